@@ -1,0 +1,3 @@
+"""Truenorth: initial alignment and navigation of strapdown inertial navigation systems."""
+
+__version__ = "0.1.0"
