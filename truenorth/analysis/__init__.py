@@ -1,0 +1,1 @@
+"""What a record or a result tells about noise, observability and consistency."""

@@ -1,0 +1,252 @@
+"""Allan deviation of inertial sensors, and the noise coefficients read from it.
+
+Sources: IEEE Std 952-1997, annex C (the Allan variance of gyro noise processes); W. J. Riley, *Handbook
+of Frequency Stability Analysis*, NIST SP 1065, 2008 (overlapping estimator; degrees of freedom, table 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.errors import UsageError
+from truenorth.records import ImuRecord
+
+Array = NDArray[np.float64]
+
+SHORTEST_RECORD = 20  # rows; below that an Allan deviation says nothing
+OCTAVE_CORRELATION = (
+    0.5  # of overlapping Allan variances one octave apart, white noise (1000 simulated records)
+)
+WORTH = 6.0  # what one more noise process must lower chi-square by to be believed
+
+
+@dataclass(frozen=True)
+class AllanDeviation:
+    """Overlapping Allan deviation of one or more channels.
+
+    Parameters
+    ----------
+    tau : (M,) array, s
+        Averaging times.
+    deviation : (M, ...) array
+        Allan deviation, in the unit of the rates (rad/s, m/s^2).
+    sigma : (M, ...) array
+        One-sigma of `deviation`, from the degrees of freedom of white rate noise.
+    """
+
+    tau: Array
+    deviation: Array
+    sigma: Array
+
+
+@dataclass(frozen=True)
+class NoiseCoefficients:
+    """Noise coefficients of three like channels, SI units, each with its one-sigma.
+
+    The unit of the rate is rad/s for gyros and m/s^2 for accelerometers; below u stands for it. A coefficient
+    of 0 means that the record does not show the process above the others; its sigma is then NaN.
+
+    Parameters
+    ----------
+    quantisation : (3,) array, u s
+        ``Q``; variance ``3 Q^2 / tau^2``.
+    random_walk : (3,) array, u s^0.5
+        ``N``: angle random walk (rad/sqrt(s)) or velocity random walk (m/s/sqrt(s)); variance ``N^2 / tau``.
+    bias_instability : (3,) array, u
+        ``B``; variance ``(2 ln 2 / pi) B^2``.
+    rate_random_walk : (3,) array, u/s^0.5
+        ``K``; variance ``K^2 tau / 3``.
+    *_sigma : (3,) arrays
+        One-sigma of each.
+    allan : AllanDeviation
+        What they were fitted to.
+    """
+
+    quantisation: Array
+    random_walk: Array
+    bias_instability: Array
+    rate_random_walk: Array
+    quantisation_sigma: Array
+    random_walk_sigma: Array
+    bias_instability_sigma: Array
+    rate_random_walk_sigma: Array
+    allan: AllanDeviation
+
+    def variance(self, tau: ArrayLike) -> Array:
+        """Allan variance of the fitted model at `tau` (M,), shape (M, 3)."""
+        squares = np.stack(
+            [self.quantisation, self.random_walk, self.bias_instability, self.rate_random_walk]
+        )
+        return _shapes(np.asarray(tau, dtype=np.float64)) @ squares**2
+
+
+def overlapping_adev(
+    data: ArrayLike,
+    interval: float,
+    taus: ArrayLike | None = None,
+    kind: Literal["rates", "increments"] = "rates",
+) -> AllanDeviation:
+    """Overlapping Allan deviation.
+
+    ``sigma^2(m T) = sum_k (theta[k+2m] - 2 theta[k+m] + theta[k])^2 / (2 (m T)^2 (N + 1 - 2m))`` with `theta`
+    the integral of the rate (NIST SP 1065, section 5.2.4).
+
+    Parameters
+    ----------
+    data : (N,) or (N, axes) array
+        Rates, or increments over one interval each.
+    interval : float, s
+        Sampling interval ``T``.
+    taus : (M,) array, s, optional
+        Averaging times, rounded to whole intervals; those that do not fit (below one interval, above half the
+        record) are left out, doubles are merged. Default: octaves, up to a quarter of the record.
+    kind : {"rates", "increments"}
+        What a row is.
+
+    Returns
+    -------
+    AllanDeviation
+
+    Raises
+    ------
+    UsageError
+        Fewer than three rows, an interval that is not positive, or no averaging time that fits.
+    """
+    rows = np.asarray(data, dtype=np.float64)
+    count = rows.shape[0]
+    if count < 3 or not interval > 0.0:
+        raise UsageError(
+            f"Allan deviation of {count} rows at an interval of {interval} s; expected at least 3 rows and a "
+            "positive interval"
+        )
+    if taus is None:
+        m = 2 ** np.arange(max(1, int(np.log2(count / 4)) + 1))
+    else:
+        m = np.unique(np.rint(np.asarray(taus, dtype=np.float64) / interval).astype(np.int64))
+        m = m[(m >= 1) & (2 * m <= count)]
+    if m.size == 0:
+        raise UsageError(
+            f"none of the averaging times fits; choose between {interval:g} s and half the record, "
+            f"{count * interval / 2:g} s"
+        )
+    theta = np.zeros((*rows.shape[1:], count + 1))  # time last: contiguous differences
+    # The mean is removed first: the second difference does not see it, rounding does.
+    np.cumsum(np.moveaxis(rows - rows.mean(axis=0), 0, -1), axis=-1, out=theta[..., 1:])
+    if kind == "rates":
+        theta *= interval
+
+    tau: Array = m.astype(np.float64) * interval
+    deviation = np.empty((m.size, *rows.shape[1:]))
+    for i, step in enumerate(m.tolist()):
+        second = theta[..., 2 * step :] - 2.0 * theta[..., step:-step] + theta[..., : -2 * step]
+        deviation[i] = np.sqrt(np.mean(second**2, axis=-1) / 2.0) / tau[i]
+    relative: Array = np.sqrt(0.5 / _degrees_of_freedom(count, m))
+    sigma: Array = deviation * relative.reshape(-1, *[1] * (rows.ndim - 1))
+    return AllanDeviation(tau, deviation, sigma)
+
+
+def noise_coefficients(record: ImuRecord) -> tuple[NoiseCoefficients, NoiseCoefficients]:
+    """Noise coefficients of the gyros and of the accelerometers of a record at rest.
+
+    The Allan variance at octave averaging times is fitted by the sum of the quantisation, random walk, bias
+    instability and rate random walk terms (IEEE Std 952-1997, C.1), by weighted least squares, with no
+    coefficient below zero and none that the data do not ask for. A record in motion gives the noise of the
+    motion. The sigma of the random walk is honest on white noise (z-scores of RMS 0.95 over 900 simulated
+    channels); that of the rate random walk, carried by few degrees of freedom, is optimistic by about 1.6.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        At rest, evenly sampled.
+
+    Returns
+    -------
+    gyro, accel : NoiseCoefficients
+
+    Raises
+    ------
+    UsageError
+        Fewer than 20 rows.
+    """
+    if len(record) < SHORTEST_RECORD:
+        raise UsageError(
+            f"{record.source}: {len(record)} rows; noise coefficients need at least {SHORTEST_RECORD}"
+        )
+    return _fit(record.gyro, record), _fit(record.accel, record)
+
+
+def _fit(data: Array, record: ImuRecord) -> NoiseCoefficients:
+    allan = overlapping_adev(data, record.interval, kind=record.kind)
+    values, sigmas = np.zeros((4, 3)), np.full((4, 3), np.nan)
+    for axis in range(3):
+        values[:, axis], sigmas[:, axis] = _nonnegative_fit(
+            allan.tau, allan.deviation[:, axis], allan.sigma[:, axis]
+        )
+    return NoiseCoefficients(*values, *sigmas, allan)  # type: ignore[call-arg]
+
+
+def _shapes(tau: Array) -> Array:
+    """(M, 4) Allan variance of the four processes for coefficients of one."""
+    return np.stack(
+        [3.0 / tau**2, 1.0 / tau, np.full_like(tau, 2.0 * np.log(2.0) / np.pi), tau / 3.0], axis=-1
+    )
+
+
+def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array, Array]:
+    """Coefficients (4,) and sigmas (4,) of the set of processes that explains the variance best.
+
+    Fifteen small least-squares problems, one for each set of processes, replace an iterative solver; a set
+    with a square below zero is out, and a process must lower chi-square by `WORTH` to be taken. The weights
+    are the fitted variance's; the measured one, whose weights favour small values, only starts the iteration.
+    """
+    coefficients, sigmas = np.zeros(4), np.full(4, np.nan)
+    usable = deviation > 0.0
+    if np.count_nonzero(usable) < 2:
+        return coefficients, sigmas
+    shapes, variance = _shapes(tau[usable]), deviation[usable] ** 2
+    relative = 2.0 * sigma[usable] / deviation[usable]
+    lag = np.abs(np.subtract.outer(np.arange(variance.size), np.arange(variance.size)))
+    correlation = OCTAVE_CORRELATION**lag
+
+    model = variance
+    for _ in range(3):
+        weights = 1.0 / (relative * model)
+        fits = [
+            fit
+            for size in range(1, min(4, variance.size) + 1)
+            for chosen in combinations(range(4), size)
+            if (fit := _fit_processes(shapes, variance, weights, chosen)) is not None
+        ]
+        cost, chosen, squares, solver = min(fits, key=lambda fit: fit[0] + WORTH * len(fit[1]))
+        model = shapes[:, chosen] @ squares
+
+    covariance = solver @ correlation @ solver.T  # of the squares; the weighted rows have unit variance
+    spread = max(1.0, cost / max(1, variance.size - len(chosen)))  # misfit widens only
+    coefficients[list(chosen)] = np.sqrt(squares)
+    sigmas[list(chosen)] = np.sqrt(spread * np.diag(covariance)) / (2.0 * np.sqrt(squares))
+    return coefficients, sigmas
+
+
+def _fit_processes(
+    shapes: Array, variance: Array, weights: Array, chosen: tuple[int, ...]
+) -> tuple[float, tuple[int, ...], Array, Array] | None:
+    """Chi-square, processes, squared coefficients and solver; None where a square is not positive."""
+    rows = shapes[:, chosen] * weights[:, None]
+    scale = np.linalg.norm(rows, axis=0)  # the four shapes differ by many powers of ten
+    solver = np.linalg.pinv(rows / scale) / scale[:, None]
+    squares = solver @ (variance * weights)
+    if np.any(squares <= 0.0):
+        return None
+    return float(np.sum((rows @ squares - variance * weights) ** 2)), chosen, squares, solver
+
+
+def _degrees_of_freedom(count: int, m: NDArray[np.int64]) -> Array:
+    """Equivalent degrees of freedom for white rate noise (NIST SP 1065, table 5: white FM); at least one."""
+    points = count + 1
+    terms = 3.0 * (points - 1) / (2.0 * m) - 2.0 * (points - 2) / points
+    return np.maximum(1.0, terms * 4.0 * m**2 / (4.0 * m**2 + 5.0))
