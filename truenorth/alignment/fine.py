@@ -1,0 +1,248 @@
+"""Fine alignment: a Kalman filter on the base's mean velocity, re-linearised until it stands still.
+
+From a coarse attitude the log is integrated, linearised about it and filtered; attitude and biases are corrected and
+the log is integrated again (Gauss-Newton on the whole log). The velocity of the base is measurement noise: how large
+it is, is read from the log itself, axis by axis, by making the innovations as large as the filter expects them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.coarse.uncertainty import detrended
+from truenorth.filters import Estimates, LinearSystem, kalman
+from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
+from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
+from truenorth.position import Position
+from truenorth.records import ImuRecord
+
+Array = NDArray[np.float64]
+
+MAX_PASSES = 8
+CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sigma is the last
+ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
+LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
+HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
+HELD = 1e-4  # rad: a heading that is to stay as it is
+VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
+QUIETEST_BASE = 1e-6  # m/s: keeps R positive on a base of stone and an IMU without noise
+COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
+COLOUR_RUNS = 5  # fewer blocks than this say nothing of it
+
+
+@dataclass(frozen=True)
+class FineAlignment:
+    """What the last pass of the filter left.
+
+    Attributes
+    ----------
+    integrals : InertialIntegrals
+    C_n0_i : (3, 3) array
+        Nominal attitude of the last pass; states are errors of it.
+    nominal_bias : (6,) array
+        Gyro and accelerometer biases taken off before the last pass.
+    system : LinearSystem
+    estimates : Estimates
+        With the whole history of x and P.
+    floor : (K, 12, 12) array
+        Covariance that is left when noise and the base's motion vanish: that of the biases.
+    disturbance : (3,) array, m/s
+        RMS mean velocity of the base (E, N, U) as the filter took it.
+    passes : int
+    settled : bool
+        Whether the last pass moved nothing by more than a small part of its sigma.
+    """
+
+    integrals: InertialIntegrals
+    C_n0_i: Array
+    nominal_bias: Array
+    system: LinearSystem
+    estimates: Estimates
+    floor: Array
+    disturbance: Array
+    passes: int
+    settled: bool
+
+    @property
+    def x(self) -> Array:
+        """(12,) the last state estimate."""
+        return self.estimates.x[-1]
+
+    @property
+    def P(self) -> Array:
+        """(12, 12) its covariance."""
+        return self.estimates.P[-1]
+
+    @property
+    def bias(self) -> Array:
+        """(6,) gyro and accelerometer bias at the last epoch."""
+        return self.nominal_bias + self.x[6:]
+
+    def misalignment_at(self, C_ib: Array, time: float) -> tuple[Array, Array, Array]:
+        """Attitude, misalignment covariance and its floor at any time of the log (smoothed to the end of the data).
+
+        Parameters
+        ----------
+        C_ib : (3, 3) array
+            Integrated attitude at that time.
+        time : float, s
+            Since the beginning of the first row's interval.
+
+        Returns
+        -------
+        C_n0_b : (3, 3) array
+        covariance, floor : (3, 3) arrays, rad^2, in ``n0``
+        """
+        # phi(t) = phi_end + int_t^end C_n0_b eps: the whole log's knowledge carried back (or a little on) to t.
+        turned = self._turned_between(time)
+        J = np.zeros((3, STATES))
+        J[:, PHI] = np.eye(3)
+        J[:, BG] = turned
+        phi = J @ self.x
+        apart = abs(self.integrals.time[-1] - time)
+        walk = self.system.Q[0, PHI, PHI] / self.integrals.intervals[0] * apart
+        C_n0_b = dcm_from_rotation_vector(phi) @ self.C_n0_i @ C_ib
+        return C_n0_b, J @ self.P @ J.T + walk, J @ self.floor[-1] @ J.T
+
+    def _turned_between(self, time: float) -> Array:
+        """``int C_n0_b dt`` from `time` to the last epoch; negative beyond it."""
+        t, T = self.integrals.time, self.integrals.intervals
+        C = self.C_n0_i @ self.integrals.C_mean
+        part = np.clip((t[1:] - time) / T, 0.0, 1.0)
+        inside = np.einsum("k,kab->ab", part * T, C)
+        return inside + min(t[-1] - time, 0.0) * C[-1]
+
+
+def bias_prior(
+    gyro_bias: float, accel_bias: float, C_n_b: Array, position: Position, lat_rate: Array, gravity_slope: float
+) -> Array:
+    """Prior covariance of the biases, (6, 6): the specification's, and what an error of the position looks like.
+
+    A latitude error ``dL`` gives the INS a wrong earth rate, as a gyro bias would, ``dL dw_ie/dL`` in n; an error of
+    height a wrong gravity, as a vertical accelerometer bias would.
+
+    Parameters
+    ----------
+    gyro_bias, accel_bias : float, rad/s and m/s^2
+    C_n_b : (3, 3) array
+    position : Position
+    lat_rate : (3,) array
+        ``dw_ie_n/dL``, rad/s a radian.
+    gravity_slope : float
+        ``dg/dh``, 1/s^2.
+    """
+    P = np.zeros((6, 6))
+    rate = C_n_b.T @ lat_rate * position.lat_sigma
+    up = C_n_b.T @ np.array([0.0, 0.0, gravity_slope * position.vertical_sigma])
+    P[:3, :3] = gyro_bias**2 * np.eye(3) + np.outer(rate, rate)
+    P[3:, 3:] = accel_bias**2 * np.eye(3) + np.outer(up, up)
+    return P
+
+
+def fine_align(
+    record: ImuRecord,
+    C_n0_i: Array,
+    position: Position,
+    model: StaticModel,
+    P_bias: Array,
+    *,
+    interval: float,
+    nominal_bias: Array | None = None,
+    rows_at: Array | None = None,
+    heading_known: bool = False,
+    keep_history: bool = True,
+) -> FineAlignment:
+    """Estimate attitude and biases from a whole log.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    C_n0_i : (3, 3) array
+        Coarse attitude.
+    position : Position
+    model : StaticModel
+    P_bias : (6, 6) array
+        Prior covariance of the biases about zero.
+    interval : float, s
+        Filter interval.
+    nominal_bias : (6,) array, optional
+        Biases to begin with, taken off the log; the prior stays about zero.
+    rows_at : (M,) int array, optional
+        Rows after which the integrated attitude is wanted.
+    heading_known : bool
+        Hold the heading of the coarse attitude: the gyros cannot find it, and level must not look for it.
+    keep_history : bool
+        Run the noise-free covariance for the floor as well.
+
+    Returns
+    -------
+    FineAlignment
+    """
+    lat, alt = position.lat, position.alt
+    rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
+    bias = np.zeros(6) if nominal_bias is None else np.array(nominal_bias, dtype=np.float64)
+    P0 = np.zeros((STATES, STATES))
+    heading_prior = HELD if heading_known else HEADING_PRIOR
+    P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, heading_prior**2])
+    P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
+    P0[6:, 6:] = P_bias
+
+    integrals = integrate(record, interval, bias[:3], bias[3:], rows)
+    v = mean_velocity(integrals, C_n0_i, lat, alt)
+    middle = (integrals.time[1:] + integrals.time[:-1]) / 2
+    R = np.maximum(np.mean(detrended(middle, v) ** 2, axis=0), QUIETEST_BASE**2)
+
+    for passes in range(1, MAX_PASSES + 1):
+        x0 = np.zeros(STATES)
+        x0[6:] = -bias
+        system = replace(model.linearise(integrals, C_n0_i, lat, alt, P0, R), x0=x0)
+        estimates = kalman(system, history="full")
+        x, P = estimates.x[-1], estimates.P[-1]
+        R_next = _base_variance(estimates, R)
+        moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
+        same_noise = bool(np.all(np.abs(np.log(R_next / R)) < 0.1))
+        if (moved < CONVERGED and same_noise) or passes == MAX_PASSES:
+            break
+        # Back to the start: phi(0) = phi(end) + int C_n0_b (eps - nominal); then everything anew about the estimate.
+        turned = np.einsum("k,kab->ab", integrals.intervals, C_n0_i @ integrals.C_mean)
+        C_n0_i = dcm_from_rotation_vector(x[PHI] + turned @ x[BG]) @ C_n0_i
+        bias = bias + np.concatenate([x[BG], x[BA]])
+        R = R_next
+        integrals = integrate(record, interval, bias[:3], bias[3:], rows)
+
+    floor = np.zeros((1, STATES, STATES))
+    if keep_history:
+        quiet = replace(system, Q=1e-4 * system.Q, R=1e-4 * system.R, S=1e-4 * system.S)
+        floor = kalman(quiet, history="full").P
+    return FineAlignment(integrals, C_n0_i, bias, system, estimates, floor, np.sqrt(R), passes, moved < ROUGHLY)
+
+
+def _base_variance(estimates: Estimates, R: Array) -> Array:
+    """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too."""
+    skip = min(5, len(estimates.innovation) // 5)
+    nu = estimates.innovation[skip:]
+    expected = np.einsum("kii->ki", estimates.innovation_covariance[skip:])
+    ratio = np.mean(nu**2 / expected, axis=0)
+    # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
+    # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
+    blocks = len(nu) // COLOUR_BLOCK
+    if blocks >= COLOUR_RUNS:
+        e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
+        colour = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
+        chance = 1.0 + 2.0 * np.sqrt(2.0 / blocks)  # two sigma of what white noise itself gives
+        ratio = np.where(colour > chance * ratio, np.maximum(colour, ratio), ratio)
+    return np.maximum(R * ratio, QUIETEST_BASE**2)
+
+
+def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:
+    """Attitude in n, covariance of the misalignment in n and its floor at each epoch, (K, 3, 3) each."""
+    t = fine.integrals.time[1:]
+    C_n_n0 = np.swapaxes(earth_rotation(t, lat), 1, 2)
+    turn = dcm_from_rotation_vector(fine.estimates.x[:, PHI])
+    C_nb = C_n_n0 @ turn @ fine.C_n0_i @ fine.integrals.C_ib[1:]
+    C_n0_n = np.swapaxes(C_n_n0, 1, 2)
+    return C_nb, C_n_n0 @ fine.estimates.P[:, PHI, PHI] @ C_n0_n, C_n_n0 @ fine.floor[:, PHI, PHI] @ C_n0_n

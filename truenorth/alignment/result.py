@@ -1,0 +1,324 @@
+"""The answer of an alignment: attitude with its uncertainty, biases, a verdict with reasons, and the history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import euler_from_dcm, to_rotation
+from truenorth.position import Position
+from truenorth.specs import ImuSpec
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+    from scipy.spatial.transform import Rotation
+
+    from truenorth.quality import Inspection
+
+Array = NDArray[np.float64]
+Status = Literal["aligned", "level_only", "not_converged", "not_observable", "inconsistent"]
+
+NOT_ESTIMATED = 0.9  # a bias whose sigma stays above this part of its prior has not been estimated
+NEAR_VERTICAL = np.radians(85.0)  # beyond this pitch heading and roll are told only together
+UNIFORM_SIGMA = np.pi / np.sqrt(3.0)  # sigma of an angle of which nothing is known, rad
+
+DEG_PER_HOUR = np.radians(1.0) / 3600.0
+MICRO_G = 9.80665e-6
+
+
+@dataclass(frozen=True)
+class History:
+    """How the answer came about, one row a filter epoch.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    C_nb : (K, 3, 3) array
+        Attitude at each epoch, as known then.
+    phi_covariance : (K, 3, 3) array, rad^2
+        Covariance of the misalignment (E, N, U), the part that does not average out included.
+    gyro_bias, gyro_bias_sigma : (K, 3) arrays, rad/s
+    accel_bias, accel_bias_sigma : (K, 3) arrays, m/s^2
+    innovation, innovation_sigma : (K, 3) arrays, m/s
+        Velocity of the base (E, N, U) seen against its prediction.
+    nis : (K,) array
+        Normalised innovation squared; its mean is 3 where the model is right.
+    """
+
+    time: Array
+    C_nb: Array
+    phi_covariance: Array
+    gyro_bias: Array
+    gyro_bias_sigma: Array
+    accel_bias: Array
+    accel_bias_sigma: Array
+    innovation: Array
+    innovation_sigma: Array
+    nis: Array
+
+    @cached_property
+    def euler(self) -> Array:
+        """(K, 3) heading, pitch, roll, rad."""
+        return np.stack(euler_from_dcm(self.C_nb), axis=-1)
+
+    @cached_property
+    def euler_sigma(self) -> Array:
+        """(K, 3) one-sigma of heading, pitch, roll, rad."""
+        return euler_sigma(self.C_nb, self.phi_covariance)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Attitude of the body at one epoch, with all that is needed to judge it.
+
+    Attributes
+    ----------
+    status : str
+        ``aligned``, ``level_only``, ``not_converged``, ``not_observable`` or ``inconsistent``.
+    reasons : tuple of str
+        The verdict in words, with figures.
+    method, method_reason : str
+        The method that gave the answer, and why it was taken.
+    time : float, s
+        Epoch of the attitude, on the record's clock.
+    C_nb : (3, 3) array
+        ``v_n = C_nb @ v_b``; n is ENU, b is RFU.
+    phi_covariance : (3, 3) array, rad^2
+        Covariance of the misalignment ``phi`` (E, N, U), ``C_nb_hat = (I - [phi x]) C_nb``; everything included.
+    phi_floor : (3, 3) array, rad^2
+        The part of it that waiting does not improve: sensor bias, deflection of the vertical, position.
+    gyro_bias, gyro_bias_sigma, gyro_bias_prior : (3,) arrays, rad/s
+    accel_bias, accel_bias_sigma, accel_bias_prior : (3,) arrays, m/s^2
+        Measured minus true; the prior sigma is what the IMU's specification says.
+    position : Position
+    imu : ImuSpec
+        The specification used; `imu_source` says where it came from.
+    duration : float, s
+        Length of data used.
+    disturbance : (3,) array, m/s
+        RMS velocity of the base's own motion (E, N, U).
+    pays_until : float or None, s
+        Length of data after which the random part of heading's sigma is below half its floor.
+    history : History or None
+    inspection : Inspection or None
+    source : str
+    """
+
+    status: Status
+    reasons: tuple[str, ...]
+    method: str
+    method_reason: str
+    time: float
+    C_nb: Array
+    phi_covariance: Array
+    phi_floor: Array
+    gyro_bias: Array
+    gyro_bias_sigma: Array
+    gyro_bias_prior: Array
+    accel_bias: Array
+    accel_bias_sigma: Array
+    accel_bias_prior: Array
+    position: Position
+    imu: ImuSpec
+    imu_source: str
+    duration: float
+    disturbance: Array
+    pays_until: float | None = None
+    history: History | None = field(default=None, repr=False)
+    inspection: Inspection | None = field(default=None, repr=False)
+    source: str = ""
+
+    @property
+    def attitude(self) -> Rotation:
+        """The attitude as a SciPy rotation from body to navigation axes."""
+        return to_rotation(self.C_nb)
+
+    @cached_property
+    def euler(self) -> Array:
+        """(3,) heading, pitch, roll, rad."""
+        return np.array(euler_from_dcm(self.C_nb))
+
+    @cached_property
+    def euler_sigma(self) -> Array:
+        """(3,) one-sigma of heading, pitch, roll, rad."""
+        return euler_sigma(self.C_nb, self.phi_covariance)
+
+    @cached_property
+    def euler_sigma_floor(self) -> Array:
+        """(3,) the part of `euler_sigma` that waiting does not improve, rad."""
+        return euler_sigma(self.C_nb, self.phi_floor)
+
+    @property
+    def heading(self) -> float:
+        """Heading of the forward (y) axis, clockwise from true north, rad."""
+        return float(self.euler[0])
+
+    @property
+    def pitch(self) -> float:
+        """Pitch, nose up positive, rad."""
+        return float(self.euler[1])
+
+    @property
+    def roll(self) -> float:
+        """Roll, right side down positive, rad."""
+        return float(self.euler[2])
+
+    @property
+    def heading_known(self) -> bool:
+        """Whether the heading may be used."""
+        return self.status == "aligned"
+
+    @property
+    def near_vertical(self) -> bool:
+        """Whether pitch is so near +-90 deg that heading and roll are told only together."""
+        return bool(abs(self.pitch) > NEAR_VERTICAL)
+
+    @cached_property
+    def azimuth(self) -> tuple[str, float, float]:
+        """Near-vertical pitch: name, value and sigma (rad) of the combination of heading and roll that is observable.
+
+        At pitch +90 deg ``C_nb = Rz(roll - heading) Rx(90 deg)``, at -90 deg ``Rz(-roll - heading) Rx(-90 deg)``:
+        only heading - roll, or heading + roll, has a meaning; its error is that about the vertical.
+        """
+        sign = -1.0 if self.pitch > 0 else 1.0
+        name = "heading_minus_roll" if sign < 0 else "heading_plus_roll"
+        value = (self.heading + sign * self.roll) % (2 * np.pi)
+        return name, float(value), float(min(np.sqrt(self.phi_covariance[2, 2]), UNIFORM_SIGMA))
+
+    @property
+    def gyro_bias_estimated(self) -> NDArray[np.bool_]:
+        """(3,) whether the data told this bias, or only the specification does."""
+        return self.gyro_bias_sigma < NOT_ESTIMATED * self.gyro_bias_prior
+
+    @property
+    def accel_bias_estimated(self) -> NDArray[np.bool_]:
+        """(3,) whether the data told this bias, or only the specification does."""
+        return self.accel_bias_sigma < NOT_ESTIMATED * self.accel_bias_prior
+
+    def summary(self) -> dict[str, Any]:
+        """One flat dictionary in datasheet units, ready for JSON; a heading that may not be used is None."""
+        deg = np.degrees
+        heading_sigma, pitch_sigma, roll_sigma = deg(self.euler_sigma)
+        result: dict[str, Any] = {
+            "status": self.status,
+            "reasons": list(self.reasons),
+            "method": self.method,
+            "method_reason": self.method_reason,
+            "time_s": self.time,
+            "duration_s": self.duration,
+            "pitch_deg": float(deg(self.pitch)),
+            "roll_deg": float(deg(self.roll)),
+            "heading_deg": float(deg(self.heading)) if self.heading_known else None,
+            "pitch_sigma_deg": float(pitch_sigma),
+            "roll_sigma_deg": float(roll_sigma),
+            "heading_sigma_deg": float(heading_sigma),
+            "pitch_sigma_floor_deg": float(deg(self.euler_sigma_floor[1])),
+            "roll_sigma_floor_deg": float(deg(self.euler_sigma_floor[2])),
+            "heading_sigma_floor_deg": float(deg(self.euler_sigma_floor[0])),
+            "heading_pays_until_s": self.pays_until,
+            "gyro_bias_deg_h": (self.gyro_bias / DEG_PER_HOUR).tolist(),
+            "gyro_bias_sigma_deg_h": (self.gyro_bias_sigma / DEG_PER_HOUR).tolist(),
+            "gyro_bias_estimated": self.gyro_bias_estimated.tolist(),
+            "accel_bias_ug": (self.accel_bias / MICRO_G).tolist(),
+            "accel_bias_sigma_ug": (self.accel_bias_sigma / MICRO_G).tolist(),
+            "accel_bias_estimated": self.accel_bias_estimated.tolist(),
+            "disturbance_m_s": self.disturbance.tolist(),
+            "imu": self.imu.name,
+            "imu_source": self.imu_source,
+            "lat_deg": float(deg(self.position.lat)),
+            "lon_deg": float(deg(self.position.lon)),
+            "alt_m": self.position.alt,
+            "source": self.source,
+        }
+        if self.near_vertical:
+            name, value, sigma = self.azimuth
+            result[f"{name}_deg"] = float(deg(value)) if self.heading_known else None
+            result[f"{name}_sigma_deg"] = float(deg(sigma))
+            result["C_nb"] = self.C_nb.tolist()
+        return result
+
+    def to_frame(self) -> pd.DataFrame:
+        """The history as a pandas table, index ``time``, datasheet units named in the columns.
+
+        Raises
+        ------
+        ValueError
+            The method kept no history.
+        """
+        import pandas as pd
+
+        if self.history is None:
+            raise ValueError(f"method {self.method!r} gives one answer and keeps no history")
+        h = self.history
+        columns: dict[str, Array] = {}
+        for i, angle in enumerate(("heading", "pitch", "roll")):
+            columns[f"{angle}_deg"] = np.degrees(h.euler[:, i])
+            columns[f"{angle}_sigma_deg"] = np.degrees(h.euler_sigma[:, i])
+        for i, axis in enumerate("xyz"):
+            columns[f"gyro_bias_{axis}_deg_h"] = h.gyro_bias[:, i] / DEG_PER_HOUR
+            columns[f"gyro_bias_{axis}_sigma_deg_h"] = h.gyro_bias_sigma[:, i] / DEG_PER_HOUR
+            columns[f"accel_bias_{axis}_ug"] = h.accel_bias[:, i] / MICRO_G
+            columns[f"accel_bias_{axis}_sigma_ug"] = h.accel_bias_sigma[:, i] / MICRO_G
+        for i, axis in enumerate("ENU"):
+            columns[f"innovation_{axis}_m_s"] = h.innovation[:, i]
+            columns[f"innovation_{axis}_sigma_m_s"] = h.innovation_sigma[:, i]
+        columns["nis"] = h.nis
+        return pd.DataFrame(columns, index=pd.Index(h.time, name="time"))
+
+    def plot(self) -> Figure:
+        """Convergence of pitch, roll and heading with sigma bands, biases and innovations, as a matplotlib figure."""
+        from truenorth.figures.alignment import plot_alignment
+
+        return plot_alignment(self)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write summary.json, history.parquet (where there is a history) and report.html; return their paths."""
+        from truenorth.report import save_alignment
+
+        return save_alignment(self, folder)
+
+    def with_verdict(self, status: Status, reasons: tuple[str, ...]) -> Alignment:
+        """The same answer under another verdict."""
+        return replace(self, status=status, reasons=reasons)
+
+
+def euler_jacobian(C_nb: Array) -> Array:
+    """Errors of heading, pitch and roll for a misalignment ``phi`` (E, N, U).
+
+    From ``C_hat = (I - [phi x]) C``: a body axis ``a`` seen in n moves by ``-phi x a``; heading and pitch belong to
+    the y axis (``atan2(y_E, y_N)``, ``asin(y_U)``), roll to x and z (``atan2(-x_U, z_U)``).
+
+    Parameters
+    ----------
+    C_nb : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Rows heading, pitch, roll; columns phi_E, phi_N, phi_U. It grows without bound towards pitch +-90 deg.
+    """
+    xU, yU, zU = C_nb[..., 2, 0], C_nb[..., 2, 1], C_nb[..., 2, 2]
+    yE, yN = C_nb[..., 0, 1], C_nb[..., 1, 1]
+    # -phi x a as a matrix on phi is [a x]; rows of [a x]: E (0, -a_U, a_N), N (a_U, 0, -a_E), U (-a_N, a_E, 0).
+    zero = np.zeros_like(xU)
+    up_row = {i: np.stack([-C_nb[..., 1, i], C_nb[..., 0, i], zero], -1) for i in range(3)}
+    east_row = np.stack([zero, -yU, yN], -1)
+    north_row = np.stack([yU, zero, -yE], -1)
+    cos2 = np.maximum(yE**2 + yN**2, 1e-12)[..., None]
+    heading = (yN[..., None] * east_row - yE[..., None] * north_row) / cos2
+    pitch = up_row[1] / np.sqrt(cos2)
+    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[..., None]
+    return np.stack([heading, pitch, roll], -2)
+
+
+def euler_sigma(C_nb: Array, phi_covariance: Array) -> Array:
+    """One-sigma of heading, pitch and roll (rad), none above that of an angle of which nothing is known."""
+    J = euler_jacobian(C_nb)
+    variance = np.einsum("...ij,...jk,...ik->...i", J, phi_covariance, J)
+    return np.minimum(np.sqrt(variance), UNIFORM_SIGMA)

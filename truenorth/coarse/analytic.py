@@ -1,0 +1,132 @@
+"""Analytic coarse alignment: TRIAD on the mean specific force and the mean angular rate of a still base.
+
+Source: K. Britting, "Inertial Navigation Systems Analysis" (1971), sec. 9.2; errors: his eqs. 9-13 to 9-15, in our
+signs the static limits ``phi_E = -nabla_N/g``, ``phi_N = nabla_E/g``, ``phi_U = -eps_E/(w_ie cos L) + phi_N tan L``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.coarse.wahba import triad
+from truenorth.earth import EARTH_RATE, earth_rate_n, normal_gravity
+from truenorth.records import ImuRecord
+from truenorth.strapdown import increments
+
+Array = NDArray[np.float64]
+BLOCKS = 10  # the scatter of this many block means tells how well the mean is known
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Means:
+    """Mean rate and specific force of a stretch of log, body axes, with the covariance of those means.
+
+    Attributes
+    ----------
+    w_ib_b : (3,) array, rad/s
+    f_b : (3,) array, m/s^2
+    w_covariance, f_covariance : (3, 3) arrays
+        From the scatter of block means: noise and the base's own motion alike.
+    """
+
+    w_ib_b: Array
+    f_b: Array
+    w_covariance: Array
+    f_covariance: Array
+
+
+def means(record: ImuRecord) -> Means:
+    """Mean rate and specific force of a record."""
+    dtheta, dvel = increments(record)
+    starts = np.linspace(0, len(record), min(BLOCKS, len(record)) + 1).astype(int)[:-1]
+    blocks = len(starts)
+    steps = record.steps
+    T = np.add.reduceat(steps, starts)[:, None]
+    w = np.add.reduceat(dtheta, starts) / T
+    f = np.add.reduceat(dvel, starts) / T
+    total = float(steps.sum())
+    return Means(
+        w_ib_b=dtheta.sum(axis=0) / total,
+        f_b=dvel.sum(axis=0) / total,
+        w_covariance=np.cov(w.T) / blocks,
+        f_covariance=np.cov(f.T) / blocks,
+    )
+
+
+def static_jacobian(lat: float, g: float) -> Array:
+    """Misalignment for errors of specific force and rate in n, (3, 6): ``phi = J [nabla_n, eps_n]`` (the static limits)."""
+    J = np.zeros((3, 6))
+    J[0, 1] = -1.0 / g
+    J[1, 0] = 1.0 / g
+    J[2, 3] = -1.0 / (EARTH_RATE * np.cos(lat))
+    J[2, 0] = np.tan(lat) / g
+    return J
+
+
+def analytic(m: Means, lat: float, alt: float, gyro_bias: float, accel_bias: float) -> tuple[Array, Array, Array]:
+    """Attitude of a still base from the means.
+
+    Parameters
+    ----------
+    m : Means
+    lat, alt : float, rad and m
+    gyro_bias, accel_bias : float, rad/s and m/s^2
+        One-sigma biases of the IMU.
+
+    Returns
+    -------
+    C_nb : (3, 3) array
+    covariance, floor : (3, 3) arrays, rad^2
+        Of the misalignment; the floor holds the biases alone.
+    """
+    C_nb = triad(m.f_b, m.w_ib_b, UP, np.asarray(earth_rate_n(lat)))
+    J = static_jacobian(lat, float(normal_gravity(lat, alt)))
+    biases = np.diag(np.repeat([accel_bias**2, gyro_bias**2], 3))
+    noise = np.zeros((6, 6))
+    noise[:3, :3] = C_nb @ m.f_covariance @ C_nb.T
+    noise[3:, 3:] = C_nb @ m.w_covariance @ C_nb.T
+    return C_nb, J @ (biases + noise) @ J.T, J @ biases @ J.T
+
+
+def two_position(
+    first: Means, second: Means, C_b1_b2: Array, lat: float, gyro_bias: float, accel_bias: float
+) -> tuple[Array, Array, Array]:
+    """Attitude and biases from two still positions of one IMU, between which it was turned.
+
+    In each position ``m_k = C_bk_b1 u + bias``, with the earth's vector ``u`` in the first body frame: least squares
+    for `u` and `bias`, the bias's specification as its prior. A turn of 180 deg about the vertical separates the
+    horizontal components of both.
+
+    Parameters
+    ----------
+    first, second : Means
+    C_b1_b2 : (3, 3) array
+        The turn between them, from the gyros or the turntable.
+    lat : float, rad
+    gyro_bias, accel_bias : float
+        Prior one-sigma of the biases, rad/s and m/s^2.
+
+    Returns
+    -------
+    C_nb1 : (3, 3) array
+        Attitude in the first position.
+    gyro_bias, accel_bias : (3,) arrays
+    """
+    w_b, eps = _separate(first.w_ib_b, second.w_ib_b, first.w_covariance, second.w_covariance, C_b1_b2, gyro_bias)
+    f_b, nabla = _separate(first.f_b, second.f_b, first.f_covariance, second.f_covariance, C_b1_b2, accel_bias)
+    return triad(f_b, w_b, UP, np.asarray(earth_rate_n(lat))), eps, nabla
+
+
+def _separate(m1: Array, m2: Array, P1: Array, P2: Array, C_b1_b2: Array, prior: float) -> tuple[Array, Array]:
+    eye, zero = np.eye(3), np.zeros((3, 3))
+    A = np.block([[eye, eye], [C_b1_b2.T, eye], [zero, eye]])
+    tiny = (1e-6 * prior) ** 2 * eye  # keeps the weights finite where the scatter is nil
+    W = np.zeros((9, 9))
+    for k, P in enumerate((P1 + tiny, P2 + tiny, prior**2 * eye)):
+        W[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = np.linalg.inv(P)
+    solution = np.linalg.solve(A.T @ W @ A, A.T @ W @ np.concatenate([m1, m2, np.zeros(3)]))
+    return solution[:3], solution[3:]

@@ -1,0 +1,178 @@
+"""What an IMU sees from a frame that does not rotate, and what the earth does there.
+
+Two frames are frozen at the first sample: ``i``, the body frame, in which the gyros carry the attitude on without
+knowing latitude or heading, and ``n0``, the local level frame (ENU), in which gravity's turn with the earth is known
+in closed form. A constant rotation ``C_n0_i`` ties them: initial alignment is the search for it.
+
+Source: Y. Qin, G. Yan et al., "Strapdown initial alignment on a swaying base using gravity in the inertial frame"
+(2005); M. Wu et al., "Optimization-based alignment for inertial navigation systems", Aerosp. Sci. Technol. 15 (2011).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.attitude import skew
+from truenorth.earth import EARTH_RATE, earth_rate_n, normal_gravity
+from truenorth.errors import AlignmentError
+from truenorth.records import ImuRecord
+from truenorth.strapdown import increments, inertial_integrals
+
+Array = NDArray[np.float64]
+SUB_EPOCHS = 5  # points within a filter interval at which the mean attitude is sampled
+
+
+def earth_rotation(t: ArrayLike, lat: float) -> Array:
+    """``C_n0_n(t)``: the local level frame at time t after freezing, seen from ``n0`` (Rodrigues, exact)."""
+    return _earth_integral(t, lat, 0)
+
+
+def gravity_velocity(t: ArrayLike, lat: float, alt: float) -> Array:
+    """Integral of gravity in ``n0`` from 0 to t, (..., 3), m/s; the base stays where it is on the earth."""
+    return _earth_integral(t, lat, 1) @ np.array([0.0, 0.0, -float(normal_gravity(lat, alt))])
+
+
+def gravity_position(t: ArrayLike, lat: float, alt: float) -> Array:
+    """Second integral of gravity in ``n0`` from 0 to t, (..., 3), m."""
+    return _earth_integral(t, lat, 2) @ np.array([0.0, 0.0, -float(normal_gravity(lat, alt))])
+
+
+def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
+    """Integrate ``exp([w_ie t x])`` `order` times from 0 to t: ``I a + K b + K^2 c`` with ``K = [w_ie x]/|w_ie|``."""
+    t = np.asarray(t, dtype=np.float64)[..., None, None]
+    K = skew(np.asarray(earth_rate_n(lat))) / EARTH_RATE
+    w = EARTH_RATE
+    half = np.sin(w * t / 2)
+    if order == 0:
+        a, b, c = np.ones_like(t), np.sin(w * t), 2 * half**2
+    elif order == 1:
+        a, b, c = t, 2 * half**2 / w, t - np.sin(w * t) / w
+    else:
+        a, b, c = t**2 / 2, (t - np.sin(w * t) / w) / w, t**2 / 2 - 2 * half**2 / w**2
+    return a * np.eye(3) + b * K + c * (K @ K)
+
+
+@dataclass(frozen=True)
+class InertialIntegrals:
+    """Attitude and integrated specific force of one log in frame ``i``, at the K + 1 ends of K filter intervals.
+
+    Attributes
+    ----------
+    start : float, s
+        Time, on the record's clock, at which ``i`` is frozen: the beginning of the first row's interval.
+    time : (K+1,) array, s
+        Since `start`; the first is 0.
+    C_ib : (K+1, 3, 3) array
+    velocity : (K+1, 3) array, m/s
+        ``int C_ib f_b dt``.
+    position : (K+1, 3) array, m
+        Its integral.
+    C_mean : (K, 3, 3) array
+        Mean of ``C_ib`` over each interval.
+    C_late : (K, 3, 3) array
+        Mean of ``C_ib`` weighted by the elapsed part of the interval, ``(1/T^2) int s C_ib ds``.
+    C_ib_at : (M, 3, 3) array
+        ``C_ib`` after the rows that were asked for besides.
+    """
+
+    start: float
+    time: Array
+    C_ib: Array
+    velocity: Array
+    position: Array
+    C_mean: Array
+    C_late: Array
+    C_ib_at: Array
+
+    @property
+    def intervals(self) -> Array:
+        """(K,) lengths of the filter intervals, s."""
+        return np.diff(self.time)
+
+    @property
+    def mean_velocity(self) -> Array:
+        """(K, 3) mean over each interval of the integrated specific force, m/s."""
+        return np.diff(self.position, axis=0) / self.intervals[:, None]
+
+    @property
+    def mean_force(self) -> Array:
+        """(K, 3) mean specific force of each interval in ``i``, m/s^2."""
+        return np.diff(self.velocity, axis=0) / self.intervals[:, None]
+
+
+def integrate(
+    record: ImuRecord,
+    interval: float = 1.0,
+    gyro_bias: Array | None = None,
+    accel_bias: Array | None = None,
+    rows_at: ArrayLike = (),
+) -> InertialIntegrals:
+    """Integrate a log in the inertial frame, known biases taken off.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    interval : float, s
+        Length of a filter interval; samples after the last whole interval serve `rows_at` alone.
+    gyro_bias : (3,) array, rad/s, optional
+    accel_bias : (3,) array, m/s^2, optional
+    rows_at : sequence of int
+        Rows after which the attitude is wanted besides.
+
+    Returns
+    -------
+    InertialIntegrals
+
+    Raises
+    ------
+    AlignmentError
+        The record is shorter than two filter intervals.
+    """
+    dtheta, dvel = increments(record)
+    steps = record.steps
+    if gyro_bias is not None:
+        dtheta = dtheta - steps[:, None] * gyro_bias
+    if accel_bias is not None:
+        dvel = dvel - steps[:, None] * accel_bias
+
+    # Edges: edge r stands before row r, at the end of row r - 1.
+    edges = np.concatenate(([0.0], np.cumsum(steps)))
+    count = int((edges[-1] + 0.5 * record.interval) // interval)
+    if count < 2:
+        raise AlignmentError(
+            f"{record.source}: {edges[-1]:.2f} s of data; at least {2 * interval:g} s are needed for any answer: "
+            "record longer, or widen --from/--to"
+        )
+    sub = max(1, min(SUB_EPOCHS, int(interval / record.interval)))
+    wanted = np.arange(count * sub + 1) * (interval / sub)
+    epochs = np.clip(np.searchsorted(edges, wanted - 0.5 * record.interval), 0, len(record))
+    extra = np.asarray(rows_at, dtype=np.int64) + 1
+    every, back = np.unique(np.concatenate((epochs, extra)), return_inverse=True)
+    C_all, v_all, p_all = inertial_integrals(dtheta, dvel, steps, every)
+
+    on_grid, at = back[: len(epochs)], back[len(epochs) :]
+    t, C = edges[epochs], C_all[on_grid]
+    # Trapezoid over the sub-epochs of each interval.
+    index = np.arange(count)[:, None] * sub + np.arange(sub + 1)
+    t_sub = t[index]
+    T = t_sub[:, -1] - t_sub[:, 0]
+    weight = np.zeros_like(t_sub)
+    weight[:, :-1] += np.diff(t_sub, axis=1) / 2
+    weight[:, 1:] += np.diff(t_sub, axis=1) / 2
+    weight /= T[:, None]
+    elapsed = (t_sub - t_sub[:, :1]) / T[:, None]
+    C_sub = C[index]
+    ends = slice(None, None, sub)
+    return InertialIntegrals(
+        start=float(record.time[0] - steps[0]),
+        time=t[ends],
+        C_ib=C[ends],
+        velocity=v_all[on_grid][ends],
+        position=p_all[on_grid][ends],
+        C_mean=np.einsum("ks,ksij->kij", weight, C_sub),
+        C_late=np.einsum("ks,ksij->kij", weight * elapsed, C_sub),
+        C_ib_at=C_all[at],
+    )

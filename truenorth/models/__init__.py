@@ -1,0 +1,1 @@
+"""Error models: each is written once, and any filter runs on it."""

@@ -1,0 +1,141 @@
+"""Error model of an INS on a base that stays where it is: still, shaken or swaying.
+
+States (12), errors computed minus true, in the frozen level frame ``n0``:
+
+| slice | state | unit |
+| --- | --- | --- |
+| PHI | misalignment phi, ``C_n0_b_hat = (I - [phi x]) C_n0_b`` | rad |
+| DV | velocity error | m/s |
+| BG | gyro bias eps, body axes | rad/s |
+| BA | accelerometer bias nabla, body axes | m/s^2 |
+
+``phi' = -C_n0_b (eps + w_g)``, ``dv' = f_n0 x phi + C_n0_b (nabla + w_a)``: the 12-state inertial-frame model of
+"Rotary SINS self-alignment under dynamic disturbance" (eqs. 30-33) with general specific force in place of -g, so that
+it holds on a moving base, and with its signs mapped to ours.
+
+The measurement is the *mean* velocity of an interval, in navigation axes: what the INS computes for a base that in
+truth goes nowhere. Its noise is the base's own bounded motion. A mean, not a sample, since on a vehicle the engine
+shakes the samples; the mean's tie to the states and to the process noise inside the interval is kept exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import skew
+from truenorth.filters import LinearSystem
+from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_position
+
+Array = NDArray[np.float64]
+
+PHI = slice(0, 3)
+DV = slice(3, 6)
+BG = slice(6, 9)
+BA = slice(9, 12)
+STATES = 12
+
+
+@dataclass(frozen=True)
+class StaticModel:
+    """Noise of the model; everything one-sigma, SI.
+
+    Attributes
+    ----------
+    gyro_random_walk : float, rad/sqrt(s)
+    accel_random_walk : float, m/s/sqrt(s)
+    gyro_rate_walk : float, rad/s/sqrt(s)
+        Slow change of the gyro bias as a random walk.
+    accel_rate_walk : float, m/s^2/sqrt(s)
+        Slow change of the accelerometer bias.
+    """
+
+    gyro_random_walk: float
+    accel_random_walk: float
+    gyro_rate_walk: float = 0.0
+    accel_rate_walk: float = 0.0
+
+    def linearise(
+        self, integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float, P0: Array, R: Array
+    ) -> LinearSystem:
+        """Stack the model over the K intervals of a log.
+
+        Parameters
+        ----------
+        integrals : InertialIntegrals
+        C_n0_i : (3, 3) array
+            The nominal attitude at the start.
+        lat, alt : float, rad and m
+        P0 : (12, 12) array
+            Covariance before the first interval.
+        R : (3,) array, (m/s)^2
+            Variance of the base's mean velocity over an interval (E, N, U).
+
+        Returns
+        -------
+        LinearSystem
+            ``Phi, Q, H, R, S, z`` with K epochs; `S` ties process noise and measurement within an interval.
+        """
+        T = integrals.intervals[:, None, None]
+        C_mean = C_n0_i @ integrals.C_mean  # (1/T) int C_n0_b
+        C_late = C_n0_i @ integrals.C_late  # (1/T^2) int s C_n0_b
+        f = skew(integrals.mean_force @ C_n0_i.T)
+        ff = f @ np.swapaxes(f, 1, 2)
+        eye = np.eye(3)
+        q_g, q_a = self.gyro_random_walk**2, self.accel_random_walk**2
+        count = len(T)
+
+        Phi = np.zeros((count, STATES, STATES))
+        Phi[:] = np.eye(STATES)
+        Phi[:, PHI, BG] = -T * C_mean
+        Phi[:, DV, PHI] = T * f
+        Phi[:, DV, BG] = -(T**2) * (f @ (C_mean - C_late))
+        Phi[:, DV, BA] = T * C_mean
+
+        # White gyro noise reaches phi at once and dv as a ramp; over an interval f is taken as constant.
+        Q = np.zeros((count, STATES, STATES))
+        Q[:, PHI, PHI] = q_g * T * eye
+        Q[:, DV, PHI] = q_g * T**2 / 2 * f
+        Q[:, PHI, DV] = np.swapaxes(Q[:, DV, PHI], 1, 2)
+        Q[:, DV, DV] = q_a * T * eye + q_g * T**3 / 3 * ff
+        Q[:, BG, BG] = self.gyro_rate_walk**2 * T * eye
+        Q[:, BA, BA] = self.accel_rate_walk**2 * T * eye
+
+        # Mean velocity error, told by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla),
+        # phi(t) = phi_k + int_t^k C eps.
+        H = np.zeros((count, 3, STATES))
+        H[:, :, DV] = eye
+        H[:, :, PHI] = -T / 2 * f
+        H[:, :, BG] = -(T**2) / 6 * (f @ C_mean)
+        H[:, :, BA] = -T * C_late
+        # Noise inside the interval acts on its mean with the weight (T-s)/T (accelerometers) and (T-s)^2/(2T)
+        # (gyros); less what H x_k already tells, -s/T and s^2/(2T) are left: their covariance, and that with Q's.
+        R_inside = q_a * T / 3 * eye + q_g * T**3 / 20 * ff
+        S = np.zeros((count, STATES, 3))
+        S[:, PHI] = q_g * T**2 / 6 * np.swapaxes(f, 1, 2)
+        S[:, DV] = -q_a * T / 2 * eye + q_g * T**3 / 24 * ff
+
+        middle = (integrals.time[1:] + integrals.time[:-1]) / 2
+        C_n_n0 = np.swapaxes(earth_rotation(middle, lat), 1, 2)
+        C_n0_n = np.swapaxes(C_n_n0, 1, 2)
+        z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
+        return LinearSystem(
+            Phi=Phi,
+            Q=Q,
+            H=C_n_n0 @ H,
+            R=C_n_n0 @ R_inside @ C_n0_n + np.diag(R),
+            S=S @ C_n0_n,
+            z=z,
+            x0=np.zeros(STATES),
+            P0=P0,
+        )
+
+
+def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
+    """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
+    p = integrals.position @ C_n0_i.T + gravity_position(integrals.time, lat, alt)
+    return np.diff(p, axis=0) / integrals.intervals[:, None]
+
+

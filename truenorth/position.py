@@ -1,0 +1,57 @@
+"""Where the IMU stands, and how well that is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from truenorth.errors import UsageError
+
+METRES_PER_RADIAN = 6_371_000.0  # mean earth radius: good enough for a position's uncertainty
+
+
+@dataclass(frozen=True)
+class Position:
+    """A place on the WGS-84 ellipsoid.
+
+    Parameters
+    ----------
+    lat, lon : float, rad
+        Geodetic latitude and longitude.
+    alt : float, m
+        Height above the ellipsoid.
+    horizontal_sigma, vertical_sigma : float, m
+        One-sigma error of the position that the user gives; it goes into the uncertainty of the attitude.
+
+    Raises
+    ------
+    UsageError
+        Latitude outside +-90 deg, longitude outside +-360 deg, a height no vehicle reaches, or a negative sigma.
+    """
+
+    lat: float
+    lon: float = 0.0
+    alt: float = 0.0
+    horizontal_sigma: float = 10.0
+    vertical_sigma: float = 20.0
+
+    def __post_init__(self) -> None:
+        lat, lon = math.degrees(self.lat), math.degrees(self.lon)
+        if not abs(lat) <= 90.0:
+            raise UsageError(f"latitude {lat:g} deg; expected -90 to 90 deg, north positive: check --lat")
+        if not abs(lon) <= 360.0:
+            raise UsageError(f"longitude {lon:g} deg; expected -180 to 180 deg, east positive: check --lon")
+        if not -12_000.0 <= self.alt <= 50_000.0:
+            raise UsageError(f"height {self.alt:g} m; expected metres between -12000 and 50000: check --alt")
+        if not (self.horizontal_sigma >= 0.0 and self.vertical_sigma >= 0.0):
+            raise UsageError("a position sigma is negative or not a number; expected metres, zero or more")
+
+    @classmethod
+    def from_degrees(cls, lat: float, lon: float = 0.0, alt: float = 0.0, **sigmas: float) -> Position:
+        """Latitude and longitude in degrees, height in metres."""
+        return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
+
+    @property
+    def lat_sigma(self) -> float:
+        """One-sigma error of the latitude, rad."""
+        return self.horizontal_sigma / METRES_PER_RADIAN
