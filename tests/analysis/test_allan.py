@@ -72,7 +72,7 @@ def test_white_noise_gives_its_density_with_honest_sigma():
 
 
 def test_four_processes_are_told_apart():
-    """Each made by its definition. Scatter over 51 channels: N 0.4 %, Q 0.4 %, K 7.5 %; bounds at 4-5 of it."""
+    """Each made by its definition. Scatter over 51 channels: N .4 %, Q .4 %, K 7.5 %; bounds at 4-5 of it."""
     rng, N, K, Q, dt = np.random.default_rng(5), 2e-4, 3e-5, 2e-5, 0.02
     shape = (200_000, 3)
     angle = Q * rng.standard_normal((shape[0] + 1, 3))

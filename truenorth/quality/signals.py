@@ -1,0 +1,194 @@
+"""Signals that tell motion from noise: even-rate means, white noise, wander of the angle, acceleration.
+
+NumPy only, a few passes over the samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from truenorth.records import ImuRecord
+
+Array = NDArray[np.float64]
+
+ARCSEC = np.pi / (180.0 * 3600.0)
+CELL = 0.1  # s, the samples are averaged over this first
+WINDOW = 10  # s, over which the angle's wander and the gain of speed are judged
+LEVEL_WINDOW = 31  # s, odd; the direction of gravity is the median over it
+# Three arcseconds are what spoils north by a degree in 15 s of static averaging.
+STILL_ANGLE = 3.0 * ARCSEC
+LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, whatever the sensor
+
+
+def even_rates(record: ImuRecord) -> tuple[float, Array]:
+    """Cell length (about 0.1 s) and (6, cells) mean rates and specific forces on an even grid."""
+    rows_a_cell = max(1, round(CELL / record.interval))
+    interval = rows_a_cell * record.interval
+    data = np.hstack([record.gyro, record.accel])
+    if not record.gaps.size and abs(record.duration / len(record) - record.interval) < 0.01 * record.interval:
+        cells = len(record) // rows_a_cell
+        mean = data[: cells * rows_a_cell].reshape(cells, rows_a_cell, 6).mean(axis=1).T
+        return interval, np.ascontiguousarray(mean if record.kind == "rates" else mean / record.interval)
+    # Uneven time: integrals to the cell edges, no rate inside a gap other than the mean of its ends.
+    steps = np.minimum(record.steps, 1.5 * record.interval)[:, None]
+    cumulated = np.cumsum(data * steps if record.kind == "rates" else data, axis=0)
+    clock = np.cumsum(steps)
+    cells = int(record.duration / interval)
+    edges = record.time[0] - record.interval + interval * np.arange(cells + 1)
+    covered = np.interp(edges, record.time, clock, left=0.0)
+    length = np.diff(covered)
+    full = length > 0.5 * interval
+    rates = np.empty((6, cells))
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    for channel in range(6):
+        integral = np.interp(covered, np.append(0.0, clock), np.append(0.0, cumulated[:, channel]))
+        rates[channel] = np.interp(middle, middle[full], np.diff(integral)[full] / length[full])
+    return interval, rates
+
+
+def second_means(signal: Array, per_second: int) -> Array:
+    """(3, seconds) means of (3, cells)."""
+    return signal.reshape(3, -1, per_second).mean(axis=2)
+
+
+def white_noise(record: ImuRecord) -> Array:
+    """(6,) random walk of the quiet quarter of the record: the least ``sigma(tau) sqrt(tau)`` of several tau.
+
+    The least, because the angle of a disturbed base is bounded: its Allan deviation falls faster than white
+    noise's at averaging times above the disturbance's period, and stays small far below it.
+    """
+    duration, rows = 20.0, len(record)
+    least = np.full(6, np.inf)
+    scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
+    for tau in (0.02, 0.1, 0.5, 1.0, 2.0):
+        m = max(1, round(tau / record.interval))
+        count = rows // m
+        if count < 4:
+            break
+        data = np.hstack([record.gyro[: count * m], record.accel[: count * m]])
+        means = data.reshape(count, m, 6).mean(axis=1) if m > 1 else data
+        squares = np.square(np.diff(means, axis=0)) / 2.0
+        group = min(len(squares), max(3, round(duration / (m * record.interval))))
+        groups = len(squares) // group
+        variance = squares[: groups * group].reshape(groups, group, 6).mean(axis=1)
+        quiet = np.quantile(variance, 0.25, axis=0)
+        least = np.minimum(least, scale * np.sqrt(quiet * m * record.interval))
+    return np.where(np.isfinite(least), least, 0.0)
+
+
+def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
+    """(3, windows) RMS of the angle about its straight line, in windows of 10 s that start at each second."""
+    angle = np.cumsum(rates * interval, axis=1)
+    length = min(WINDOW * per_second, angle.shape[1])
+    windows = sliding_window_view(angle, length, axis=1)[:, ::per_second]
+    line = np.arange(length) - (length - 1) / 2.0
+    energy = np.einsum("cwt,cwt->cw", windows, windows) / length
+    mean = windows.mean(axis=2)
+    slope = windows @ line
+    return np.sqrt(np.maximum(energy - mean**2 - slope**2 / (length * (line @ line)), 0.0))
+
+
+def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) -> Array:
+    """(3,) constant part of the rate: mean over the windows of 10 s, those of little motion counting most.
+
+    The largest bias believed grows with the noise, as it does in the market: 50 sigma of a one-second mean,
+    at least 0.1 deg/s, at most 3 deg/s. A constant turn slower than that is indistinguishable from bias.
+    """
+    length = min(WINDOW * per_second, rates.shape[1])
+    total = np.cumsum(np.pad(rates, ((0, 0), (1, 0))), axis=1)
+    mean = ((total[:, length:] - total[:, :-length]) / length)[:, ::per_second][:, : wander.shape[1]]
+    limit = np.clip(50.0 * float(np.linalg.norm(angle_noise)), np.radians(0.1), LARGEST_BIAS)
+    everywhere = np.ones(mean.shape[1], dtype=bool)
+    believable = np.linalg.norm(mean, axis=0) < limit
+    for windows in (everywhere, believable):
+        if not windows.any():
+            continue
+        chosen, still = mean[:, windows], wander[:, windows].max(axis=0)
+        drift = (
+            np.linalg.norm(chosen - np.median(chosen, axis=1, keepdims=True), axis=0) * WINDOW / np.sqrt(12.0)
+        )
+        weight = 1.0 / (still**2 + drift**2 + STILL_ANGLE**2)
+        bias: Array = chosen @ weight / weight.sum()
+        if np.linalg.norm(bias) < limit:
+            return bias
+    return np.zeros(3)
+
+
+def attitude_from(angles: Array) -> Array:
+    """(4, n) attitudes (w, x, y, z) after each of the rotations (3, n): running product by doubling."""
+    half = 0.5 * np.linalg.norm(angles, axis=0)
+    q = np.vstack([np.cos(half), 0.5 * angles * np.sinc(half / np.pi)])
+    reach = 1
+    while reach < q.shape[1]:
+        q[:, reach:] = _product(q[:, :-reach], q[:, reach:])
+        reach *= 2
+    return q
+
+
+def _product(p: Array, q: Array) -> Array:
+    """Hamilton product of (4, n) quaternions."""
+    a, b, c, d = p
+    e, f, g, h = q
+    return np.stack(
+        [
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ]
+    )
+
+
+def rotate(q: Array, v: Array) -> Array:
+    """(3, n) vectors turned by (4, n) unit quaternions."""
+    t = 2.0 * np.cross(q[1:], v, axis=0)
+    return v + q[0] * t + np.cross(q[1:], t, axis=0)
+
+
+def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
+    """(m,) acceleration of each second and (m,) its norm averaged, as a vector, over 10 s.
+
+    The smallest of three deviations of the specific force over 31 s: in axes that do not turn, from the
+    median and from a line (a gyro bias makes the level drift); in body axes, from the median (there, a turned
+    accelerometer bias stays constant). What neither drift, tilt nor bias explains is acceleration.
+    """
+    level, slope = _running_level(steady)
+    drifting = steady - slope
+    deviations = np.stack([steady - level, drifting, body - _running_level(body)[0]])
+    size = np.linalg.norm(deviations, axis=1)
+    gain = np.linalg.norm(box_mean(np.where(size[0] < size[1], deviations[0], drifting), WINDOW), axis=0)
+    return size.min(axis=0), gain
+
+
+def _running_level(signal: Array) -> tuple[Array, Array]:
+    """(3, m) median, and line through the medians of both halves, of the 31 s around each second.
+
+    At the ends the window is the 31 s that fit.
+    """
+    seconds = signal.shape[1]
+    width = min(LEVEL_WINDOW, seconds)
+    windows = sliding_window_view(signal, width, axis=1)
+    first = offset(seconds, width)
+    within = np.arange(seconds) - first
+    half = width // 2
+    early = np.median(windows[..., :half], axis=2)[:, first]
+    late = np.median(windows[..., width - half :], axis=2)[:, first]
+    line = early + (late - early) * (within - (half - 1) / 2.0) / (width - half)
+    return np.median(windows, axis=2)[:, first], line
+
+
+def offset(seconds: int, width: int) -> NDArray[np.intp]:
+    """(m,) first second of the window of `width` seconds around each second, kept inside the record."""
+    return np.clip(np.arange(seconds) - width // 2, 0, seconds - width)
+
+
+def box_mean(signal: Array, width: int) -> Array:
+    """(k, m) mean over `width` seconds around each second; at the ends over the last `width` that fit."""
+    seconds = signal.shape[1]
+    windows = sliding_window_view(signal, min(width, seconds), axis=1)
+    return np.asarray(windows.mean(axis=2)[:, offset(seconds, min(width, seconds))])
+
+
+# ------------------------------------------------------------------------------------------- classification
