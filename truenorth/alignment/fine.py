@@ -48,8 +48,10 @@ class FineAlignment:
     system : LinearSystem
     estimates : Estimates
         With the whole history of x and P.
+    gains : tuple of (K, 12, 3) and (K, 12, 12) arrays
+        Of :func:`filter_gains`.
     floor : (K, 12, 12) array
-        Covariance that is left when noise and the base's motion vanish: that of the biases.
+        The part of the covariance that the biases alone make, ``P = floor + random``: what waiting does not improve.
     disturbance : (3,) array, m/s
         RMS mean velocity of the base (E, N, U) as the filter took it.
     passes : int
@@ -62,6 +64,7 @@ class FineAlignment:
     nominal_bias: Array
     system: LinearSystem
     estimates: Estimates
+    gains: tuple[Array, Array]
     floor: Array
     disturbance: Array
     passes: int
@@ -118,7 +121,12 @@ class FineAlignment:
 
 
 def bias_prior(
-    gyro_bias: float, accel_bias: float, C_n_b: Array, position: Position, lat_rate: Array, gravity_slope: float
+    gyro_bias: float,
+    accel_bias: float,
+    C_n_b: Array,
+    position: Position,
+    lat_rate: Array,
+    gravity_slope: float,
 ) -> Array:
     """Prior covariance of the biases, (6, 6): the specification's, and what an error of the position looks like.
 
@@ -154,7 +162,6 @@ def fine_align(
     nominal_bias: Array | None = None,
     rows_at: Array | None = None,
     heading_known: bool = False,
-    keep_history: bool = True,
 ) -> FineAlignment:
     """Estimate attitude and biases from a whole log.
 
@@ -175,9 +182,6 @@ def fine_align(
         Rows after which the integrated attitude is wanted.
     heading_known : bool
         Hold the heading of the coarse attitude: the gyros cannot find it, and level must not look for it.
-    keep_history : bool
-        Run the noise-free covariance for the floor as well.
-
     Returns
     -------
     FineAlignment
@@ -202,9 +206,9 @@ def fine_align(
         system = replace(model.linearise(integrals, C_n0_i, lat, alt, P0, R), x0=x0)
         estimates = kalman(system, history="full")
         x, P = estimates.x[-1], estimates.P[-1]
-        R_next = _base_variance(estimates, R)
+        R_next, expected = _base_variance(estimates, R)
         moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
-        same_noise = bool(np.all(np.abs(np.log(R_next / R)) < 0.1))
+        same_noise = bool(np.all(np.abs(R_next - R) < 0.1 * expected))
         if (moved < CONVERGED and same_noise) or passes == MAX_PASSES:
             break
         # Back to the start: phi(0) = phi(end) + int C_n0_b (eps - nominal); then everything anew about the estimate.
@@ -214,15 +218,49 @@ def fine_align(
         R = R_next
         integrals = integrate(record, interval, bias[:3], bias[3:], rows)
 
-    floor = np.zeros((1, STATES, STATES))
-    if keep_history:
-        quiet = replace(system, Q=1e-4 * system.Q, R=1e-4 * system.R, S=1e-4 * system.S)
-        floor = kalman(quiet, history="full").P
-    return FineAlignment(integrals, C_n0_i, bias, system, estimates, floor, np.sqrt(R), passes, moved < ROUGHLY)
+    gains = filter_gains(system, estimates)
+    return FineAlignment(
+        integrals=integrals,
+        C_n0_i=C_n0_i,
+        nominal_bias=bias,
+        system=system,
+        estimates=estimates,
+        gains=gains,
+        floor=bias_part(gains[1], P_bias),
+        disturbance=np.sqrt(R),
+        passes=passes,
+        settled=moved < ROUGHLY,
+    )
 
 
-def _base_variance(estimates: Estimates, R: Array) -> Array:
-    """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too."""
+def filter_gains(system: LinearSystem, estimates: Estimates) -> tuple[Array, Array]:
+    """Gains ``K_k`` (K, 12, 3) of a filter run, and how its errors go on, ``(I - K_k H_k) Phi_k`` (K, 12, 12)."""
+    Phi, H, P = system.Phi, system.H, estimates.P
+    before = np.concatenate([system.P0[None], P[:-1]])
+    P_predicted = Phi @ before @ np.swapaxes(Phi, 1, 2) + system.Q
+    cross = P_predicted @ np.swapaxes(H, 1, 2) + system.S
+    gain = cross @ np.linalg.inv(estimates.innovation_covariance)
+    return gain, Phi - gain @ (H @ Phi)
+
+
+def bias_part(step: Array, P_bias: Array) -> Array:
+    """The biases' share of each covariance, (K, 12, 12): the initial bias errors carried through the filter's gains.
+
+    Errors obey ``e_k = (I - K_k H_k) Phi_k e_{k-1}`` + noise; what is not the biases' is noise and the forgotten start.
+    """
+    response = np.empty((len(step), STATES, 6))
+    e = np.eye(STATES)[:, 6:]
+    for k, step_k in enumerate(step):
+        e = step_k @ e
+        response[k] = e
+    return response @ P_bias @ np.swapaxes(response, 1, 2)
+
+
+def _base_variance(estimates: Estimates, R: Array) -> tuple[Array, Array]:
+    """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
+
+    Returns it with the mean expected variance of the innovations.
+    """
     skip = min(5, len(estimates.innovation) // 5)
     nu = estimates.innovation[skip:]
     expected = np.einsum("kii->ki", estimates.innovation_covariance[skip:])
@@ -235,11 +273,11 @@ def _base_variance(estimates: Estimates, R: Array) -> Array:
         colour = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
         chance = 1.0 + 2.0 * np.sqrt(2.0 / blocks)  # two sigma of what white noise itself gives
         ratio = np.where(colour > chance * ratio, np.maximum(colour, ratio), ratio)
-    return np.maximum(R * ratio, QUIETEST_BASE**2)
+    return np.maximum(R * ratio, QUIETEST_BASE**2), expected.mean(axis=0)
 
 
 def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:
-    """Attitude in n, covariance of the misalignment in n and its floor at each epoch, (K, 3, 3) each."""
+    """Attitude in n, covariance of the misalignment in n and the biases' part of it, at each epoch, (K, 3, 3) each."""
     t = fine.integrals.time[1:]
     C_n_n0 = np.swapaxes(earth_rotation(t, lat), 1, 2)
     turn = dcm_from_rotation_vector(fine.estimates.x[:, PHI])

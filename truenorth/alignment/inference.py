@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.allan import overlapping_adev
+from truenorth.analysis.allan import AllanDeviation, overlapping_adev
 from truenorth.records import ImuRecord
 from truenorth.specs import ImuSpec, imu_spec
 from truenorth.strapdown import increments
@@ -28,6 +28,7 @@ ONE_SIGMA = math.erf(1.0 / math.sqrt(2.0))  # .6827
 WORST_GYRO = np.radians(10.0)  # rad/s: end of the search for a bias scale
 WORST_ACCEL = 10.0  # m/s^2
 ALLAN_RATE = 10.0  # Hz: random walks show far below this; the log is averaged down to it first
+CORRELATION_TIME = 300.0  # s: of bias instability, where a specification names none
 SHORTEST_ALLAN = 10  # averaging times a window must hold for its Allan deviation to mean something
 
 
@@ -80,13 +81,16 @@ def predictive_sigma(residuals: Array, noises: Array, smallest: float, largest: 
     return math.sqrt(low * high)
 
 
-def infer_spec(record: ImuRecord, check: LogCheck) -> ImuSpec:
+def infer_spec(record: ImuRecord, check: LogCheck, still: bool) -> ImuSpec:
     """Specification inferred from a log; no better than the `navigation` preset is ever assumed of biases.
 
     Parameters
     ----------
     record : ImuRecord
     check : LogCheck
+    still : bool
+        Whether nothing but the sensors moves the numbers: then the Allan deviation is theirs. On a base that moves it
+        bounds the random walks from above, and those usual for such biases are taken where they are smaller.
 
     Returns
     -------
@@ -97,30 +101,81 @@ def infer_spec(record: ImuRecord, check: LogCheck) -> ImuSpec:
     accel_bias = predictive_sigma(
         np.array([check.force_residual]), np.array([check.force_noise]), best.accel_bias, WORST_ACCEL
     )
-    gyro_walk, accel_walk = random_walks(record)
+    bounds = random_walks(record)
+    usual = usual_walks(gyro_bias, accel_bias)
+    drifts = bias_drifts(record) if still else (0.0, 0.0)
     return replace(
         best,
         name="inferred",
         gyro_bias=gyro_bias,
         accel_bias=accel_bias,
-        gyro_random_walk=gyro_walk,
-        accel_random_walk=accel_walk,
-        gyro_bias_instability=0.0,
-        accel_bias_instability=0.0,
+        gyro_random_walk=min(bounds[0], usual[0]) if not still else bounds[0],
+        accel_random_walk=min(bounds[1], usual[1]) if not still else bounds[1],
+        gyro_bias_instability=drifts[0],
+        accel_bias_instability=drifts[1],
+    )
+
+
+def usual_walks(gyro_bias: float, accel_bias: float) -> tuple[float, float]:
+    """Angle and velocity random walk usual for IMUs of such biases: the presets, interpolated on logarithmic scales."""
+    presets = [imu_spec(name) for name in ("navigation", "tactical", "industrial", "consumer")]
+
+    def interpolate(bias: float, biases: list[float], random_walks: list[float]) -> float:
+        return float(np.exp(np.interp(np.log(bias), np.log(biases), np.log(random_walks))))
+
+    return (
+        interpolate(gyro_bias, [p.gyro_bias for p in presets], [p.gyro_random_walk for p in presets]),
+        interpolate(accel_bias, [p.accel_bias for p in presets], [p.accel_random_walk for p in presets]),
     )
 
 
 def random_walks(record: ImuRecord) -> tuple[float, float]:
     """Upper bounds of angle and velocity random walk (worst axis), rad/sqrt(s) and m/s/sqrt(s)."""
+    gyro, accel = _allan(record)
+    return _walk(gyro), _walk(accel)
+
+
+def bias_drifts(record: ImuRecord) -> tuple[float, float]:
+    """How far the biases of a still IMU wander within the log (worst axis), rad/s and m/s^2.
+
+    What the Allan deviation at the longest averaging time has above the random walk's.
+    """
+    drifts = []
+    for allan in _allan(record):
+        excess = allan.deviation[-1] ** 2 - _walk(allan) ** 2 / allan.tau[-1]
+        drifts.append(float(np.sqrt(np.max(np.maximum(excess, 0.0)))))
+    return drifts[0], drifts[1]
+
+
+def walks(spec: ImuSpec) -> tuple[float, float, float, float]:
+    """Noise of the static model for a specification: two random walks, and two random walks of the biases.
+
+    A Gauss-Markov bias of size B and correlation time tau spreads as a random walk of ``B sqrt(2/tau)`` over times
+    shorter than tau.
+    """
+    spread = math.sqrt(2.0 / CORRELATION_TIME)
+    return (
+        spec.gyro_random_walk,
+        spec.accel_random_walk,
+        spec.gyro_bias_instability * spread,
+        spec.accel_bias_instability * spread,
+    )
+
+
+def _allan(record: ImuRecord) -> tuple[AllanDeviation, AllanDeviation]:
     dtheta, dvel = increments(record)
     block = max(1, round(record.rate / ALLAN_RATE))
     count = len(record) // block
     interval = block * record.interval
-    longest = max(1, count // SHORTEST_ALLAN)
-    taus = np.geomspace(1, longest, 12) * interval
-    walks = []
-    for increment in (dtheta, dvel):
-        sums = increment[: count * block].reshape(count, block, 3).sum(axis=1)
-        allan = overlapping_adev(sums, interval, taus, kind="increments")
-        walks.append(float(np.max(np.min(allan.deviation * np.sqrt(allan.tau)[:, None], axis=0))))
-    return walks[0], walks[1]
+    taus = np.geomspace(1, max(1, count // SHORTEST_ALLAN), 12) * interval
+    gyro, accel = (
+        overlapping_adev(
+            x[: count * block].reshape(count, block, 3).sum(axis=1), interval, taus, "increments"
+        )
+        for x in (dtheta, dvel)
+    )
+    return gyro, accel
+
+
+def _walk(allan: AllanDeviation) -> float:
+    return float(np.max(np.min(allan.deviation * np.sqrt(allan.tau)[:, None], axis=0)))

@@ -11,9 +11,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.epoch import Epoch, find_epoch
 from truenorth.alignment.fine import FineAlignment, attitude_history, bias_prior, fine_align
-from truenorth.alignment.inference import LogCheck, infer_spec, random_walks
+from truenorth.alignment.inference import LogCheck, infer_spec, walks
 from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
 from truenorth.alignment.verdict import Circumstances, judge
 from truenorth.attitude import dcm_from_euler, euler_from_dcm
@@ -34,7 +35,9 @@ Array = NDArray[np.float64]
 Method = Literal["auto", "analytic", "inertial", "oba", "kalman"]
 
 HEADING_LIMIT = math.radians(5.0)
-DEFLECTION = math.radians(5.0 / 3600.0)  # of the vertical, one sigma: what gravity's direction differs from the normal
+DEFLECTION = math.radians(
+    5.0 / 3600.0
+)  # of the vertical, one sigma: what gravity's direction differs from the normal
 FILTER_INTERVAL = 1.0  # s
 FEWEST_EPOCHS, MOST_EPOCHS = 60, 5000
 SHORTEST = 1.0  # s: below that no mean is worth its name
@@ -42,6 +45,8 @@ SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion
 LONGEST_BRIDGE = 4.5  # nominal intervals: up to three lost samples are bridged by the next one's rate
 BLIND_RATE = math.radians(5.0) / 3600.0  # rad/s: a mean rate this far from the earth's holds no heading
 LOOSE_GYRO, LOOSE_ACCEL = math.radians(10.0) / 3600.0, 0.5  # rad/s, m/s^2: priors that let the log speak
+HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
+LONGEST_BLIND = 120.0  # s: a gyro that does not see the earth turn carries attitude no longer than this
 
 
 @dataclass(frozen=True)
@@ -157,11 +162,11 @@ def align(
     tell(f"aligning: {chosen}")
     if chosen == "analytic":
         answer, check = _align_analytic(task, spec)
-        settled = True
+        settled, drift = True, None
     else:
-        answer, check, settled = _align_inertial(task, spec, chosen)
+        answer, check, settled, drift = _align_inertial(task, spec, chosen)
     answer = replace(answer, method=chosen, method_reason=why)
-    status, reasons = judge(answer, Circumstances(heading_limit, check, motion.moves_from, settled))
+    status, reasons = judge(answer, Circumstances(heading_limit, check, motion.moves_from, settled, drift))
     return answer.with_verdict(status, reasons)
 
 
@@ -177,7 +182,9 @@ def _choose(method: Method, record: ImuRecord, motion: MotionSummary) -> tuple[s
         "disturbed": "the base is disturbed: mean rates would be off, the inertial frame is not",
         "swaying": "the base sways: mean rates mean nothing, the inertial frame follows every motion",
     }
-    return "kalman", words.get(motion.regime, f"the base is {motion.regime}: only the inertial frame follows it")
+    return "kalman", words.get(
+        motion.regime, f"the base is {motion.regime}: only the inertial frame follows it"
+    )
 
 
 def _align_analytic(task: _Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
@@ -200,12 +207,16 @@ def _align_analytic(task: _Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     return answer, check
 
 
-def _align_inertial(task: _Task, spec: ImuSpec | None, method: str) -> tuple[Alignment, LogCheck, bool]:
+def _align_inertial(
+    task: _Task, spec: ImuSpec | None, method: str
+) -> tuple[Alignment, LogCheck, bool, Drift | None]:
     lat, alt = task.position.lat, task.position.alt
     check = _check_means(task.means, lat, task.gravity)
     pre_bias = np.zeros(6)
     blind = _is_blind(task.motion, check)
     if blind:
+        task = _last_part(task)
+        check = _check_means(task.means, lat, task.gravity)
         # The earth's rate is lost in the gyro bias: take off all of the mean rate but what level and latitude tell.
         up_b = task.means.f_b / np.linalg.norm(task.means.f_b)
         pre_bias[:3] = task.means.w_ib_b - EARTH_RATE * math.sin(lat) * up_b
@@ -217,7 +228,7 @@ def _align_inertial(task: _Task, spec: ImuSpec | None, method: str) -> tuple[Ali
         check = _check_filter(task, coarse.C_n0_i)
     used, where = _specification(task, spec, check)
     P = task.bias_prior(used, coarse.C_n0_i)
-    model = StaticModel(used.gyro_random_walk, used.accel_random_walk)
+    model = StaticModel(*walks(used))
 
     if method != "kalman":
         disturbance = np.sqrt(np.mean(base_velocity(integrals, coarse.C_n0_i, lat, alt) ** 2, axis=0))
@@ -225,7 +236,7 @@ def _align_inertial(task: _Task, spec: ImuSpec | None, method: str) -> tuple[Ali
         C_ib = task.epoch.attitude(integrals.C_ib_at[0])
         C_n0_b = coarse.C_n0_i @ C_ib
         answer = _at_epoch(task, used, where, C_n0_b, covariance, floor, P, blind)
-        return replace(answer, disturbance=disturbance), check, True
+        return replace(answer, disturbance=disturbance), check, True, None
 
     P_run = P.copy()
     if blind:
@@ -257,7 +268,7 @@ def _align_inertial(task: _Task, spec: ImuSpec | None, method: str) -> tuple[Ali
         history=history,
         pays_until=None if blind else _pays_until(history, answer, fine, task),
     )
-    return answer, check, fine.settled
+    return answer, check, fine.settled, None if blind else detect_drift(fine)
 
 
 def _coarse(task: _Task, integrals: Any, method: str, blind: bool) -> CoarseAttitude:
@@ -290,12 +301,14 @@ def _check_means(m: Means, lat: float, g: float) -> LogCheck:
 
 def _check_filter(task: _Task, C_n0_i: Array) -> LogCheck:
     """What the inertial frame tells of the biases: a filter that believes in no specification."""
-    gyro_walk, accel_walk = random_walks(task.record)
-    P = np.diag(np.repeat([LOOSE_GYRO**2, LOOSE_ACCEL**2], 3))
-    model = StaticModel(gyro_walk, accel_walk)
-    fine = fine_align(
-        task.record, C_n0_i, task.position, model, P, interval=task.interval, keep_history=False
-    )
+    # Loose where the log can answer, held where tilt or heading would take the blame.
+    C_n_b = C_n0_i.T
+    P = np.zeros((6, 6))
+    P[:3, :3] = C_n_b @ np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2]) @ C_n_b.T
+    P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
+    best = imu_spec("navigation")
+    model = StaticModel(best.gyro_random_walk, best.accel_random_walk)
+    fine = fine_align(task.record, C_n0_i, task.position, model, P, interval=task.interval)
     C = earth_rotation(fine.integrals.time[-1], task.position.lat).T @ fine.C_n0_i @ fine.integrals.C_ib[-1]
     bias, cov = fine.bias, fine.P
     rate, rate_P = C @ bias[:3], C @ cov[6:9, 6:9] @ C.T
@@ -317,14 +330,37 @@ def _is_blind(motion: MotionSummary, check: LogCheck) -> bool:
     return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)
 
 
+def _last_part(task: _Task) -> _Task:
+    """The last two minutes before the epoch: level needs no more, and a poor gyro's bias changes over longer."""
+    record, at = task.record, task.epoch.time
+    if record.duration <= LONGEST_BLIND:
+        return task
+    stop = max(at, record.time[0] + LONGEST_BLIND)
+    record = record.between(stop - LONGEST_BLIND, stop)
+    return replace(
+        task,
+        record=record,
+        interval=_filter_interval(record),
+        epoch=find_epoch(record, at),
+        means=means(record),
+    )
+
+
 def _specification(task: _Task, spec: ImuSpec | None, check: LogCheck) -> tuple[ImuSpec, str]:
     if spec is not None:
         return spec, f"specification {spec.name!r}"
-    return infer_spec(task.record, check), "inferred from the log"
+    return infer_spec(task.record, check, task.motion.regime == "still"), "inferred from the log"
 
 
 def _at_epoch(
-    task: _Task, spec: ImuSpec, where: str, C_n0_b: Array, covariance: Array, floor: Array, P: Array, blind: bool
+    task: _Task,
+    spec: ImuSpec,
+    where: str,
+    C_n0_b: Array,
+    covariance: Array,
+    floor: Array,
+    P: Array,
+    blind: bool,
 ) -> Alignment:
     """An answer given in n0, turned into navigation axes at the epoch asked for."""
     time = task.epoch.elapsed
@@ -364,15 +400,16 @@ def _assemble(
 
 
 def _history(task: _Task, fine: FineAlignment, blind: bool) -> History:
-    C_nb, covariance, _ = attitude_history(fine, task.position.lat)
+    C_nb, covariance, floor = attitude_history(fine, task.position.lat)
     if blind:
-        covariance = _without_heading(covariance)
+        covariance, floor = _without_heading(covariance), _without_heading(floor)
     x, P, e = fine.estimates.x, fine.estimates.P, fine.estimates
     sigma = np.sqrt(np.einsum("kii->ki", P))
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
         C_nb=C_nb,
         phi_covariance=covariance + task.deflection,
+        phi_floor=floor + task.deflection,
         gyro_bias=fine.nominal_bias[:3] + x[:, 6:9],
         gyro_bias_sigma=sigma[:, 6:9],
         accel_bias=fine.nominal_bias[3:] + x[:, 9:],
@@ -390,7 +427,7 @@ def _pays_until(history: History, answer: Alignment, fine: FineAlignment, task: 
     """
     floor = math.sqrt(answer.phi_floor[2, 2])
     elapsed = history.time - fine.integrals.start
-    random = np.sqrt(np.maximum(history.phi_covariance[:, 2, 2] - floor**2, 1e-20))
+    random = np.sqrt(np.maximum(history.phi_covariance[:, 2, 2] - history.phi_floor[:, 2, 2], 1e-20))
     below = np.flatnonzero(random < 0.5 * floor)
     if below.size:
         return float(elapsed[below[0]])

@@ -42,7 +42,9 @@ class History:
     C_nb : (K, 3, 3) array
         Attitude at each epoch, as known then.
     phi_covariance : (K, 3, 3) array, rad^2
-        Covariance of the misalignment (E, N, U), the part that does not average out included.
+        Covariance of the misalignment (E, N, U), everything included.
+    phi_floor : (K, 3, 3) array, rad^2
+        The part of it that waiting does not improve.
     gyro_bias, gyro_bias_sigma : (K, 3) arrays, rad/s
     accel_bias, accel_bias_sigma : (K, 3) arrays, m/s^2
     innovation, innovation_sigma : (K, 3) arrays, m/s
@@ -54,6 +56,7 @@ class History:
     time: Array
     C_nb: Array
     phi_covariance: Array
+    phi_floor: Array
     gyro_bias: Array
     gyro_bias_sigma: Array
     accel_bias: Array
@@ -313,7 +316,9 @@ def euler_jacobian(C_nb: Array) -> Array:
     cos2 = np.maximum(yE**2 + yN**2, 1e-12)[..., None]
     heading = (yN[..., None] * east_row - yE[..., None] * north_row) / cos2
     pitch = up_row[1] / np.sqrt(cos2)
-    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[..., None]
+    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[
+        ..., None
+    ]
     return np.stack([heading, pitch, roll], -2)
 
 

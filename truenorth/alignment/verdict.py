@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.drift import Drift
 from truenorth.alignment.inference import LogCheck
 from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, Alignment, Status
 from truenorth.earth import EARTH_RATE
@@ -14,7 +15,7 @@ from truenorth.earth import EARTH_RATE
 Array = NDArray[np.float64]
 
 OUTLIER = 5.0  # sigmas by which a checkable component may miss its specification
-LEVEL_LIMIT = np.radians(1.0)  # a tilt less certain than this is no level
+LEVEL_LIMIT = np.radians(3.0)  # a tilt less certain than this is no level
 
 
 @dataclass(frozen=True)
@@ -30,15 +31,15 @@ class Circumstances:
         When the base begins to go somewhere.
     settled : bool
         Whether re-linearisation came to rest.
-    drift : str
-        What the base's drift test says; empty where it found nothing.
+    drift : Drift or None
+        What the test for a base that leaves says.
     """
 
     heading_limit: float
     check: LogCheck
     moves_from: float | None = None
     settled: bool = True
-    drift: str = ""
+    drift: Drift | None = None
 
 
 def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, ...]]:
@@ -56,11 +57,15 @@ def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, 
     limit = around.heading_limit
     good_level = f"level is known to {np.degrees(level) * 60:.2f} arcmin (one sigma)"
     if sigma <= limit:
-        reasons = [f"heading is known to {_angle(sigma)} (one sigma); {_angle(floor)} of it is sensor bias, which waiting does not improve"]
+        reasons = [
+            f"heading is known to {_angle(sigma)} (one sigma); {_angle(floor)} of it is sensor bias, which waiting does not improve"
+        ]
         if answer.pays_until is not None and np.isfinite(answer.pays_until):
             reasons.append(_waiting(answer))
         if answer.near_vertical:
-            reasons.append("pitch is near +-90 deg: heading and roll are told only together (see the combination)")
+            reasons.append(
+                "pitch is near +-90 deg: heading and roll are told only together (see the combination)"
+            )
         return "aligned", tuple(reasons)
 
     horizontal = EARTH_RATE * np.cos(answer.position.lat)
@@ -78,7 +83,11 @@ def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, 
             f"{horizontal * np.tan(min(limit, 1.0)) / DEG_PER_HOUR:.2g} deg/h or better: heading is refused",
             good_level,
         )
-    more = "" if answer.pays_until is None else f"; about {answer.pays_until:.0f} s in all would bring it near its floor"
+    more = (
+        ""
+        if answer.pays_until is None
+        else f"; about {answer.pays_until:.0f} s in all would bring it near its floor"
+    )
     return "not_converged", (
         f"heading is known to {_angle(sigma)} only after {answer.duration:.0f} s, {_angle(limit)} is wanted; sensor bias "
         f"would allow {_angle(floor)}{more}: record longer",
@@ -109,10 +118,12 @@ def _contradictions(answer: Alignment, around: Circumstances) -> list[str]:
             f"the mean specific force misses gravity by {check.force_residual / MICRO_G:.0f} ug, where the specification "
             f"({answer.imu_source}) allows {accel / MICRO_G:.3g} ug: check --alt, the units, and the specification"
         )
-    if around.drift:
-        found.append(around.drift)
+    if around.drift is not None and around.drift.found:
+        found.append(str(around.drift))
     if not around.settled:
-        found.append("re-linearisation did not come to rest: the log does not look like a base that stays where it is")
+        found.append(
+            "re-linearisation did not come to rest: the log does not look like a base that stays where it is"
+        )
     return found
 
 

@@ -67,7 +67,9 @@ def static_jacobian(lat: float, g: float) -> Array:
     return J
 
 
-def analytic(m: Means, lat: float, alt: float, gyro_bias: float, accel_bias: float) -> tuple[Array, Array, Array]:
+def analytic(
+    m: Means, lat: float, alt: float, gyro_bias: float, accel_bias: float
+) -> tuple[Array, Array, Array]:
     """Attitude of a still base from the means.
 
     Parameters
@@ -116,12 +118,18 @@ def two_position(
         Attitude in the first position.
     gyro_bias, accel_bias : (3,) arrays
     """
-    w_b, eps = _separate(first.w_ib_b, second.w_ib_b, first.w_covariance, second.w_covariance, C_b1_b2, gyro_bias)
-    f_b, nabla = _separate(first.f_b, second.f_b, first.f_covariance, second.f_covariance, C_b1_b2, accel_bias)
+    w_b, eps = _separate(
+        first.w_ib_b, second.w_ib_b, first.w_covariance, second.w_covariance, C_b1_b2, gyro_bias
+    )
+    f_b, nabla = _separate(
+        first.f_b, second.f_b, first.f_covariance, second.f_covariance, C_b1_b2, accel_bias
+    )
     return triad(f_b, w_b, UP, np.asarray(earth_rate_n(lat))), eps, nabla
 
 
-def _separate(m1: Array, m2: Array, P1: Array, P2: Array, C_b1_b2: Array, prior: float) -> tuple[Array, Array]:
+def _separate(
+    m1: Array, m2: Array, P1: Array, P2: Array, C_b1_b2: Array, prior: float
+) -> tuple[Array, Array]:
     eye, zero = np.eye(3), np.zeros((3, 3))
     A = np.block([[eye, eye], [C_b1_b2.T, eye], [zero, eye]])
     tiny = (1e-6 * prior) ** 2 * eye  # keeps the weights finite where the scatter is nil

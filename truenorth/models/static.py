@@ -137,5 +137,3 @@ def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: 
     """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
     p = integrals.position @ C_n0_i.T + gravity_position(integrals.time, lat, alt)
     return np.diff(p, axis=0) / integrals.intervals[:, None]
-
-

@@ -1,0 +1,60 @@
+"""The earth: WGS-84 ellipsoid, its rotation, and normal gravity.
+
+Source: NIMA TR8350.2, "Department of Defense World Geodetic System 1984", 3rd ed. (2000): table 3.1 (defining
+parameters), eq. 4-1 (Somigliana's closed form on the ellipsoid), eq. 4-3 (its second-order continuation with height).
+
+Functions take scalars or arrays; the same source is compiled for kernels.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SEMI_MAJOR = 6378137.0  # m
+FLATTENING = 1.0 / 298.257223563
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+EARTH_RATE = 7.292115e-5  # rad/s
+GM = 3.986004418e14  # m^3/s^2
+GRAVITY_EQUATOR = 9.7803253359  # m/s^2
+SOMIGLIANA = 0.00193185265241
+CENTRIFUGAL_RATIO = 0.00344978650684  # m = w^2 a^2 b / GM
+
+
+def radii(lat: Any) -> tuple[Any, Any]:
+    """Meridian and prime-vertical radius of curvature, m."""
+    W2 = 1.0 - ECCENTRICITY_SQUARED * np.sin(lat) ** 2
+    R_N = SEMI_MAJOR / np.sqrt(W2)
+    return R_N * (1.0 - ECCENTRICITY_SQUARED) / W2, R_N
+
+
+def normal_gravity(lat: Any, alt: Any) -> Any:
+    """Normal gravity, m/s^2, downward positive, at geodetic latitude (rad) and height (m)."""
+    s2 = np.sin(lat) ** 2
+    surface = GRAVITY_EQUATOR * (1.0 + SOMIGLIANA * s2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
+    h = alt / SEMI_MAJOR
+    return surface * (
+        1.0 - 2.0 * (1.0 + FLATTENING + CENTRIFUGAL_RATIO - 2.0 * FLATTENING * s2) * h + 3.0 * h * h
+    )
+
+
+def earth_rate_n(lat: Any) -> Array:
+    """``w_ie_n`` (E, N, U), (..., 3) rad/s."""
+    return np.stack([np.zeros_like(lat), EARTH_RATE * np.cos(lat), EARTH_RATE * np.sin(lat)], axis=-1)
+
+
+def transport_rate_n(lat: Any, alt: Any, v_n: Array) -> Array:
+    """``w_en_n`` (E, N, U), (..., 3) rad/s, of a velocity ``v_n`` (..., 3) m/s."""
+    R_M, R_N = radii(lat)
+    east = v_n[..., 0] / (R_N + alt)
+    return np.stack([-v_n[..., 1] / (R_M + alt), east, east * np.tan(lat)], axis=-1)
+
+
+def gravity_n(lat: Any, alt: Any) -> Array:
+    """Normal gravity as a vector in n, (..., 3) m/s^2."""
+    g = normal_gravity(lat, alt)
+    return np.stack([np.zeros_like(g), np.zeros_like(g), -g], axis=-1)
