@@ -1,0 +1,6 @@
+"""Filters and smoothers for linear systems; they know nothing of navigation."""
+
+from truenorth.filters.kalman import kalman
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
+
+__all__ = ["Estimates", "FilterState", "LinearSystem", "kalman"]

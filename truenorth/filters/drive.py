@@ -1,0 +1,112 @@
+"""From a system to a kernel and back to estimates: one driver for all linear filters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+
+from truenorth.errors import DataError, UsageError
+from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, Histories
+from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs, runs_of
+from truenorth.linalg import Size, padded
+
+History = Literal["last", "sigma", "full"]
+Kernel = Callable[[Size, Runs, int, Histories], None]
+
+
+def drive(
+    kernel: Kernel,
+    system: LinearSystem,
+    state: FilterState | None,
+    *,
+    history: History,
+    innovations: bool | None,
+    workers: int,
+) -> Estimates:
+    """Run a kernel over all runs of a system and shape what it kept.
+
+    Parameters
+    ----------
+    kernel : callable
+        ``kernel(size, runs, epochs, histories)``.
+    system, state, history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+    """
+    if history not in get_args(History):
+        raise UsageError(f'history is {history!r}, expected "last", "sigma" or "full"')
+    if workers < 1:
+        raise UsageError(f"workers is {workers}, expected at least 1")
+    if state is not None:
+        system = replace(system, x0=state.x, P0=state.P)
+    shape, epochs = system.runs, system.epochs
+    runs = runs_of(system, shape)
+    keep_innovations = history != "last" if innovations is None else innovations
+    out = _histories(shape, system, history, epochs if keep_innovations else 0)
+    if state is not None:
+        out.log_likelihood[:] = np.broadcast_to(state.log_likelihood, shape).ravel()
+
+    size, count = padded(system.states), len(out.x)
+    if workers == 1 or count == 1:
+        kernel(size, runs, epochs, out)
+    else:
+        edges = np.linspace(0, count, min(workers, count) + 1).astype(int)
+        parts = list(pairwise(edges))
+        with ThreadPoolExecutor(len(parts)) as pool:
+            list(pool.map(lambda part: kernel(size, _part(runs, *part), epochs, _share(out, *part)), parts))
+    _raise_failure(out, shape)
+
+    x, sigma, P, innovation, innovation_covariance, nis, log_likelihood = (
+        a.reshape(shape + a.shape[1:]) for a in out[:-1]
+    )
+    last = FilterState(x[..., -1, :], P[..., -1, :, :], log_likelihood)
+    return Estimates(x, sigma, P, innovation, innovation_covariance, nis, log_likelihood, last)
+
+
+def _histories(shape: tuple[int, ...], system: LinearSystem, history: History, innovations: int) -> Histories:
+    count, n, m, epochs = int(np.prod(shape, dtype=int)), system.states, system.rows, system.epochs
+    of_x = 1 if history == "last" else epochs
+    of_P = epochs if history == "full" else 1
+    return Histories(
+        x=np.empty((count, of_x, n)),
+        sigma=np.empty((count, of_x, n)),
+        P=np.empty((count, of_P, n, n)),
+        innovation=np.empty((count, innovations, m)),
+        innovation_covariance=np.empty((count, innovations, m, m)),
+        nis=np.zeros((count, innovations)),
+        log_likelihood=np.zeros(count),
+        failure=np.zeros((count, 2), dtype=np.int64),
+    )
+
+
+def _part(runs: Runs, start: int, stop: int) -> Runs:
+    return Runs(*(a[start:stop] if len(a) > 1 else a for a in runs))
+
+
+def _share(out: Histories, start: int, stop: int) -> Histories:
+    return out._make(a[start:stop] for a in out)
+
+
+def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
+    failed = np.flatnonzero(out.failure[:, 0])
+    if len(failed) == 0:
+        return
+    reason, epoch = out.failure[failed[0]]
+    run = f" of run {', '.join(str(i) for i in np.unravel_index(failed[0], shape))}" if shape else ""
+    if reason == NO_INNOVATION_VARIANCE:
+        raise DataError(
+            f"the filter broke down at epoch {epoch}{run}: the variance of an innovation is not positive and finite; "
+            "R is zero where the state is already known, S does not fit Q and R, or Phi has made P overflow"
+        )
+    raise DataError(
+        f"the filter broke down at epoch {epoch}{run}: rounding made the covariance P indefinite; use Joseph's form "
+        "(joseph=True), scale the states, or add process noise"
+    )

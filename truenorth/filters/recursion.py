@@ -1,0 +1,229 @@
+"""The steps that linear filters share: loading an epoch, predicting, updating by one row, keeping a history."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.compiled import compiled
+from truenorth.filters.system import Runs
+from truenorth.linalg import (
+    Array,
+    Size,
+    dot,
+    load,
+    load_transposed,
+    propagate_covariance,
+    take_off,
+    take_off_pair,
+    transposed_times,
+)
+
+LOG_2PI = float(np.log(2.0 * np.pi))
+SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE = 0, 1, 2
+
+
+class Workspace(NamedTuple):
+    """One epoch of one run, padded: matrices (N, N), vectors (N,); rows of `H`, `S_t` and `CH` are (m, N)."""
+
+    x: Array
+    P: Array
+    Phi: Array
+    Phi_t: Array
+    Q: Array
+    u: Array
+    H: Array
+    R: Array
+    S_t: Array  # covariance of each row's noise with the state
+    z: Array
+    v: Array  # estimate of each row's noise, from the rows before it
+    g: Array
+    a: Array
+    k: Array
+    t: Array
+    temporary: Array
+
+
+class Histories(NamedTuple):
+    """What is kept of each run; a time axis of length 0 keeps nothing."""
+
+    x: Array
+    sigma: Array
+    P: Array
+    innovation: Array
+    innovation_covariance: Array
+    nis: Array
+    log_likelihood: Array
+    failure: NDArray[np.int64]  # (runs, 2): reason and epoch
+
+
+@compiled
+def workspace(size: Size, rows: int) -> Workspace:
+    """Zeros throughout: padding stays zero for good."""
+    N = len(size)
+    return Workspace(
+        np.zeros(N),
+        np.zeros((N, N)),
+        np.zeros((N, N)),
+        np.zeros((N, N)),
+        np.zeros((N, N)),
+        np.zeros(N),
+        np.zeros((rows, N)),
+        np.zeros((rows, rows)),
+        np.zeros((rows, N)),
+        np.zeros(rows),
+        np.zeros(rows),
+        np.zeros(rows),
+        np.zeros(N),
+        np.zeros(N),
+        np.zeros(N),
+        np.zeros((N, N)),
+    )
+
+
+@compiled(forceinline=True)
+def begin(size: Size, system: Runs, run: int, w: Workspace) -> None:
+    """Load the state before epoch 0."""
+    b = run if system.x0.shape[0] > 1 else 0
+    c = run if system.P0.shape[0] > 1 else 0
+    for i in range(system.x0.shape[1]):
+        w.x[i] = system.x0[b, i]
+    load(size, system.P0[c], w.P)
+
+
+@compiled(forceinline=True)
+def load_process(size: Size, system: Runs, run: int, epoch: int, w: Workspace) -> None:
+    """Load ``Phi, Q, u`` of an epoch; what is constant in time was loaded at epoch 0."""
+    if epoch == 0 or system.Phi.shape[1] > 1:
+        b = run if system.Phi.shape[0] > 1 else 0
+        load(size, system.Phi[b, epoch], w.Phi)
+        load_transposed(size, system.Phi[b, epoch], w.Phi_t)
+    if epoch == 0 or system.Q.shape[1] > 1:
+        b = run if system.Q.shape[0] > 1 else 0
+        load(size, system.Q[b, epoch], w.Q)
+    if epoch == 0 or system.u.shape[1] > 1:
+        b = run if system.u.shape[0] > 1 else 0
+        for i in range(system.u.shape[2]):
+            w.u[i] = system.u[b, epoch, i]
+
+
+@compiled(forceinline=True)
+def load_measurement(size: Size, system: Runs, run: int, epoch: int, w: Workspace) -> tuple[int, bool]:
+    """Load ``z, H, R, S`` of an epoch.
+
+    Returns
+    -------
+    present : int
+        Rows that are there.
+    correlated : bool
+        Whether the noise of a row is correlated with that of another, or with the process noise.
+    """
+    b = run if system.z.shape[0] > 1 else 0
+    k = epoch if system.z.shape[1] > 1 else 0
+    rows = system.z.shape[2]
+    present = 0
+    for i in range(rows):
+        w.z[i] = system.z[b, k, i]
+        present += not np.isnan(w.z[i])
+    if epoch == 0 or system.H.shape[1] > 1:
+        b = run if system.H.shape[0] > 1 else 0
+        load(size, system.H[b, epoch], w.H)
+    b = run if system.R.shape[0] > 1 else 0
+    k = epoch if system.R.shape[1] > 1 else 0
+    correlated = False
+    for i in range(rows):
+        w.v[i] = 0.0
+        for j in range(rows):
+            w.R[i, j] = system.R[b, k, i, j]
+            correlated |= i != j and w.R[i, j] != 0.0
+    b = run if system.S.shape[0] > 1 else 0
+    k = epoch if system.S.shape[1] > 1 else 0
+    for i in range(system.S.shape[2]):
+        for j in range(rows):
+            w.S_t[j, i] = system.S[b, k, i, j]
+            correlated |= w.S_t[j, i] != 0.0
+    return present, correlated
+
+
+@compiled(forceinline=True)
+def predict(size: Size, w: Workspace) -> None:
+    """``x = Phi x + u``, ``P = Phi P Phi' + Q``."""
+    transposed_times(size, w.Phi_t, w.x, w.a)
+    for i in range(len(size)):
+        w.x[i] = w.a[i] + w.u[i]
+    propagate_covariance(size, w.Phi, w.Phi_t, w.Q, w.P, w.temporary)
+
+
+@compiled(forceinline=True)
+def innovate(size: Size, w: Workspace, innovation: Array, covariance: Array) -> None:
+    """``nu = z - H x`` and ``H P H' + H S + S' H' + R`` of the predicted state."""
+    for i in range(w.z.shape[0]):
+        innovation[i] = w.z[i] - dot(size, w.H[i], w.x)
+        transposed_times(size, w.P, w.H[i], w.a)
+        for j in range(i + 1):
+            covariance[i, j] = (
+                dot(size, w.a, w.H[j]) + dot(size, w.H[i], w.S_t[j]) + dot(size, w.S_t[i], w.H[j]) + w.R[i, j]
+            )
+            covariance[j, i] = covariance[i, j]
+
+
+@compiled(forceinline=True)
+def row_variance(size: Size, w: Workspace, row: int, correlated: bool) -> tuple[float, float, float]:
+    """Innovation of one row, its variance, and ``h' s``; leaves its covariance with x, ``a = P h + s``, in ``w.a``."""
+    transposed_times(size, w.P, w.H[row], w.a)
+    h_s = 0.0
+    if correlated:
+        h_s = dot(size, w.H[row], w.S_t[row])
+        for i in range(len(size)):
+            w.a[i] += w.S_t[row, i]
+    variance = dot(size, w.H[row], w.a) + h_s + w.R[row, row]
+    return w.z[row] - dot(size, w.H[row], w.x) - w.v[row], variance, h_s
+
+
+@compiled(forceinline=True)
+def update_by_row(
+    size: Size, w: Workspace, row: int, nu: float, variance: float, h_s: float, correlated: bool, joseph: bool
+) -> None:
+    """Condition state and the noise of later rows on one row: exact for any ``R`` and ``S``, row by row.
+
+    ``k = a / variance``; ``x += k nu``; ``P -= k a'``, and for Joseph's form ``(I - k h') P (I - k h')' + ...`` the
+    same factor once more from the right: ``t = P h + s - k (h' s + r)``, zero but for rounding, ``P -= t k'``.
+    """
+    for i in range(len(size)):
+        w.k[i] = w.a[i] / variance
+        w.x[i] += w.k[i] * nu
+    take_off(size, w.P, w.a, 1.0 / variance)
+    if joseph:
+        transposed_times(size, w.P, w.H[row], w.t)
+        noise = h_s + w.R[row, row]
+        for i in range(len(size)):
+            w.t[i] += w.S_t[row, i] - w.k[i] * noise
+        take_off_pair(size, w.P, w.t, w.k)
+    if correlated:
+        rows = w.z.shape[0]
+        for i in range(row + 1, rows):
+            w.g[i] = dot(size, w.H[row], w.S_t[i]) + w.R[row, i]
+        for i in range(row + 1, rows):
+            w.v[i] += w.g[i] / variance * nu
+            for j in range(len(size)):
+                w.S_t[i, j] -= w.k[j] * w.g[i]
+            for j in range(row + 1, rows):
+                w.R[i, j] -= w.g[i] * w.g[j] / variance
+
+
+@compiled(forceinline=True)
+def keep(out: Histories, run: int, epoch: int, last: int, w: Workspace) -> None:
+    """Keep state, sigma and covariance of an epoch in those histories that have room; the last epoch in all."""
+    n = out.x.shape[2]
+    if out.x.shape[1] > epoch or epoch == last:
+        k = epoch if out.x.shape[1] > 1 else 0
+        for i in range(n):
+            out.x[run, k, i] = w.x[i]
+            out.sigma[run, k, i] = np.sqrt(w.P[i, i])
+    if out.P.shape[1] > epoch or epoch == last:
+        k = epoch if out.P.shape[1] > 1 else 0
+        for i in range(n):
+            for j in range(n):
+                out.P[run, k, i, j] = w.P[i, j]

@@ -1,0 +1,109 @@
+"""Matrix work of the recursions: small symmetric and square matrices, padded, without BLAS and without allocation.
+
+A matrix of n rows lives in the corner of an N x N array with N the next multiple of 8 and zeros beyond n. Each
+function takes `size`, a tuple of N nothings, first: its length is part of its *type*, so that Numba compiles every
+function once for each N with loops of constant length, and one source serves all. With the innermost loop of constant
+length summing into a scalar, LLVM unrolls it and turns the loop around it into vector instructions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.compiled import compiled
+
+Array = NDArray[np.float64]
+Size = tuple[Any, ...]
+
+MULTIPLE = 8
+
+
+def padded(n: int) -> Size:
+    """Give the `size` of matrices with `n` rows: a tuple as long as the next multiple of 8."""
+    return (None,) * (MULTIPLE * -(-n // MULTIPLE))
+
+
+@compiled(forceinline=True)
+def load(size: Size, source: Array, M: Array) -> None:
+    """``M = source``, with `source` (rows, n) in the corner of `M` (at least as many rows, N); the rest stays."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            M[i, j] = source[i, j]
+
+
+@compiled(forceinline=True)
+def load_transposed(size: Size, source: Array, M: Array) -> None:
+    """``M = source'``; as :func:`load`."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            M[j, i] = source[i, j]
+
+
+@compiled(forceinline=True)
+def dot(size: Size, a: Array, b: Array) -> float:
+    """``a' b``."""
+    total = 0.0
+    for k in range(len(size)):
+        total += a[k] * b[k]
+    return total
+
+
+@compiled(forceinline=True)
+def transposed_times(size: Size, A: Array, x: Array, y: Array) -> None:
+    """``y = A' x``: for a symmetric `A` the product itself; the transpose runs along rows."""
+    for j in range(len(size)):
+        total = 0.0
+        for k in range(len(size)):
+            total += A[k, j] * x[k]
+        y[j] = total
+
+
+@compiled(forceinline=True)
+def multiply(size: Size, A: Array, B: Array, C: Array) -> None:
+    """``C = A B``; `C` is neither `A` nor `B`."""
+    for i in range(len(size)):
+        for j in range(len(size)):
+            total = 0.0
+            for k in range(len(size)):
+                total += A[i, k] * B[k, j]
+            C[i, j] = total
+
+
+@compiled(forceinline=True)
+def propagate_covariance(size: Size, Phi: Array, Phi_t: Array, Q: Array, P: Array, work: Array) -> None:
+    """``P = Phi P Phi' + Q``, symmetric to the bit; `Phi_t` is the transpose of `Phi`."""
+    multiply(size, Phi, P, work)
+    for i in range(len(size)):
+        for j in range(len(size)):
+            total = 0.0
+            for k in range(len(size)):
+                total += work[i, k] * Phi_t[k, j]
+            P[i, j] = total + Q[i, j]
+    mirror(size, P)
+
+
+@compiled(forceinline=True)
+def mirror(size: Size, P: Array) -> None:
+    """Make `P` symmetric: the upper triangle becomes the lower one."""
+    for i in range(len(size)):
+        for j in range(i):
+            P[j, i] = P[i, j]
+
+
+@compiled(forceinline=True)
+def take_off(size: Size, P: Array, a: Array, scale: float) -> None:
+    """``P = P - scale a a'``, symmetric to the bit."""
+    for i in range(len(size)):
+        for j in range(len(size)):
+            P[i, j] -= scale * (a[i] * a[j])
+
+
+@compiled(forceinline=True)
+def take_off_pair(size: Size, P: Array, a: Array, b: Array) -> None:
+    """``P = P - (a b' + b a') / 2``, symmetric to the bit."""
+    for i in range(len(size)):
+        for j in range(len(size)):
+            P[i, j] -= 0.5 * (a[i] * b[j] + b[i] * a[j])
