@@ -82,6 +82,7 @@ class StaticModel:
         C_mean = C_n0_i @ integrals.C_mean  # (1/T) int C_n0_b
         C_late = C_n0_i @ integrals.C_late  # (1/T^2) int s C_n0_b
         f = skew(integrals.mean_force @ C_n0_i.T)
+        f_late = skew((integrals.velocity[1:] - integrals.mean_velocity) @ C_n0_i.T)  # (1/T) int s f ds, exact
         ff = f @ np.swapaxes(f, 1, 2)
         eye = np.eye(3)
         q_g, q_a = self.gyro_random_walk**2, self.accel_random_walk**2
@@ -91,7 +92,7 @@ class StaticModel:
         Phi[:] = np.eye(STATES)
         Phi[:, PHI, BG] = -T * C_mean
         Phi[:, DV, PHI] = T * f
-        Phi[:, DV, BG] = -(T**2) * (f @ (C_mean - C_late))
+        Phi[:, DV, BG] = -2 * T * (f_late @ (C_mean - C_late))
         Phi[:, DV, BA] = T * C_mean
 
         # White gyro noise reaches phi at once and dv as a ramp; over an interval f is taken as constant.
@@ -104,10 +105,10 @@ class StaticModel:
         Q[:, BA, BA] = self.accel_rate_walk**2 * T * eye
 
         # Mean velocity error, told by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla),
-        # phi(t) = phi_k + int_t^k C eps.
+        # phi(t) = phi_k + int_t^k C eps; averaged, the force counts with its elapsed part s/T of the interval.
         H = np.zeros((count, 3, STATES))
         H[:, :, DV] = eye
-        H[:, :, PHI] = -T / 2 * f
+        H[:, :, PHI] = -f_late
         H[:, :, BG] = -(T**2) / 6 * (f @ C_mean)
         H[:, :, BA] = -T * C_late
         # Noise inside the interval acts on its mean with the weight (T-s)/T (accelerometers) and (T-s)^2/(2T)
