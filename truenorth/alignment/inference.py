@@ -28,7 +28,6 @@ ONE_SIGMA = math.erf(1.0 / math.sqrt(2.0))  # .6827
 WORST_GYRO = np.radians(10.0)  # rad/s: end of the search for a bias scale
 WORST_ACCEL = 10.0  # m/s^2
 ALLAN_RATE = 10.0  # Hz: random walks show far below this; the log is averaged down to it first
-CORRELATION_TIME = 300.0  # s: of bias instability, where a specification names none
 SHORTEST_ALLAN = 10  # averaging times a window must hold for its Allan deviation to mean something
 
 
@@ -153,7 +152,7 @@ def walks(spec: ImuSpec) -> tuple[float, float, float, float]:
     A Gauss-Markov bias of size B and correlation time tau spreads as a random walk of ``B sqrt(2/tau)`` over times
     shorter than tau.
     """
-    spread = math.sqrt(2.0 / CORRELATION_TIME)
+    spread = math.sqrt(2.0 / spec.correlation_time)
     return (
         spec.gyro_random_walk,
         spec.accel_random_walk,
