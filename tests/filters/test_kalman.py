@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -118,22 +119,27 @@ def test_histories_are_opt_in():
 
 
 def test_joseph_survives_what_the_plain_form_does_not():
-    # Two almost parallel precise measurements of an almost unknown state: the plain form is left with rounding
-    # of the prior (1e16 * 1e-16); the truth is the information form, exact here to 1e-6.
-    H = np.array([[[1.0, 0.0], [1.0, 1e-3]]])
+    # Two almost parallel precise measurements of an unknown state, P0 / R = 1e16: the plain form is left with the
+    # rounding of the prior. The truth is the information form in rational numbers.
+    prior, r, slope = 1e12, 1e-4, 1e-3
     system = LinearSystem(
         Phi=np.eye(2)[None],
         Q=np.zeros((1, 2, 2)),
-        H=H,
-        R=1e-2 * np.eye(2)[None],
+        H=np.array([[[1.0, 0.0], [1.0, slope]]]),
+        R=r * np.eye(2)[None],
         z=np.ones((1, 2)),
         x0=np.zeros(2),
-        P0=1e10 * np.eye(2),
+        P0=prior * np.eye(2),
     )
-    exact = np.linalg.inv(H[0].T @ H[0] / 1e-2 + 1e-10 * np.eye(2))
-    joseph = kalman(system).state.P
-    assert_allclose(joseph, exact, rtol=1e-3)
-    assert np.linalg.eigvalsh(joseph).min() > 0.0
+    a, b, c = (
+        2 / Fraction(r) + 1 / Fraction(prior),
+        Fraction(slope) / Fraction(r),
+        Fraction(slope) ** 2 / Fraction(r) + 1 / Fraction(prior),
+    )
+    exact = np.array([[c, -b], [-b, a]]) / (a * c - b * b)
+    assert_allclose(kalman(system).state.P, exact.astype(float), rtol=1e-12)
+    with pytest.raises(DataError, match="epoch 0: the covariance P is lost in rounding"):
+        kalman(system, joseph=False)
 
 
 def test_a_second_process_compiles_nothing():

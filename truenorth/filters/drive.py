@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import pairwise
-from typing import Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs,
 from truenorth.linalg import Size, padded
 
 History = Literal["last", "sigma", "full"]
+T = TypeVar("T", bound=tuple[Any, ...])
 Kernel = Callable[[Size, Runs, int, Histories], None]
 
 
@@ -43,8 +43,6 @@ def drive(
     """
     if history not in get_args(History):
         raise UsageError(f'history is {history!r}, expected "last", "sigma" or "full"')
-    if workers < 1:
-        raise UsageError(f"workers is {workers}, expected at least 1")
     if state is not None:
         system = replace(system, x0=state.x, P0=state.P)
     shape, epochs = system.runs, system.epochs
@@ -54,14 +52,10 @@ def drive(
     if state is not None:
         out.log_likelihood[:] = np.broadcast_to(state.log_likelihood, shape).ravel()
 
-    size, count = padded(system.states), len(out.x)
-    if workers == 1 or count == 1:
-        kernel(size, runs, epochs, out)
-    else:
-        edges = np.linspace(0, count, min(workers, count) + 1).astype(int)
-        parts = list(pairwise(edges))
-        with ThreadPoolExecutor(len(parts)) as pool:
-            list(pool.map(lambda part: kernel(size, _part(runs, *part), epochs, _share(out, *part)), parts))
+    size = padded(system.states)
+    in_parts(
+        len(out.x), workers, lambda start, stop: kernel(size, part(runs, start, stop), epochs, part(out, start, stop))
+    )
     _raise_failure(out, shape)
 
     x, sigma, P, innovation, innovation_covariance, nis, log_likelihood = (
@@ -87,12 +81,21 @@ def _histories(shape: tuple[int, ...], system: LinearSystem, history: History, i
     )
 
 
-def _part(runs: Runs, start: int, stop: int) -> Runs:
-    return Runs(*(a[start:stop] if len(a) > 1 else a for a in runs))
+def in_parts(count: int, workers: int, call: Callable[[int, int], None]) -> None:
+    """Call ``call(start, stop)`` over all `count` runs, shared among threads; the kernels hold no lock."""
+    if workers < 1:
+        raise UsageError(f"workers is {workers}, expected at least 1")
+    if workers == 1 or count == 1:
+        call(0, count)
+        return
+    edges = np.linspace(0, count, min(workers, count) + 1).astype(int)
+    with ThreadPoolExecutor(len(edges) - 1) as pool:
+        list(pool.map(call, edges[:-1], edges[1:]))
 
 
-def _share(out: Histories, start: int, stop: int) -> Histories:
-    return out._make(a[start:stop] for a in out)
+def part(arrays: T, start: int, stop: int) -> T:
+    """Runs ``start <= run < stop`` of a named tuple of arrays; what all runs share stays whole."""
+    return type(arrays)(*(a[start:stop] if len(a) > 1 else a for a in arrays))
 
 
 def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
@@ -107,6 +110,6 @@ def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
             "R is zero where the state is already known, S does not fit Q and R, or Phi has made P overflow"
         )
     raise DataError(
-        f"the filter broke down at epoch {epoch}{run}: rounding made the covariance P indefinite; use Joseph's form "
-        "(joseph=True), scale the states, or add process noise"
+        f"the filter broke down at epoch {epoch}{run}: the covariance P is lost in rounding; use Joseph's form "
+        "(joseph=True) or the UD filter, a smaller P0, or more process noise"
     )

@@ -43,6 +43,7 @@ class Workspace(NamedTuple):
     a: Array
     k: Array
     t: Array
+    largest: Array  # variance of each state so far
     temporary: Array
 
 
@@ -79,6 +80,7 @@ def workspace(size: Size, rows: int) -> Workspace:
         np.zeros(N),
         np.zeros(N),
         np.zeros(N),
+        np.zeros(N),
         np.zeros((N, N)),
     )
 
@@ -91,6 +93,8 @@ def begin(size: Size, system: Runs, run: int, w: Workspace) -> None:
     for i in range(system.x0.shape[1]):
         w.x[i] = system.x0[b, i]
     load(size, system.P0[c], w.P)
+    for i in range(len(size)):
+        w.largest[i] = w.P[i, i]
 
 
 @compiled(forceinline=True)

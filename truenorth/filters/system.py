@@ -267,8 +267,9 @@ def _where(name: str, index: tuple[int, ...]) -> str:
 
 def _check_finite(name: str, a: Array) -> None:
     # A finite sum has finite terms: one pass, no temporary; only where it fails is the culprit looked for.
-    if name != "z" and np.isfinite(a.sum()):
-        return
+    with np.errstate(over="ignore", invalid="ignore"):
+        if name != "z" and np.isfinite(a.sum()):
+            return
     bad = np.isinf(a) if name == "z" else ~np.isfinite(a)
     if bad.any():
         index = tuple(int(i) for i in np.argwhere(bad)[0])
