@@ -194,6 +194,16 @@ def _normalised(q: Any) -> Any:
 
 
 @compiled(inline="always")
+def _turned_force(theta: Any, dv: Any) -> Any:
+    """What the body's turn within an interval adds to ``dv``: ``(1/2 - t^2/24) t x dv + (1/6 - t^2/120) t x (t x dv)``."""
+    square = theta[0] * theta[0] + theta[1] * theta[1] + theta[2] * theta[2]
+    once = _cross(theta, dv)
+    twice = _cross(theta, once)
+    c1, c2 = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    return c1 * once[0] + c2 * twice[0], c1 * once[1] + c2 * twice[1], c1 * once[2] + c2 * twice[2]
+
+
+@compiled(inline="always")
 def _motion(rows: Any, start: int, samples: int, k: Any, k_before: float, th0: Any, dv0: Any) -> Any:
     """Rotation vector and velocity increment (in the body at the beginning) of one update of N samples."""
     last = start + samples - 1
@@ -215,12 +225,12 @@ def _motion(rows: Any, start: int, samples: int, k: Any, k_before: float, th0: A
         B = (B[0] + y[0], B[1] + y[1], B[2] + y[2])
         T += rows[r, 0]
     coning = _cross(ka, a)
-    scull_1, scull_2, turn = _cross(ka, b), _cross(kb, a), _cross(A, B)
+    scull_1, scull_2, turn = _cross(ka, b), _cross(kb, a), _turned_force(A, B)
     phi = (A[0] + coning[0], A[1] + coning[1], A[2] + coning[2])
     dv = (
-        B[0] + 0.5 * turn[0] + scull_1[0] + scull_2[0],
-        B[1] + 0.5 * turn[1] + scull_1[1] + scull_2[1],
-        B[2] + 0.5 * turn[2] + scull_1[2] + scull_2[2],
+        B[0] + turn[0] + scull_1[0] + scull_2[0],
+        B[1] + turn[1] + scull_1[1] + scull_2[1],
+        B[2] + turn[2] + scull_1[2] + scull_2[2],
     )
     return T, phi, dv, a, b
 
@@ -366,14 +376,14 @@ def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, q_out: 
         a = (dtheta[k, 0], dtheta[k, 1], dtheta[k, 2])
         b = (dvel[k, 0], dvel[k, 1], dvel[k, 2])
         T = steps[k]
-        coning, turn = _cross(th0, a), _cross(a, b)
+        coning, turn = _cross(th0, a), _turned_force(a, b)
         s1, s2 = _cross(th0, b), _cross(dv0, a)
         f = _rotate(
             q,
             (
-                b[0] + 0.5 * turn[0] + c * (s1[0] + s2[0]),
-                b[1] + 0.5 * turn[1] + c * (s1[1] + s2[1]),
-                b[2] + 0.5 * turn[2] + c * (s1[2] + s2[2]),
+                b[0] + turn[0] + c * (s1[0] + s2[0]),
+                b[1] + turn[1] + c * (s1[1] + s2[1]),
+                b[2] + turn[2] + c * (s1[2] + s2[2]),
             ),
         )
         px += (vx + 0.5 * f[0]) * T

@@ -27,7 +27,7 @@ from truenorth.errors import AlignmentError, DataError, UsageError
 from truenorth.inertial import earth_rotation, integrate
 from truenorth.models.static import StaticModel
 from truenorth.position import Position
-from truenorth.quality import MotionSummary, motion_summary
+from truenorth.quality.regimes import MotionSummary, motion_summary
 from truenorth.records import ImuRecord
 from truenorth.specs import ImuSpec, imu_spec
 
@@ -166,7 +166,7 @@ def align(
     else:
         answer, check, settled, drift = _align_inertial(task, spec, chosen)
     answer = replace(answer, method=chosen, method_reason=why)
-    status, reasons = judge(answer, Circumstances(heading_limit, check, motion.moves_from, settled, drift))
+    status, reasons = judge(answer, Circumstances(heading_limit, check, _moves_from(motion), settled, drift))
     return answer.with_verdict(status, reasons)
 
 
@@ -183,7 +183,7 @@ def _choose(method: Method, record: ImuRecord, motion: MotionSummary) -> tuple[s
         "swaying": "the base sways: mean rates mean nothing, the inertial frame follows every motion",
     }
     return "kalman", words.get(
-        motion.regime, f"the base is {motion.regime}: only the inertial frame follows it"
+        motion.overall, f"the base is {motion.overall}: only the inertial frame follows it"
     )
 
 
@@ -324,7 +324,7 @@ def _check_filter(task: _Task, C_n0_i: Array) -> LogCheck:
 
 def _is_blind(motion: MotionSummary, check: LogCheck) -> bool:
     """Whether the mean rate of a base that does not turn is so far from the earth's that it holds no heading."""
-    if motion.regime not in ("still", "disturbed"):
+    if motion.overall not in ("still", "disturbed"):
         return False
     noise = 5.0 * float(np.max(check.rate_noise))
     return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)
@@ -346,10 +346,15 @@ def _last_part(task: _Task) -> _Task:
     )
 
 
+def _moves_from(motion: MotionSummary) -> float | None:
+    """When the base first goes somewhere, s on the record's clock; None if it stays."""
+    return next((float(stretch.start) for stretch in motion.regimes if stretch.kind == "moving"), None)
+
+
 def _specification(task: _Task, spec: ImuSpec | None, check: LogCheck) -> tuple[ImuSpec, str]:
     if spec is not None:
         return spec, f"specification {spec.name!r}"
-    return infer_spec(task.record, check, task.motion.regime == "still"), "inferred from the log"
+    return infer_spec(task.record, check, task.motion.overall == "still"), "inferred from the log"
 
 
 def _at_epoch(
