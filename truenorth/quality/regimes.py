@@ -48,9 +48,7 @@ TURN_SHARE = 0.4  # of the RMS rate that is net rotation; a sway of 15 s period 
 MOVING_ACCELERATION = 0.08  # m/s^2 over one second; tilt error, bias and people in the car stay below 0.05
 SWAY_ACCELERATION = 0.2  # m/s^2 over WINDOW: a rocking base with less gains no speed
 MOVING_PAUSE = 60  # s between two accelerations, without rest, that counts as moving too (cruising)
-TURNED_BIAS = (
-    0.5  # m/s^2 for a radian: level error and bias of a cheap sensor that a turn shows as acceleration
-)
+TURNED_BIAS = 0.5  # m/s^2 for a radian: level error and bias of a cheap sensor that a turn shows as acceleration
 SHORTEST_SWAY = 30  # s; accelerations during a shorter rocking are not put down to it
 SHORTEST_RECORD = 3.0  # s
 OVERALL_SHARE = 0.05  # of the seconds, from which a kind of motion names the record
@@ -212,15 +210,12 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
         rate,
         active=_in_every_window(active, seconds),
         sways=around * np.sqrt(2.0) > SWAY_ANGLE,
-        accelerates=motion
-        > np.hypot(MOVING_ACCELERATION, 3.0 * np.linalg.norm(force_noise)) + TURNED_BIAS * turned,
+        accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * np.linalg.norm(force_noise)) + TURNED_BIAS * turned,
         gains_speed=gain > SWAY_ACCELERATION,
         rate_noise=float(np.linalg.norm(angle_noise)),
     )
     time = record.time[0] - record.interval + per_second * interval * np.arange(1, seconds + 1)
-    return MotionSummary(
-        time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record)
-    )
+    return MotionSummary(time, kind, rate.T, force.T, motion, around, bias, angle_noise, _stretches(time, kind, record))
 
 
 def _unknown(record: ImuRecord) -> MotionSummary:
@@ -270,9 +265,7 @@ def _in_every_window(active: NDArray[np.bool_], seconds: int) -> NDArray[np.bool
     return np.asarray(sliding_window_view(padded, length).all(axis=1))
 
 
-def _closed(
-    flags: NDArray[np.bool_], pause: int, unless: NDArray[np.bool_] | None = None
-) -> NDArray[np.bool_]:
+def _closed(flags: NDArray[np.bool_], pause: int, unless: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
     """Fill the holes of up to `pause` seconds, except holes that `unless` touches."""
     filled = flags.copy()
     for first, last in _runs(~flags):

@@ -106,9 +106,7 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
         if not windows.any():
             continue
         chosen, still = mean[:, windows], wander[:, windows].max(axis=0)
-        drift = (
-            np.linalg.norm(chosen - np.median(chosen, axis=1, keepdims=True), axis=0) * WINDOW / np.sqrt(12.0)
-        )
+        drift = np.linalg.norm(chosen - np.median(chosen, axis=1, keepdims=True), axis=0) * WINDOW / np.sqrt(12.0)
         weight = 1.0 / (still**2 + drift**2 + STILL_ANGLE**2)
         bias: Array = chosen @ weight / weight.sum()
         if np.linalg.norm(bias) < limit:

@@ -1,0 +1,323 @@
+"""Likely mistakes of units and axes, told from gravity, the earth's rate, and their agreement with each other.
+
+A claim is made only where the data leave no other reading: gravity is 9.8 m/s^2 everywhere on earth, and its
+direction in body axes turns as ``du/dt = -w x u`` whatever the mounting, so turning data show the gyros' unit
+and axes; data at rest show the gyros' unit only if the gyros resolve the earth's rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.quality.regimes import MotionSummary
+from truenorth.quality.sampling import Finding
+from truenorth.quality.signals import even_rates
+from truenorth.records import ImuRecord
+
+Array = NDArray[np.float64]
+
+G = 9.80665  # m/s^2, standard gravity: units of g are defined by it
+EARTH_RATE = 7.292115e-5  # rad/s, WGS-84
+DEG = np.pi / 180.0
+LEVEL_TOLERANCE = 0.12  # of g: local gravity, biases of cheap sensors, motion
+UP_LIMIT = np.radians(60.0)  # tilt of z from up beyond which the axes are doubtful
+TURN_STEP = 0.5  # s, over which the turn of gravity is compared with the gyros
+LEAST_TURN = np.radians(2.0)  # rad, RMS of gravity's turn over 2 s, for a judgement on the gyros
+AGREES = 0.8  # share of gravity's turn that the gyros must explain for a claim
+DISAGREES = 0.4  # share below which another reading contradicts
+EQUAL = 0.02  # readings whose shares differ by less are equals
+RATE_RESOLVED = 0.05  # relative sigma of the mean rate, to compare it with the earth's
+RATE_SHARP = 0.01  # the same, to tell a unit by it
+# A cheap gyro's bias imitates any rate: a unit is told only where, converted, the noise is a gyrocompass's.
+GYROCOMPASS_NOISE = 0.03 * np.pi / 180.0 / 60.0  # rad/sqrt(s), norm of three axes: 0.03 deg/sqrt(h)
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Turning:
+    """How the gyros explain the turning of gravity in body axes.
+
+    Parameters
+    ----------
+    scale : float
+        Measured rate over the rate that gravity's direction shows, axes as given; NaN where nothing turned.
+    agreement : float
+        Share of gravity's turning explained with the axes as given and that scale, at most 1.
+    best_axes : str
+        Signed axes, such as ``+y +x -z``, of the reading that agrees best: what the gyro columns x, y, z hold.
+    best_agreement : float
+        Its agreement.
+    """
+
+    scale: float
+    agreement: float
+    best_axes: str
+    best_agreement: float
+
+
+def check_plausibility(
+    record: ImuRecord, motion: MotionSummary, lat: float | None = None
+) -> tuple[Turning, list[Finding]]:
+    """Look for mistakes of units and axes.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    motion : MotionSummary
+        Of the same record.
+    lat : float, rad, optional
+        Latitude; lets the earth's rate be checked by its vertical part too.
+
+    Returns
+    -------
+    turning : Turning
+    findings : list of Finding
+    """
+    findings: list[Finding] = []
+    unit_is_right = _force_level(record, findings)
+    if unit_is_right:
+        _up_axis(record, findings)
+    turning = _turning(record)
+    if not _gyro_against_gravity(turning, findings):
+        _gyro_against_earth(record, motion, lat, findings)
+    return turning, findings
+
+
+# ----------------------------------------------------------------------------------------- accelerometers
+
+
+def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
+    """Judge the accelerometers' unit by the size of the median specific force."""
+    dt = record.interval
+    size = np.linalg.norm(record.accel, axis=1)
+    level = float(np.median(size)) / (dt if record.kind == "increments" else 1.0)
+    if abs(level / G - 1.0) < LEVEL_TOLERANCE:
+        return True
+    readings = [
+        (1.0 / G, "in g", "--units with accel in g, or multiply by 9.80665"),
+        (1000.0 / G, "in mg", "--units with accel in mg, or multiply by 0.00980665"),
+        (100.0, "in cm/s^2", "divide by 100"),
+        (1e6 / G, "in ug", "--units with accel in ug, or multiply by 9.80665e-6"),
+        (G, "multiplied by 9.80665 twice", "remove one conversion"),
+    ]
+    if record.kind == "rates":
+        readings.append((dt, "velocity increments of one row, not rates", "read them as increments (dvel_x ..)"))
+        readings.append((dt / G, "velocity increments in g s", "read them as increments, multiplied by 9.80665"))
+    else:
+        readings.append((1.0 / dt, "specific force, not increments", "read them as rates (accel_x ..)"))
+        readings.append((1.0 / (dt * G), "specific force in g, not increments", "read them as rates in g"))
+    found = f"the accelerometers show {level:.4g} m/s^2 (median of the norm); expected about 9.8"
+    distance = np.abs([level / (G * factor) - 1.0 for factor, _, _ in readings])
+    likely = [readings[i] for i in np.argsort(distance) if distance[i] < LEVEL_TOLERANCE / 2.0]
+    if likely:
+        looks = "; or ".join(f"the values look {what}: {remedy}" for _, what, remedy in likely)
+        findings.append(Finding("error", "accel_unit", f"{found}; {looks}"))
+        return False
+    if level < 1e-3:
+        text = f"{found}: gravity is missing; a free-falling or gravity-compensated output cannot be used"
+        findings.append(Finding("error", "no_gravity", text))
+    else:
+        text = f"{found}: unit, range or scale factor are wrong, or the base accelerates throughout"
+        findings.append(Finding("warning", "accel_level", text))
+    return False
+
+
+def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
+    """Specific force at rest points up; with RFU axes that is +z."""
+    mean = np.median(record.accel, axis=0)
+    up = mean / np.linalg.norm(mean)
+    axis = int(np.argmax(np.abs(up)))
+    if up[2] > np.cos(UP_LIMIT):
+        return
+    share = f"the specific force points along ({up[0]:+.2f}, {up[1]:+.2f}, {up[2]:+.2f})"
+    if up[2] < -np.cos(UP_LIMIT):
+        findings.append(
+            Finding(
+                "error",
+                "axes_down",
+                f"{share}: z points down; expected up (x right, y forward, z up): if the axes are forward, right, "
+                "down use --axes FRD; if the log holds gravity instead of specific force, change the "
+                "accelerometers' sign; an IMU mounted upside down needs its own --axes",
+            )
+        )
+    elif abs(up[axis]) > np.cos(UP_LIMIT / 2.0):
+        name = ("+" if up[axis] > 0 else "-") + AXES[axis]
+        findings.append(
+            Finding(
+                "warning",
+                "axes_up",
+                f"{share}: {name} points up; expected +z (x right, y forward, z up): give the mounting with "
+                "--axes, unless the IMU really stands on its side",
+            )
+        )
+    else:
+        findings.append(
+            Finding(
+                "warning",
+                "axes_tilted",
+                f"{share}, {np.degrees(np.arccos(up[2])):.0f} deg from z; expected z up: give the mounting with "
+                "--axes, unless the IMU really is tilted so far",
+            )
+        )
+
+
+# -------------------------------------------------------------------------------- gyros against gravity
+
+
+def _turning(record: ImuRecord) -> Turning:
+    """Fit the gyros to the turn of gravity, ``du = -theta x u``, for all 48 signed axes.
+
+    Steps in which the specific force is not of its usual size are left out. The agreement of a reading is the
+    share of ``sum |du|^2`` that it explains with its best positive scale.
+    """
+    nothing = Turning(np.nan, np.nan, "", np.nan)
+    interval, rates = even_rates(record)
+    cells = max(1, round(TURN_STEP / interval))
+    count = rates.shape[1] // cells
+    if count < 20:
+        return nothing
+    means = rates[:, : count * cells].reshape(6, count, cells).mean(axis=2)
+    size = np.linalg.norm(means[3:], axis=0)
+    if not np.all(size > 0.0):
+        return nothing
+    up = means[3:] / size
+    usual = np.abs(size / np.median(size) - 1.0) < 0.05
+    good = usual[1:] & usual[:-1]
+    angle = 0.5 * (means[:3, 1:] + means[:3, :-1]) * cells * interval
+    angle = angle - np.median(angle, axis=1, keepdims=True)  # bias and earth rate; a sway keeps its swing
+    middle = 0.5 * (up[:, 1:] + up[:, :-1])
+    turn = np.where(good, up[:, 1:] - up[:, :-1], 0.0)
+    slow = _smoothed_turn(turn)
+    if np.sqrt(np.mean(np.sum(slow**2, axis=0))) < LEAST_TURN:
+        return nothing
+
+    total = float(np.sum(turn**2))
+    readings = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            theta = angle[list(order)] * np.array(signs)[:, None]
+            predicted = np.where(good, -np.cross(theta, middle, axis=0), 0.0)
+            power, overlap = float(np.sum(predicted**2)), float(np.sum(predicted * turn))
+            explained = max(0.0, overlap) ** 2 / (power * total) if power > 0.0 else 0.0
+            readings.append((explained, power / overlap if overlap > 0.0 else np.nan, order, signs))
+    identity = next(r for r in readings if r[2] == (0, 1, 2) and r[3] == (1.0, 1.0, 1.0))
+    most = max(r[0] for r in readings)
+    # A turn about one axis leaves others open: of equals, the reading nearest to the axes as given.
+    equals = [r for r in readings if r[0] > most - EQUAL]
+    best = max(equals, key=lambda r: sum(sign for i, sign in enumerate(r[3]) if r[2][i] == i))
+    return Turning(identity[1], identity[0], _columns(best[2], best[3]), best[0])
+
+
+def _smoothed_turn(turn: Array) -> Array:
+    """Turn over four steps: noise of single steps must not pass for turning."""
+    total = np.cumsum(np.pad(turn, ((0, 0), (1, 0))), axis=1)
+    return np.asarray(total[:, 4:] - total[:, :-4])
+
+
+def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:
+    """What the columns x, y, z hold when axis i is column ``order[i]`` times ``signs[i]``."""
+    names = [""] * 3
+    for axis, (column, sign) in enumerate(zip(order, signs)):
+        names[column] = ("+" if sign > 0 else "-") + AXES[axis]
+    return " ".join(names)
+
+
+def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
+    """Judge unit and axes of the gyros by the turning; True where that was possible."""
+    if not np.isfinite(turning.best_agreement) or turning.best_agreement < AGREES:
+        return False
+    if turning.agreement < DISAGREES:
+        findings.append(
+            Finding(
+                "error",
+                "gyro_axes",
+                f"the gyros explain {100 * turning.agreement:.0f} % of how gravity turns in the accelerometers, with "
+                f"the columns x y z read as {turning.best_axes} {100 * turning.best_agreement:.0f} %: gyro axes "
+                "look swapped or of the wrong sign against the accelerometers'; check --axes and the wiring",
+            )
+        )
+        return True
+    if turning.agreement < AGREES or abs(turning.scale - 1.0) < 0.1:
+        return turning.agreement >= AGREES
+    found = f"the gyros turn {turning.scale:.3g} times as far as gravity in the accelerometers; expected 1"
+    readings = [(1.0 / DEG, "in deg/s"), (3600.0 / DEG, "in deg/h"), (1000.0, "in mrad/s")]
+    for factor, unit in readings:
+        if abs(turning.scale / factor - 1.0) < 0.1:
+            text = f"{found}: the values look {unit}, not rad/s; use --units, or convert them"
+            findings.append(Finding("error", "gyro_unit", text))
+            return True
+    severity, code = ("error", "gyro_unit") if not 0.5 < turning.scale < 2.0 else ("warning", "gyro_scale")
+    text = f"{found}: unit (increments read as rates?) or scale factor of the gyros are wrong"
+    findings.append(Finding(severity, code, text))  # type: ignore[arg-type]
+    return True
+
+
+# ------------------------------------------------------------------------------ gyros against the earth
+
+
+def _gyro_against_earth(record: ImuRecord, motion: MotionSummary, lat: float | None, findings: list[Finding]) -> None:
+    """Judge the gyros' unit on a still base by the earth's rate, where they resolve it."""
+    rest = motion.longest("still", "disturbed")
+    if rest is None or rest.duration < 30.0:
+        return
+    # Bounded motion cancels in the mean: its sigma is the noise's plus the wander over the stretch.
+    inside = (motion.time > rest.start) & (motion.time <= rest.stop)
+    seconds = int(np.count_nonzero(inside))
+    mean = motion.rate[inside].mean(axis=0) + motion.rate_bias
+    size = float(np.linalg.norm(mean))
+    noise = float(np.linalg.norm(motion.angle_noise)) / np.sqrt(seconds)
+    sigma = np.hypot(noise, float(np.sqrt(np.mean(motion.wander[inside] ** 2))) * 4.0 / seconds)
+    if size == 0.0 or sigma > RATE_RESOLVED * size:
+        return
+    found = f"at rest the gyros show {size:.4g} rad/s, that is {size / EARTH_RATE:.4g} times the earth's rate"
+    dt = record.interval
+    readings = [(1.0 / DEG, "in deg/s, not rad/s"), (3600.0 / DEG, "in deg/h, not rad/s")]
+    if record.kind == "rates":
+        readings.append((dt, "angle increments of one row, not rates"))
+        readings.append((dt / DEG, "angle increments in deg"))
+    else:
+        readings.append((1.0 / dt, "rates, not increments"))
+        readings.append((1.0 / (dt * DEG), "rates in deg/s, not increments in rad"))
+    if abs(size / EARTH_RATE - 1.0) < 0.2:
+        _vertical_earth_rate(record, motion, mean, sigma, inside, lat, findings)
+        return
+    sharp = sigma < RATE_SHARP * size
+    for factor, what in readings:
+        quiet = np.linalg.norm(motion.angle_noise) < GYROCOMPASS_NOISE * factor
+        if sharp and quiet and abs(size / (EARTH_RATE * factor) - 1.0) < 0.03:
+            text = f"{found}: the values may be {what}; check --units (a bias of that size would look the same)"
+            findings.append(Finding("warning", "gyro_unit", text))
+            return
+
+
+def _vertical_earth_rate(
+    record: ImuRecord,
+    motion: MotionSummary,
+    mean: Array,
+    sigma: float,
+    inside: NDArray[np.bool_],
+    lat: float | None,
+    findings: list[Finding],
+) -> None:
+    """Compare the vertical part of the mean rate with ``w_ie sin(lat)``."""
+    up = motion.specific_force[inside].mean(axis=0)
+    vertical = float(mean @ up / np.linalg.norm(up))
+    horizontal = float(np.sqrt(max(0.0, float(mean @ mean) - vertical**2)))
+    apparent = float(np.degrees(np.arctan2(vertical, horizontal)))
+    uncertain = float(np.degrees(sigma / np.linalg.norm(mean)))
+    text = f"the gyros resolve the earth's rate; with gravity they show the latitude {apparent:.2f} deg"
+    if lat is None or abs(apparent - np.degrees(lat)) < max(5.0, 3.0 * uncertain):
+        findings.append(Finding("note", "earth_rate", text))
+        return
+    findings.append(
+        Finding(
+            "warning",
+            "latitude",
+            f"{text} (sigma {uncertain:.2g} deg without bias); expected {np.degrees(lat):.2f} deg: check the "
+            "latitude and its sign, the axes, and the gyro bias",
+        )
+    )

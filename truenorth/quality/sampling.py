@@ -1,0 +1,219 @@
+"""Faults of the log itself: clock jitter, gaps, repeated rows, frozen and saturated channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.records import COLUMNS, ImuRecord
+
+Array = NDArray[np.float64]
+Severity = Literal["error", "warning", "note"]
+
+JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
+REPEATED_SHARE = 0.002  # of the rows, beyond chance
+FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
+FROZEN_FACTOR = 3.0  # times the longest run that chance gives
+BLOCK = 1000  # rows over which the chance of a repeat is counted
+SATURATED_RUN = 3  # rows at the extreme, one after the other
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong, or worth knowing, about a record.
+
+    Parameters
+    ----------
+    severity : {"error", "warning", "note"}
+        An error makes results from the record wrong; a warning may.
+    code : str
+        Stable name of the kind of finding, such as ``gaps`` or ``accel_unit``.
+    message : str
+        What was found, what was expected, and what to do.
+    """
+
+    severity: Severity
+    code: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Clock and values of a record, as figures.
+
+    Parameters
+    ----------
+    jitter_rms, jitter_max : float, s
+        Deviation of the steps from the nominal interval, gaps left out.
+    gap_times, gap_lengths : (g,) arrays, s
+        Time after each gap and the length of the step that bridges it.
+    repeated_rows : int
+        Rows equal to the row before in all six channels.
+    longest_runs : (6,) array of int
+        Longest run of one value in each channel, rows.
+    saturated_rows : (6,) array of int
+        Rows at a clipped extreme of each channel; 0 where nothing is clipped.
+    """
+
+    jitter_rms: float
+    jitter_max: float
+    gap_times: Array
+    gap_lengths: Array
+    repeated_rows: int
+    longest_runs: NDArray[np.intp]
+    saturated_rows: NDArray[np.intp]
+
+
+def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
+    """Look for faults of clock, logging and range.
+
+    Returns
+    -------
+    sampling : Sampling
+    findings : list of Finding
+    """
+    findings: list[Finding] = []
+    jitter_rms, jitter_max = _clock(record, findings)
+    data = np.ascontiguousarray(np.hstack([record.gyro, record.accel]).T)
+    same = data[:, 1:] == data[:, :-1]
+    repeated = _repeated(record, same, findings)
+    runs = _frozen(record, data, same, findings)
+    saturated = _saturated(record, data, findings)
+    gaps = record.gaps
+    sampling = Sampling(jitter_rms, jitter_max, record.time[gaps], record.steps[gaps], repeated, runs, saturated)
+    return sampling, findings
+
+
+def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
+    regular = np.delete(record.steps, record.gaps) - record.interval
+    rms, largest = float(np.sqrt(np.mean(regular**2))), float(np.max(np.abs(regular)))
+    gaps = record.gaps
+    if gaps.size:
+        longest = gaps[np.argmax(record.steps[gaps])]
+        lost = float(np.sum(record.steps[gaps] - record.interval))
+        findings.append(
+            Finding(
+                "warning",
+                "gaps",
+                f"{gaps.size} gap(s), {lost:.3g} s lost in all, the longest of {record.steps[longest]:.3g} s before "
+                f"row {longest + 1} (t = {record.time[longest]:.3f} s); expected a row every "
+                f"{record.interval:.4g} s: use a stretch without gaps (--from, --to), or repair the log",
+            )
+        )
+    if rms > JITTER * record.interval:
+        findings.append(
+            Finding(
+                "warning",
+                "jitter",
+                f"the time steps scatter by {rms * 1e3:.3g} ms RMS ({largest * 1e3:.3g} ms at most) about "
+                f"{record.interval * 1e3:.4g} ms; expected a steady clock: if the sensor samples evenly and the "
+                "computer stamped the rows, give the sensor's rate instead (--rate)",
+            )
+        )
+    if record.interval >= 1.0 or record.interval < 2e-5:
+        guess = "milliseconds or ticks" if record.interval >= 1.0 else "another unit"
+        findings.append(
+            Finding(
+                "warning",
+                "time_unit",
+                f"a row every {record.interval:.4g} s; expected 1 to 10,000 rows a second: time is probably in "
+                f"{guess}; convert it to seconds or give --rate",
+            )
+        )
+    return rms, largest
+
+
+def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding]) -> int:
+    repeated = int(np.count_nonzero(same.all(axis=0)))
+    chance = float(np.prod(_chance_of_repeat(same))) * same.shape[1]
+    if repeated > 3 + 5.0 * chance + REPEATED_SHARE * same.shape[1]:
+        share = 100.0 * repeated / len(record)
+        findings.append(
+            Finding(
+                "warning" if share > 5.0 else "note",
+                "repeated_rows",
+                f"{repeated} rows ({share:.1f} %) repeat the row before in all six channels; expected new values in "
+                "each row: the log may be written faster than the sensor samples; log at the sensor's rate",
+            )
+        )
+    return repeated
+
+
+def _frozen(record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: list[Finding]) -> NDArray[np.intp]:
+    """Longest run of each channel; a finding where chance does not explain it."""
+    chance = np.minimum(_chance_of_repeat(same), 0.98)
+    by_chance = np.log(len(record)) / -np.log(np.maximum(chance, 1e-3))
+    runs = np.empty(6, dtype=np.intp)
+    for channel, name in enumerate(COLUMNS[record.kind]):
+        changes = np.concatenate([[0], np.flatnonzero(~same[channel]) + 1, [len(record)]])
+        lengths = np.diff(changes)
+        longest = int(np.argmax(lengths))
+        runs[channel] = lengths[longest]
+        first = int(changes[longest])
+        limit = max(10.0, FROZEN_TIME / record.interval, FROZEN_FACTOR * by_chance[channel])
+        if runs[channel] == len(record):
+            findings.append(
+                Finding(
+                    "error",
+                    "constant_channel",
+                    f"{name} is {data[channel, 0]:g} in all {len(record)} rows; expected a sensor's noise: the "
+                    "channel is dead or not connected",
+                )
+            )
+        elif runs[channel] > limit:
+            findings.append(
+                Finding(
+                    "warning",
+                    "frozen",
+                    f"{name} stays at {data[channel, first]:g} for {runs[channel]} rows from row {first + 1} "
+                    f"(t = {record.time[first]:.3f} s); expected at most about {limit:.0f} equal values: the sensor "
+                    "or the log was stuck; leave this stretch out",
+                )
+            )
+    return runs
+
+
+def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArray[np.intp]:
+    """Rows at an extreme that is piled up: clipping breaks the fall of the tail, a coarse quantum does not."""
+    rows = np.zeros(6, dtype=np.intp)
+    unit = ("rad/s", "m/s^2") if record.kind == "rates" else ("rad a row", "m/s a row")
+    for channel, name in enumerate(COLUMNS[record.kind]):
+        values = data[channel]
+        for sign in (1.0, -1.0):
+            signed = sign * values
+            top = float(signed.max())
+            at_top = signed == top
+            count = int(np.count_nonzero(at_top))
+            if count < 2 * SATURATED_RUN or count == values.size:
+                continue
+            below = signed[~at_top]
+            second = float(below.max())
+            inside = int(np.count_nonzero(below == second))
+            consecutive = np.convolve(at_top, np.ones(SATURATED_RUN), "valid").max() >= SATURATED_RUN
+            spread = top - float(np.median(signed))
+            if count > 2 * inside and consecutive and spread > 5.0 * (top - second):
+                rows[channel] += count
+                findings.append(
+                    Finding(
+                        "error",
+                        "saturated",
+                        f"{name} stands at its extreme {sign * top:.4g} {unit[channel // 3]} in {count} rows (the "
+                        f"next value inside in {inside}); expected a tail that thins out: the sensor's range is "
+                        "exceeded; use a sensor of larger range or leave this stretch out",
+                    )
+                )
+    return rows
+
+
+def _chance_of_repeat(same: NDArray[np.bool_]) -> Array:
+    """(6,) probability that a value equals the one before: that of the steadiest tenth of the record.
+
+    The steadiest, because a quantised sensor repeats most at rest, and a record may be at rest only in part.
+    """
+    blocks = max(1, same.shape[1] // BLOCK)
+    length = same.shape[1] // blocks
+    share = same[:, : blocks * length].reshape(6, blocks, length).mean(axis=2)
+    return np.asarray(np.quantile(share, 0.9, axis=1))
