@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from itertools import permutations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -121,18 +121,17 @@ def dcm_from_euler(heading: ArrayLike, pitch: ArrayLike, roll: ArrayLike) -> Arr
 def euler_from_dcm(C_nb: ArrayLike) -> tuple[Array, Array, Array]:
     """Heading (0..2 pi, clockwise from north), pitch and roll, rad, of (..., 3, 3).
 
-    At pitch +-90 deg heading and roll turn about the same axis; roll is then given as zero and heading holds the
-    combination ``heading -+ roll``.
+    Within 1e-9 rad of pitch +-90 deg heading and roll turn about the same axis and cannot be told apart: roll is then
+    given as zero, and heading holds what can be seen, ``heading - roll`` (nose up) or ``heading + roll`` (nose down).
     """
     C = np.asarray(C_nb, dtype=np.float64)
     cos_pitch = np.hypot(C[..., 0, 1], C[..., 1, 1])
     pitch = np.arctan2(C[..., 2, 1], cos_pitch)
     vertical = cos_pitch < 1e-9
-    heading = np.where(
-        vertical, np.arctan2(-C[..., 1, 0], C[..., 0, 0]), np.arctan2(C[..., 0, 1], C[..., 1, 1])
-    )
+    heading = np.where(vertical, np.arctan2(-C[..., 1, 0], C[..., 0, 0]), np.arctan2(C[..., 0, 1], C[..., 1, 1]))
     roll = np.where(vertical, 0.0, np.arctan2(-C[..., 2, 0], C[..., 2, 2]))
-    return np.mod(heading, 2 * np.pi), pitch, roll
+    heading = np.mod(heading, 2 * np.pi)
+    return np.where(heading == 2 * np.pi, 0.0, heading), pitch, roll  # mod rounds -1e-17 up to 2 pi
 
 
 def to_rotation(C: ArrayLike) -> Rotation:
@@ -140,6 +139,11 @@ def to_rotation(C: ArrayLike) -> Rotation:
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_matrix(np.asarray(C, dtype=np.float64))
+
+
+def from_rotation(rotation: Rotation) -> Array:
+    """Direction cosine matrix (..., 3, 3) of a SciPy rotation (or a stack of them)."""
+    return np.asarray(rotation.as_matrix(), dtype=np.float64)
 
 
 def body_axes(axes: str) -> Array:
@@ -165,26 +169,46 @@ def body_axes(axes: str) -> Array:
             f"axes {axes!r}; expected three letters saying where x, y and z point, of R/L (right, left), F/B (forward, "
             "back), U/D (up, down), such as RFU, FRD or FLU"
         )
-    C = np.array([DIRECTIONS[letter] for letter in name], dtype=np.float64).T
-    determinant = round(float(np.linalg.det(C)))
-    if determinant == 0:
-        raise UsageError(
-            f"axes {axes!r} name one direction twice; expected three different ones, such as FRD"
-        )
-    if determinant < 0:
-        others = [a for a in map("".join, permutations(name)) if np.linalg.det(body_axes_unchecked(a)) > 0]
+    C = _columns(name)
+    handedness = np.linalg.det(C)  # 1, -1, or 0 where two letters lie along one axis
+    if handedness < -0.5:
+        others = [a for a in map("".join, permutations(name)) if np.linalg.det(_columns(a)) > 0]
         raise UsageError(f"axes {axes!r} are left-handed; did you mean one of {', '.join(others)}?")
+    if handedness < 0.5:
+        raise UsageError(
+            f"axes {axes!r}: two letters lie along one axis; expected one each of R/L, F/B and U/D, such as FRD"
+        )
     return C
 
 
-def body_axes_unchecked(axes: str) -> Array:
-    """Columns of :func:`body_axes` for letters already known to be good."""
+def _columns(axes: str) -> Array:
     return np.array([DIRECTIONS[letter] for letter in axes], dtype=np.float64).T
 
 
+# For kernels: vectors and quaternions as tuples of scalars, which stay in registers and allocate nothing.
+
+
 @compiled(inline="always")
-def quaternion_from_vector(x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Unit quaternion of a rotation vector, scalars in and out (for kernels)."""
+def cross(a: Any, b: Any) -> Any:
+    """``a x b`` of two vectors as tuples."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled(inline="always")
+def quaternion_product(p: Any, q: Any) -> Any:
+    """Hamilton's product of two quaternions as tuples."""
+    return (
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
+    )
+
+
+@compiled(inline="always")
+def quaternion_from_rotation_vector(rotation: Any) -> Any:
+    """Unit quaternion of a rotation vector, tuples; exact to rounding at any angle."""
+    x, y, z = rotation
     square = x * x + y * y + z * z
     if square < SMALL_ANGLE_SQUARED:
         w = 1.0 - square / 8.0 * (1.0 - square / 48.0)
@@ -194,3 +218,23 @@ def quaternion_from_vector(x: float, y: float, z: float) -> tuple[float, float, 
         w = math.cos(0.5 * angle)
         s = math.sin(0.5 * angle) / angle
     return w, s * x, s * y, s * z
+
+
+@compiled(inline="always")
+def rotate(q: Any, v: Any) -> Any:
+    """A vector turned by a unit quaternion, tuples: ``v + 2 w t + 2 u x t`` with ``t = u x v``."""
+    u = (q[1], q[2], q[3])
+    t = cross(u, v)
+    s = cross(u, t)
+    return (
+        v[0] + 2.0 * (q[0] * t[0] + s[0]),
+        v[1] + 2.0 * (q[0] * t[1] + s[1]),
+        v[2] + 2.0 * (q[0] * t[2] + s[2]),
+    )
+
+
+@compiled(inline="always")
+def normalised(q: Any) -> Any:
+    """A nearly unit quaternion, a tuple, made unit: one Newton step, exact to rounding for errors below 1e-8."""
+    scale = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale

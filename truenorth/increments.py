@@ -1,62 +1,33 @@
-"""From rows of an IMU to increments, and from increments to what rotates and accelerates: coning and sculling.
-
-Sources: P. Savage, "Strapdown inertial navigation integration algorithm design", J. Guid. Control Dyn. 21 (1998),
-part 1 eqs. 33-37 (coning) and part 2 eqs. 47-50 (sculling); R. Miller, "A new strapdown attitude algorithm", J. Guid.
-Control Dyn. 6 (1983) (three samples); the coefficients of N samples as tabled by J. Mark and D. Tazartes, "Tuning of
-coning algorithms to gyro data frequency response characteristics", J. Guid. Control Dyn. 24 (2001).
-"""
+"""From rows of an IMU record to increments, a whole record at once or chunk by chunk."""
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import UsageError
+from truenorth.errors import DataError
 from truenorth.records import GAP_FACTOR, ImuRecord
 
 Array = NDArray[np.float64]
-Algorithm = Literal["previous", "1", "2", "3", "4"]
-
-# Rotation vector of an update of N samples: sum of increments + sum_i k_i dtheta_i x dtheta_N, exact for a pure
-# coning motion up to the order 2N of coning angle per sample; sculling takes the same coefficients (Savage's
-# equivalence of the two). "previous": one sample an update, with the one before it: dtheta_before x dtheta / 12.
-CONING: dict[str, Array] = {
-    "previous": np.zeros(0),
-    "1": np.zeros(0),
-    "2": np.array([2.0 / 3.0]),
-    "3": np.array([9.0 / 20.0, 27.0 / 20.0]),
-    "4": np.array([54.0 / 105.0, 92.0 / 105.0, 214.0 / 105.0]),
-}
-PREVIOUS = 1.0 / 12.0
 
 
-def coefficients(algorithm: str) -> tuple[Array, float]:
-    """Coefficients of the samples within an update, and of the sample before it.
+def increments(
+    record: ImuRecord, before: ImuRecord | None = None, interval: float | None = None
+) -> tuple[Array, Array]:
+    """Angle and velocity increments over the interval that ends at each row.
 
-    Raises
-    ------
-    UsageError
-        An algorithm that is not known.
-    """
-    if algorithm not in CONING:
-        raise UsageError(f"algorithm {algorithm!r} is not known; choose one of {', '.join(CONING)}")
-    return CONING[algorithm], PREVIOUS if algorithm == "previous" else 0.0
-
-
-def increments(record: ImuRecord, before: Array | None = None) -> tuple[Array, Array]:
-    """Angle and velocity increments of each row.
-
-    Increment rows are given back as they are. Rates are taken as instantaneous and integrated by the causal rule of
-    third order ``T (5 w_k + 8 w_{k-1} - w_{k-2})/12`` (Adams-Moulton); the first row's interval by its own value, the second's
-    and those beside a gap by the trapezoid.
+    Increment rows are given back as they are. Rates are instantaneous, and are integrated by the causal rule of third
+    order ``T (5 w_k + 8 w_{k-1} - w_{k-2})/12`` (Adams-Moulton: exact for a rate that is quadratic in time; a sinusoid
+    that turns by x rad an interval comes out late by x^3/24 rad, and smaller by 11 x^4/720). Beside a gap, and at the
+    second row, the trapezoid; the first row's interval by its own rate.
 
     Parameters
     ----------
     record : ImuRecord
-    before : (2, 6) array, optional
-        The two rows of rates before the first, one interval apart, so that a chunk goes on where another ended.
+    before : ImuRecord, optional
+        The rows just before, at least two (see :func:`last_rows`), so that a chunk goes on where another ended.
+    interval : float, s, optional
+        Nominal sampling interval; the record's own when left out.
 
     Returns
     -------
@@ -65,16 +36,54 @@ def increments(record: ImuRecord, before: Array | None = None) -> tuple[Array, A
     """
     if record.kind == "increments":
         return record.gyro, record.accel
+    nominal = record.interval if interval is None else interval
     rows = np.hstack([record.gyro, record.accel])
-    steps = record.steps
+    steps = interval_lengths(record, before, nominal)
+    earlier = 0 if before is None else 2
     if before is not None:
-        rows = np.vstack([before, rows])
-        steps = np.concatenate([[record.interval, record.interval], steps])
+        rows = np.vstack([np.hstack([before.gyro, before.accel])[-2:], rows])
+        steps = np.concatenate([[nominal, before.time[-1] - before.time[-2]], steps])
     T = steps[:, None]
     result = T * rows
     result[1:] = 0.5 * T[1:] * (rows[1:] + rows[:-1])
-    regular = np.abs(steps) < GAP_FACTOR * record.interval
+    regular = steps < GAP_FACTOR * nominal
     third = np.flatnonzero(regular[2:] & regular[1:-1]) + 2
     result[third] = T[third] / 12.0 * (5.0 * rows[third] + 8.0 * rows[third - 1] - rows[third - 2])
-    result = result[0 if before is None else 2 :]
-    return np.ascontiguousarray(result[:, :3]), np.ascontiguousarray(result[:, 3:])
+    return np.ascontiguousarray(result[earlier:, :3]), np.ascontiguousarray(result[earlier:, 3:])
+
+
+def interval_lengths(record: ImuRecord, before: ImuRecord | None = None, interval: float | None = None) -> Array:
+    """(N,) length of the interval that ends at each row, s; with nothing before it, the first row's is the nominal one.
+
+    Raises
+    ------
+    DataError
+        The record does not go on where `before` ended: another kind of rows, or time going back.
+    """
+    first = record.interval if interval is None else interval
+    if before is not None:
+        if before.kind != record.kind:
+            raise DataError(
+                f"{record.source}: this chunk holds {record.kind}, the one before it {before.kind}; expected one kind"
+            )
+        first = record.time[0] - before.time[-1]
+        if first <= 0:
+            raise DataError(
+                f"{record.source}: row 1, column time: the chunk begins at {record.time[0]:.6f} s, but the one before "
+                f"it ended at {before.time[-1]:.6f} s; expected chunks in order, each row in one chunk only"
+            )
+    return np.concatenate([[first], np.diff(record.time)])
+
+
+def last_rows(record: ImuRecord) -> ImuRecord:
+    """What the next chunk needs of this one: its last two rows, copied so that the rest can be let go."""
+    return ImuRecord(
+        record.time[-2:].copy(), record.gyro[-2:].copy(), record.accel[-2:].copy(), record.kind, record.source
+    )
+
+
+def read_only(array: ArrayLike) -> Array:
+    """A read-only contiguous view: Numba compiles a kernel anew for a writable array, so all of ours look alike."""
+    view = np.ascontiguousarray(array, dtype=np.float64).view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,120 @@
+"""Strapdown integration in an inertial frame, which knows nothing of the earth: attitude, velocity, position; compiled.
+
+Frame ``i`` is the body's at the first sample. Source: P. Savage, "Strapdown inertial navigation integration algorithm
+design", J. Guid. Control Dyn. 21 (1998), parts 1 and 2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.attitude import (
+    dcm_from_quaternion,
+    normalised,
+    quaternion_from_rotation_vector,
+    quaternion_product,
+    rotate,
+)
+from truenorth.compiled import compiled
+from truenorth.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
+from truenorth.errors import UsageError
+from truenorth.increments import read_only
+
+Array = NDArray[np.float64]
+
+
+def integrate_attitude(dtheta: ArrayLike, q0: ArrayLike | None = None, algorithm: Algorithm = "previous") -> Array:
+    """Attitude in an inertial frame after each update, attitude alone.
+
+    Parameters
+    ----------
+    dtheta : (N, 3) array, rad
+    q0 : (4,) array, optional
+        Initial attitude ``q_ib``, scalar first; identity when left out.
+    algorithm : {"previous", "1", "2", "3", "4"}
+
+    Returns
+    -------
+    (N // samples + 1, 4) array
+        The initial one first; samples that do not fill an update are left out.
+    """
+    k, k_before = coefficients(algorithm)
+    rows = read_only(dtheta)
+    out = np.empty((len(rows) // (len(k) + 1) + 1, 4))
+    out[0] = (1.0, 0.0, 0.0, 0.0) if q0 is None else q0
+    _integrate_attitude(rows, read_only(k), k_before, out)
+    return out
+
+
+@compiled
+def _integrate_attitude(dtheta: Any, k: Any, k_before: float, out: Any) -> None:
+    samples = len(k) + 1
+    q = (out[0, 0], out[0, 1], out[0, 2], out[0, 3])
+    a = (0.0, 0.0, 0.0)
+    for m in range(len(dtheta) // samples):
+        K, A, a = update_sums(dtheta, m * samples, samples, k, k_before, a)
+        phi = rotation_vector(K, A, a)
+        q = normalised(quaternion_product(q, quaternion_from_rotation_vector(phi)))
+        out[m + 1, 0], out[m + 1, 1], out[m + 1, 2], out[m + 1, 3] = q
+
+
+def inertial_integrals(
+    dtheta: ArrayLike, dvel: ArrayLike, steps: ArrayLike, epochs: ArrayLike
+) -> tuple[Array, Array, Array]:
+    """Attitude, and first and second integral of specific force, in the inertial frame of the body at the start.
+
+    Algorithm "previous": one sample an update, with the one before it. Position is the trapezoid of velocity, so that
+    the mean velocity between two epochs is the difference of their positions over their time.
+
+    Parameters
+    ----------
+    dtheta, dvel : (N, 3) arrays, rad and m/s
+    steps : (N,) array, s
+    epochs : (K,) int array
+        Ascending: outputs after this many rows (0 is the start).
+
+    Returns
+    -------
+    C_ib : (K, 3, 3) array
+    velocity : (K, 3) array, m/s
+        ``int C_ib f_b dt`` since the start.
+    position : (K, 3) array, m
+        Its integral.
+    """
+    wanted = np.ascontiguousarray(epochs, dtype=np.int64)
+    rows = read_only(dtheta)
+    if wanted.size and (wanted[0] < 0 or wanted[-1] > len(rows) or np.any(np.diff(wanted) < 0)):
+        raise UsageError(f"epochs are not ascending row counts between 0 and {len(rows)}")
+    k, k_before = coefficients("previous")
+    out = np.empty((len(wanted), 10))
+    _inertial_integrals(rows, read_only(dvel), read_only(steps), wanted, read_only(k), k_before, out)
+    return dcm_from_quaternion(out[:, :4]), out[:, 4:7].copy(), out[:, 7:].copy()
+
+
+@compiled
+def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, k: Any, k_before: float, out: Any) -> None:
+    q = (1.0, 0.0, 0.0, 0.0)
+    vx = vy = vz = px = py = pz = 0.0
+    a = b = (0.0, 0.0, 0.0)
+    row = 0
+    for j in range(len(epochs)):
+        while row < epochs[j]:
+            K, A, a = update_sums(dtheta, row, 1, k, k_before, a)
+            L, B, b = update_sums(dvel, row, 1, k, k_before, b)
+            f = rotate(q, velocity_increment(K, A, a, L, B, b))
+            T = steps[row]
+            px += (vx + 0.5 * f[0]) * T
+            py += (vy + 0.5 * f[1]) * T
+            pz += (vz + 0.5 * f[2]) * T
+            vx += f[0]
+            vy += f[1]
+            vz += f[2]
+            phi = rotation_vector(K, A, a)
+            q = normalised(quaternion_product(q, quaternion_from_rotation_vector(phi)))
+            row += 1
+        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
+        out[j, 4], out[j, 5], out[j, 6] = vx, vy, vz
+        out[j, 7], out[j, 8], out[j, 9] = px, py, pz
