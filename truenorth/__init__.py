@@ -1,3 +1,73 @@
-"""Truenorth: initial alignment and navigation of strapdown inertial navigation systems."""
+"""Truenorth: initial alignment and navigation of strapdown inertial navigation systems.
+
+The public names load what they need when they are first used, so that ``import truenorth`` stays light.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment, align
+    from truenorth.calibration import Calibration
+    from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
+    from truenorth.formats import read_imu, write_imu
+    from truenorth.position import Position
+    from truenorth.quality import inspect
+    from truenorth.records import ImuRecord
+    from truenorth.report import write_report
+    from truenorth.simulation import simulate
+    from truenorth.specs import ImuSpec, imu_spec
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "Alignment": "alignment",
+    "AlignmentError": "errors",
+    "Calibration": "calibration",
+    "DataError": "errors",
+    "ImuRecord": "records",
+    "ImuSpec": "specs",
+    "Position": "position",
+    "TruenorthError": "errors",
+    "UsageError": "errors",
+    "align": "alignment",
+    "imu_spec": "specs",
+    "inspect": "quality",
+    "read_imu": "formats",
+    "simulate": "simulation",
+    "write_imu": "formats",
+    "write_report": "report",
+}
+
+__all__ = [
+    "Alignment",
+    "AlignmentError",
+    "Calibration",
+    "DataError",
+    "ImuRecord",
+    "ImuSpec",
+    "Position",
+    "TruenorthError",
+    "UsageError",
+    "align",
+    "imu_spec",
+    "inspect",
+    "read_imu",
+    "simulate",
+    "write_imu",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'truenorth' has no attribute {name!r}")
+    value = getattr(import_module(f"truenorth.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

@@ -5,19 +5,21 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.earth import normal_gravity
 from truenorth.inertial import gravity_velocity, integrate
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
+from truenorth.position import Position
 from truenorth.records import ImuRecord
+from truenorth.simulation import Sway, Tone, simulate
 
 LAT, ALT = np.radians(40.0), 100.0
 
 
-def _swaying_record(seconds: float = 20.0, rate: float = 100.0) -> ImuRecord:
-    """A restless body: rates and specific force with no relation to any truth; the model must hold for any log."""
-    t = np.arange(1, int(seconds * rate) + 1) / rate
-    gyro = 0.2 * np.stack([np.sin(1.1 * t), np.cos(0.9 * t), 0.5 * np.sin(0.7 * t + 1)], -1)
-    accel = np.array([0.0, 0.0, 9.8]) + 0.3 * np.stack([np.sin(0.8 * t), np.cos(1.3 * t), np.sin(t)], -1)
-    return ImuRecord(t, gyro / rate, accel / rate, "increments")
+def _turning_record(seconds: float = 20.0, rate: float = 100.0) -> tuple[ImuRecord, np.ndarray]:
+    """An IMU that turns about its own centre on a base at rest, and its attitude at the start."""
+    tones = (Tone(0.3, 11.0, 0.4),), (Tone(0.2, 7.0, 1.0),), (Tone(0.25, 9.0, 2.0),)
+    motion = Sway(Position(LAT, 0.0, ALT), 0.7, 0.05, -0.1, *tones)
+    return simulate(motion, rate=rate, duration=seconds).record, motion.states(0.0).C_nb
 
 
 def _mean_velocity(record, interval, C_n0_i, gyro_bias, accel_bias):
@@ -33,8 +35,7 @@ def test_jacobian_is_the_derivative_of_the_integration(state, interval, toleranc
     Within an interval the model takes the product of force and turn as constant: its error falls with the square of the
     interval, and so does the tolerance.
     """
-    record = _swaying_record()
-    C = Rotation.from_euler("zxy", [-40, 5, -8], degrees=True).as_matrix()
+    record, C = _turning_record()
     zero = np.zeros(3)
     model = StaticModel(0.0, 0.0)
     base, integrals = _mean_velocity(record, interval, C, zero, zero)
@@ -77,7 +78,7 @@ def test_noise_inside_an_interval():
     rng = np.random.default_rng(3)
     runs, rate = 4000, 200
     q_g, q_a = 3e-4, 2e-3
-    force = np.array([0.4, -0.2, 9.8])
+    force = np.array([0.0, 0.0, float(normal_gravity(np.pi / 2, ALT))])
     dt = 1.0 / rate
     w_g = q_g * np.sqrt(dt) * rng.standard_normal((runs, rate, 3))
     w_a = q_a * np.sqrt(dt) * rng.standard_normal((runs, rate, 3))

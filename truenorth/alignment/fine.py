@@ -120,37 +120,6 @@ class FineAlignment:
         return inside + min(t[-1] - time, 0.0) * C[-1]
 
 
-def bias_prior(
-    gyro_bias: float,
-    accel_bias: float,
-    C_n_b: Array,
-    position: Position,
-    lat_rate: Array,
-    gravity_slope: float,
-) -> Array:
-    """Prior covariance of the biases, (6, 6): the specification's, and what an error of the position looks like.
-
-    A latitude error ``dL`` gives the INS a wrong earth rate, as a gyro bias would, ``dL dw_ie/dL`` in n; an error of
-    height a wrong gravity, as a vertical accelerometer bias would.
-
-    Parameters
-    ----------
-    gyro_bias, accel_bias : float, rad/s and m/s^2
-    C_n_b : (3, 3) array
-    position : Position
-    lat_rate : (3,) array
-        ``dw_ie_n/dL``, rad/s a radian.
-    gravity_slope : float
-        ``dg/dh``, 1/s^2.
-    """
-    P = np.zeros((6, 6))
-    rate = C_n_b.T @ lat_rate * position.lat_sigma
-    up = C_n_b.T @ np.array([0.0, 0.0, gravity_slope * position.vertical_sigma])
-    P[:3, :3] = gyro_bias**2 * np.eye(3) + np.outer(rate, rate)
-    P[3:, 3:] = accel_bias**2 * np.eye(3) + np.outer(up, up)
-    return P
-
-
 def fine_align(
     record: ImuRecord,
     C_n0_i: Array,

@@ -5,19 +5,19 @@ rate along north and along the vertical (their length and angle to gravity again
 force along the vertical. The rate along *east*, which turns heading, and the level components of force, which tilt,
 cannot: their size is inferred from those that can, as drawn from the same population.
 
-Random walks: overlapping Allan deviation. A base's own bounded motion falls off as 1/tau in it, white noise as
-1/sqrt(tau), so the smallest ``adev sqrt(tau)`` bounds the random walk from above, on a moving base too.
+Random walks: the Allan deviation of a still base is fitted. On a base that moves, its own bounded motion falls off as
+1/tau, white noise as 1/sqrt(tau): the smallest ``adev sqrt(tau)`` bounds the random walk from above.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.allan import AllanDeviation, overlapping_adev
+from truenorth.analysis.allan import noise_coefficients, overlapping_adev
 from truenorth.records import ImuRecord
 from truenorth.specs import ImuSpec, imu_spec
 from truenorth.strapdown import increments
@@ -100,19 +100,27 @@ def infer_spec(record: ImuRecord, check: LogCheck, still: bool) -> ImuSpec:
     accel_bias = predictive_sigma(
         np.array([check.force_residual]), np.array([check.force_noise]), best.accel_bias, WORST_ACCEL
     )
-    bounds = random_walks(record)
-    usual = usual_walks(gyro_bias, accel_bias)
-    drifts = bias_drifts(record) if still else (0.0, 0.0)
-    return replace(
-        best,
+    if still:
+        gyro, accel = noise_coefficients(record)
+        walks = _worst(gyro.random_walk), _worst(accel.random_walk)
+        drifts = _worst(gyro.bias_instability), _worst(accel.bias_instability)
+    else:
+        bounds, usual = random_walk_bounds(record), usual_walks(gyro_bias, accel_bias)
+        walks = min(bounds[0], usual[0]), min(bounds[1], usual[1])
+        drifts = 0.0, 0.0
+    return ImuSpec(
         name="inferred",
         gyro_bias=gyro_bias,
         accel_bias=accel_bias,
-        gyro_random_walk=min(bounds[0], usual[0]) if not still else bounds[0],
-        accel_random_walk=min(bounds[1], usual[1]) if not still else bounds[1],
+        gyro_random_walk=walks[0],
+        accel_random_walk=walks[1],
         gyro_bias_instability=drifts[0],
         accel_bias_instability=drifts[1],
     )
+
+
+def _worst(per_axis: Array) -> float:
+    return float(np.max(per_axis))
 
 
 def usual_walks(gyro_bias: float, accel_bias: float) -> tuple[float, float]:
@@ -128,22 +136,18 @@ def usual_walks(gyro_bias: float, accel_bias: float) -> tuple[float, float]:
     )
 
 
-def random_walks(record: ImuRecord) -> tuple[float, float]:
+def random_walk_bounds(record: ImuRecord) -> tuple[float, float]:
     """Upper bounds of angle and velocity random walk (worst axis), rad/sqrt(s) and m/s/sqrt(s)."""
-    gyro, accel = _allan(record)
-    return _walk(gyro), _walk(accel)
-
-
-def bias_drifts(record: ImuRecord) -> tuple[float, float]:
-    """How far the biases of a still IMU wander within the log (worst axis), rad/s and m/s^2.
-
-    What the Allan deviation at the longest averaging time has above the random walk's.
-    """
-    drifts = []
-    for allan in _allan(record):
-        excess = allan.deviation[-1] ** 2 - _walk(allan) ** 2 / allan.tau[-1]
-        drifts.append(float(np.sqrt(np.max(np.maximum(excess, 0.0)))))
-    return drifts[0], drifts[1]
+    block = max(1, round(record.rate / ALLAN_RATE))
+    count = len(record) // block
+    interval = block * record.interval
+    taus = np.geomspace(1, max(1, count // SHORTEST_ALLAN), 12) * interval
+    bounds = []
+    for increment in increments(record):
+        sums = increment[: count * block].reshape(count, block, 3).sum(axis=1)
+        allan = overlapping_adev(sums, interval, taus, "increments")
+        bounds.append(_worst(np.min(allan.deviation * np.sqrt(allan.tau)[:, None], axis=0)))
+    return bounds[0], bounds[1]
 
 
 def walks(spec: ImuSpec) -> tuple[float, float, float, float]:
@@ -159,22 +163,3 @@ def walks(spec: ImuSpec) -> tuple[float, float, float, float]:
         spec.gyro_bias_instability * spread,
         spec.accel_bias_instability * spread,
     )
-
-
-def _allan(record: ImuRecord) -> tuple[AllanDeviation, AllanDeviation]:
-    dtheta, dvel = increments(record)
-    block = max(1, round(record.rate / ALLAN_RATE))
-    count = len(record) // block
-    interval = block * record.interval
-    taus = np.geomspace(1, max(1, count // SHORTEST_ALLAN), 12) * interval
-    gyro, accel = (
-        overlapping_adev(
-            x[: count * block].reshape(count, block, 3).sum(axis=1), interval, taus, "increments"
-        )
-        for x in (dtheta, dvel)
-    )
-    return gyro, accel
-
-
-def _walk(allan: AllanDeviation) -> float:
-    return float(np.max(np.min(allan.deviation * np.sqrt(allan.tau)[:, None], axis=0)))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.epoch import Epoch, find_epoch
-from truenorth.alignment.fine import FineAlignment, attitude_history, bias_prior, fine_align
+from truenorth.alignment.fine import FineAlignment, attitude_history, fine_align
+from truenorth.alignment.bias import bias_prior, spec_variance, true_bias
 from truenorth.alignment.inference import LogCheck, infer_spec, walks
 from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
 from truenorth.alignment.verdict import Circumstances, judge
@@ -70,17 +71,9 @@ class _Task:
         """Normal gravity, m/s^2."""
         return float(normal_gravity(self.position.lat, self.position.alt))
 
-    def bias_prior(self, spec: ImuSpec, C_nb: Array) -> Array:
-        """(6, 6) prior covariance of the biases."""
-        slope = float(normal_gravity(self.position.lat, self.position.alt + 1.0)) - self.gravity
-        return bias_prior(
-            _total(spec.gyro_bias, spec.gyro_bias_instability),
-            _total(spec.accel_bias, spec.accel_bias_instability),
-            C_nb.T,
-            self.position,
-            self.lat_rate,
-            slope,
-        )
+    def bias_prior(self, spec: ImuSpec, C_n_b: Array) -> Array:
+        """(6, 6) prior covariance of what acts as gyro and accelerometer bias here."""
+        return bias_prior(spec, C_n_b, self.position, self.lat_rate, self.gravity)
 
     @property
     def deflection(self) -> Array:
@@ -190,7 +183,7 @@ def _choose(method: Method, record: ImuRecord, motion: MotionSummary) -> tuple[s
 def _align_analytic(task: _Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
     check = _check_means(task.means, task.position.lat, task.gravity)
     used, where = _specification(task, spec, check)
-    P = task.bias_prior(used, np.eye(3))
+    P = task.bias_prior(used, _level_of(task.means.f_b).T)
     C_nb, covariance, floor = analytic(
         task.means,
         task.position.lat,
@@ -203,7 +196,7 @@ def _align_analytic(task: _Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
         [used.accel_random_walk, used.gyro_random_walk], 3
     )
     covariance = covariance + walk @ walk.T / T
-    answer = _assemble(task, used, where, C_nb, covariance, floor, P)
+    answer = _assemble(task, used, where, C_nb, covariance, floor)
     return answer, check
 
 
@@ -227,7 +220,7 @@ def _align_inertial(
     if not blind:
         check = _check_filter(task, coarse.C_n0_i)
     used, where = _specification(task, spec, check)
-    P = task.bias_prior(used, coarse.C_n0_i)
+    P = task.bias_prior(used, coarse.C_n0_i.T)
     model = StaticModel(*walks(used))
 
     if method != "kalman":
@@ -235,7 +228,7 @@ def _align_inertial(
         covariance, floor = coarse_covariance(coarse, integrals, model, P, disturbance)
         C_ib = task.epoch.attitude(integrals.C_ib_at[0])
         C_n0_b = coarse.C_n0_i @ C_ib
-        answer = _at_epoch(task, used, where, C_n0_b, covariance, floor, P, blind)
+        answer = _at_epoch(task, used, where, C_n0_b, covariance, floor, blind)
         return replace(answer, disturbance=disturbance), check, True, None
 
     P_run = P.copy()
@@ -255,15 +248,15 @@ def _align_inertial(
     )
     C_ib = task.epoch.attitude(fine.integrals.C_ib_at[0])
     C_n0_b, covariance, floor = fine.misalignment_at(C_ib, task.epoch.elapsed)
-    answer = _at_epoch(task, used, where, C_n0_b, covariance, floor, P, blind)
-    history = _history(task, fine, blind)
-    sigma = np.sqrt(np.diag(fine.P))
+    answer = _at_epoch(task, used, where, C_n0_b, covariance, floor, blind)
+    history = _history(task, fine, used, blind)
+    bias, sigma = true_bias(fine.bias, np.diag(fine.P)[6:], np.diag(P_run), spec_variance(used))
     answer = replace(
         answer,
-        gyro_bias=fine.bias[:3],
-        gyro_bias_sigma=sigma[6:9],
-        accel_bias=fine.bias[3:],
-        accel_bias_sigma=sigma[9:12],
+        gyro_bias=bias[:3],
+        gyro_bias_sigma=sigma[:3],
+        accel_bias=bias[3:],
+        accel_bias_sigma=sigma[3:],
         disturbance=fine.disturbance,
         history=history,
         pays_until=None if blind else _pays_until(history, answer, fine, task),
@@ -277,10 +270,13 @@ def _coarse(task: _Task, integrals: Any, method: str, blind: bool) -> CoarseAtti
     if not blind:
         return coarse
     # No heading to be had: level as found from the mean specific force, heading zero by convention.
-    f = integrals.velocity[-1] / integrals.time[-1]
-    up = f / np.linalg.norm(f)
-    pitch, roll = math.asin(float(np.clip(up[1], -1, 1))), math.atan2(-up[0], up[2])
-    return replace(coarse, C_n0_i=dcm_from_euler(0.0, pitch, roll))
+    return replace(coarse, C_n0_i=_level_of(integrals.velocity[-1]))
+
+
+def _level_of(f_b: Array) -> Array:
+    """``C_nb`` with the pitch and roll that a specific force tells, and heading zero."""
+    up = f_b / np.linalg.norm(f_b)
+    return dcm_from_euler(0.0, math.asin(float(np.clip(up[1], -1.0, 1.0))), math.atan2(-up[0], up[2]))
 
 
 def _check_means(m: Means, lat: float, g: float) -> LogCheck:
@@ -364,7 +360,6 @@ def _at_epoch(
     C_n0_b: Array,
     covariance: Array,
     floor: Array,
-    P: Array,
     blind: bool,
 ) -> Alignment:
     """An answer given in n0, turned into navigation axes at the epoch asked for."""
@@ -373,13 +368,13 @@ def _at_epoch(
     if blind:
         covariance, floor = _without_heading(covariance), _without_heading(floor)
     C_nb = earth_rotation(time, task.position.lat).T @ C_n0_b
-    return _assemble(task, spec, where, C_nb, covariance, floor, P)
+    return _assemble(task, spec, where, C_nb, covariance, floor)
 
 
 def _assemble(
-    task: _Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array, P: Array
+    task: _Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array
 ) -> Alignment:
-    prior = np.sqrt(np.diag(P))
+    prior = np.sqrt(spec_variance(spec))
     return Alignment(
         status="not_converged",
         reasons=(),
@@ -404,21 +399,23 @@ def _assemble(
     )
 
 
-def _history(task: _Task, fine: FineAlignment, blind: bool) -> History:
+def _history(task: _Task, fine: FineAlignment, used: ImuSpec, blind: bool) -> History:
     C_nb, covariance, floor = attitude_history(fine, task.position.lat)
     if blind:
         covariance, floor = _without_heading(covariance), _without_heading(floor)
-    x, P, e = fine.estimates.x, fine.estimates.P, fine.estimates
-    sigma = np.sqrt(np.einsum("kii->ki", P))
+    e, P0 = fine.estimates, np.diag(fine.system.P0)[6:]
+    bias, sigma = true_bias(
+        fine.nominal_bias + e.x[:, 6:], np.einsum("kii->ki", e.P)[:, 6:], P0, spec_variance(used)
+    )
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
         C_nb=C_nb,
         phi_covariance=covariance + task.deflection,
         phi_floor=floor + task.deflection,
-        gyro_bias=fine.nominal_bias[:3] + x[:, 6:9],
-        gyro_bias_sigma=sigma[:, 6:9],
-        accel_bias=fine.nominal_bias[3:] + x[:, 9:],
-        accel_bias_sigma=sigma[:, 9:],
+        gyro_bias=bias[:, :3],
+        gyro_bias_sigma=sigma[:, :3],
+        accel_bias=bias[:, 3:],
+        accel_bias_sigma=sigma[:, 3:],
         innovation=e.innovation,
         innovation_sigma=np.sqrt(np.einsum("kii->ki", e.innovation_covariance)),
         nis=e.nis,
@@ -475,7 +472,3 @@ def _bridged(record: ImuRecord) -> ImuRecord:
     scale = np.ones(len(record))
     scale[gaps] = steps[gaps]
     return replace(record, gyro=record.gyro * scale[:, None], accel=record.accel * scale[:, None])
-
-
-def _total(*sigmas: float | None) -> float:
-    return math.sqrt(sum((s or 0.0) ** 2 for s in sigmas))

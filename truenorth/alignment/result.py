@@ -105,7 +105,7 @@ class Alignment:
     duration : float, s
         Length of data used.
     disturbance : (3,) array, m/s
-        RMS velocity of the base's own motion (E, N, U).
+        RMS velocity of the base's own motion (E, N, U); NaN where the method does not see it.
     pays_until : float or None, s
         Length of data after which the random part of heading's sigma is below half its floor.
     history : History or None
@@ -231,7 +231,7 @@ class Alignment:
             "accel_bias_ug": (self.accel_bias / MICRO_G).tolist(),
             "accel_bias_sigma_ug": (self.accel_bias_sigma / MICRO_G).tolist(),
             "accel_bias_estimated": self.accel_bias_estimated.tolist(),
-            "disturbance_m_s": self.disturbance.tolist(),
+            "disturbance_m_s": [float(v) if np.isfinite(v) else None for v in self.disturbance],
             "imu": self.imu.name,
             "imu_source": self.imu_source,
             "lat_deg": float(deg(self.position.lat)),

@@ -9,9 +9,10 @@ States (12), errors computed minus true, in the frozen level frame ``n0``:
 | BG | gyro bias eps, body axes | rad/s |
 | BA | accelerometer bias nabla, body axes | m/s^2 |
 
-``phi' = -C_n0_b (eps + w_g)``, ``dv' = f_n0 x phi + C_n0_b (nabla + w_a)``: the 12-state inertial-frame model of
-"Rotary SINS self-alignment under dynamic disturbance" (eqs. 30-33) with general specific force in place of -g, so that
-it holds on a moving base, and with its signs mapped to ours.
+``phi' = -C_n0_b (eps + w_g)``, ``dv' = -g_n0 x phi + C_n0_b (nabla + w_a)``: the 12-state inertial-frame model of
+"Rotary SINS self-alignment under dynamic disturbance" (eqs. 30-33), its signs mapped to ours. The force is gravity's
+reaction, known exactly, not the measured one: the base's own acceleration in it would be correlated with the base's own
+velocity, which is the measurement's noise, and the filter would take their product for knowledge of the azimuth.
 
 The measurement is the *mean* velocity of an interval, in navigation axes: what the INS computes for a base that in
 truth goes nowhere. Its noise is the base's own bounded motion. A mean, not a sample, since on a vehicle the engine
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 
 from truenorth.attitude import skew
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_position
+from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
 
 Array = NDArray[np.float64]
 
@@ -81,8 +82,10 @@ class StaticModel:
         T = integrals.intervals[:, None, None]
         C_mean = C_n0_i @ integrals.C_mean  # (1/T) int C_n0_b
         C_late = C_n0_i @ integrals.C_late  # (1/T^2) int s C_n0_b
-        f = skew(integrals.mean_force @ C_n0_i.T)
-        f_late = skew((integrals.velocity[1:] - integrals.mean_velocity) @ C_n0_i.T)  # (1/T) int s f ds, exact
+        v, p = -gravity_velocity(integrals.time, lat, alt), -gravity_position(integrals.time, lat, alt)
+        v_mean = np.diff(p, axis=0) / integrals.intervals[:, None]
+        f = skew(np.diff(v, axis=0) / integrals.intervals[:, None])  # mean of -g_n0 over the interval
+        f_late = skew(v[1:] - v_mean)  # (1/T) int s f ds
         ff = f @ np.swapaxes(f, 1, 2)
         eye = np.eye(3)
         q_g, q_a = self.gyro_random_walk**2, self.accel_random_walk**2
@@ -95,7 +98,7 @@ class StaticModel:
         Phi[:, DV, BG] = -2 * T * (f_late @ (C_mean - C_late))
         Phi[:, DV, BA] = T * C_mean
 
-        # White gyro noise reaches phi at once and dv as a ramp; over an interval f is taken as constant.
+        # White gyro noise reaches phi at once and dv as a ramp.
         Q = np.zeros((count, STATES, STATES))
         Q[:, PHI, PHI] = q_g * T * eye
         Q[:, DV, PHI] = q_g * T**2 / 2 * f
@@ -104,7 +107,7 @@ class StaticModel:
         Q[:, BG, BG] = self.gyro_rate_walk**2 * T * eye
         Q[:, BA, BA] = self.accel_rate_walk**2 * T * eye
 
-        # Mean velocity error, told by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla),
+        # Mean velocity error, told by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
         # phi(t) = phi_k + int_t^k C eps; averaged, the force counts with its elapsed part s/T of the interval.
         H = np.zeros((count, 3, STATES))
         H[:, :, DV] = eye

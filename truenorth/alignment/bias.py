@@ -1,0 +1,70 @@
+"""What acts as a bias, and what of it is one.
+
+On a base that stays, a scale factor error of the accelerometers is a bias (it always multiplies gravity), and so is a
+misalignment; an error of latitude looks like a gyro bias, one of height like an accelerometer bias. The filter estimates
+their sum; what it tells of the bias proper is less.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.earth import normal_gravity
+from truenorth.position import Position
+from truenorth.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+
+def spec_variance(spec: ImuSpec) -> Array:
+    """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2."""
+    gyro = spec.gyro_bias**2 + spec.gyro_bias_instability**2
+    accel = spec.accel_bias**2 + spec.accel_bias_instability**2
+    return np.repeat([gyro, accel], 3)
+
+
+def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array, gravity: float) -> Array:
+    """Prior covariance of the sum, (6, 6).
+
+    Parameters
+    ----------
+    spec : ImuSpec
+    C_n_b : (3, 3) array
+        ``v_b = C_n_b v_n``, about; heading does not matter.
+    position : Position
+        With its uncertainty: a latitude error ``dL`` gives the INS a wrong earth rate, ``dL dw_ie/dL`` in n; an error of
+        height a wrong gravity.
+    lat_rate : (3,) array
+        ``dw_ie_n/dL``, rad/s a radian.
+    gravity : float, m/s^2
+    """
+    P = np.diag(spec_variance(spec))
+    rate = C_n_b @ lat_rate * position.lat_sigma
+    P[:3, :3] += np.outer(rate, rate)
+    slope = float(normal_gravity(position.lat, position.alt + 1.0)) - gravity
+    up = C_n_b @ np.array([0.0, 0.0, 1.0])
+    P[3:, 3:] += np.outer(up, up) * (slope * position.vertical_sigma) ** 2
+    # measured = (I + S + M) f: the i-th scale factor acts on f_i, the misalignments on the two others.
+    f2 = (gravity * up) ** 2
+    P[3:, 3:] += np.diag(spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2))
+    return P
+
+
+def true_bias(total: Array, variance: Array, prior: Array, proper: Array) -> tuple[Array, Array]:
+    """The bias proper, and its sigma, of an estimate of the sum.
+
+    Of two independent Gaussian terms with variances `proper` and ``prior - proper`` whose sum is known to be `total` with
+    posterior variance `variance`: their share of the sum, and what the share leaves open.
+
+    Parameters
+    ----------
+    total, variance : (..., 6) arrays
+    prior, proper : (6,) arrays
+
+    Returns
+    -------
+    bias, sigma : (..., 6) arrays
+    """
+    share = proper / prior
+    return share * total, np.sqrt(share * (prior - proper) + share**2 * variance)

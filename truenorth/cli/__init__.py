@@ -1,0 +1,52 @@
+"""The command line: `truenorth align`, `truenorth inspect`.
+
+Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from truenorth import __version__
+from truenorth.cli.align import align
+from truenorth.cli.inspect import inspect
+from truenorth.errors import TruenorthError
+
+app = typer.Typer(
+    name="truenorth",
+    help="Find level and true north from an IMU log, and say how far the answer can be trusted.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("align")(align)
+app.command("inspect")(inspect)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"truenorth {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
+    try:
+        app()
+    except TruenorthError as error:
+        print(f"truenorth: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print("truenorth: interrupted; nothing half-written is left", file=sys.stderr)
+        sys.exit(130)

@@ -1,0 +1,173 @@
+"""`truenorth align`: from a log to pitch, roll and true heading, a verdict and a report."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from truenorth.cli.reading import Axes, Columns, Format, From, Log, Rate, To, Units, read_log
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment
+
+EXAMPLES = """
+Examples:
+
+  truenorth align log.csv --lat 34.246 --lon 108.910 --alt 380
+
+  truenorth align log.csv --lat 34.246 --lon 108.910 --imu navigation -o result
+
+  truenorth align bag/ --lat 48.1 --lon 11.6 --axes FLU --from 10 --to 310 --json
+
+  truenorth align old.csv --lat -33.9 --lon 151.2 --units deg/s,g --rate 100 --imu my_imu.yaml
+
+Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
+"""
+
+
+def align(
+    log: Log,
+    lat: Annotated[float, typer.Option(help="Latitude, deg, north positive.", show_default=False)],
+    lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0,
+    alt: Annotated[float, typer.Option(help="Height above the ellipsoid, m.")] = 0.0,
+    position_sigma: Annotated[float, typer.Option(help="One-sigma error of that position, m.")] = 10.0,
+    imu: Annotated[
+        str | None,
+        typer.Option(
+            help="Specification: navigation, tactical, industrial, consumer, or a YAML file. Without it the log is asked.",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[str, typer.Option(help="auto, analytic, inertial, oba or kalman.")] = "auto",
+    axes: Axes = None,
+    units: Units = None,
+    rate: Rate = None,
+    columns: Columns = None,
+    format: Format = None,
+    start: From = None,
+    stop: To = None,
+    at: Annotated[
+        float | None, typer.Option(help="Epoch of the attitude, s; the last sample without it.", show_default=False)
+    ] = None,
+    heading_limit: Annotated[float, typer.Option(help="Largest usable one-sigma heading error, deg.")] = 5.0,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(help="YAML file of known bias, scale factor and misalignment, taken off first.", show_default=False),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Folder for summary.json, history.parquet and report.html.", show_default=False
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying."""
+    import math
+
+    from truenorth.atomic import writable_folder
+    from truenorth.position import Position
+
+    position = Position.from_degrees(lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2 * position_sigma)
+    if output is not None:
+        writable_folder(output)  # before the work, not after it
+    with _progress(quiet=as_json) as tell:
+        tell(f"reading {log.name}")
+        record = read_log(
+            log, axes=axes, units=units, rate=rate, columns=columns, format=format, start=start, stop=stop
+        )
+        from truenorth.alignment import align as align_record
+        from truenorth.calibration import Calibration
+
+        result = align_record(
+            record,
+            position,
+            imu,
+            method,  # type: ignore[arg-type]  # checked there, with the list of methods in the message
+            at=at,
+            calibration=None if calibration is None else Calibration.from_file(calibration),
+            heading_limit=math.radians(heading_limit),
+            progress=tell,
+        )
+        paths: list[Path] = []
+        if output is not None:
+            from dataclasses import replace
+
+            from truenorth.quality import inspect
+
+            tell("inspecting the log")
+            result = replace(result, inspection=inspect(record, position.lat))
+            tell("writing the report")
+            paths = result.save(output)
+    if as_json:
+        print(json.dumps(result.summary(), allow_nan=False))
+    else:
+        _print(result, paths)
+    if result.status not in ("aligned", "level_only"):
+        raise typer.Exit(4)
+
+
+def _progress(quiet: bool) -> Any:
+    """A spinner with the stage's name on standard error, where a person looks at it."""
+    if quiet or not sys.stderr.isatty():
+        return nullcontext(lambda stage: None)
+    from contextlib import contextmanager
+
+    @contextmanager
+    def spinner() -> Any:
+        from rich.console import Console
+
+        with Console(stderr=True).status("starting") as status:
+            yield status.update
+
+    return spinner()
+
+
+def _print(result: Alignment, paths: list[Path]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    s = result.summary()
+    colour = {"aligned": "green", "level_only": "yellow"}.get(result.status, "red")
+    console.print(f"[bold {colour}]{result.status}[/]  {result.source}, {result.duration:.1f} s", soft_wrap=True)
+    for reason in result.reasons:
+        console.print(f"  {reason}", markup=False, soft_wrap=True)
+    table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
+    for title in ("", "deg", "one sigma, deg", "of it bias, deg"):
+        table.add_column(title, justify="right" if title else "left")
+    for name in ("heading", "pitch", "roll"):
+        value = s[f"{name}_deg"]
+        table.add_row(
+            name,
+            "refused" if value is None else f"{value:.4f}",
+            f"{s[f'{name}_sigma_deg']:.4f}",
+            f"{s[f'{name}_sigma_floor_deg']:.4f}",
+        )
+    if result.near_vertical:
+        name, value, sigma = result.azimuth
+        degrees = 57.29577951308232
+        shown = f"{value * degrees:.4f}" if result.heading_known else "refused"
+        table.add_row(name.replace("_", " "), shown, f"{sigma * degrees:.4f}", "")
+    console.print(table)
+    for name, values, sigmas, known in (
+        ("gyro bias, deg/h", s["gyro_bias_deg_h"], s["gyro_bias_sigma_deg_h"], s["gyro_bias_estimated"]),
+        ("accelerometer bias, ug", s["accel_bias_ug"], s["accel_bias_sigma_ug"], s["accel_bias_estimated"]),
+    ):
+        shown = [
+            f"{axis} {value:.4g} ± {sigma:.2g}" if ok else f"{axis} not estimated (± {sigma:.2g})"
+            for axis, value, sigma, ok in zip("xyz", values, sigmas, known, strict=True)
+        ]
+        console.print(f"{name}: {', '.join(shown)}", soft_wrap=True)
+    console.print(f"attitude at {result.time:.3f} s, method {result.method}: {result.method_reason}", soft_wrap=True)
+    console.print(f"IMU: {result.imu_source}", soft_wrap=True)
+    for path in paths:
+        console.print(f"wrote {path}", soft_wrap=True)
+
+
+align.__doc__ = f"{align.__doc__}\n{EXAMPLES}"

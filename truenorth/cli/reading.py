@@ -1,0 +1,63 @@
+"""Options by which every command reads a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from truenorth.records import ImuRecord
+
+Log = Annotated[
+    Path,
+    typer.Argument(help="IMU log: .csv, .parquet, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.", show_default=False),
+]
+Axes = Annotated[
+    str | None,
+    typer.Option(help="Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, ...", show_default=False),
+]
+Units = Annotated[
+    str | None, typer.Option(help="Units of gyro and accelerometer columns, such as 'deg/s,g'.", show_default=False)
+]
+Rate = Annotated[
+    float | None, typer.Option(help="Samples a second, for a log without a time column.", show_default=False)
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        help="Names of the columns in the log, as 'time=t,gyro_x=wx,...'; for .npz and .mat the variables.",
+        show_default=False,
+    ),
+]
+Format = Annotated[str | None, typer.Option("--format", help="Format, where the suffix does not tell.", show_default=False)]
+From = Annotated[float | None, typer.Option("--from", help="Use the log from this time on, s.", show_default=False)]
+To = Annotated[float | None, typer.Option("--to", help="Use the log up to this time, s.", show_default=False)]
+
+
+def read_log(
+    log: Path,
+    *,
+    axes: str | None,
+    units: str | None,
+    rate: float | None,
+    columns: str | None,
+    format: str | None,
+    start: float | None,
+    stop: float | None,
+) -> ImuRecord:
+    """Read a log as the options say, and cut the window out of it."""
+    from truenorth.errors import UsageError
+    from truenorth.formats import read_imu
+
+    names: dict[str, str] | None = None
+    if columns is not None:
+        pairs = [pair.partition("=") for pair in columns.split(",")]
+        if any(not equals or not ours.strip() or not theirs.strip() for ours, equals, theirs in pairs):
+            raise UsageError(f"--columns {columns!r}: expected pairs such as time=t,gyro_x=wx")
+        names = {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
+    record = read_imu(log, format=format, units=units, axes=axes, rate=rate, columns=names)
+    if start is not None or stop is not None:
+        record = record.between(start, stop)
+    return record
