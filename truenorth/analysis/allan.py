@@ -19,9 +19,9 @@ from truenorth.records import ImuRecord
 Array = NDArray[np.float64]
 
 SHORTEST_RECORD = 20  # rows; below that an Allan deviation says nothing
-OCTAVE_CORRELATION = (
-    0.5  # of overlapping Allan variances one octave apart, white noise (1000 simulated records)
-)
+OCTAVE_CORRELATION = 0.5  # of overlapping Allan variances one octave apart, white noise (1000 simulated records)
+MODEL_ERRORS = (0.0, 0.1, 0.3, 1.0, 3.0)  # of the variance, relative
+MISFIT = 3.0  # chi-square a degree of freedom, above which the four processes do not describe the record
 WORTH = 6.0  # what one more noise process must lower chi-square by to be believed
 
 
@@ -79,9 +79,7 @@ class NoiseCoefficients:
 
     def variance(self, tau: ArrayLike) -> Array:
         """Allan variance of the fitted model at `tau` (M,), shape (M, 3)."""
-        squares = np.stack(
-            [self.quantisation, self.random_walk, self.bias_instability, self.rate_random_walk]
-        )
+        squares = np.stack([self.quantisation, self.random_walk, self.bias_instability, self.rate_random_walk])
         return _shapes(np.asarray(tau, dtype=np.float64)) @ squares**2
 
 
@@ -174,9 +172,7 @@ def noise_coefficients(record: ImuRecord) -> tuple[NoiseCoefficients, NoiseCoeff
         Fewer than 20 rows.
     """
     if len(record) < SHORTEST_RECORD:
-        raise UsageError(
-            f"{record.source}: {len(record)} rows; noise coefficients need at least {SHORTEST_RECORD}"
-        )
+        raise UsageError(f"{record.source}: {len(record)} rows; noise coefficients need at least {SHORTEST_RECORD}")
     return _fit(record.gyro, record), _fit(record.accel, record)
 
 
@@ -184,17 +180,13 @@ def _fit(data: Array, record: ImuRecord) -> NoiseCoefficients:
     allan = overlapping_adev(data, record.interval, kind=record.kind)
     values, sigmas = np.zeros((4, 3)), np.full((4, 3), np.nan)
     for axis in range(3):
-        values[:, axis], sigmas[:, axis] = _nonnegative_fit(
-            allan.tau, allan.deviation[:, axis], allan.sigma[:, axis]
-        )
+        values[:, axis], sigmas[:, axis] = _nonnegative_fit(allan.tau, allan.deviation[:, axis], allan.sigma[:, axis])
     return NoiseCoefficients(*values, *sigmas, allan)  # type: ignore[call-arg]
 
 
 def _shapes(tau: Array) -> Array:
     """(M, 4) Allan variance of the four processes for coefficients of one."""
-    return np.stack(
-        [3.0 / tau**2, 1.0 / tau, np.full_like(tau, 2.0 * np.log(2.0) / np.pi), tau / 3.0], axis=-1
-    )
+    return np.stack([3.0 / tau**2, 1.0 / tau, np.full_like(tau, 2.0 * np.log(2.0) / np.pi), tau / 3.0], axis=-1)
 
 
 def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array, Array]:
@@ -203,6 +195,10 @@ def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array,
     Fifteen small least-squares problems, one for each set of processes, replace an iterative solver; a set
     with a square below zero is out, and a process must lower chi-square by `WORTH` to be taken. The weights
     are the fitted variance's; the measured one, whose weights favour small values, only starts the iteration.
+
+    Real sensors have vibration, filters and resonances that the four processes lack. Where chi-square shows it, a
+    relative error of the model joins the weights until it no longer does, so that no part of the curve rules;
+    residuals are then meant on the logarithmic scale of the plot.
     """
     coefficients, sigmas = np.zeros(4), np.full(4, np.nan)
     usable = deviation > 0.0
@@ -213,28 +209,46 @@ def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array,
     lag = np.abs(np.subtract.outer(np.arange(variance.size), np.arange(variance.size)))
     correlation = OCTAVE_CORRELATION**lag
 
-    model = variance
-    for _ in range(3):
-        weights = 1.0 / (relative * model)
-        fits = [
-            fit
-            for size in range(1, min(4, variance.size) + 1)
-            for chosen in combinations(range(4), size)
-            if (fit := _fit_processes(shapes, variance, weights, chosen)) is not None
-        ]
-        cost, chosen, squares, solver = min(fits, key=lambda fit: fit[0] + WORTH * len(fit[1]))
-        model = shapes[:, chosen] @ squares
+    for model_error in MODEL_ERRORS:
+        model = variance
+        for _ in range(3 if model_error == 0.0 else 5):
+            size = model if model_error == 0.0 else _logarithmic_size(model, variance)
+            cost, chosen, squares, solver = _best_processes(
+                shapes, variance, 1.0 / (np.hypot(relative, model_error) * size)
+            )
+            model = shapes[:, chosen] @ squares
+        spread = cost / max(1, variance.size - len(chosen))
+        if spread < MISFIT:
+            break
 
     covariance = solver @ correlation @ solver.T  # of the squares; the weighted rows have unit variance
-    spread = max(1.0, cost / max(1, variance.size - len(chosen)))  # misfit widens only
     coefficients[list(chosen)] = np.sqrt(squares)
-    sigmas[list(chosen)] = np.sqrt(spread * np.diag(covariance)) / (2.0 * np.sqrt(squares))
+    sigmas[list(chosen)] = np.sqrt(max(1.0, spread) * np.diag(covariance)) / (2.0 * np.sqrt(squares))
     return coefficients, sigmas
 
 
-def _fit_processes(
-    shapes: Array, variance: Array, weights: Array, chosen: tuple[int, ...]
-) -> tuple[float, tuple[int, ...], Array, Array] | None:
+def _logarithmic_size(model: Array, variance: Array) -> Array:
+    """Scale of residuals whose weighted normal equations are those of ``sum (log model - log variance)^2``."""
+    log_ratio = np.log(model / variance)
+    near = np.abs(log_ratio) < 1e-6
+    logarithmic_mean = np.where(near, model, (model - variance) / np.where(near, 1.0, log_ratio))
+    return np.asarray(np.sqrt(model * logarithmic_mean))
+
+
+Fit = tuple[float, tuple[int, ...], Array, Array]
+
+
+def _best_processes(shapes: Array, variance: Array, weights: Array) -> Fit:
+    fits = [
+        fit
+        for size in range(1, min(4, variance.size) + 1)
+        for chosen in combinations(range(4), size)
+        if (fit := _fit_processes(shapes, variance, weights, chosen)) is not None
+    ]
+    return min(fits, key=lambda fit: fit[0] + WORTH * len(fit[1]))
+
+
+def _fit_processes(shapes: Array, variance: Array, weights: Array, chosen: tuple[int, ...]) -> Fit | None:
     """Chi-square, processes, squared coefficients and solver; None where a square is not positive."""
     rows = shapes[:, chosen] * weights[:, None]
     scale = np.linalg.norm(rows, axis=0)  # the four shapes differ by many powers of ten

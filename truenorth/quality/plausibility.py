@@ -13,15 +13,15 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.earth import EARTH_RATE
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding
 from truenorth.quality.signals import even_rates
 from truenorth.records import ImuRecord
+from truenorth.units import STANDARD_GRAVITY as G
 
 Array = NDArray[np.float64]
 
-G = 9.80665  # m/s^2, standard gravity: units of g are defined by it
-EARTH_RATE = 7.292115e-5  # rad/s, WGS-84
 DEG = np.pi / 180.0
 LEVEL_TOLERANCE = 0.12  # of g: local gravity, biases of cheap sensors, motion
 UP_LIMIT = np.radians(60.0)  # tilt of z from up beyond which the axes are doubtful

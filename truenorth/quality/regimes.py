@@ -114,7 +114,7 @@ class MotionSummary:
     angle_noise: Array
     regimes: tuple[Regime, ...]
 
-    def fraction(self, kind: Kind) -> float:
+    def fraction(self, kind: str) -> float:
         """Share of the record's seconds that are of this kind, 0..1."""
         if kind not in KINDS or self.kind.size == 0:
             return float(kind == "unknown" and self.kind.size == 0)

@@ -1,0 +1,1 @@
+"""Figures with matplotlib: plain arrays or results in, a `Figure` out, units on every axis."""

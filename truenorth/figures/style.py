@@ -1,0 +1,131 @@
+"""One look for all figures: fonts, colours that colour-blind readers tell apart, sigma bands, long traces.
+
+Draw inside ``with style():`` on a figure from `new_figure`. Figures are made without pyplot, so no window system
+is needed, nothing is global, and a long campaign leaks no figure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# Okabe and Ito (2008), "Color universal design", in the order in which neighbours differ most.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+REFERENCE = "#444444"  # truth and limits
+AXES_NAMES = ("x", "y", "z")
+POINTS = 4000  # that a long trace is thinned to; more than any screen shows
+
+_RC: dict[Any, Any] = {
+    "figure.dpi": 110,
+    "figure.constrained_layout.use": True,
+    "figure.facecolor": "white",
+    "savefig.dpi": 150,
+    "font.size": 10.0,
+    "font.family": "sans-serif",
+    "axes.titlesize": 11.0,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": 10.0,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.prop_cycle": cycler(color=COLOURS),
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "axes.xmargin": 0.0,
+    "grid.color": "#D9D9D9",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "legend.handlelength": 1.6,
+    "svg.fonttype": "none",
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Set the project's look for the figures made and drawn inside."""
+    with mpl.rc_context(_RC):
+        yield
+
+
+def new_figure(width: float = 9.0, height: float = 6.0) -> Figure:
+    """Make a figure of this size, inches, that belongs to no window; its `savefig` works without a display."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def band(
+    ax: Axes,
+    time: ArrayLike,
+    mean: ArrayLike,
+    sigma: ArrayLike,
+    *,
+    factor: float = 1.0,
+    label: str | None = None,
+    color: str | None = None,
+) -> None:
+    """Draw a line within its sigma band.
+
+    Parameters
+    ----------
+    ax : Axes
+    time, mean, sigma : (N,) arrays
+        In the units of the axes.
+    factor : float
+        Half width of the band in sigmas.
+    label : str, optional
+        Of the line; the band is named after it.
+    color : str, optional
+        Default: the next of the palette.
+    """
+    t, m, s = (np.asarray(x, dtype=np.float64) for x in (time, mean, sigma))
+    keep = thin(t, m)
+    (line,) = ax.plot(t[keep], m[keep], label=label, color=color)
+    even = evenly(t.size)
+    ax.fill_between(
+        t[even],
+        (m - factor * s)[even],
+        (m + factor * s)[even],
+        color=line.get_color(),
+        alpha=0.18,
+        linewidth=0.0,
+        label=None if label is None else f"{label} ± {factor:g}σ",
+    )
+
+
+def trace(ax: Axes, time: ArrayLike, values: ArrayLike, **options: Any) -> None:
+    """Plot a long trace thinned to what the eye can tell; `options` go to ``Axes.plot``."""
+    t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    keep = thin(t, v)
+    ax.plot(t[keep], v[keep], **options)
+
+
+def thin(time: ArrayLike, values: ArrayLike, points: int = POINTS) -> NDArray[np.intp]:
+    """Rows (M,) of a trace (N,) to draw, M <= about `points`: peaks and shape survive (MinMaxLTTB)."""
+    t = np.ascontiguousarray(time, dtype=np.float64)
+    v = np.ascontiguousarray(values, dtype=np.float64)
+    if v.size <= points:
+        return np.arange(v.size)
+    if not np.all(np.isfinite(v)):
+        return evenly(v.size, points)
+    from tsdownsample import MinMaxLTTBDownsampler
+
+    rows = MinMaxLTTBDownsampler().downsample(t, v, n_out=points)
+    return np.asarray(rows, dtype=np.intp)
+
+
+def evenly(count: int, points: int = POINTS) -> NDArray[np.intp]:
+    """Rows evenly spread over `count`, both ends included."""
+    return np.unique(np.linspace(0, count - 1, min(count, points)).astype(np.intp))

@@ -1,0 +1,279 @@
+"""Everything that a record tells about itself, in one object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truenorth.quality.plausibility import Turning, check_plausibility
+from truenorth.quality.regimes import KINDS, Kind, MotionSummary, Regime, motion_summary
+from truenorth.quality.sampling import Finding, Sampling, check_sampling
+from truenorth.records import ImuRecord
+from truenorth.units import parse_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from rich.table import Table
+
+    from truenorth.analysis.allan import NoiseCoefficients
+
+SHORTEST_REST = 20.0  # s at rest, from which noise densities are given
+SEVERITIES = ("error", "warning", "note")
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """Health, noise and motion of one record; all figures in SI.
+
+    Parameters
+    ----------
+    source : str
+        Where the record came from.
+    samples : int
+    start, stop, duration, interval : float, s
+        Clock of the record; `interval` is the median step.
+    sampling : Sampling
+        Jitter, gaps, repeated rows, frozen and saturated channels.
+    motion : MotionSummary
+        How the base moved, second by second.
+    turning : Turning
+        How far the gyros explain the turning of gravity.
+    gyro_noise, accel_noise : NoiseCoefficients or None
+        From the longest stretch at rest (`noise_from`); None where no 20 s are at rest.
+    noise_from : Regime or None
+        That stretch; its kind is ``disturbed`` where no still one is long enough: the noise is then an upper bound.
+    findings : tuple of Finding
+        Errors first.
+    record : ImuRecord
+        What was inspected; the figure shows it.
+    """
+
+    source: str
+    samples: int
+    start: float
+    stop: float
+    duration: float
+    interval: float
+    sampling: Sampling
+    motion: MotionSummary
+    turning: Turning
+    gyro_noise: NoiseCoefficients | None
+    accel_noise: NoiseCoefficients | None
+    noise_from: Regime | None
+    findings: tuple[Finding, ...]
+    record: ImuRecord = field(repr=False, compare=False)
+
+    @property
+    def regimes(self) -> tuple[Regime, ...]:
+        """Stretches of one kind of motion, in order."""
+        return self.motion.regimes
+
+    @property
+    def overall(self) -> Kind:
+        """The strongest kind of motion that over 5 % of the seconds show."""
+        return self.motion.overall
+
+    @property
+    def still_fraction(self) -> float:
+        """Share of seconds without motion above the sensor's noise, 0..1."""
+        return self.motion.still_fraction
+
+    @property
+    def rate_rms(self) -> float:
+        """RMS of the norm of the one-second mean rates, bias taken out, rad/s."""
+        return self.motion.rate_rms
+
+    @property
+    def angular_amplitude(self) -> float:
+        """Amplitude of the angular oscillation, rad."""
+        return self.motion.angular_amplitude
+
+    @property
+    def force_rms(self) -> float:
+        """RMS deviation of the one-second mean specific force from its mean, m/s^2."""
+        return self.motion.force_rms
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no finding of severity ``error``."""
+        return all(finding.severity != "error" for finding in self.findings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything in datasheet units, ready for JSON: a figure that does not exist is None, never NaN."""
+        sampling, motion = self.sampling, self.motion
+        return {
+            "source": self.source,
+            "samples": self.samples,
+            "start_s": self.start,
+            "stop_s": self.stop,
+            "duration_s": self.duration,
+            "rate_hz": 1.0 / self.interval,
+            "jitter_rms_ms": sampling.jitter_rms * 1e3,
+            "jitter_max_ms": sampling.jitter_max * 1e3,
+            "gaps": [
+                {"time_s": float(time), "length_s": float(length)}
+                for time, length in zip(sampling.gap_times, sampling.gap_lengths)
+            ],
+            "repeated_rows": sampling.repeated_rows,
+            "longest_equal_run": sampling.longest_runs.tolist(),
+            "saturated_rows": sampling.saturated_rows.tolist(),
+            "motion": {
+                "overall": motion.overall,
+                "fractions": {kind: motion.fraction(kind) for kind in KINDS},
+                "regimes": [{"start_s": r.start, "stop_s": r.stop, "kind": r.kind} for r in motion.regimes],
+                "rate_rms_deg_s": _figure(np.degrees(motion.rate_rms)),
+                "angular_amplitude_deg": _figure(np.degrees(motion.angular_amplitude)),
+                "force_rms_m_s2": _figure(motion.force_rms),
+                "acceleration_rms_m_s2": _figure(motion.acceleration_rms),
+            },
+            "gyro_against_gravity": {
+                "scale": _figure(self.turning.scale),
+                "agreement": _figure(self.turning.agreement),
+            },
+            "noise": self._noise(),
+            "findings": [{"severity": f.severity, "code": f.code, "message": f.message} for f in self.findings],
+        }
+
+    def _noise(self) -> dict[str, Any] | None:
+        if self.gyro_noise is None or self.accel_noise is None or self.noise_from is None:
+            return None
+        table: dict[str, Any] = {
+            "from_s": self.noise_from.start,
+            "to_s": self.noise_from.stop,
+            "motion": self.noise_from.kind,
+        }
+        for key, _, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
+            factor, _ = parse_unit(unit)
+            table[key] = [_figure(value / factor) for value in getattr(noise, name)]
+            table[f"{key}_sigma"] = [_figure(value / factor) for value in getattr(noise, f"{name}_sigma")]
+        return table
+
+    def table(self) -> Table:
+        """Figures as a rich table: sampling, motion, noise."""
+        from rich.table import Table
+
+        table = Table("figure", "value", title=self.source, title_justify="left", show_header=False)
+        sampling, motion = self.sampling, self.motion
+        table.add_row("duration", f"{self.duration:.3f} s, {self.samples} samples from {self.start:.3f} s")
+        table.add_row(
+            "rate",
+            f"{1.0 / self.interval:.4g} Hz, jitter {sampling.jitter_rms * 1e3:.3f} ms RMS, "
+            f"{sampling.jitter_max * 1e3:.3f} ms at most",
+        )
+        table.add_row("gaps", str(sampling.gap_times.size))
+        table.add_row("repeated rows", f"{sampling.repeated_rows} ({sampling.repeated_rows / self.samples:.1%})")
+        table.add_row("saturated rows", str(int(sampling.saturated_rows.sum())))
+        shares = {kind: motion.fraction(kind) for kind in (*KINDS, "unknown")}
+        table.add_row("motion", ", ".join(f"{kind} {share:.0%}" for kind, share in shares.items() if share > 0.0))
+        if motion.time.size:
+            table.add_row("angular amplitude", f"{np.degrees(motion.angular_amplitude):.3g} deg")
+            table.add_row("rate, RMS of 1 s means", f"{np.degrees(motion.rate_rms):.3g} deg/s")
+            table.add_row("acceleration, RMS of 1 s means", f"{motion.acceleration_rms:.3g} m/s^2")
+        if self.gyro_noise is not None and self.accel_noise is not None and self.noise_from is not None:
+            where = f"{self.noise_from.kind}, {round(self.noise_from.start)} to {round(self.noise_from.stop)} s"
+            table.add_row("noise x, y, z from", where)
+            for _, words, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
+                factor, _ = parse_unit(unit)
+                values = getattr(noise, name) / factor
+                if np.any(values > 0.0):
+                    shown = ", ".join(f"{value:.3g}" if value > 0.0 else "-" for value in values)
+                    table.add_row(f"  {words}", f"{shown} {unit}")
+        return table
+
+    def plot(self) -> Figure:
+        """Draw rates and specific force over the motion regimes, and the Allan deviation."""
+        from truenorth.figures.inspection import plot_inspection
+
+        return plot_inspection(self)
+
+
+def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
+    """Look for what is wrong with a record, and measure its noise and motion.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    lat : float, rad, optional
+        Latitude; lets the earth's rate be checked by its vertical part too.
+
+    Returns
+    -------
+    Inspection
+    """
+    motion = motion_summary(record)
+    sampling, findings = check_sampling(record)
+    turning, doubts = check_plausibility(record, motion, lat)
+    findings += doubts
+    gyro_noise, accel_noise, rest = _noise_at_rest(record, motion, findings)
+    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    return Inspection(
+        source=record.source,
+        samples=len(record),
+        start=float(record.time[0]),
+        stop=float(record.time[-1]),
+        duration=record.duration,
+        interval=record.interval,
+        sampling=sampling,
+        motion=motion,
+        turning=turning,
+        gyro_noise=gyro_noise,
+        accel_noise=accel_noise,
+        noise_from=rest,
+        findings=tuple(findings),
+        record=record,
+    )
+
+
+def _noise_at_rest(
+    record: ImuRecord, motion: MotionSummary, findings: list[Finding]
+) -> tuple[NoiseCoefficients | None, NoiseCoefficients | None, Regime | None]:
+    """Noise of the longest still stretch, else of the longest disturbed one; gaps cut a stretch."""
+    from truenorth.analysis.allan import SHORTEST_RECORD, noise_coefficients
+
+    for kinds in (("still",), ("still", "disturbed")):
+        rest = motion.longest(*kinds)
+        if rest is None or rest.duration < SHORTEST_REST:
+            continue
+        part = _longest_without_gap(record.between(rest.start, rest.stop))
+        if part.duration < SHORTEST_REST or len(part) < SHORTEST_RECORD:
+            continue
+        gyro, accel = noise_coefficients(part)
+        kind: Kind = "still" if kinds == ("still",) else "disturbed"
+        return gyro, accel, Regime(float(part.time[0] - part.interval), float(part.time[-1]), kind)
+    findings.append(
+        Finding(
+            "note",
+            "no_rest",
+            f"no {SHORTEST_REST:.0f} s at rest; noise densities are not given: record some minutes with the base still",
+        )
+    )
+    return None, None, None
+
+
+def _longest_without_gap(record: ImuRecord) -> ImuRecord:
+    edges = np.concatenate([[0], record.gaps, [len(record)]])
+    longest = int(np.argmax(np.diff(edges)))
+    first, last = int(edges[longest]), int(edges[longest + 1])
+    return record[first:last] if last - first >= 2 else record
+
+
+def _noise_rows(
+    gyro: NoiseCoefficients, accel: NoiseCoefficients
+) -> list[tuple[str, str, NoiseCoefficients, str, str]]:
+    """JSON key, words, coefficients, attribute and datasheet unit of each figure."""
+    return [
+        ("angle_random_walk_deg_sqrt_h", "angle random walk", gyro, "random_walk", "deg/sqrt(h)"),
+        ("gyro_bias_instability_deg_h", "gyro bias instability", gyro, "bias_instability", "deg/h"),
+        ("gyro_rate_random_walk_deg_h_sqrt_h", "gyro rate random walk", gyro, "rate_random_walk", "deg/h/sqrt(h)"),
+        ("gyro_quantisation_arcsec", "gyro quantisation", gyro, "quantisation", "arcsec"),
+        ("velocity_random_walk_ug_sqrt_hz", "velocity random walk", accel, "random_walk", "ug/sqrt(Hz)"),
+        ("accel_bias_instability_ug", "accel bias instability", accel, "bias_instability", "ug"),
+        ("accel_random_walk_ug_sqrt_s", "accel random walk", accel, "rate_random_walk", "ug/sqrt(s)"),
+        ("accel_quantisation_mm_s", "accel quantisation", accel, "quantisation", "mm/s"),
+    ]
+
+
+def _figure(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
