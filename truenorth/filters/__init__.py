@@ -1,7 +1,21 @@
 """Filters and smoothers for linear systems; they know nothing of navigation."""
 
+from truenorth.filters.fading import fading
+from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.kalman import kalman
 from truenorth.filters.smoother import Smoothed, smoother
+from truenorth.filters.strong_tracking import strong_tracking
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
-__all__ = ["Estimates", "FilterState", "LinearSystem", "Smoothed", "kalman", "smoother"]
+__all__ = [
+    "Estimates",
+    "FilterState",
+    "LinearSystem",
+    "Smoothed",
+    "fading",
+    "h_infinity",
+    "kalman",
+    "smallest_bound",
+    "smoother",
+    "strong_tracking",
+]

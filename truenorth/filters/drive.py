@@ -10,12 +10,18 @@ from typing import Any, Literal, TypeVar, get_args
 import numpy as np
 
 from truenorth.errors import DataError, UsageError
-from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, Histories
+from truenorth.filters.recursion import NO_FILTER, NO_INNOVATION_VARIANCE, Histories
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs, runs_of
-from truenorth.linalg import Size, padded
+from truenorth.linalg import Array, Size, padded
 
 History = Literal["last", "sigma", "full"]
 T = TypeVar("T", bound=tuple[Any, ...])
+
+
+class NoFilterError(DataError):
+    """No H-infinity filter keeps the bound."""
+
+
 Kernel = Callable[[Size, Runs, int, Histories], None]
 
 
@@ -27,6 +33,8 @@ def drive(
     history: History,
     innovations: bool | None,
     workers: int,
+    memory: Array | None = None,
+    adaptation: int = 0,
 ) -> Estimates:
     """Run a kernel over all runs of a system and shape what it kept.
 
@@ -36,6 +44,10 @@ def drive(
         ``kernel(size, runs, epochs, histories)``.
     system, state, history, innovations, workers
         As in :func:`truenorth.filters.kalman`.
+    memory : (a,) array, optional
+        What an adaptive filter begins with, where no `state` says better.
+    adaptation : int
+        Figures that an adaptive filter reports of each epoch.
 
     Returns
     -------
@@ -48,9 +60,12 @@ def drive(
     shape, epochs = system.runs, system.epochs
     runs = runs_of(system, shape)
     keep_innovations = history != "last" if innovations is None else innovations
-    out = _histories(shape, system, history, epochs if keep_innovations else 0)
+    out = _histories(shape, system, history, epochs if keep_innovations else 0, adaptation)
+    if memory is not None:
+        out = out._replace(memory=np.tile(memory, (len(out.x), 1)))
     if state is not None:
         out.log_likelihood[:] = np.broadcast_to(state.log_likelihood, shape).ravel()
+        out.memory[:] = _remembered(state, out.memory.shape[1], shape)
 
     size = padded(system.states)
     in_parts(
@@ -58,14 +73,31 @@ def drive(
     )
     _raise_failure(out, shape)
 
-    x, sigma, P, innovation, innovation_covariance, nis, log_likelihood = (
-        a.reshape(shape + a.shape[1:]) for a in out[:-1]
+    out = out._replace(**{name: a.reshape(shape + a.shape[1:]) for name, a in out._asdict().items()})
+    return Estimates(
+        x=out.x,
+        sigma=out.sigma,
+        P=out.P,
+        innovation=out.innovation,
+        innovation_covariance=out.innovation_covariance,
+        nis=out.nis,
+        log_likelihood=out.log_likelihood,
+        state=FilterState(out.x[..., -1, :], out.P[..., -1, :, :], out.log_likelihood, out.memory),
+        adaptation=out.adaptation,
     )
-    last = FilterState(x[..., -1, :], P[..., -1, :, :], log_likelihood)
-    return Estimates(x, sigma, P, innovation, innovation_covariance, nis, log_likelihood, last)
 
 
-def _histories(shape: tuple[int, ...], system: LinearSystem, history: History, innovations: int) -> Histories:
+def _remembered(state: FilterState, length: int, shape: tuple[int, ...]) -> Array:
+    if state.memory.shape[-1] != length:
+        raise UsageError(
+            f"the state remembers {state.memory.shape[-1]} figures, expected {length}: it is of another filter"
+        )
+    return np.broadcast_to(state.memory, (*shape, length)).reshape(int(np.prod(shape, dtype=int)), length)
+
+
+def _histories(
+    shape: tuple[int, ...], system: LinearSystem, history: History, innovations: int, adaptation: int
+) -> Histories:
     count, n, m, epochs = int(np.prod(shape, dtype=int)), system.states, system.rows, system.epochs
     of_x = 1 if history == "last" else epochs
     of_P = epochs if history == "full" else 1
@@ -77,6 +109,8 @@ def _histories(shape: tuple[int, ...], system: LinearSystem, history: History, i
         innovation_covariance=np.empty((count, innovations, m, m)),
         nis=np.zeros((count, innovations)),
         log_likelihood=np.zeros(count),
+        adaptation=np.empty((count, innovations, adaptation)),
+        memory=np.empty((count, 0)),
         failure=np.zeros((count, 2), dtype=np.int64),
     )
 
@@ -104,6 +138,11 @@ def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
         return
     reason, epoch = out.failure[failed[0]]
     run = f" of run {', '.join(str(i) for i in np.unravel_index(failed[0], shape))}" if shape else ""
+    if reason == NO_FILTER:
+        raise NoFilterError(
+            f"no H-infinity filter keeps this bound: at epoch {epoch}{run} the error to be bounded reaches it; take a "
+            "larger bound"
+        )
     if reason == NO_INNOVATION_VARIANCE:
         raise DataError(
             f"the filter broke down at epoch {epoch}{run}: the variance of an innovation is not positive and finite; "

@@ -7,81 +7,22 @@ to Guidance*, 1968; rows one by one and correlated noise: D. Simon, *Optimal Sta
 
 from __future__ import annotations
 
-import numpy as np
-
 from truenorth.compiled import compiled
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
-    LOG_2PI,
-    NO_INNOVATION_VARIANCE,
-    NOT_POSITIVE,
     SOUND,
     Histories,
-    Workspace,
     begin,
     innovate,
     keep,
     load_measurement,
     load_process,
     predict,
-    row_variance,
-    update_by_row,
+    update,
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
 from truenorth.linalg import Size
-
-ROUNDING = 1e-13  # of a variance
-PLAIN_RANGE = 1e13  # of an innovation's variance over its noise: beyond it the plain form leaves rounding in P
-
-
-@compiled(forceinline=True)
-def settle(size: Size, w: Workspace) -> None:
-    """After a row without noise: a variance that is zero but for rounding is zero, and so are its covariances."""
-    for i in range(len(size)):
-        if abs(w.P[i, i]) < ROUNDING * abs(w.a[i] * w.k[i]):
-            for j in range(len(size)):
-                w.P[i, j] = 0.0
-                w.P[j, i] = 0.0
-
-
-@compiled(forceinline=True)
-def still_positive(size: Size, w: Workspace) -> bool:
-    """Whether no variance is below zero by more than rounding of the largest it ever was; rounding becomes zero."""
-    for i in range(len(size)):
-        if w.P[i, i] < 0.0:
-            if w.P[i, i] < -ROUNDING * w.largest[i]:
-                return False
-            w.P[i, i] = 0.0
-    return True
-
-
-@compiled(forceinline=True)
-def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[int, float, float]:
-    """Condition on all rows present; the failure if any, NIS and log-likelihood."""
-    nis = 0.0
-    log_likelihood = 0.0
-    for i in range(len(size)):
-        w.largest[i] = max(w.largest[i], w.P[i, i])
-    for row in range(w.z.shape[0]):
-        if np.isnan(w.z[row]):
-            continue
-        nu, variance, h_s = row_variance(size, w, row, correlated)
-        noise = w.R[row, row]
-        if not variance > 0.0:
-            return NO_INNOVATION_VARIANCE, nis, log_likelihood
-        if not correlated and (
-            variance < (1.0 - ROUNDING) * noise or (not joseph and variance > PLAIN_RANGE * noise > 0)
-        ):
-            return NOT_POSITIVE, nis, log_likelihood
-        nis += nu * nu / variance
-        log_likelihood -= 0.5 * (nu * nu / variance + np.log(variance) + LOG_2PI)
-        update_by_row(size, w, row, nu, variance, h_s, correlated, joseph)
-        if noise == 0.0:
-            settle(size, w)
-    if not still_positive(size, w):
-        return NOT_POSITIVE, nis, log_likelihood
-    return SOUND, nis, log_likelihood
 
 
 @compiled

@@ -22,7 +22,10 @@ from truenorth.linalg import (
 )
 
 LOG_2PI = float(np.log(2.0 * np.pi))
-SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE = 0, 1, 2
+ROUNDING = 1e-13  # of a variance
+PLAIN_RANGE = 1e13  # of an innovation's variance over its noise: beyond it the plain form leaves rounding in P
+
+SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE, NO_FILTER = range(4)
 
 
 class Workspace(NamedTuple):
@@ -57,6 +60,8 @@ class Histories(NamedTuple):
     innovation_covariance: Array
     nis: Array
     log_likelihood: Array
+    adaptation: Array
+    memory: Array
     failure: NDArray[np.int64]  # (runs, 2): reason and epoch
 
 
@@ -152,11 +157,17 @@ def load_measurement(size: Size, system: Runs, run: int, epoch: int, w: Workspac
 
 
 @compiled(forceinline=True)
-def predict(size: Size, w: Workspace) -> None:
-    """``x = Phi x + u``, ``P = Phi P Phi' + Q``."""
+def predict_state(size: Size, w: Workspace) -> None:
+    """``x = Phi x + u``."""
     transposed_times(size, w.Phi_t, w.x, w.a)
     for i in range(len(size)):
         w.x[i] = w.a[i] + w.u[i]
+
+
+@compiled(forceinline=True)
+def predict(size: Size, w: Workspace) -> None:
+    """``x = Phi x + u``, ``P = Phi P Phi' + Q``."""
+    predict_state(size, w)
     propagate_covariance(size, w.Phi, w.Phi_t, w.Q, w.P, w.temporary)
 
 
@@ -215,6 +226,55 @@ def update_by_row(
                 w.S_t[i, j] -= w.k[j] * w.g[i]
             for j in range(row + 1, rows):
                 w.R[i, j] -= w.g[i] * w.g[j] / variance
+
+
+@compiled(forceinline=True)
+def settle(size: Size, w: Workspace) -> None:
+    """After a row without noise: a variance that is zero but for rounding is zero, and so are its covariances."""
+    for i in range(len(size)):
+        if abs(w.P[i, i]) < ROUNDING * abs(w.a[i] * w.k[i]):
+            for j in range(len(size)):
+                w.P[i, j] = 0.0
+                w.P[j, i] = 0.0
+
+
+@compiled(forceinline=True)
+def still_positive(size: Size, w: Workspace) -> bool:
+    """Whether no variance is below zero by more than rounding of the largest it ever was; rounding becomes zero."""
+    for i in range(len(size)):
+        if w.P[i, i] < 0.0:
+            if w.P[i, i] < -ROUNDING * w.largest[i]:
+                return False
+            w.P[i, i] = 0.0
+    return True
+
+
+@compiled(forceinline=True)
+def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[int, float, float]:
+    """Condition on all rows present; the failure if any, NIS and log-likelihood."""
+    nis = 0.0
+    log_likelihood = 0.0
+    for i in range(len(size)):
+        w.largest[i] = max(w.largest[i], w.P[i, i])
+    for row in range(w.z.shape[0]):
+        if np.isnan(w.z[row]):
+            continue
+        nu, variance, h_s = row_variance(size, w, row, correlated)
+        noise = w.R[row, row]
+        if not variance > 0.0:
+            return NO_INNOVATION_VARIANCE, nis, log_likelihood
+        if not correlated and (
+            variance < (1.0 - ROUNDING) * noise or (not joseph and variance > PLAIN_RANGE * noise > 0)
+        ):
+            return NOT_POSITIVE, nis, log_likelihood
+        nis += nu * nu / variance
+        log_likelihood -= 0.5 * (nu * nu / variance + np.log(variance) + LOG_2PI)
+        update_by_row(size, w, row, nu, variance, h_s, correlated, joseph)
+        if noise == 0.0:
+            settle(size, w)
+    if not still_positive(size, w):
+        return NOT_POSITIVE, nis, log_likelihood
+    return SOUND, nis, log_likelihood
 
 
 @compiled(forceinline=True)

@@ -158,11 +158,14 @@ class FilterState:
     P : (..., n, n) array
     log_likelihood : (...) array
         Of all measurements up to here.
+    memory : (..., a) array
+        What an adaptive filter remembers beside; of length 0 for others.
     """
 
     x: Array
     P: Array
     log_likelihood: Array
+    memory: Array
 
 
 @dataclass(frozen=True)
@@ -187,6 +190,8 @@ class Estimates:
         Of all measurements since the state's beginning.
     state : FilterState
         To go on from.
+    adaptation : (..., K or 0, f) array
+        What an adaptive filter chose at each epoch (its docstring says what); of width 0 for others.
     """
 
     x: Array
@@ -197,6 +202,7 @@ class Estimates:
     nis: Array
     log_likelihood: Array
     state: FilterState
+    adaptation: Array
 
     @property
     def nis_rows(self) -> NDArray[np.int64]:

@@ -1,0 +1,189 @@
+"""The H-infinity filter: bounds the worst ratio of estimation error to disturbance, whatever the disturbance.
+
+For every disturbance ``sum |L (x - x_hat)|^2 < g^2 (|x - x0|^2 / P0 + sum |w|^2 / Q + sum |v|^2 / R)``, with the
+bound g and x_hat from the measurements up to its epoch. The filter is a Kalman filter that after each measurement
+also "measures" ``L x`` as just what it took it to be, with the negative variance ``-g^2``: the state stays, and
+``P^-1 = P_pred^-1 + H' R^-1 H - L' L / g^2``. It exists while this is positive, that is, while ``L P L' < g^2``
+before that step. P is then no covariance any more; it is larger than the Kalman filter's.
+
+Source: B. Hassibi, A. H. Sayed, T. Kailath, Linear estimation in Krein spaces, part II, IEEE Trans. Autom. Control
+41, 1996 (the a-posteriori filter, its theorem 2); D. Simon, *Optimal State Estimation*, 2006, chapter 11.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truenorth.compiled import compiled
+from truenorth.errors import UsageError
+from truenorth.filters.drive import History, NoFilterError, drive
+from truenorth.filters.recursion import (
+    NO_FILTER,
+    SOUND,
+    Histories,
+    Workspace,
+    begin,
+    innovate,
+    keep,
+    load_measurement,
+    load_process,
+    predict,
+    update,
+    workspace,
+)
+from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.linalg import Array, Size, dot, padded, take_off, transposed_times
+
+TINY = 1e-150  # its square is still a number
+
+
+@compiled(forceinline=True)
+def distrust(size: Size, w: Workspace, L: Array, theta: float) -> float:
+    """``P = (P^-1 - theta L' L)^-1``, row by row; the margin, ``min(1 - theta l P l')``."""
+    margin = 1.0
+    for row in range(L.shape[0]):
+        transposed_times(size, w.P, L[row], w.a)
+        left = 1.0 - theta * dot(size, w.a, L[row])
+        margin = min(margin, left)
+        if not left > 0.0:
+            return left
+        take_off(size, w.P, w.a, -theta / left)
+    return margin
+
+
+@compiled
+def h_infinity_runs(size: Size, system: Runs, epochs: int, L: Array, theta: float, out: Histories) -> None:
+    """H-infinity filter of each run; `L` is padded (rows, N)."""
+    w = workspace(size, system.z.shape[2])
+    for run in range(out.x.shape[0]):
+        begin(size, system, run, w)
+        for epoch in range(epochs):
+            load_process(size, system, run, epoch, w)
+            predict(size, w)
+            present, correlated = load_measurement(size, system, run, epoch, w)
+            if out.innovation.shape[1] > 0:
+                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
+            failure, nis, log_likelihood = SOUND, 0.0, 0.0
+            if present > 0:
+                failure, nis, log_likelihood = update(size, w, correlated, True)
+            out.log_likelihood[run] += log_likelihood
+            margin = distrust(size, w, L, theta)
+            if out.innovation.shape[1] > 0:
+                out.nis[run, epoch] = nis
+                out.adaptation[run, epoch, 0] = margin
+            out.memory[run, 0] = min(out.memory[run, 0], margin)
+            if failure == SOUND and not margin > 0.0:
+                failure = NO_FILTER
+            if failure != SOUND:
+                out.failure[run, 0] = failure
+                out.failure[run, 1] = epoch
+                break
+            keep(out, run, epoch, epochs - 1, w)
+
+
+def h_infinity(
+    system: LinearSystem,
+    state: FilterState | None = None,
+    *,
+    bound: float,
+    L: ArrayLike | None = None,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """H-infinity filter.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    state : FilterState, optional
+        From an earlier call, to go on from.
+    bound : float
+        g: bound on the estimation error's energy against the normalised disturbance's, in the unit of ``L x``. With a
+        growing bound the filter becomes the Kalman filter.
+    L : (p, n) array, optional
+        What of the state is to be estimated; all of it as a rule.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        `adaptation` holds the margin, ``min(1 - l P l' / g^2)``: how far the epoch was from having no such filter;
+        ``state.memory`` the smallest so far. `P` is the bound's, not a covariance; `log_likelihood` and `nis` are of
+        the Gaussian with it.
+
+    Raises
+    ------
+    UsageError
+        An option out of range.
+    NoFilterError
+        There is no filter that keeps the bound, naming run and epoch.
+    DataError
+        As :func:`truenorth.filters.kalman`.
+    """
+    if not bound > 0.0:
+        raise UsageError(f"bound is {bound}, expected a positive number")
+    wanted = np.eye(system.states) if L is None else np.asarray(L, dtype=np.float64)
+    if wanted.ndim != 2 or wanted.shape[1] != system.states or not np.isfinite(wanted).all():
+        raise UsageError(f"L has shape {wanted.shape}, expected (p, n) finite numbers with n = {system.states}")
+    rows = np.zeros((len(wanted), len(padded(system.states))))
+    rows[:, : system.states] = wanted
+    theta = 1.0 / float(bound) ** 2
+
+    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
+        h_infinity_runs(size, runs, epochs, rows, theta, out)
+
+    return drive(
+        kernel,
+        system,
+        state,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+        memory=np.ones(1),
+        adaptation=1,
+    )
+
+
+def smallest_bound(system: LinearSystem, *, L: ArrayLike | None = None, tolerance: float = 1e-6) -> float:
+    """Smallest bound for which the H-infinity filter exists in all runs and epochs, by bisection.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    L : (p, n) array, optional
+    tolerance : float
+        Relative.
+
+    Returns
+    -------
+    float
+        A bound that can be kept, at most `tolerance` above one that cannot.
+
+    Raises
+    ------
+    UsageError
+        Any bound can be kept, since ``L x`` is known exactly.
+    """
+
+    def exists(bound: float) -> bool:
+        try:
+            h_infinity(system, bound=bound, L=L)
+        except NoFilterError:
+            return False
+        return True
+
+    high = 1.0
+    while not exists(high):
+        high *= 2.0
+    low = high / 2.0
+    while exists(low):
+        if low < TINY:
+            raise UsageError("there is no smallest bound: L x is known exactly")
+        low, high = low / 2.0, low
+    while high > (1.0 + tolerance) * low:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if exists(middle) else (middle, high)
+    return high

@@ -1,0 +1,57 @@
+"""The strong tracking filter: a fading filter with softening and cap.
+
+Source: D. H. Zhou, P. M. Frank, Strong tracking filtering of nonlinear time-varying stochastic systems with coloured
+noise, Int. J. Control 65, 1996: ``lam = max(1, tr(V - beta R - H Q H') / tr(H Phi P Phi' H'))``,
+``P = lam Phi P Phi' + Q``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truenorth.filters.drive import History
+from truenorth.filters.fading import SINGLE, faded
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
+
+
+def strong_tracking(
+    system: LinearSystem,
+    state: FilterState | None = None,
+    *,
+    softening: float = 1.0,
+    rho: float = 0.95,
+    cap: float = np.inf,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """Strong tracking filter.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    state : FilterState, optional
+        From an earlier call, to go on from.
+    softening : float
+        beta, at least 1: how much larger than expected the measurement noise may look before the factor fires; at 1
+        the filter is the fading filter of kind "single".
+    rho : float
+        Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
+    cap : float
+        Largest factor.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        `adaptation` holds the factor.
+
+    Raises
+    ------
+    UsageError
+        An option out of range.
+    DataError
+        As :func:`truenorth.filters.kalman`.
+    """
+    return faded(system, state, SINGLE, rho, softening, cap, history, innovations, workers)
