@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from truenorth.analysis.allan import NoiseCoefficients
 
-SHORTEST_REST = 20.0  # s at rest, from which noise densities are given
+SHORTEST_REST = 15.0  # s at rest, from which noise densities are given
+REST_MARGIN = 2.0  # s between a motion and a stretch at rest
 SEVERITIES = ("error", "warning", "note")
 
 
@@ -41,7 +42,7 @@ class Inspection:
     turning : Turning
         How far the gyros explain the turning of gravity.
     gyro_noise, accel_noise : NoiseCoefficients or None
-        From the longest stretch at rest (`noise_from`); None where no 20 s are at rest.
+        From the longest stretch at rest (`noise_from`); None where no 15 s are at rest.
     noise_from : Regime or None
         That stretch; its kind is ``disturbed`` where no still one is long enough: the noise is then an upper bound.
     findings : tuple of Finding
@@ -236,7 +237,10 @@ def _noise_at_rest(
         rest = motion.longest(*kinds)
         if rest is None or rest.duration < SHORTEST_REST:
             continue
-        part = _longest_without_gap(record.between(rest.start, rest.stop))
+        # A motion begins softly: its first and last moments are left to it.
+        start = rest.start if rest.start <= record.time[0] else rest.start + REST_MARGIN
+        stop = rest.stop if rest.stop >= record.time[-1] else rest.stop - REST_MARGIN
+        part = _longest_without_gap(record.between(start, stop))
         if part.duration < SHORTEST_REST or len(part) < SHORTEST_RECORD:
             continue
         gyro, accel = noise_coefficients(part)

@@ -26,9 +26,9 @@ DEG = np.pi / 180.0
 LEVEL_TOLERANCE = 0.12  # of g: local gravity, biases of cheap sensors, motion
 UP_LIMIT = np.radians(60.0)  # tilt of z from up beyond which the axes are doubtful
 TURN_STEP = 0.5  # s, over which the turn of gravity is compared with the gyros
-LEAST_TURN = np.radians(2.0)  # rad, RMS of gravity's turn over 2 s, for a judgement on the gyros
+LEAST_TURN = np.radians(0.5)  # rad, RMS of gravity's turn over TURN_STEP, for a judgement on the gyros
 AGREES = 0.8  # share of gravity's turn that the gyros must explain for a claim
-DISAGREES = 0.4  # share below which another reading contradicts
+CONTRADICTS = 4.0  # times as much left unexplained as by another reading: the axes as given are wrong
 EQUAL = 0.02  # readings whose shares differ by less are equals
 RATE_RESOLVED = 0.05  # relative sigma of the mean rate, to compare it with the earth's
 RATE_SHARP = 0.01  # the same, to tell a unit by it
@@ -171,37 +171,42 @@ def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
 def _turning(record: ImuRecord) -> Turning:
     """Fit the gyros to the turn of gravity, ``du = -theta x u``, for all 48 signed axes.
 
-    Steps in which the specific force is not of its usual size are left out. The agreement of a reading is the
-    share of ``sum |du|^2`` that it explains with its best positive scale.
+    Cells of 0.1 s in which the specific force is not of its usual size are left out of both sides; both are
+    then averaged over 0.5 s twice, against noise. The agreement of a reading is the share of ``sum |du|^2`` that
+    it explains with its best positive scale.
     """
     nothing = Turning(np.nan, np.nan, "", np.nan)
     interval, rates = even_rates(record)
     cells = max(1, round(TURN_STEP / interval))
-    count = rates.shape[1] // cells
-    if count < 20:
+    size = np.linalg.norm(rates[3:], axis=0)
+    if rates.shape[1] < 20 * cells or not np.all(size > 0.0):
         return nothing
-    means = rates[:, : count * cells].reshape(6, count, cells).mean(axis=2)
-    size = np.linalg.norm(means[3:], axis=0)
-    if not np.all(size > 0.0):
-        return nothing
-    up = means[3:] / size
-    usual = np.abs(size / np.median(size) - 1.0) < 0.05
+    up = rates[3:] / size
+    usual = np.abs(size / np.median(size) - 1.0) < 0.1
     good = usual[1:] & usual[:-1]
-    angle = 0.5 * (means[:3, 1:] + means[:3, :-1]) * cells * interval
-    angle = angle - np.median(angle, axis=1, keepdims=True)  # bias and earth rate; a sway keeps its swing
-    middle = 0.5 * (up[:, 1:] + up[:, :-1])
-    turn = np.where(good, up[:, 1:] - up[:, :-1], 0.0)
-    slow = _smoothed_turn(turn)
-    if np.sqrt(np.mean(np.sum(slow**2, axis=0))) < LEAST_TURN:
+    angle = rates[:3] - rates[:3].mean(axis=1, keepdims=True)  # bias and earth rate; a sway keeps its swing
+    theta = 0.5 * interval * (angle[:, 1:] + angle[:, :-1])
+    middle = np.where(good, 0.5 * (up[:, 1:] + up[:, :-1]), 0.0)
+    turn = _smooth(np.where(good, np.diff(up, axis=1), 0.0), cells)
+    if np.sqrt(np.mean(np.sum(turn**2, axis=0))) < LEAST_TURN * interval / TURN_STEP:
         return nothing
 
-    total = float(np.sum(turn**2))
+    # Turn if axis i holds column j, for all i and j: each reading is a sum of three of the nine.
+    basis = np.stack(
+        [
+            [_smooth(-np.cross(np.eye(3)[i], middle, axisb=0, axisc=0) * theta[j], cells).ravel() for j in range(3)]
+            for i in range(3)
+        ]
+    )
+    products = np.einsum("ijn,kln->ijkl", basis, basis)
+    overlaps, total = basis @ turn.ravel(), float(np.sum(turn**2))
     readings = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
-            theta = angle[list(order)] * np.array(signs)[:, None]
-            predicted = np.where(good, -np.cross(theta, middle, axis=0), 0.0)
-            power, overlap = float(np.sum(predicted**2)), float(np.sum(predicted * turn))
+            reading = np.zeros((3, 3))
+            reading[range(3), order] = signs
+            power = float(np.einsum("ij,ijkl,kl", reading, products, reading))
+            overlap = float(np.sum(reading * overlaps))
             explained = max(0.0, overlap) ** 2 / (power * total) if power > 0.0 else 0.0
             readings.append((explained, power / overlap if overlap > 0.0 else np.nan, order, signs))
     identity = next(r for r in readings if r[2] == (0, 1, 2) and r[3] == (1.0, 1.0, 1.0))
@@ -212,10 +217,12 @@ def _turning(record: ImuRecord) -> Turning:
     return Turning(identity[1], identity[0], _columns(best[2], best[3]), best[0])
 
 
-def _smoothed_turn(turn: Array) -> Array:
-    """Turn over four steps: noise of single steps must not pass for turning."""
-    total = np.cumsum(np.pad(turn, ((0, 0), (1, 0))), axis=1)
-    return np.asarray(total[:, 4:] - total[:, :-4])
+def _smooth(signal: Array, cells: int) -> Array:
+    """(3, m) means over `cells`, taken twice, of every `cells`-th column."""
+    for _ in range(2):
+        total = np.cumsum(np.pad(signal, ((0, 0), (1, 0))), axis=1)
+        signal = (total[:, cells:] - total[:, :-cells]) / cells
+    return signal[:, ::cells]
 
 
 def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:
@@ -230,7 +237,8 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
     """Judge unit and axes of the gyros by the turning; True where that was possible."""
     if not np.isfinite(turning.best_agreement) or turning.best_agreement < AGREES:
         return False
-    if turning.agreement < DISAGREES:
+    unexplained = max(0.05, CONTRADICTS * (1.0 - turning.best_agreement))
+    if 1.0 - turning.agreement > unexplained:
         findings.append(
             Finding(
                 "error",
