@@ -11,7 +11,7 @@ from tests.filters.test_kalman import SYSTEMS, TIGHT
 from truenorth.filters import LinearSystem, kalman, smoother
 
 
-@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("kind", [kind for kind in SYSTEMS if kind != "seventeen states"])  # 6 s of compiling
 def test_smoother_is_the_joint_gaussian(kind):
     system = random_system(**SYSTEMS[kind])
     dense = Dense.of(system)

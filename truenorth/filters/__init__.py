@@ -3,6 +3,7 @@
 from truenorth.filters.fading import fading
 from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.kalman import kalman
+from truenorth.filters.robust import gated, robust
 from truenorth.filters.smoother import Smoothed, smoother
 from truenorth.filters.strong_tracking import strong_tracking
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
@@ -13,8 +14,10 @@ __all__ = [
     "LinearSystem",
     "Smoothed",
     "fading",
+    "gated",
     "h_infinity",
     "kalman",
+    "robust",
     "smallest_bound",
     "smoother",
     "strong_tracking",

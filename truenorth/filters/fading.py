@@ -31,10 +31,10 @@ from truenorth.compiled import compiled
 from truenorth.errors import UsageError
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
-    SOUND,
     Histories,
     Workspace,
     begin,
+    conclude,
     innovate,
     keep,
     load_measurement,
@@ -145,12 +145,7 @@ def fading_runs(
                     out.adaptation[run, epoch, i] = lam[i]
             if present > 0:
                 failure, nis, log_likelihood = update(size, w, correlated, True)
-                out.log_likelihood[run] += log_likelihood
-                if out.nis.shape[1] > 0:
-                    out.nis[run, epoch] = nis
-                if failure != SOUND:
-                    out.failure[run, 0] = failure
-                    out.failure[run, 1] = epoch
+                if not conclude(out, run, epoch, failure, nis, log_likelihood):
                     break
             keep(out, run, epoch, epochs - 1, w)
 

@@ -24,6 +24,7 @@ from truenorth.filters.recursion import (
     Histories,
     Workspace,
     begin,
+    conclude,
     innovate,
     keep,
     load_measurement,
@@ -67,17 +68,13 @@ def h_infinity_runs(size: Size, system: Runs, epochs: int, L: Array, theta: floa
             failure, nis, log_likelihood = SOUND, 0.0, 0.0
             if present > 0:
                 failure, nis, log_likelihood = update(size, w, correlated, True)
-            out.log_likelihood[run] += log_likelihood
             margin = distrust(size, w, L, theta)
             if out.innovation.shape[1] > 0:
-                out.nis[run, epoch] = nis
                 out.adaptation[run, epoch, 0] = margin
             out.memory[run, 0] = min(out.memory[run, 0], margin)
             if failure == SOUND and not margin > 0.0:
                 failure = NO_FILTER
-            if failure != SOUND:
-                out.failure[run, 0] = failure
-                out.failure[run, 1] = epoch
+            if not conclude(out, run, epoch, failure, nis, log_likelihood):
                 break
             keep(out, run, epoch, epochs - 1, w)
 

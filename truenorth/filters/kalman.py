@@ -10,9 +10,9 @@ from __future__ import annotations
 from truenorth.compiled import compiled
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
-    SOUND,
     Histories,
     begin,
+    conclude,
     innovate,
     keep,
     load_measurement,
@@ -39,12 +39,7 @@ def kalman_runs(size: Size, system: Runs, epochs: int, joseph: bool, out: Histor
                 innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
             if present > 0:
                 failure, nis, log_likelihood = update(size, w, correlated, joseph)
-                out.log_likelihood[run] += log_likelihood
-                if out.nis.shape[1] > 0:
-                    out.nis[run, epoch] = nis
-                if failure != SOUND:
-                    out.failure[run, 0] = failure
-                    out.failure[run, 1] = epoch
+                if not conclude(out, run, epoch, failure, nis, log_likelihood):
                     break
             keep(out, run, epoch, epochs - 1, w)
 

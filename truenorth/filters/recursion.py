@@ -291,3 +291,15 @@ def keep(out: Histories, run: int, epoch: int, last: int, w: Workspace) -> None:
         for i in range(n):
             for j in range(n):
                 out.P[run, k, i, j] = w.P[i, j]
+
+
+@compiled(forceinline=True)
+def conclude(out: Histories, run: int, epoch: int, failure: int, nis: float, log_likelihood: float) -> bool:
+    """Note what an update told; whether the run can go on."""
+    out.log_likelihood[run] += log_likelihood
+    if out.nis.shape[1] > 0:
+        out.nis[run, epoch] = nis
+    if failure != SOUND:
+        out.failure[run, 0] = failure
+        out.failure[run, 1] = epoch
+    return failure == SOUND
