@@ -5,6 +5,7 @@ from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.kalman import kalman
 from truenorth.filters.robust import gated, robust
 from truenorth.filters.smoother import Smoothed, smoother
+from truenorth.filters.square_root import square_root
 from truenorth.filters.strong_tracking import strong_tracking
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
@@ -20,5 +21,6 @@ __all__ = [
     "robust",
     "smallest_bound",
     "smoother",
+    "square_root",
     "strong_tracking",
 ]

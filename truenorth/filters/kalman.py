@@ -68,7 +68,8 @@ def kalman(
         Keep innovations, their covariances and NIS of every epoch; as a rule where a history is kept.
     joseph : bool
         Update the covariance in Joseph's form, which survives precise measurements of what was unknown; the plain
-        form takes two thirds of the time of an update.
+        form takes two thirds of the time of an update. What a prior 1e14 times R and worse hides from both,
+        :func:`truenorth.filters.square_root` sees.
     workers : int
         Threads that share the runs; the bits do not depend on it.
 
