@@ -1,8 +1,8 @@
 """Speed of the mechanisation beside python-ins, on the same increments in the same run.
 
 A slow turn over the ellipsoid, 10 minutes at 100 Hz. Both go from increments to attitude, velocity and position after
-each sample, with one-sample coning and sculling; that they agree is checked first. python-ins returns a table with Euler
-angles, so its compiled loop is timed alone too. Run: ``python -m benchmarks mechanisation``.
+each sample, with one-sample coning and sculling; that they agree is checked first. python-ins returns a table with
+Euler angles, so its compiled loop is timed alone too. Run: ``python -m benchmarks mechanisation``.
 """
 
 from __future__ import annotations
