@@ -90,9 +90,7 @@ def test_near_vertical_pitch_gives_the_combination(pitch):
     assert "C_nb" in answer.summary()
 
 
-@given(
-    st.floats(0, 2 * np.pi), st.floats(-1.4, 1.4), st.floats(-3, 3), st.integers(0, 2**31 - 1)
-)
+@given(st.floats(0, 2 * np.pi), st.floats(-1.4, 1.4), st.floats(-3, 3), st.integers(0, 2**31 - 1))
 @settings(max_examples=60, deadline=None)
 def test_euler_jacobian_is_the_derivative(heading, pitch, roll, seed):
     C = dcm_from_euler(heading, pitch, roll)
@@ -136,7 +134,7 @@ def test_still_base_sigmas_are_honest():
     spec = imu_spec("navigation")
     position = Position.from_degrees(40.0, 118.0, 0.0)
     errors, covariance, answers = _study(rest(position, 0.65, 0.03, -0.05), spec, 100, 300.0, method="kalman")
-    from truenorth.alignment.procedure import DEFLECTION
+    from truenorth.alignment.task import DEFLECTION
     from truenorth.coarse.analytic import static_jacobian
 
     J = static_jacobian(position.lat, 9.8)[:, :2] * 9.8 * DEFLECTION

@@ -28,17 +28,14 @@ class TestRingLaserOnADisturbedVehicle:
             assert abs(_heading(answer) - 90.6) < 0.1
             assert answer.method != "analytic"
 
-    @pytest.mark.parametrize("imu", [None, "navigation"])
-    def test_scatter_of_120_s_windows_is_what_the_random_part_says(self, imu):
+    def test_scatter_of_120_s_windows_is_what_the_random_part_says(self):
         """(n - 1) s^2/sigma^2 is chi-square with 6 degrees of freedom: 1.24 to 14.45 in 95 of 100 cases."""
         record, position = recordings.rlg_vehicle_xian()
-        answers = [align(window, position, imu) for window in _windows(record, 120.0)]
+        answers = [align(window, position) for window in _windows(record, 120.0)]
         headings = np.array([_heading(a) for a in answers])
         assert len(headings) == 7
         assert np.all(np.abs(headings - 90.6) < 0.3)
-        random = np.degrees(
-            np.sqrt(np.mean([a.euler_sigma[0] ** 2 - a.euler_sigma_floor[0] ** 2 for a in answers]))
-        )
+        random = np.degrees(np.sqrt(np.mean([a.euler_sigma[0] ** 2 - a.euler_sigma_floor[0] ** 2 for a in answers])))
         assert 1.24 < 6 * np.var(headings, ddof=1) / random**2 < 14.45
 
     def test_mean_rates_fail_and_say_so(self):
@@ -79,7 +76,10 @@ def test_idling_engine_50_s():
 
 
 def test_a_vehicle_that_drives_off_is_noticed():
-    record, position, = recordings.fog_gps_xian()
+    (
+        record,
+        position,
+    ) = recordings.fog_gps_xian()
     answer = align(record, position)
     if answer.status == "inconsistent":
         assert any("moves" in reason or "drifts" in reason for reason in answer.reasons)

@@ -52,19 +52,19 @@ def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array,
 
 
 def true_bias(total: Array, variance: Array, prior: Array, proper: Array) -> tuple[Array, Array]:
-    """The bias proper, and its sigma, of an estimate of the sum.
+    """The accelerometer bias proper, and its sigma, of an estimate of the sum.
 
     Of two independent Gaussian terms with variances `proper` and ``prior - proper`` whose sum is known to be `total` with
     posterior variance `variance`: their share of the sum, and what the share leaves open.
 
     Parameters
     ----------
-    total, variance : (..., 6) arrays
-    prior, proper : (6,) arrays
+    total, variance : (..., 3) arrays
+    prior, proper : (3,) arrays
 
     Returns
     -------
-    bias, sigma : (..., 6) arrays
+    bias, sigma : (..., 3) arrays
     """
     share = proper / prior
     return share * total, np.sqrt(share * (prior - proper) + share**2 * variance)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.coarse.uncertainty import detrended
 from truenorth.filters import Estimates, LinearSystem, kalman
 from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
@@ -27,7 +26,6 @@ CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sig
 ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
 LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
 HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
-HELD = 1e-4  # rad: a heading that is to stay as it is
 VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
 QUIETEST_BASE = 1e-6  # m/s: keeps R positive on a base of stone and an IMU without noise
 COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
@@ -126,11 +124,8 @@ def fine_align(
     position: Position,
     model: StaticModel,
     P_bias: Array,
-    *,
     interval: float,
-    nominal_bias: Array | None = None,
     rows_at: Array | None = None,
-    heading_known: bool = False,
 ) -> FineAlignment:
     """Estimate attitude and biases from a whole log.
 
@@ -145,29 +140,23 @@ def fine_align(
         Prior covariance of the biases about zero.
     interval : float, s
         Filter interval.
-    nominal_bias : (6,) array, optional
-        Biases to begin with, taken off the log; the prior stays about zero.
     rows_at : (M,) int array, optional
         Rows after which the integrated attitude is wanted.
-    heading_known : bool
-        Hold the heading of the coarse attitude: the gyros cannot find it, and level must not look for it.
+
     Returns
     -------
     FineAlignment
     """
     lat, alt = position.lat, position.alt
     rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
-    bias = np.zeros(6) if nominal_bias is None else np.array(nominal_bias, dtype=np.float64)
+    bias = np.zeros(6)
     P0 = np.zeros((STATES, STATES))
-    heading_prior = HELD if heading_known else HEADING_PRIOR
-    P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, heading_prior**2])
+    P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
     P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
     P0[6:, 6:] = P_bias
 
     integrals = integrate(record, interval, bias[:3], bias[3:], rows)
-    v = mean_velocity(integrals, C_n0_i, lat, alt)
-    middle = (integrals.time[1:] + integrals.time[:-1]) / 2
-    R = np.maximum(np.mean(detrended(middle, v) ** 2, axis=0), QUIETEST_BASE**2)
+    R = white_variance(mean_velocity(integrals, C_n0_i, lat, alt))
 
     for passes in range(1, MAX_PASSES + 1):
         x0 = np.zeros(STATES)
@@ -175,7 +164,7 @@ def fine_align(
         system = replace(model.linearise(integrals, C_n0_i, lat, alt, P0, R), x0=x0)
         estimates = kalman(system, history="full")
         x, P = estimates.x[-1], estimates.P[-1]
-        R_next, expected = _base_variance(estimates, R)
+        R_next, expected = base_variance(estimates, R)
         moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
         same_noise = bool(np.all(np.abs(R_next - R) < 0.1 * expected))
         if (moved < CONVERGED and same_noise) or passes == MAX_PASSES:
@@ -225,7 +214,15 @@ def bias_part(step: Array, P_bias: Array) -> Array:
     return response @ P_bias @ np.swapaxes(response, 1, 2)
 
 
-def _base_variance(estimates: Estimates, R: Array) -> tuple[Array, Array]:
+def white_variance(velocity: Array) -> Array:
+    """Variance (3,) of what is white in a velocity (K, 3): half the mean square of its differences.
+
+    A start for the variance of the base's motion that slow errors of the INS do not enter.
+    """
+    return np.maximum(0.5 * np.mean(np.diff(velocity, axis=0) ** 2, axis=0), QUIETEST_BASE**2)
+
+
+def base_variance(estimates: Estimates, R: Array, colour: bool = True) -> tuple[Array, Array]:
     """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
 
     Returns it with the mean expected variance of the innovations.
@@ -237,11 +234,11 @@ def _base_variance(estimates: Estimates, R: Array) -> tuple[Array, Array]:
     # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
     # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
     blocks = len(nu) // COLOUR_BLOCK
-    if blocks >= COLOUR_RUNS:
+    if colour and blocks >= COLOUR_RUNS:
         e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
-        colour = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
+        low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
         chance = 1.0 + 2.0 * np.sqrt(2.0 / blocks)  # two sigma of what white noise itself gives
-        ratio = np.where(colour > chance * ratio, np.maximum(colour, ratio), ratio)
+        ratio = np.where(low > chance * ratio, np.maximum(low, ratio), ratio)
     return np.maximum(R * ratio, QUIETEST_BASE**2), expected.mean(axis=0)
 
 

@@ -316,9 +316,7 @@ def euler_jacobian(C_nb: Array) -> Array:
     cos2 = np.maximum(yE**2 + yN**2, 1e-12)[..., None]
     heading = (yN[..., None] * east_row - yE[..., None] * north_row) / cos2
     pitch = up_row[1] / np.sqrt(cos2)
-    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[
-        ..., None
-    ]
+    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[..., None]
     return np.stack([heading, pitch, roll], -2)
 
 

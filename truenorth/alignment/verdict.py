@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
-from truenorth.alignment.inference import LogCheck
 from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, Alignment, Status
 from truenorth.earth import EARTH_RATE
 
@@ -63,9 +63,7 @@ def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, 
         if answer.pays_until is not None and np.isfinite(answer.pays_until):
             reasons.append(_waiting(answer))
         if answer.near_vertical:
-            reasons.append(
-                "pitch is near +-90 deg: heading and roll are told only together (see the combination)"
-            )
+            reasons.append("pitch is near +-90 deg: heading and roll are told only together (see the combination)")
         return "aligned", tuple(reasons)
 
     horizontal = EARTH_RATE * np.cos(answer.position.lat)
@@ -84,9 +82,7 @@ def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, 
             good_level,
         )
     more = (
-        ""
-        if answer.pays_until is None
-        else f"; about {answer.pays_until:.0f} s in all would bring it near its floor"
+        "" if answer.pays_until is None else f"; about {answer.pays_until:.0f} s in all would bring it near its floor"
     )
     return "not_converged", (
         f"heading is known to {_angle(sigma)} only after {answer.duration:.0f} s, {_angle(limit)} is wanted; sensor bias "
@@ -121,9 +117,7 @@ def _contradictions(answer: Alignment, around: Circumstances) -> list[str]:
     if around.drift is not None and around.drift.found:
         found.append(str(around.drift))
     if not around.settled:
-        found.append(
-            "re-linearisation did not come to rest: the log does not look like a base that stays where it is"
-        )
+        found.append("re-linearisation did not come to rest: the log does not look like a base that stays where it is")
     return found
 
 

@@ -67,17 +67,15 @@ def static_jacobian(lat: float, g: float) -> Array:
     return J
 
 
-def analytic(
-    m: Means, lat: float, alt: float, gyro_bias: float, accel_bias: float
-) -> tuple[Array, Array, Array]:
+def analytic(m: Means, lat: float, alt: float, P_bias: Array) -> tuple[Array, Array, Array]:
     """Attitude of a still base from the means.
 
     Parameters
     ----------
     m : Means
     lat, alt : float, rad and m
-    gyro_bias, accel_bias : float, rad/s and m/s^2
-        One-sigma biases of the IMU.
+    P_bias : (6, 6) array
+        Covariance of gyro and accelerometer bias, body axes.
 
     Returns
     -------
@@ -87,10 +85,13 @@ def analytic(
     """
     C_nb = triad(m.f_b, m.w_ib_b, UP, np.asarray(earth_rate_n(lat)))
     J = static_jacobian(lat, float(normal_gravity(lat, alt)))
-    biases = np.diag(np.repeat([accel_bias**2, gyro_bias**2], 3))
-    noise = np.zeros((6, 6))
-    noise[:3, :3] = C_nb @ m.f_covariance @ C_nb.T
-    noise[3:, 3:] = C_nb @ m.w_covariance @ C_nb.T
+    biases, noise = np.zeros((6, 6)), np.zeros((6, 6))
+    for block, P_block, scatter in (
+        (slice(0, 3), P_bias[3:, 3:], m.f_covariance),
+        (slice(3, 6), P_bias[:3, :3], m.w_covariance),
+    ):
+        biases[block, block] = C_nb @ P_block @ C_nb.T
+        noise[block, block] = C_nb @ scatter @ C_nb.T
     return C_nb, J @ (biases + noise) @ J.T, J @ biases @ J.T
 
 
@@ -118,18 +119,12 @@ def two_position(
         Attitude in the first position.
     gyro_bias, accel_bias : (3,) arrays
     """
-    w_b, eps = _separate(
-        first.w_ib_b, second.w_ib_b, first.w_covariance, second.w_covariance, C_b1_b2, gyro_bias
-    )
-    f_b, nabla = _separate(
-        first.f_b, second.f_b, first.f_covariance, second.f_covariance, C_b1_b2, accel_bias
-    )
+    w_b, eps = _separate(first.w_ib_b, second.w_ib_b, first.w_covariance, second.w_covariance, C_b1_b2, gyro_bias)
+    f_b, nabla = _separate(first.f_b, second.f_b, first.f_covariance, second.f_covariance, C_b1_b2, accel_bias)
     return triad(f_b, w_b, UP, np.asarray(earth_rate_n(lat))), eps, nabla
 
 
-def _separate(
-    m1: Array, m2: Array, P1: Array, P2: Array, C_b1_b2: Array, prior: float
-) -> tuple[Array, Array]:
+def _separate(m1: Array, m2: Array, P1: Array, P2: Array, C_b1_b2: Array, prior: float) -> tuple[Array, Array]:
     eye, zero = np.eye(3), np.zeros((3, 3))
     A = np.block([[eye, eye], [C_b1_b2.T, eye], [zero, eye]])
     tiny = (1e-6 * prior) ** 2 * eye  # keeps the weights finite where the scatter is nil

@@ -46,9 +46,7 @@ class CoarseAttitude:
     C_history: Array | None = None
 
 
-def dual_vector(
-    integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velocity"
-) -> CoarseAttitude:
+def dual_vector(integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velocity") -> CoarseAttitude:
     """TRIAD on the integral up to .4 of the window and on the whole one.
 
     Parameters

@@ -1,0 +1,106 @@
+"""From what a method found to an `Alignment`: navigation axes, the asked epoch, floors, history."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias import spec_variance, true_bias
+from truenorth.alignment.fine import FineAlignment, attitude_history
+from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
+from truenorth.alignment.task import Task
+from truenorth.inertial import earth_rotation
+from truenorth.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+
+def at_epoch(
+    task: Task,
+    spec: ImuSpec,
+    where: str,
+    C_n0_b: Array,
+    covariance: Array,
+    floor: Array,
+) -> Alignment:
+    """An answer given in n0, turned into navigation axes at the epoch asked for."""
+    time = task.epoch.elapsed
+    covariance, floor = task.in_navigation_axes(covariance, time), task.in_navigation_axes(floor, time)
+    C_nb = earth_rotation(time, task.position.lat).T @ C_n0_b
+    return assemble(task, spec, where, C_nb, covariance, floor)
+
+
+def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array) -> Alignment:
+    prior = np.sqrt(spec_variance(spec))
+    return Alignment(
+        status="not_converged",
+        reasons=(),
+        method="",
+        method_reason="",
+        time=task.epoch.time,
+        C_nb=C_nb,
+        phi_covariance=covariance + task.deflection,
+        phi_floor=floor + task.deflection,
+        gyro_bias=np.zeros(3),
+        gyro_bias_sigma=prior[:3],
+        gyro_bias_prior=prior[:3],
+        accel_bias=np.zeros(3),
+        accel_bias_sigma=prior[3:],
+        accel_bias_prior=prior[3:],
+        position=task.position,
+        imu=spec,
+        imu_source=where,
+        duration=task.record.duration,
+        disturbance=np.full(3, np.nan),
+        source=task.record.source,
+    )
+
+
+def make_history(task: Task, fine: FineAlignment, used: ImuSpec) -> History:
+    C_nb, covariance, floor = attitude_history(fine, task.position.lat)
+    e = fine.estimates
+    bias, variance = fine.nominal_bias + e.x[:, 6:], np.einsum("kii->ki", e.P)[:, 6:]
+    prior = np.diag(fine.system.P0)[9:]
+    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance[:, 3:], prior, spec_variance(used)[3:])
+    return History(
+        time=fine.integrals.start + fine.integrals.time[1:],
+        C_nb=C_nb,
+        phi_covariance=covariance + task.deflection,
+        phi_floor=floor + task.deflection,
+        gyro_bias=bias[:, :3],
+        gyro_bias_sigma=np.sqrt(variance[:, :3]),
+        accel_bias=accel_bias,
+        accel_bias_sigma=accel_sigma,
+        innovation=e.innovation,
+        innovation_sigma=np.sqrt(np.einsum("kii->ki", e.innovation_covariance)),
+        nis=e.nis,
+    )
+
+
+def pays_until(history: History, answer: Alignment, fine: FineAlignment) -> float | None:
+    """Length of data after which the random part of heading's sigma is below half its floor.
+
+    Read off the history, or extrapolated by the power law of its second half.
+    """
+    floor = math.sqrt(answer.phi_floor[2, 2])
+    elapsed = history.time - fine.integrals.start
+    random = np.sqrt(np.maximum(history.phi_covariance[:, 2, 2] - history.phi_floor[:, 2, 2], 1e-20))
+    below = np.flatnonzero(random < 0.5 * floor)
+    if below.size:
+        return float(elapsed[below[0]])
+    half = len(elapsed) // 2
+    slope = math.log(random[-1] / random[half]) / math.log(elapsed[-1] / elapsed[half])
+    if slope > -0.2:
+        return None
+    return float(elapsed[-1] * (0.5 * floor / random[-1]) ** (1.0 / slope))
+
+
+def without_heading(covariance: Array) -> Array:
+    """The same covariance of level, with nothing known of heading."""
+    result = covariance.copy()
+    result[..., 2, :] = 0.0
+    result[..., :, 2] = 0.0
+    result[..., 2, 2] = UNIFORM_SIGMA**2
+    return result

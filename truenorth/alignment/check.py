@@ -1,0 +1,110 @@
+"""What a log itself can check: the earth's rate along north and up, gravity along up.
+
+On a base that stays where it is, the earth's rate and gravity are known. Three components can be held against them: the
+rate along north and along the vertical (their length, and their angle to gravity against the latitude), and the specific
+force along the vertical. The rate along *east*, which turns heading, and the level components of force, which tilt,
+cannot be checked by anyone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.fine import fine_align, white_variance
+from truenorth.alignment.noise import fit_noise
+from truenorth.alignment.task import Task
+from truenorth.coarse.analytic import Means
+from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.filters import LinearSystem
+from truenorth.inertial import InertialIntegrals, earth_rotation
+from truenorth.models.static import StaticModel, mean_velocity
+from truenorth.quality.regimes import MotionSummary
+
+Array = NDArray[np.float64]
+
+BLIND_RATE = math.radians(5.0) / 3600.0  # rad/s: a mean rate this far from the earth's holds no heading
+LOOSE_GYRO, LOOSE_ACCEL = math.radians(10.0) / 3600.0, 0.5  # rad/s, m/s^2: priors that let the log speak
+HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
+
+
+@dataclass(frozen=True)
+class LogCheck:
+    """Components of rate and specific force that the log lets us check, measured minus expected, with their noise.
+
+    Attributes
+    ----------
+    rate_residual, rate_noise : (2,) arrays, rad/s
+        Along north and up.
+    force_residual, force_noise : float, m/s^2
+        Along up.
+    """
+
+    rate_residual: Array
+    rate_noise: Array
+    force_residual: float
+    force_noise: float
+
+
+def check_means(m: Means, lat: float, g: float) -> LogCheck:
+    """What the means of a still base tell of the biases."""
+    f = float(np.linalg.norm(m.f_b))
+    up = m.f_b / f
+    w_up = float(m.w_ib_b @ up)
+    level = m.w_ib_b - w_up * up
+    w_level = float(np.linalg.norm(level))
+    north = level / w_level if w_level > 0 else np.zeros(3)
+    return LogCheck(
+        rate_residual=np.array([w_level - EARTH_RATE * math.cos(lat), w_up - EARTH_RATE * math.sin(lat)]),
+        rate_noise=np.sqrt([north @ m.w_covariance @ north, up @ m.w_covariance @ up]),
+        force_residual=f - g,
+        force_noise=float(np.sqrt(up @ m.f_covariance @ up)),
+    )
+
+
+def check_filter(task: Task, C_n0_i: Array, usual: StaticModel) -> tuple[LogCheck, StaticModel]:
+    """What the inertial frame tells of the biases and random walks: a filter that believes in no specification."""
+    # Loose where the log can answer, held where tilt or heading would take the blame.
+    C_n_b = C_n0_i.T
+    P = np.zeros((6, 6))
+    P[:3, :3] = C_n_b @ np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2]) @ C_n_b.T
+    P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
+    fine = fine_align(task.record, C_n0_i, task.position, usual, P, task.interval)
+    noise = fit_task_noise(task, fine.integrals, fine.C_n0_i, fine.system.P0, usual)
+    fine = fine_align(task.record, fine.C_n0_i, task.position, noise, P, task.interval)
+
+    lat = task.position.lat
+    C = earth_rotation(fine.integrals.time[-1], lat).T @ fine.C_n0_i @ fine.integrals.C_ib[-1]
+    rate, rate_P = C @ fine.bias[:3], C @ fine.P[6:9, 6:9] @ C.T
+    force, force_P = C @ fine.bias[3:], C @ fine.P[9:, 9:] @ C.T
+    slope = float(normal_gravity(lat, task.position.alt + 1.0)) - task.gravity
+    check = LogCheck(
+        rate_residual=rate[1:],
+        rate_noise=np.sqrt(np.diag(rate_P)[1:]),
+        force_residual=float(force[2]),
+        force_noise=float(np.hypot(np.sqrt(force_P[2, 2]), slope * task.position.vertical_sigma)),
+    )
+    return check, noise
+
+
+def fit_task_noise(
+    task: Task, integrals: InertialIntegrals, C_n0_i: Array, P0: Array, usual: StaticModel
+) -> StaticModel:
+    """Random walks of a log, linearised about an attitude; biases as already taken off the integrals."""
+    lat, alt = task.position.lat, task.position.alt
+
+    def build(model: StaticModel, R: Array) -> LinearSystem:
+        return model.linearise(integrals, C_n0_i, lat, alt, P0, R)
+
+    return fit_noise(build, white_variance(mean_velocity(integrals, C_n0_i, lat, alt)), usual)
+
+
+def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
+    """Whether the mean rate of a base that does not turn is so far from the earth's that it holds no heading."""
+    if motion.overall not in ("still", "disturbed"):
+        return False
+    noise = 5.0 * float(np.max(check.rate_noise))
+    return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)

@@ -1,0 +1,70 @@
+"""Random walks of the sensors and motion of the base, told apart by maximum likelihood.
+
+On a base that moves, the Allan deviation sees the motion. The filter tells both apart by their spectra: white gyro noise
+makes the velocity of a base that stays wander as ``g t^(3/2)``, white accelerometer noise as ``t^(1/2)``, and bounded motion
+not at all. Where the log has nothing to say (heavy sway hides it all), a prior about the usual values decides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import astuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.fine import base_variance
+from truenorth.filters import LinearSystem, kalman
+from truenorth.models.static import StaticModel
+
+Array = NDArray[np.float64]
+
+PRIOR_WIDTH = math.log(5.0)  # one sigma of a random walk about its usual value: a factor of five
+STEPS = (math.log(4.0), math.log(2.0), math.log(1.4), math.log(1.2))  # pattern search, coarse to fine
+
+
+def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usual: StaticModel) -> StaticModel:
+    """Random walks of greatest posterior density.
+
+    Parameters
+    ----------
+    build : callable
+        ``build(model, R)`` gives the linear system.
+    R : (3,) array, (m/s)^2
+        Variance of the base's velocity to begin with; fitted along.
+    usual : StaticModel
+        Centre of the log-normal prior; terms that are zero stay zero.
+
+    Returns
+    -------
+    StaticModel
+    """
+    centre = np.array(astuple(usual))
+    free = np.flatnonzero(centre > 0.0)
+
+    def model_at(x: Array) -> StaticModel:
+        return StaticModel(*(centre * np.exp(x)).tolist())
+
+    def cost(x: Array, R: Array) -> tuple[float, Array]:
+        first = kalman(build(model_at(x), R), innovations=True)
+        R = base_variance(first, R, colour=False)[0]  # slow wander is for the walks to explain
+        second = kalman(build(model_at(x), R), innovations=True)
+        return -2.0 * float(second.log_likelihood) + float(np.sum((x / PRIOR_WIDTH) ** 2)), R
+
+    x = np.zeros(len(centre))
+    best, R = cost(x, R)
+    for step in STEPS:
+        for axis in free:
+            for change in (step, -step):
+                moved = False
+                while True:
+                    trial = x.copy()
+                    trial[axis] += change
+                    value, R_trial = cost(trial, R)
+                    if value >= best:
+                        break
+                    x, best, R, moved = trial, value, R_trial, True
+                if moved:
+                    break
+    return model_at(x)

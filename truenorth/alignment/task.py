@@ -1,0 +1,125 @@
+"""One alignment to do: the data, the place, the epoch, and what was seen of the motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias import bias_prior
+from truenorth.alignment.epoch import Epoch, find_epoch
+from truenorth.attitude import dcm_from_euler
+from truenorth.coarse.analytic import Means, means, static_jacobian
+from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.errors import DataError
+from truenorth.inertial import earth_rotation
+from truenorth.position import Position
+from truenorth.quality.regimes import MotionSummary, motion_summary
+from truenorth.records import ImuRecord
+from truenorth.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+DEFLECTION = math.radians(5.0 / 3600.0)  # of the vertical, one sigma: what gravity's direction differs from the normal
+FILTER_INTERVAL = 1.0  # s
+FEWEST_EPOCHS, MOST_EPOCHS = 60, 5000
+LONGEST_BRIDGE = 4.5  # nominal intervals: up to three lost samples are bridged by the next one's rate
+LONGEST_BLIND = 120.0  # s: a gyro that does not see the earth turn carries attitude no longer than this
+
+
+@dataclass(frozen=True)
+class Task:
+    """One alignment: the data, where, with what, and for when."""
+
+    record: ImuRecord
+    position: Position
+    interval: float
+    epoch: Epoch
+    motion: MotionSummary
+    means: Means
+
+    @property
+    def lat_rate(self) -> Array:
+        """``dw_ie_n/dL``, rad/s a radian."""
+        return EARTH_RATE * np.array([0.0, -math.sin(self.position.lat), math.cos(self.position.lat)])
+
+    @property
+    def gravity(self) -> float:
+        """Normal gravity, m/s^2."""
+        return float(normal_gravity(self.position.lat, self.position.alt))
+
+    def bias_prior(self, spec: ImuSpec, C_n_b: Array) -> Array:
+        """(6, 6) prior covariance of what acts as gyro and accelerometer bias here."""
+        return bias_prior(spec, C_n_b, self.position, self.lat_rate, self.gravity)
+
+    @property
+    def deflection(self) -> Array:
+        """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would."""
+        J = static_jacobian(self.position.lat, self.gravity)[:, :2] * (DEFLECTION * self.gravity)
+        return J @ J.T
+
+    def in_navigation_axes(self, covariance_n0: Array, time: float) -> Array:
+        """Turn a covariance of phi from n0 to n at a time since the start of the log."""
+        C = earth_rotation(time, self.position.lat).T
+        return C @ covariance_n0 @ C.T
+
+
+def make_task(record: ImuRecord, position: Position, at: float | None) -> Task:
+    """Look at a record and set up its alignment for an epoch (the last sample when `at` is None)."""
+    return Task(
+        record=record,
+        position=position,
+        interval=filter_interval(record),
+        epoch=find_epoch(record, at),
+        motion=motion_summary(record),
+        means=means(record),
+    )
+
+
+def last_part(task: Task) -> Task:
+    """The last two minutes before the epoch: level needs no more, and a poor gyro's bias changes over longer."""
+    record, at = task.record, task.epoch.time
+    if record.duration <= LONGEST_BLIND:
+        return task
+    stop = max(at, record.time[0] + LONGEST_BLIND)
+    record = record.between(stop - LONGEST_BLIND, stop)
+    return replace(
+        task,
+        record=record,
+        interval=filter_interval(record),
+        epoch=find_epoch(record, at),
+        means=means(record),
+    )
+
+
+def level_of(f_b: Array) -> Array:
+    """``C_nb`` with the pitch and roll that a specific force tells, and heading zero."""
+    up = f_b / np.linalg.norm(f_b)
+    return dcm_from_euler(0.0, math.asin(float(np.clip(up[1], -1.0, 1.0))), math.atan2(-up[0], up[2]))
+
+
+def filter_interval(record: ImuRecord) -> float:
+    longest = max(FILTER_INTERVAL, record.duration / MOST_EPOCHS)
+    return max(2.0 * record.interval, min(longest, record.duration / FEWEST_EPOCHS))
+
+
+def bridged(record: ImuRecord) -> ImuRecord:
+    """The record with up to three lost samples in a row bridged; longer gaps are refused."""
+    gaps = record.gaps
+    if gaps.size == 0:
+        return record
+    steps = record.steps / record.interval
+    worst = int(gaps[np.argmax(steps[gaps])])
+    if steps[worst] > LONGEST_BRIDGE:
+        raise DataError(
+            f"{record.source}: row {worst + 1}, column time: a gap of {record.steps[worst]:.3f} s after "
+            f"{record.time[worst - 1]:.3f} s, where samples come every {record.interval:.4f} s; what the base did in it is "
+            "not known: align a part without the gap (--from, --to)"
+        )
+    if record.kind == "rates":
+        return record
+    scale = np.ones(len(record))
+    scale[gaps] = steps[gaps]
+    return replace(record, gyro=record.gyro * scale[:, None], accel=record.accel * scale[:, None])
