@@ -37,9 +37,7 @@ def normal_gravity(lat: Any, alt: Any) -> Any:
     s2 = np.sin(lat) ** 2
     surface = GRAVITY_EQUATOR * (1.0 + SOMIGLIANA * s2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
     h = alt / SEMI_MAJOR
-    return surface * (
-        1.0 - 2.0 * (1.0 + FLATTENING + CENTRIFUGAL_RATIO - 2.0 * FLATTENING * s2) * h + 3.0 * h * h
-    )
+    return surface * (1.0 - 2.0 * (1.0 + FLATTENING + CENTRIFUGAL_RATIO - 2.0 * FLATTENING * s2) * h + 3.0 * h * h)
 
 
 def earth_rate_n(lat: Any) -> Array:
