@@ -4,10 +4,12 @@ from truenorth.filters.fading import fading
 from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.kalman import kalman
 from truenorth.filters.robust import gated, robust
+from truenorth.filters.sage_husa import sage_husa
 from truenorth.filters.smoother import Smoothed, smoother
 from truenorth.filters.square_root import square_root
 from truenorth.filters.strong_tracking import strong_tracking
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
+from truenorth.filters.variational import variational
 
 __all__ = [
     "Estimates",
@@ -19,8 +21,10 @@ __all__ = [
     "h_infinity",
     "kalman",
     "robust",
+    "sage_husa",
     "smallest_bound",
     "smoother",
     "square_root",
     "strong_tracking",
+    "variational",
 ]

@@ -1,0 +1,166 @@
+"""The variational Bayes filter: state and measurement noise are estimated together.
+
+The variance r of each row is unknown and drifts: an inverse gamma distribution ``IG(alpha, beta)``, widened at each
+epoch, ``alpha = rho alpha, beta = rho beta``. State and variances are taken as independent after the measurement, and
+each is found from the other's mean, in turns: with ``r = beta / alpha`` the Kalman update; with its x and P
+``alpha = alpha + 1/2``, ``beta = beta + (z - h x)^2 / 2 + h P h' / 2``. Unlike Sage and Husa's, this estimate is
+positive by itself.
+
+Source: S. Sarkka, A. Nummenmaa, Recursive noise adaptive Kalman filtering by variational Bayesian approximations,
+IEEE Trans. Autom. Control 54, 2009.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truenorth.compiled import compiled
+from truenorth.errors import UsageError
+from truenorth.filters.drive import History, drive
+from truenorth.filters.recursion import (
+    SOUND,
+    Histories,
+    Workspace,
+    begin,
+    conclude,
+    innovate,
+    keep,
+    load_measurement,
+    load_process,
+    predict,
+    update,
+    workspace,
+)
+from truenorth.filters.sage_husa import check_independent_rows
+from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.linalg import Array, Size, dot, load, transposed_times
+
+
+@compiled(forceinline=True)
+def set_noise(w: Workspace, alpha: Array, beta: Array) -> None:
+    """``R = beta / alpha``."""
+    for row in range(w.z.shape[0]):
+        w.R[row, row] = beta[row] / alpha[row]
+
+
+@compiled(forceinline=True)
+def blame(size: Size, w: Workspace, before: Array, beta: Array) -> None:
+    """``beta = before + (z - h x)^2 / 2 + h P h' / 2`` of each row present."""
+    for row in range(w.z.shape[0]):
+        if np.isnan(w.z[row]):
+            continue
+        transposed_times(size, w.P, w.H[row], w.a)
+        residual = w.z[row] - dot(size, w.H[row], w.x)
+        beta[row] = before[row] + 0.5 * residual * residual + 0.5 * dot(size, w.a, w.H[row])
+
+
+@compiled
+def variational_runs(
+    size: Size, system: Runs, epochs: int, rho: float, worth: float, iterations: int, out: Histories
+) -> None:
+    """Variational Bayes filter of each run."""
+    N, rows = len(size), system.z.shape[2]
+    w = workspace(size, rows)
+    x, P, before = np.zeros(N), np.zeros((N, N)), np.zeros(rows)
+    for run in range(out.x.shape[0]):
+        begin(size, system, run, w)
+        alpha, beta = out.memory[run, :rows], out.memory[run, rows:]
+        for epoch in range(epochs):
+            load_process(size, system, run, epoch, w)
+            predict(size, w)
+            present, _ = load_measurement(size, system, run, epoch, w)
+            for row in range(rows):
+                if np.isnan(alpha[row]):
+                    alpha[row], beta[row] = 0.5 * worth, 0.5 * worth * w.R[row, row]
+                alpha[row], beta[row] = rho * alpha[row], rho * beta[row]
+                before[row] = beta[row]
+                if not np.isnan(w.z[row]):
+                    alpha[row] += 0.5
+            set_noise(w, alpha, beta)
+            if out.innovation.shape[1] > 0:
+                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
+            x[:] = w.x
+            load(size, w.P, P)
+            failure, nis, log_likelihood = SOUND, 0.0, 0.0
+            for turn in range(iterations):
+                if present == 0 or failure != SOUND:
+                    break
+                w.x[:] = x
+                load(size, P, w.P)
+                set_noise(w, alpha, beta)
+                failure, turn_nis, turn_log_likelihood = update(size, w, False, True)
+                if turn == 0:
+                    nis, log_likelihood = turn_nis, turn_log_likelihood
+                blame(size, w, before, beta)
+            if not conclude(out, run, epoch, failure, nis, log_likelihood):
+                break
+            if out.innovation.shape[1] > 0:
+                for row in range(rows):
+                    out.adaptation[run, epoch, row] = beta[row] / alpha[row]
+            keep(out, run, epoch, epochs - 1, w)
+
+
+def variational(
+    system: LinearSystem,
+    state: FilterState | None = None,
+    *,
+    rho: float = 0.99,
+    worth: float = 10.0,
+    iterations: int = 3,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """Kalman filter that estimates the measurement noise by variational Bayes.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        With a diagonal R, the prior guess of the variances, and without S.
+    state : FilterState, optional
+        From an earlier call, to go on from.
+    rho : float
+        Forgetting factor; the memory is ``1 / (1 - rho)`` epochs.
+    worth : float
+        How many measurements the given R is worth.
+    iterations : int
+        Turns an epoch.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        `adaptation` holds each row's variance, ``beta / alpha``, after the epoch. Innovation covariances, `nis` and
+        `log_likelihood` are of the first turn, which knows this epoch's measurement not yet.
+
+    Raises
+    ------
+    UsageError
+        An option out of range, R not diagonal or with a zero, or S given.
+    DataError
+        As :func:`truenorth.filters.kalman`.
+    """
+    if not 0.0 < rho <= 1.0:
+        raise UsageError(f"rho is {rho}, expected more than 0 and at most 1")
+    if not worth > 0.0 or not np.isfinite(worth):
+        raise UsageError(f"worth is {worth}, expected a positive number")
+    if iterations < 1:
+        raise UsageError(f"iterations is {iterations}, expected at least 1")
+    check_independent_rows(system)
+    if (np.diagonal(system.R, axis1=-2, axis2=-1) == 0.0).any():
+        raise UsageError("R has a zero on its diagonal: expected a guess of each row's variance")
+
+    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
+        variational_runs(size, runs, epochs, float(rho), float(worth), iterations, out)
+
+    return drive(
+        kernel,
+        system,
+        state,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+        memory=np.full(2 * system.rows, np.nan),
+        adaptation=system.rows,
+    )
