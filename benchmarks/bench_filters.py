@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from truenorth.filters import LinearSystem, kalman, smoother
+from truenorth.filters import LinearSystem, fading, kalman, smoother, square_root
 
 STATES, ROWS, EVERY = 15, 3, 10
 RUNS, REPEATS = 200, 5
@@ -86,6 +86,8 @@ def main() -> None:
     print(f"  one run,  truenorth, plain             {best(lambda: kalman(one, joseph=False), one.epochs):8.3f}")
     print(f"  one run,  truenorth, full history      {best(lambda: kalman(one, history='full'), one.epochs):8.3f}")
     print(f"  one run,  truenorth, smoother          {best(lambda: smoother(one), one.epochs):8.3f}")
+    print(f"  one run,  truenorth, fading            {best(lambda: fading(one, kind='single'), one.epochs):8.3f}")
+    print(f"  one run,  truenorth, square root       {best(lambda: square_root(one), one.epochs):8.3f}")
     theirs = best(lambda: by_filterpy(few), few.epochs)
     print(f"  one run,  filterpy (Joseph)            {theirs:8.3f}   {theirs / ours:.0f} times ours")
     every = system(20_000, every=1)
