@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -10,13 +16,15 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"nopython": True, "error_model": "numpy", "fastmath": False, "nogil": True}
+PACKAGE = Path(__file__).parent
 
 
 def compiled(function: F | None = None, **options: Any) -> Any:
     """Compile a function with Numba: IEEE arithmetic, NumPy division rules, cached on disk.
 
-    Where no cache folder is writable (a read-only installation), Numba raises at decoration time; the function
-    is then compiled anew in each process instead.
+    The cache is kept by the text of all files that hold compiled code, since kernels call each other across files and
+    Numba itself watches only the one a kernel stands in. Where no cache folder is writable (a read-only installation),
+    Numba raises at decoration time; the function is then compiled anew in each process.
 
     Parameters
     ----------
@@ -32,8 +40,42 @@ def compiled(function: F | None = None, **options: Any) -> Any:
     if function is None:
         return lambda f: compiled(f, **options)
     try:
-        return numba.jit(cache=True, **(OPTIONS | options))(function)
+        with _cache_folder(_folder()):
+            return numba.jit(cache=True, **(OPTIONS | options))(function)
     except RuntimeError as error:  # "cannot cache function ...: no locator available"
         if "cache" not in str(error):
             raise
         return numba.jit(cache=False, **(OPTIONS | options))(function)
+
+
+@cache
+def _folder() -> str:
+    """The cache folder of this very source: beside the package where that is writable, else in the user's cache."""
+    text = hashlib.sha256()
+    for file in sorted(PACKAGE.rglob("*.py")):
+        content = file.read_bytes()
+        if b"compiled" in content:  # every kernel, and the plain functions that are said to be compiled elsewhere
+            text.update(file.relative_to(PACKAGE).as_posix().encode())
+            text.update(content)
+    name = f"kernels-{text.hexdigest()[:16]}"
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for parent in (PACKAGE / "__pycache__", home / "truenorth"):
+        try:
+            (parent / name).mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=parent / name):
+                return str(parent / name)
+        except OSError:
+            continue
+    return str(PACKAGE / "__pycache__")
+
+
+@contextmanager
+def _cache_folder(folder: str) -> Iterator[None]:
+    """Numba's cache folder for the functions decorated inside; an environment's own choice is respected."""
+    before = numba.config.CACHE_DIR
+    if not before:
+        numba.config.CACHE_DIR = folder
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before

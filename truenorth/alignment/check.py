@@ -9,7 +9,7 @@ cannot be checked by anyone.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,8 +96,20 @@ def fit_task_noise(
     """Random walks of a log, linearised about an attitude; biases as already taken off the integrals."""
     lat, alt = task.position.lat, task.position.alt
 
+    # Q, R and S are linear in the squares of the random walks: linearise once for each, then add up.
+    one = np.ones(3)
+    silent = StaticModel(0.0, 0.0).linearise(integrals, C_n0_i, lat, alt, P0, one)
+    terms = [StaticModel(*unit).linearise(integrals, C_n0_i, lat, alt, P0, one) for unit in np.eye(4).tolist()]
+
     def build(model: StaticModel, R: Array) -> LinearSystem:
-        return model.linearise(integrals, C_n0_i, lat, alt, P0, R)
+        weights = [walk**2 for walk in astuple(model)]
+        used = [(w, term) for w, term in zip(weights, terms, strict=True) if w > 0.0]
+        return replace(
+            silent,
+            Q=sum((w * term.Q for w, term in used), silent.Q),
+            R=sum((w * (term.R - np.eye(3)) for w, term in used), np.diag(R)),
+            S=sum((w * term.S for w, term in used), silent.S),
+        )
 
     return fit_noise(build, white_variance(mean_velocity(integrals, C_n0_i, lat, alt)), usual)
 

@@ -22,6 +22,8 @@ from truenorth.records import ImuRecord
 Array = NDArray[np.float64]
 
 MAX_PASSES = 8
+MAX_NOISE_PASSES = 6
+SAME_NOISE = 0.1  # of the expected innovation variance
 CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sigma is the last
 ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
 LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
@@ -162,18 +164,15 @@ def fine_align(
         x0 = np.zeros(STATES)
         x0[6:] = -bias
         system = replace(model.linearise(integrals, C_n0_i, lat, alt, P0, R), x0=x0)
-        estimates = kalman(system, history="full")
+        system, estimates, R = _with_base_variance(system, R)
         x, P = estimates.x[-1], estimates.P[-1]
-        R_next, expected = base_variance(estimates, R)
         moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
-        same_noise = bool(np.all(np.abs(R_next - R) < 0.1 * expected))
-        if (moved < CONVERGED and same_noise) or passes == MAX_PASSES:
+        if moved < CONVERGED or passes == MAX_PASSES:
             break
         # Back to the start: phi(0) = phi(end) + int C_n0_b (eps - nominal); then everything anew about the estimate.
         turned = np.einsum("k,kab->ab", integrals.intervals, C_n0_i @ integrals.C_mean)
         C_n0_i = dcm_from_rotation_vector(x[PHI] + turned @ x[BG]) @ C_n0_i
         bias = bias + np.concatenate([x[BG], x[BA]])
-        R = R_next
         integrals = integrate(record, interval, bias[:3], bias[3:], rows)
 
     gains = filter_gains(system, estimates)
@@ -212,6 +211,19 @@ def bias_part(step: Array, P_bias: Array) -> Array:
         e = step_k @ e
         response[k] = e
     return response @ P_bias @ np.swapaxes(response, 1, 2)
+
+
+def _with_base_variance(system: LinearSystem, R: Array) -> tuple[LinearSystem, Estimates, Array]:
+    """Filter with the variance of the base's velocity that the innovations ask for."""
+    estimates = kalman(system, history="full")
+    for _ in range(MAX_NOISE_PASSES):
+        R_next, expected = base_variance(estimates, R)
+        if np.all(np.abs(R_next - R)[:2] < SAME_NOISE * expected[:2]):  # the vertical carries no attitude
+            break
+        system = replace(system, R=system.R + np.diag(R_next - R))
+        R = R_next
+        estimates = kalman(system, history="full")
+    return system, estimates, R
 
 
 def white_variance(velocity: Array) -> Array:

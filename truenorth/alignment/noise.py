@@ -21,7 +21,8 @@ from truenorth.models.static import StaticModel
 Array = NDArray[np.float64]
 
 PRIOR_WIDTH = math.log(5.0)  # one sigma of a random walk about its usual value: a factor of five
-STEPS = (math.log(4.0), math.log(2.0), math.log(1.4), math.log(1.2))  # pattern search, coarse to fine
+STEPS = (math.log(4.0), math.log(2.0), math.log(1.4))  # pattern search, coarse to fine
+SETTLE = 3  # runs for the base's variance before the search
 
 
 def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usual: StaticModel) -> StaticModel:
@@ -47,13 +48,15 @@ def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usu
         return StaticModel(*(centre * np.exp(x)).tolist())
 
     def cost(x: Array, R: Array) -> tuple[float, Array]:
-        first = kalman(build(model_at(x), R), innovations=True)
-        R = base_variance(first, R, colour=False)[0]  # slow wander is for the walks to explain
-        second = kalman(build(model_at(x), R), innovations=True)
-        return -2.0 * float(second.log_likelihood) + float(np.sum((x / PRIOR_WIDTH) ** 2)), R
+        estimates = kalman(build(model_at(x), R), innovations=True)
+        value = -2.0 * float(estimates.log_likelihood) + float(np.sum((x / PRIOR_WIDTH) ** 2))
+        # Slow wander is for the walks to explain: the base's own motion is fitted without its colour.
+        return value, base_variance(estimates, R, colour=False)[0]
 
     x = np.zeros(len(centre))
-    best, R = cost(x, R)
+    for _ in range(SETTLE):
+        _, R = cost(x, R)
+    best, _ = cost(x, R)
     for step in STEPS:
         for axis in free:
             for change in (step, -step):
@@ -64,7 +67,9 @@ def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usu
                     value, R_trial = cost(trial, R)
                     if value >= best:
                         break
-                    x, best, R, moved = trial, value, R_trial, True
+                    # The variance follows each step that is taken, and the step is judged again with it.
+                    x, R, moved = trial, R_trial, True
+                    best, _ = cost(x, R)
                 if moved:
                     break
     return model_at(x)
