@@ -107,7 +107,8 @@ def align(
     tell(f"aligning: {chosen}")
     blind = is_blind(task.motion, check_means(task.means, position.lat, task.gravity))
     if blind:
-        why += "; the gyros do not see the earth turn: the mean specific force levels, nothing finds north"
+        asked = "" if method == "auto" else f"{method} was asked for, but "
+        chosen, why = "analytic", f"{asked}the gyros do not see the earth turn: the mean force levels, nothing finds north"
         found = _align_level(task, spec)
     elif chosen == "analytic":
         found = _align_analytic(task, spec)

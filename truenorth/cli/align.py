@@ -57,7 +57,9 @@ def align(
     heading_limit: Annotated[float, typer.Option(help="Largest usable one-sigma heading error, deg.")] = 5.0,
     calibration: Annotated[
         Path | None,
-        typer.Option(help="YAML file of known bias, scale factor and misalignment, taken off first.", show_default=False),
+        typer.Option(
+            help="YAML file of known bias, scale factor and misalignment, taken off first.", show_default=False
+        ),
     ] = None,
     output: Annotated[
         Path | None,
@@ -160,7 +162,7 @@ def _print(result: Alignment, paths: list[Path]) -> None:
         ("accelerometer bias, ug", s["accel_bias_ug"], s["accel_bias_sigma_ug"], s["accel_bias_estimated"]),
     ):
         shown = [
-            f"{axis} {value:.4g} ± {sigma:.2g}" if ok else f"{axis} not estimated (± {sigma:.2g})"
+            f"{axis} {value:.4g} ± {sigma:.3g}" if ok else f"{axis} not estimated (± {sigma:.3g})"
             for axis, value, sigma, ok in zip("xyz", values, sigmas, known, strict=True)
         ]
         console.print(f"{name}: {', '.join(shown)}", soft_wrap=True)

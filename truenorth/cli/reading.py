@@ -12,7 +12,9 @@ if TYPE_CHECKING:
 
 Log = Annotated[
     Path,
-    typer.Argument(help="IMU log: .csv, .parquet, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.", show_default=False),
+    typer.Argument(
+        help="IMU log: .csv, .parquet, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.", show_default=False
+    ),
 ]
 Axes = Annotated[
     str | None,
@@ -31,7 +33,9 @@ Columns = Annotated[
         show_default=False,
     ),
 ]
-Format = Annotated[str | None, typer.Option("--format", help="Format, where the suffix does not tell.", show_default=False)]
+Format = Annotated[
+    str | None, typer.Option("--format", help="Format, where the suffix does not tell.", show_default=False)
+]
 From = Annotated[float | None, typer.Option("--from", help="Use the log from this time on, s.", show_default=False)]
 To = Annotated[float | None, typer.Option("--to", help="Use the log up to this time, s.", show_default=False)]
 

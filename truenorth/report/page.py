@@ -1,0 +1,177 @@
+"""The page of an alignment: verdict first, then the numbers, then how they came about, then the log's health."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G
+from truenorth.report.charts import charts
+from truenorth.units import format as quantity
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment
+
+VERDICTS = {
+    "aligned": ("good", "Aligned"),
+    "level_only": ("fair", "Levelled; heading refused"),
+    "not_converged": ("bad", "Not converged"),
+    "not_observable": ("bad", "Heading not observable"),
+    "inconsistent": ("bad", "The data contradict a base that stays"),
+}
+MOTION_COLOURS = {
+    "still": "#cfe8cf",
+    "disturbed": "#f6e3b4",
+    "swaying": "#bcd9f0",
+    "rotating": "#dcc5ec",
+    "moving": "#f3b7a5",
+    "unknown": "#e6e6e6",
+}
+
+
+def alignment_page(result: Alignment) -> str:
+    """HTML text of the page; plotly's script is inside, so that it works offline."""
+    from jinja2 import Environment, PackageLoader
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    shown = [
+        (title, caption, figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False}))
+        for title, caption, figure in charts(result)
+    ]
+    from truenorth import __version__
+
+    mood, verdict = VERDICTS[result.status]
+    return environment.get_template("alignment.html").render(
+        result=result,
+        mood=mood,
+        verdict=verdict,
+        numbers=_numbers(result),
+        facts=_facts(result),
+        biases=_biases(result),
+        charts=shown,
+        health=_health(result),
+        plotly=get_plotlyjs() if shown else "",
+        version=__version__,
+    )
+
+
+def _numbers(result: Alignment) -> list[dict[str, str]]:
+    rows = []
+    names = ("Heading", "Pitch", "Roll")
+    for i, name in enumerate(names):
+        known = name != "Heading" or result.heading_known
+        rows.append(
+            {
+                "name": name,
+                "value": f"{np.degrees(result.euler[i]):.4f}°" if known else "refused",
+                "sigma": _angle(float(result.euler_sigma[i])),
+                "floor": _angle(float(result.euler_sigma_floor[i])),
+            }
+        )
+    if result.near_vertical:
+        name, value, sigma = result.azimuth
+        rows.append(
+            {
+                "name": name.replace("_", " ").capitalize(),
+                "value": f"{np.degrees(value):.4f}°" if result.heading_known else "refused",
+                "sigma": _angle(sigma),
+                "floor": _angle(float(np.sqrt(result.phi_floor[2, 2]))),
+            }
+        )
+    return rows
+
+
+def _angle(x: float) -> str:
+    degrees = float(np.degrees(x))
+    return f"{degrees:.2f}°" if degrees >= 1.0 else f"{degrees:.4f}° ({degrees * 60:.2f}′)"
+
+
+def _short(x: float) -> str:
+    """Three significant digits, never with an exponent."""
+    return f"{x:.3g}" if abs(x) < 1000.0 else f"{x:.0f}"
+
+
+def _facts(result: Alignment) -> list[tuple[str, str]]:
+    p, imu = result.position, result.imu
+    facts = [
+        ("Log", f"{result.source}, {result.duration:.1f} s used"),
+        ("Attitude at", f"{result.time:.3f} s on the log's clock"),
+        ("Place", f"{np.degrees(p.lat):.5f}°, {np.degrees(p.lon):.5f}°, {p.alt:.0f} m"),
+        ("Method", f"{result.method}: {result.method_reason}"),
+        (
+            "IMU",
+            f"{result.imu_source}: gyro bias {quantity(imu.gyro_bias, 'deg/h', 3)}, "
+            f"{quantity(imu.gyro_random_walk, 'deg/sqrt(h)', 3)}; accelerometer bias {_short(imu.accel_bias / MICRO_G)} µg, "
+            f"{quantity(imu.accel_random_walk, 'ug/sqrt(Hz)', 3)} (one sigma)",
+        ),
+    ]
+    if np.all(np.isfinite(result.disturbance)):
+        east, north, up = 1e3 * result.disturbance
+        facts.append(("Base's own motion", f"{east:.2g}, {north:.2g}, {up:.2g} mm/s RMS (east, north, up)"))
+    if result.pays_until is not None and result.heading_known:
+        verb = "stopped paying after" if result.pays_until <= result.duration else "pays until about"
+        facts.append(("More time", f"{verb} {result.pays_until:.0f} s: then heading's random part is half its floor"))
+    return facts
+
+
+def _biases(result: Alignment) -> list[dict[str, str]]:
+    rows = []
+    for name, unit, scale, values, sigmas, known in (
+        (
+            "Gyro",
+            "deg/h",
+            DEG_PER_HOUR,
+            result.gyro_bias,
+            result.gyro_bias_sigma,
+            result.gyro_bias_estimated,
+        ),
+        (
+            "Accelerometer",
+            "µg",
+            MICRO_G,
+            result.accel_bias,
+            result.accel_bias_sigma,
+            result.accel_bias_estimated,
+        ),
+    ):
+        for axis, value, sigma, told in zip("xyz", values / scale, sigmas / scale, known, strict=True):
+            rows.append(
+                {
+                    "name": f"{name} {axis}",
+                    "value": f"{_short(value)} {unit}" if told else "not estimated",
+                    "sigma": f"{_short(sigma)} {unit}",
+                }
+            )
+    return rows
+
+
+def _health(result: Alignment) -> dict[str, Any] | None:
+    found = result.inspection
+    if found is None:
+        return None
+    d = found.to_dict()
+    stretches = [
+        {
+            "kind": r.kind,
+            "share": 100.0 * r.duration / max(found.duration, 1e-9),
+            "colour": MOTION_COLOURS[r.kind],
+            "words": f"{r.kind}, {r.start:.0f} to {r.stop:.0f} s",
+        }
+        for r in found.regimes
+    ]
+    facts = [
+        ("Rate", f"{d['rate_hz']:.4g} Hz, jitter {d['jitter_rms_ms']:.2g} ms RMS"),
+        ("Gaps", str(len(d["gaps"]))),
+        ("Repeated rows", str(d["repeated_rows"])),
+        ("Saturated rows", str(sum(d["saturated_rows"]))),
+    ]
+    return {
+        "findings": found.findings,
+        "stretches": stretches,
+        "legend": {s["kind"]: s["colour"] for s in stretches},
+        "facts": facts,
+    }
