@@ -18,7 +18,7 @@ from typing import Any
 
 from truenorth.errors import DataError, UsageError
 from truenorth.units import format as format_quantity
-from truenorth.units import parse
+from truenorth.yaml_file import quantity, read_mapping, unknown_key
 
 
 @dataclass(frozen=True)
@@ -66,24 +66,42 @@ class ImuSpec:
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name != "name" and not value >= 0.0:
-                raise UsageError(f"IMU specification {self.name!r}: {item.name} is {value}; expected zero or more")
-        if self.correlation_time == 0.0:
-            raise UsageError(f"IMU specification {self.name!r}: correlation_time is 0; expected a positive time")
+            if item.name == "name":
+                continue
+            positive = item.name in ("gyro_range", "accel_range", "correlation_time")
+            if not (value > 0.0 if positive else 0.0 <= value < float("inf")):
+                wanted = "a positive value" if positive else "zero or more, and finite"
+                raise UsageError(f"IMU specification {self.name!r}: {item.name} is {value}; expected {wanted}")
 
     def to_mapping(self) -> dict[str, Any]:
-        """The specification as it stands in a file; only what differs from zero or infinity."""
+        """The specification as it stands in a file, exactly; only what differs from zero or infinity."""
         result: dict[str, Any] = {"name": self.name}
         for group in ("gyro", "accel"):
             values = {
-                key: format_quantity(getattr(self, f"{group}_{key}"), unit)
+                key: format_quantity(getattr(self, f"{group}_{key}"), unit, digits=None)
                 for key, (_, unit) in KEYS[group].items()
                 if getattr(self, f"{group}_{key}") not in (0.0, float("inf"))
             }
             if values:
                 result[group] = values
-        result["correlation_time"] = format_quantity(self.correlation_time, "s")
+        if self.correlation_time < float("inf"):
+            result["correlation_time"] = format_quantity(self.correlation_time, "s", digits=None)
         return result
+
+    def to_yaml(self, path: str | PathLike[str]) -> None:
+        """Write the specification as a file that `imu_spec` reads back.
+
+        Raises
+        ------
+        UsageError
+            The file cannot be written.
+        """
+        import yaml
+
+        from truenorth.atomic import atomic_path
+
+        with atomic_path(path) as temporary:
+            temporary.write_text(yaml.safe_dump(self.to_mapping(), sort_keys=False, allow_unicode=True), "utf-8")
 
 
 # Keys of a file with their dimension and the unit they are written in.
@@ -194,18 +212,12 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
         return _from_mapping(PRESETS[source], source, source)
     path = Path(source)
     if not path.is_file():
+        near = get_close_matches(str(source), PRESETS, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
         raise UsageError(
-            f"IMU specification {str(source)!r} is neither a preset ({', '.join(PRESETS)}) nor a file that can be read"
+            f"IMU specification {str(source)!r} is neither a preset ({', '.join(PRESETS)}) nor a file that can be read{hint}"
         )
-    import yaml
-
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        where = getattr(error, "problem_mark", None)
-        line = f", line {where.line + 1}" if where is not None else ""
-        raise DataError(f"{path}{line}: not a YAML file: {getattr(error, 'problem', error)}") from None
-    return _from_mapping(content, str(path), path.stem)
+    return _from_mapping(read_mapping(path), str(path), path.stem)
 
 
 def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
@@ -216,29 +228,24 @@ def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
         if group == "name":
             continue
         if group == "correlation_time":
-            values[group] = _value(entries, "time", f"{where}: {group}")
+            values[group] = _sigma(entries, "time", f"{where}: {group}")
             continue
         if group not in KEYS:
-            raise DataError(_unknown(where, str(group), [*KEYS, "name", "correlation_time"]))
+            raise DataError(unknown_key(where, str(group), [*KEYS, "name", "correlation_time"]))
         if not isinstance(entries, Mapping):
             raise DataError(f"{where}: {group}: expected keys such as bias and random_walk, found {entries!r}")
         for key, text in entries.items():
             if key not in KEYS[group]:
-                raise DataError(_unknown(where, f"{group}.{key}", [f"{group}.{k}" for k in KEYS[group]]))
-            values[f"{group}_{key}"] = _value(text, KEYS[group][key][0], f"{where}: {group}.{key}")
-    return ImuSpec(**values)
-
-
-def _value(text: Any, dimension: str, where: str) -> float:
+                raise DataError(unknown_key(where, f"{group}.{key}", [f"{group}.{k}" for k in KEYS[group]]))
+            values[f"{group}_{key}"] = _sigma(text, KEYS[group][key][0], f"{where}: {group}.{key}")
     try:
-        value = parse(text, dimension)
+        return ImuSpec(**values)
     except UsageError as error:
         raise DataError(f"{where}: {error}") from None
+
+
+def _sigma(text: Any, dimension: str, where: str) -> float:
+    value = quantity(text, dimension, where)
     if value < 0.0:
         raise DataError(f"{where}: {text!r} is negative; expected a one-sigma value, zero or more")
     return value
-
-
-def _unknown(where: str, key: str, known: list[str]) -> str:
-    near = get_close_matches(key, known, n=1)
-    return f"{where}: key {key!r} is not known" + (f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}")

@@ -1,8 +1,11 @@
 """Datasheet quantities: ``"0.01 deg/h"`` to SI and back.
 
-A parser of two dozen units, since what general unit libraries read into ``deg/sqrt(h)``, ``ug`` or ``mg`` is wrong in this
-field. Angle is a dimension of its own, so that ``deg/h`` is never a frequency; ``g`` is standard gravity (9.80665
+A parser of some forty units, since what general unit libraries read into ``deg/sqrt(h)``, ``ug`` or ``mg`` is wrong in
+this field. Angle is a dimension of its own, so that ``deg/h`` is never a frequency; ``g`` is standard gravity (9.80665
 m/s^2), never a gram. Exactly one finite number and one unit are accepted: no arithmetic, no bare number.
+
+A unit is one of the names below or of their usual spellings, joined by ``*`` and ``/`` from left to right, with powers
+(``s^2``, ``m/s2``, ``s²``, ``h^0.5``), roots (``sqrt(h)``, ``√h``, ``√(h)``) and parentheses (``(deg/h)/sqrt(Hz)``).
 """
 
 from __future__ import annotations
@@ -26,7 +29,12 @@ _ATOMS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
     "deg": (math.pi / 180, (1, 0, 0, 0)),
     "arcmin": (math.pi / 180 / 60, (1, 0, 0, 0)),
     "arcsec": (math.pi / 180 / 3600, (1, 0, 0, 0)),
+    "mdeg": (1e-3 * math.pi / 180, (1, 0, 0, 0)),
     "rev": (2 * math.pi, (1, 0, 0, 0)),
+    "dps": (math.pi / 180, (1, 0, -1, 0)),
+    "mdps": (1e-3 * math.pi / 180, (1, 0, -1, 0)),
+    "dph": (math.pi / 180 / 3600, (1, 0, -1, 0)),
+    "rpm": (2 * math.pi / 60, (1, 0, -1, 0)),
     "m": (1.0, (0, 1, 0, 0)),
     "cm": (1e-2, (0, 1, 0, 0)),
     "mm": (1e-3, (0, 1, 0, 0)),
@@ -37,6 +45,7 @@ _ATOMS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
     "s": (1.0, (0, 0, 1, 0)),
     "ms": (1e-3, (0, 0, 1, 0)),
     "us": (1e-6, (0, 0, 1, 0)),
+    "ns": (1e-9, (0, 0, 1, 0)),
     "min": (60.0, (0, 0, 1, 0)),
     "h": (3600.0, (0, 0, 1, 0)),
     "d": (86400.0, (0, 0, 1, 0)),
@@ -55,6 +64,7 @@ _ATOMS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
 
 _SPELLINGS = {
     "°": "deg",
+    "º": "deg",  # the ordinal sign, which many a datasheet has in place of the degree sign
     "′": "arcmin",
     "'": "arcmin",
     "″": "arcsec",
@@ -64,6 +74,7 @@ _SPELLINGS = {
     "radian": "rad",
     "radians": "rad",
     "hr": "h",
+    "hrs": "h",
     "hour": "h",
     "hours": "h",
     "sec": "s",
@@ -116,8 +127,11 @@ DIMENSIONS: dict[str, tuple[Dimension, str]] = {
     "acceleration_per_temperature": (_dimension(0, 1, -2, -1), "10 ug/degC"),
 }
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_FACTOR = re.compile(r"(sqrt\(|√\(?)?([^\W\d_²³]+|[°′″'\"%µμ]+[^\W\d_²³]*|1)(?:\^?([-+]?\d+)|([²³]))?(\))?")
+_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.DOTALL)
+_SUPERSCRIPTS = str.maketrans("⁻¹²³⁴", "-1234")
+_NAME = re.compile(r"°C|[°º′″'\"%]|[A-Za-zµμ]+|1(?![\d.])")
+_POWER = re.compile(r"\^?([-+]?\d(?:\.\d+)?)(?!\d)|\^\(([-+]?\d)/([1-9])\)")
+_ROOT = re.compile(r"sqrt(?=\()|√")
 
 
 def parse_unit(text: str) -> tuple[float, Dimension]:
@@ -128,32 +142,65 @@ def parse_unit(text: str) -> tuple[float, Dimension]:
     UsageError
         A unit that is not known.
     """
-    factor, dimension = 1.0, [Fraction(0)] * 4
-    sign, rest = 1, text.strip().replace(" ", "").replace("·", "*")
-    if not rest:
+    plain = re.sub("[⁻¹²³⁴]+", lambda match: "^" + match[0].translate(_SUPERSCRIPTS), text.strip())
+    plain = re.sub(r"\s*([*/()^])\s*", r"\1", plain.replace("·", "*").replace("⋅", "*"))
+    if not plain:
         raise UsageError(f"{text!r} names no unit")
-    while rest:
-        match = _FACTOR.match(rest)
-        if match is None or bool(match[1] and match[1].endswith("(")) != bool(match[5]):
-            raise UsageError(f"unit {text!r} is not understood at {rest!r}; write it like deg/h, deg/sqrt(h), ug/sqrt(Hz)")
-        name = _SPELLINGS.get(match[2], match[2])
-        if name not in _ATOMS:
-            near = get_close_matches(name, _ATOMS, n=3, cutoff=0.5)
-            hint = f"; did you mean {', '.join(near)}?" if near else ""
-            raise UsageError(f"unit {match[2]!r} in {text!r} is not known{hint}")
-        power = Fraction(int(match[3])) if match[3] else Fraction({"²": 2, "³": 3}.get(match[4] or "", 1))
-        power *= sign * (_HALF if match[1] else 1)
-        value, exponents = _ATOMS[name]
-        factor *= value ** float(power)
-        dimension = [d + power * e for d, e in zip(dimension, exponents, strict=True)]
+    factor, dimension, rest = _product(plain, text)
+    if rest:
+        raise UsageError(
+            f"unit {text!r} is not understood at {rest!r}; write it like deg/h, deg/sqrt(h) or ug/sqrt(Hz)"
+        )
+    return factor, dimension
+
+
+def _product(rest: str, text: str) -> tuple[float, Dimension, str]:
+    """Factors joined by * and /, from left to right; also what is left of the text."""
+    factor, dimension, rest = _power(rest, text)
+    while rest[:1] in ("*", "/"):
+        sign = 1 if rest[0] == "*" else -1
+        other, exponents, rest = _power(rest[1:], text)
+        factor *= other**sign
+        dimension = _sum(dimension, exponents, sign)
+    return factor, dimension, rest
+
+
+def _power(rest: str, text: str) -> tuple[float, Dimension, str]:
+    """A name or a parenthesis, with its root or power."""
+    root = _ROOT.match(rest)
+    rest = rest[root.end() :] if root else rest
+    name = _NAME.match(rest)
+    if name is not None:
+        factor, dimension = _atom(name[0], text)
+        rest = rest[name.end() :]
+    elif rest.startswith("("):
+        factor, dimension, rest = _product(rest[1:], text)
+        if not rest.startswith(")"):
+            raise UsageError(f"unit {text!r}: a parenthesis is not closed")
+        rest = rest[1:]
+    else:
+        raise UsageError(f"unit {text!r}: the name of a unit is expected {f'at {rest!r}' if rest else 'at its end'}")
+    power = _HALF if root else Fraction(1)
+    match = _POWER.match(rest)
+    if match is not None:
+        power *= Fraction(match[1]) if match[1] else Fraction(int(match[2]), int(match[3]))
         rest = rest[match.end() :]
-        if rest:
-            if rest[0] not in "/*":
-                raise UsageError(f"unit {text!r} is not understood at {rest!r}; join units with / or *")
-            sign, rest = (-1 if rest[0] == "/" else 1), rest[1:]
-            if not rest:
-                raise UsageError(f"unit {text!r} ends with an operator")
-    return factor, (dimension[0], dimension[1], dimension[2], dimension[3])
+    zero = Fraction(0), Fraction(0), Fraction(0), Fraction(0)
+    return factor ** float(power), _sum(zero, dimension, power), rest
+
+
+def _atom(name: str, text: str) -> tuple[float, Dimension]:
+    known = _SPELLINGS.get(name, name)
+    if known not in _ATOMS:
+        near = get_close_matches(known, _ATOMS, n=3, cutoff=0.5)
+        hint = f"; did you mean {', '.join(near)}?" if near else ""
+        raise UsageError(f"unit {name!r} in {text!r} is not known{hint}")
+    factor, (angle, length, time, temperature) = _ATOMS[known]
+    return factor, _dimension(angle, length, time, temperature)
+
+
+def _sum(a: Dimension, b: Dimension, times: Fraction | int) -> Dimension:
+    return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2], a[3] + times * b[3]
 
 
 def parse_quantity(text: str) -> tuple[float, Dimension]:
@@ -166,16 +213,21 @@ def parse_quantity(text: str) -> tuple[float, Dimension]:
     """
     if not isinstance(text, str):
         raise UsageError(f"{text!r} has no unit; write it as text with one, such as '0.01 deg/h'")
-    match = _NUMBER.match(text.strip())
+    match = _QUANTITY.fullmatch(text.strip().replace("\N{MINUS SIGN}", "-"))
     if match is None:
-        raise UsageError(f"{text!r} does not begin with a number; expected one number and one unit, such as '0.01 deg/h'")
-    number, unit = float(match[0]), text.strip()[match.end() :].strip()
+        raise UsageError(
+            f"{text!r} does not begin with a number; expected one number and one unit, such as '0.01 deg/h'"
+        )
+    number, unit = match.groups()
     if not unit:
-        raise UsageError(f"{text!r} has no unit; add one, such as '{match[0]} deg/h'")
-    if not math.isfinite(number):
-        raise UsageError(f"{text!r} is not a finite number")
+        raise UsageError(f"{text!r} has no unit; add one, such as '{number} deg/h'")
+    if unit[0] in "+-*/.,^" or unit[0].isdigit():
+        raise UsageError(f"{text!r} is not one number (with a decimal point, no arithmetic) and one unit")
     factor, dimension = parse_unit(unit)
-    return number * factor, dimension
+    value = float(number) * factor
+    if not math.isfinite(value):
+        raise UsageError(f"{text!r} is not a finite number")
+    return value, dimension
 
 
 def parse(text: str, dimension: str) -> float:
@@ -202,7 +254,8 @@ def parse(text: str, dimension: str) -> float:
     try:
         value, found = parse_quantity(text)
     except UsageError as error:
-        raise UsageError(f"{error} (a quantity of {words} is expected, such as {example!r})") from None
+        what = str(error) if repr(text) in str(error) else f"{text!r}: {error}"
+        raise UsageError(f"{what} (a quantity of {words} is expected, such as {example!r})") from None
     if found != wanted:
         names = [name.replace("_", " ") for name, (d, _) in DIMENSIONS.items() if d == found]
         what = f" is a quantity of {names[0]}" if names else " has another dimension"
@@ -210,7 +263,22 @@ def parse(text: str, dimension: str) -> float:
     return value
 
 
-def format(value: float, unit: str, digits: int = 6) -> str:
-    """An SI value as a datasheet string: ``format(4.848e-8, "deg/h") == "0.01 deg/h"`` to `digits` significant digits."""
+def format(value: float, unit: str, digits: int | None = 6) -> str:
+    """An SI value as a datasheet string: ``format(4.848e-8, "deg/h") == "0.00999974 deg/h"``.
+
+    Parameters
+    ----------
+    value : float
+        In SI.
+    unit : str
+    digits : int or None
+        Significant digits; None takes the fewest that `parse` reads back to the same value.
+
+    Returns
+    -------
+    str
+    """
     factor, _ = parse_unit(unit)
+    if digits is None:
+        digits = next((n for n in range(1, 17) if float(f"{value / factor:.{n}g}") * factor == value), 17)
     return f"{value / factor:.{digits}g} {unit}"

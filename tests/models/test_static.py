@@ -89,13 +89,9 @@ def test_noise_inside_an_interval():
     phi_end, dv_end = phi[:, -1], dv[:, -1]
     noise = mean - dv_end + 0.5 * np.cross(force, phi_end)  # z - H x for H = [-T/2 [f x], I]
 
-    record = ImuRecord(
-        np.arange(1, 501) / 100, np.zeros((500, 3)), np.tile(force / 100, (500, 1)), "increments"
-    )
+    record = ImuRecord(np.arange(1, 501) / 100, np.zeros((500, 3)), np.tile(force / 100, (500, 1)), "increments")
     integrals = integrate(record, 1.0)
-    system = StaticModel(q_g, q_a).linearise(
-        integrals, np.eye(3), np.pi / 2, ALT, np.eye(STATES), np.zeros(3)
-    )
+    system = StaticModel(q_g, q_a).linearise(integrals, np.eye(3), np.pi / 2, ALT, np.eye(STATES), np.zeros(3))
     Q, S, R = system.Q[0], system.S[0], system.R[0]
     process = np.concatenate([phi_end, dv_end], axis=1)
     for sample, theory, a, b in (

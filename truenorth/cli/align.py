@@ -14,6 +14,7 @@ from truenorth.cli.reading import Axes, Columns, Format, From, Log, Rate, To, Un
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
+    from truenorth.records import ImuRecord
 
 EXAMPLES = """
 Examples:
@@ -61,6 +62,9 @@ def align(
             help="YAML file of known bias, scale factor and misalignment, taken off first.", show_default=False
         ),
     ] = None,
+    any_attitude: Annotated[
+        bool, typer.Option("--any-attitude", help="The IMU really lies on its head: do not refuse z pointing down.")
+    ] = False,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -83,6 +87,7 @@ def align(
         record = read_log(
             log, axes=axes, units=units, rate=rate, columns=columns, format=format, start=start, stop=stop
         )
+        _refuse_implausible(record, position.lat, any_attitude, units_given=units is not None)
         from truenorth.alignment import align as align_record
         from truenorth.calibration import Calibration
 
@@ -112,6 +117,25 @@ def align(
         _print(result, paths)
     if result.status not in ("aligned", "level_only"):
         raise typer.Exit(4)
+
+
+def _refuse_implausible(record: ImuRecord, lat: float, any_attitude: bool, units_given: bool) -> None:
+    """Stop at mistakes of units and axes that leave no other reading; mention those that do."""
+    from truenorth.errors import DataError
+    from truenorth.quality.plausibility import check_plausibility
+    from truenorth.quality.regimes import motion_summary
+
+    _, findings = check_plausibility(record, motion_summary(record), lat)
+    for finding in findings:
+        if finding.code == "axes_down" and any_attitude:
+            continue
+        doubtful_unit = finding.code == "gyro_unit" and not units_given
+        if finding.severity == "error" or doubtful_unit:
+            extra = ", or --any-attitude if it really is" if finding.code == "axes_down" else ""
+            extra = "; if they are in rad/s, say so: --units rad/s,m/s^2" if doubtful_unit else extra
+            raise DataError(f"{record.source}: rows 1 to {len(record)}: {finding.message}{extra}")
+        if finding.severity == "warning":
+            print(f"truenorth: warning: {finding.message}", file=sys.stderr)
 
 
 def _progress(quiet: bool) -> Any:

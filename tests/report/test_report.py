@@ -1,0 +1,86 @@
+"""The page and the files of an alignment: whole, self-contained, and saying what the result says."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truenorth.alignment import align
+from truenorth.errors import UsageError
+from truenorth.position import Position
+from truenorth.quality import inspect
+from truenorth.report import save_alignment, write_report
+from truenorth.simulation import rest, simulate
+from truenorth.specs import imu_spec
+
+PLACE = Position.from_degrees(40.0, 118.0)
+
+
+@pytest.fixture(scope="module")
+def aligned():
+    record = simulate(rest(PLACE, 1.0), rate=20.0, duration=120.0, imu=imu_spec("navigation"), seed=1).record
+    return replace(align(record, PLACE, "navigation"), inspection=inspect(record, PLACE.lat), source="a <log> & more")
+
+
+@pytest.fixture(scope="module")
+def levelled():
+    record = simulate(rest(PLACE, 1.0), rate=20.0, duration=60.0, imu=imu_spec("consumer"), seed=1).record
+    return align(record, PLACE, "consumer")
+
+
+def test_files(aligned, tmp_path):
+    paths = save_alignment(aligned, tmp_path / "new" / "folder")
+    assert [p.name for p in paths] == ["summary.json", "history.parquet", "report.html"]
+    assert sorted(p.name for p in paths[0].parent.iterdir()) == sorted(p.name for p in paths)
+    assert json.loads(paths[0].read_text())["status"] == "aligned"
+    import pandas as pd
+
+    frame = pd.read_parquet(paths[1])
+    assert frame.index.name == "time"
+    assert frame["heading_deg"].iloc[-1] == pytest.approx(np.degrees(aligned.heading), abs=1e-6)
+
+
+def test_the_page_says_what_the_result_says(aligned, tmp_path):
+    path = write_report(aligned, tmp_path / "report.html")
+    page = path.read_text()
+    assert path.stat().st_size < 6.5e6
+    assert f"{np.degrees(aligned.heading):.4f}°" in page
+    assert "Aligned" in page
+    for reason in aligned.reasons:
+        assert reason in page
+    assert "a &lt;log&gt; &amp; more" in page
+    assert "a <log>" not in page
+    body = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert not re.search(r"(src|href)\s*=\s*[\"']https?:", body)
+
+
+def test_a_refused_heading_is_refused_on_the_page(levelled, tmp_path):
+    assert levelled.status == "level_only"
+    page = write_report(levelled, tmp_path / "report.html").read_text()
+    assert "heading refused" in page
+    assert "deg/h" in page
+    assert levelled.reasons[0] in page.replace("&#39;", "'")
+
+
+def test_the_figure(aligned, levelled, tmp_path):
+    aligned.plot().savefig(tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 20_000
+    with pytest.raises(ValueError, match="no history"):
+        levelled.plot()
+
+
+def test_a_failure_leaves_nothing_half_written(aligned, tmp_path, monkeypatch):
+    from pathlib import Path
+
+    real = Path.write_text
+
+    def broken(self, text, **options):
+        real(self, text[: len(text) // 2], **options)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", broken)
+    with pytest.raises(UsageError, match="No space left"):
+        write_report(aligned, tmp_path / "report.html")
+    assert list(tmp_path.iterdir()) == []

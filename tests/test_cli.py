@@ -1,0 +1,296 @@
+"""The command line as a person meets it: answers, exit codes, and one clear message for each kind of bad input."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from truenorth.cli import main
+from truenorth.formats import write_imu
+from truenorth.position import Position
+from truenorth.records import ImuRecord
+from truenorth.simulation import rest, simulate
+from truenorth.specs import imu_spec
+
+PLACE = Position.from_degrees(34.25, 108.9, 380.0)
+WHERE = ["--lat", "34.25", "--lon", "108.9", "--alt", "380"]
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("logs") / "still.csv"
+    motion = rest(PLACE, np.radians(77.0), 0.02, -0.01)
+    write_imu(simulate(motion, rate=20.0, duration=120.0, imu=imu_spec("navigation"), seed=6).record, path)
+    return path
+
+
+def run(capsys, monkeypatch, *arguments) -> tuple[int, str, str]:
+    monkeypatch.setattr(sys, "argv", ["truenorth", *map(str, arguments)])
+    code = 0
+    try:
+        main()
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out = capsys.readouterr()
+    return code, out.out, out.err
+
+
+def test_json_is_one_object_with_the_documented_keys(capsys, monkeypatch, log):
+    code, out, _ = run(capsys, monkeypatch, "align", log, *WHERE, "--imu", "navigation", "--json")
+    assert code == 0
+    found = json.loads(out)
+    documented = (
+        "status reasons method time_s pitch_deg roll_deg heading_deg pitch_sigma_deg roll_sigma_deg heading_sigma_deg "
+        "heading_sigma_floor_deg gyro_bias_deg_h gyro_bias_sigma_deg_h accel_bias_ug accel_bias_sigma_ug"
+    )
+    assert set(documented.split()) <= set(found)
+    assert found["status"] == "aligned"
+    assert abs(found["heading_deg"] - 77.0) < 4 * found["heading_sigma_deg"] < 1.0
+    assert found["time_s"] == 120.0
+
+
+@pytest.mark.parametrize("method", ["auto", "analytic", "inertial", "oba", "kalman"])
+def test_every_method_prints_json(capsys, monkeypatch, log, method):
+    code, out, _ = run(capsys, monkeypatch, "align", log, *WHERE, "--method", method, "--json")
+    assert code == 0
+    assert json.loads(out)["method"] == ("kalman" if method == "auto" else method)
+
+
+def test_results_are_written_and_named(capsys, monkeypatch, log, tmp_path):
+    code, out, _ = run(capsys, monkeypatch, "align", log, *WHERE, "-o", tmp_path / "result")
+    assert code == 0
+    for name in ("summary.json", "history.parquet", "report.html"):
+        assert (tmp_path / "result" / name).stat().st_size > 0
+        assert name in out
+    assert not list((tmp_path / "result").glob(".*"))
+
+
+def test_window_and_epoch(capsys, monkeypatch, log):
+    code, out, _ = run(capsys, monkeypatch, "align", log, *WHERE, "--from", 20, "--to", 90, "--at", 50, "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert found["time_s"] == 50.0
+    assert found["duration_s"] == pytest.approx(70.05)
+
+
+def _lines(log: Path) -> list[str]:
+    return log.read_text().splitlines()
+
+
+def _write(folder: Path, lines: list[str], name: str = "bad.csv") -> Path:
+    path = folder / name
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def _with_cell(lines, line, column, text):
+    cells = lines[line - 1].split(",")
+    cells[column] = text
+    return [*lines[: line - 1], ",".join(cells), *lines[line:]]
+
+
+BAD = {
+    "missing column": (lambda x: [",".join(row.split(",")[:-1]) for row in x], 3, ["dvel_z", "missing", "dvel_y"]),
+    "text in a number": (lambda x: _with_cell(x, 11, 3, "abc"), 3, ["line 11", "dtheta_z", "'abc'"]),
+    "NaN": (lambda x: _with_cell(x, 7, 1, "nan"), 3, ["line 7", "dtheta_x", "nan"]),
+    "inf": (lambda x: _with_cell(x, 7, 5, "-inf"), 3, ["line 7", "dvel_y", "inf"]),
+    "time going back": (lambda x: _with_cell(x, 100, 0, "1.0"), 3, ["line 100", "time", "goes back"]),
+    "time that repeats": (lambda x: [*x[:50], x[49], *x[50:]], 3, ["line 51", "time", "repeats"]),
+    "a gap": (lambda x: x[:500] + x[600:], 3, ["gap of 5.050 s", "row 500", "--from"]),
+    "no header": (lambda x: x[1:], 3, ["line 1", "numbers", "header"]),
+    "a short line": (lambda x: [*x[:20], "1,2", *x[20:]], 3, ["line 21", "2 columns"]),
+    "3 rows": (lambda x: x[:4], 4, ["3 samples", "record longer"]),
+    "a header alone": (lambda x: x[:1], 3, ["no rows"]),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_logs_get_one_message(capsys, monkeypatch, log, tmp_path, what):
+    spoil, expected_code, words = BAD[what]
+    path = _write(tmp_path, spoil(_lines(log)))
+    code, out, err = run(capsys, monkeypatch, "align", path, *WHERE)
+    assert code == expected_code, err
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert "bad.csv" in err
+    for word in words:
+        assert word in err
+
+
+def _scaled(log_path: Path, gyro: float, accel: float) -> ImuRecord:
+    from truenorth.formats import read_imu
+
+    record = read_imu(log_path)
+    T = record.interval
+    return ImuRecord(record.time, record.gyro / T * gyro, record.accel / T * accel, "rates")
+
+
+def test_wrong_units_are_found(capsys, monkeypatch, log, tmp_path):
+    path = tmp_path / "in_g.csv"
+    write_imu(_scaled(log, 1.0, 1 / 9.80665), path)
+    code, _, err = run(capsys, monkeypatch, "align", path, *WHERE)
+    assert code == 3
+    assert "in g" in err
+    assert "in_g.csv" in err
+    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, "--units", "rad/s,g", "--json")
+    assert code == 0
+    assert json.loads(out)["status"] == "aligned"
+
+
+def test_degrees_a_second_are_found(capsys, monkeypatch, log, tmp_path):
+    path = tmp_path / "deg.csv"
+    write_imu(_scaled(log, np.degrees(1.0), 1.0), path)
+    code, _, err = run(capsys, monkeypatch, "align", path, *WHERE)
+    assert code == 3
+    assert "deg/s" in err
+    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, "--units", "deg/s,m/s^2", "--json")
+    assert code == 0
+    assert abs(json.loads(out)["heading_deg"] - 77.0) < 1.0
+
+
+def test_wrong_axes_are_found(capsys, monkeypatch, log, tmp_path):
+    from truenorth.formats import read_imu
+
+    frd = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    path = tmp_path / "frd.csv"
+    write_imu(read_imu(log).rotated(frd), path)
+    code, _, err = run(capsys, monkeypatch, "align", path, *WHERE)
+    assert code == 3
+    assert "--axes FRD" in err
+    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, "--axes", "FRD", "--json")
+    assert code == 0
+    assert abs(json.loads(out)["heading_deg"] - 77.0) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--lat", "95"], ["latitude 95", "-90 to 90"]),
+        (["--lat", "34", "--alt", "4e5"], ["height"]),
+        (["--lat", "34", "--imu", "rocket"], ["rocket", "navigation"]),
+        (["--lat", "34", "--method", "magic"], ["magic", "kalman"]),
+        (["--lat", "34", "--axes", "FFD"], ["FFD"]),
+        (["--lat", "34", "--axes", "RFD"], ["left-handed"]),
+        (["--lat", "34", "--units", "deg/s,deg"], ["deg"]),
+        (["--lat", "34", "--at", "500"], ["500", "0.05"]),
+        (["--lat", "34", "--heading-limit", "-1"], ["heading limit"]),
+    ],
+)
+def test_wrong_usage_is_exit_code_2(capsys, monkeypatch, log, arguments, words):
+    code, _, err = run(capsys, monkeypatch, "align", log, *arguments)
+    assert code == 2, err
+    for word in words:
+        assert word in err
+
+
+def test_missing_file_and_missing_latitude(capsys, monkeypatch, log):
+    code, _, err = run(capsys, monkeypatch, "align", "nowhere.csv", *WHERE)
+    assert code == 2
+    assert "no such file" in err
+    code, _, err = run(capsys, monkeypatch, "align", log)
+    assert code == 2
+    assert "--lat" in err
+
+
+def test_empty_file_and_misnamed_file(capsys, monkeypatch, log, tmp_path):
+    empty = tmp_path / "empty.csv"
+    empty.touch()
+    code, _, err = run(capsys, monkeypatch, "align", empty, *WHERE)
+    assert (code, "empty" in err) == (3, True)
+    from truenorth.formats import read_imu
+
+    parquet = tmp_path / "log.parquet"
+    write_imu(read_imu(log), parquet)
+    misnamed = parquet.rename(tmp_path / "log.csv")
+    code, _, err = run(capsys, monkeypatch, "align", misnamed, *WHERE)
+    assert code == 3
+    assert "parquet" in err
+    text = tmp_path / "text.parquet"
+    text.write_bytes(log.read_bytes())
+    code, _, err = run(capsys, monkeypatch, "align", text, *WHERE)
+    assert code == 3
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(capsys, monkeypatch, log, tmp_path):
+    blocked = tmp_path / "blocked"
+    blocked.write_text("a file where a folder is wanted")
+    code, _, err = run(capsys, monkeypatch, "align", log, *WHERE, "-o", blocked)
+    assert code == 2
+    assert "blocked" in err
+
+
+def test_a_file_that_is_no_specification_names_key_and_fix(capsys, monkeypatch, log, tmp_path):
+    spec = tmp_path / "imu.yaml"
+    spec.write_text("gyro: {bias: 0.01 deg/sqrt(h)}\n")
+    code, _, err = run(capsys, monkeypatch, "align", log, *WHERE, "--imu", spec)
+    assert code == 3
+    for word in ("imu.yaml", "gyro.bias", "deg/h"):
+        assert word in err
+
+
+def test_inspect(capsys, monkeypatch, log, tmp_path):
+    code, out, _ = run(capsys, monkeypatch, "inspect", log, "--lat", 34.25, "--json")
+    assert code == 0
+    assert json.loads(out)["motion"]["overall"] == "still"
+    code, out, _ = run(capsys, monkeypatch, "inspect", log, "--plot", tmp_path / "log.png")
+    assert code == 0
+    assert (tmp_path / "log.png").stat().st_size > 10_000
+    assert "Hz" in out
+
+
+def test_help_shows_examples(capsys, monkeypatch):
+    for command in ("align", "inspect"):
+        code, out, _ = run(capsys, monkeypatch, command, "--help")
+        assert code == 0
+        assert "Examples" in out
+        assert f"truenorth {command} log.csv" in out
+
+
+def test_a_refused_alignment_is_exit_code_4_and_still_json(capsys, monkeypatch, log):
+    arguments = ["align", log, "--lat", "10", "--imu", "navigation", "--json"]
+    code, out, _ = run(capsys, monkeypatch, *arguments)
+    assert code == 4
+    assert json.loads(out)["status"] == "inconsistent"
+
+
+HEAVY = ("numba", "numpy", "pandas", "matplotlib", "plotly", "dask", "pydantic", "scipy", "pyarrow")
+
+
+@pytest.mark.parametrize("statement", ["import truenorth", "import truenorth.cli"])
+def test_importing_stays_light(statement):
+    code = f"import sys; {statement}; print([m for m in {HEAVY!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_public_names_are_what_they_say():
+    import truenorth
+
+    for name in truenorth.__all__:
+        assert getattr(truenorth, name) is not None
+    assert set(truenorth.__all__) <= set(dir(truenorth))
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = truenorth.nothing
+
+
+def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):
+    """A full disk half way through, and a kill at any moment: the target is whole or not there."""
+    from truenorth.atomic import atomic_path
+    from truenorth.errors import UsageError
+
+    target = tmp_path / "result.csv"
+    with pytest.raises(UsageError, match=r"result\.csv"), atomic_path(target) as temporary:
+        temporary.write_text("half")
+        raise OSError(28, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+    code = (
+        "import os, signal\nfrom truenorth.atomic import atomic_path\n"
+        f"with atomic_path({str(target)!r}) as path:\n    path.write_text('half')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, env=dict(os.environ))
+    assert done.returncode == -9
+    assert not target.exists()

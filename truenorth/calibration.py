@@ -1,0 +1,138 @@
+"""A known calibration, taken off a log before anything else.
+
+``measured = (I + S + M) true + bias`` for gyros and accelerometers alike: `S` diagonal (scale factors), `M` off-diagonal
+(small angles by which the sensitive axes miss the body's). In a file:
+
+    gyro: {bias: [1.2 deg/h, -0.4 deg/h, 0 deg/h], scale_factor: [100 ppm, 0 ppm, -50 ppm]}
+    accel: {bias: [1 mg, 0 mg, 2 mg], misalignment: [[0 arcsec, 20 arcsec, 0 arcsec], ...]}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import DataError, UsageError
+from truenorth.records import ImuRecord
+from truenorth.units import parse
+
+Array = NDArray[np.float64]
+
+SHAPES = {"bias": (3,), "scale_factor": (3,), "misalignment": (3, 3)}
+DIMENSIONS = {
+    "gyro": {"bias": "angular_rate", "scale_factor": "ratio", "misalignment": "angle"},
+    "accel": {"bias": "acceleration", "scale_factor": "ratio", "misalignment": "angle"},
+}
+
+
+def _zeros(*shape: int) -> Any:
+    return field(default_factory=lambda: np.zeros(shape))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Known errors of an IMU, body axes of the record they are applied to.
+
+    Attributes
+    ----------
+    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
+    gyro_scale_factor, accel_scale_factor : (3,) arrays
+    gyro_misalignment, accel_misalignment : (3, 3) arrays, rad
+        Row i, column j: how much of axis j sensor i sees; the diagonal is zero.
+    """
+
+    gyro_bias: Array = _zeros(3)
+    gyro_scale_factor: Array = _zeros(3)
+    gyro_misalignment: Array = _zeros(3, 3)
+    accel_bias: Array = _zeros(3)
+    accel_scale_factor: Array = _zeros(3)
+    accel_misalignment: Array = _zeros(3, 3)
+
+    def __post_init__(self) -> None:
+        for group in DIMENSIONS:
+            for key, shape in SHAPES.items():
+                name = f"{group}_{key}"
+                value = np.asarray(getattr(self, name), dtype=np.float64)
+                if value.shape != shape or not np.all(np.isfinite(value)):
+                    raise UsageError(f"calibration: {name} has shape {value.shape}; expected finite numbers, {shape}")
+                if key == "misalignment" and np.any(np.diag(value) != 0.0):
+                    raise UsageError(f"calibration: {name} has a diagonal; what belongs there is scale_factor")
+                object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_file(cls, path: str | PathLike[str]) -> Calibration:
+        """Read a YAML file of datasheet quantities.
+
+        Raises
+        ------
+        UsageError
+            No such file.
+        DataError
+            An unknown key, a wrong unit or shape; the message names file and key.
+        """
+        import yaml
+
+        file = Path(path)
+        if not file.is_file():
+            raise UsageError(f"{file}: no such calibration file")
+        try:
+            content = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise DataError(f"{file}: not a YAML file: {error}") from None
+        values: dict[str, Array] = {}
+        for group, entries in _items(content, f"{file}"):
+            if group not in DIMENSIONS:
+                raise DataError(f"{file}: key {group!r} is not known; expected gyro and accel")
+            for key, value in _items(entries, f"{file}: {group}"):
+                if key not in SHAPES:
+                    raise DataError(f"{file}: key {group}.{key!r} is not known; known: {', '.join(SHAPES)}")
+                values[f"{group}_{key}"] = _array(
+                    value, SHAPES[key], DIMENSIONS[group][key], f"{file}: {group}.{key}"
+                )
+        try:
+            return cls(**values)
+        except UsageError as error:
+            raise DataError(f"{file}: {error}") from None
+
+    def apply(self, record: ImuRecord) -> ImuRecord:
+        """The record as an IMU without these errors would have made it."""
+        T = record.steps[:, None] if record.kind == "increments" else 1.0
+        gyro = _corrected(record.gyro, T * self.gyro_bias, self.gyro_scale_factor, self.gyro_misalignment)
+        accel = _corrected(record.accel, T * self.accel_bias, self.accel_scale_factor, self.accel_misalignment)
+        return ImuRecord(record.time, gyro, accel, record.kind, record.source)
+
+
+def _corrected(measured: Array, bias: Array, scale_factor: Array, misalignment: Array) -> Array:
+    matrix = np.eye(3) + np.diag(scale_factor) + misalignment
+    return np.linalg.solve(matrix, (measured - bias).T).T
+
+
+def _items(content: Any, where: str) -> list[tuple[str, Any]]:
+    if not isinstance(content, Mapping):
+        raise DataError(f"{where}: expected keys and values, found {content!r}")
+    return [(str(key), value) for key, value in content.items()]
+
+
+def _array(value: Any, shape: tuple[int, ...], dimension: str, where: str) -> Array:
+    def parsed(item: Any) -> Any:
+        if isinstance(item, list):
+            return [parsed(part) for part in item]
+        try:
+            return parse(item, dimension)
+        except UsageError as error:
+            raise DataError(f"{where}: {error}") from None
+
+    quantities = parsed(value)
+    try:
+        result = np.array(quantities, dtype=np.float64)
+    except ValueError:
+        raise DataError(f"{where}: the rows differ in length; expected shape {shape}") from None
+    if result.shape != shape:
+        raise DataError(f"{where}: shape {result.shape}; expected {shape}, such as one quantity an axis in brackets")
+    return result
