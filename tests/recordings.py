@@ -40,7 +40,7 @@ def navgrade_static_beijing() -> tuple[ImuRecord, Position, dict[str, float]]:
 
 def fog_gps_xian() -> tuple[ImuRecord, Position]:
     z = _open("fog_gps_xian/static_engine_0_68s.npz")
-    t, lat, lon, alt = z["gnss"][0, :4]
+    lat, lon, alt = z["gnss"][0, 1:4]
     record = _record(z["dtheta"], z["dvel"], 0.005, "increments", "fog_gps_xian")
     return record, Position(float(lat), float(lon), float(alt))
 

@@ -283,9 +283,14 @@ def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):
     from truenorth.errors import UsageError
 
     target = tmp_path / "result.csv"
-    with pytest.raises(UsageError, match=r"result\.csv"), atomic_path(target) as temporary:
-        temporary.write_text("half")
-        raise OSError(28, "No space left on device")
+
+    def half_a_file() -> None:
+        with atomic_path(target) as temporary:
+            temporary.write_text("half")
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(UsageError, match=r"result\.csv"):
+        half_a_file()
     assert list(tmp_path.iterdir()) == []
     code = (
         "import os, signal\nfrom truenorth.atomic import atomic_path\n"

@@ -31,10 +31,6 @@ DIMENSIONS = {
 }
 
 
-def _zeros(*shape: int) -> Any:
-    return field(default_factory=lambda: np.zeros(shape))
-
-
 @dataclass(frozen=True)
 class Calibration:
     """Known errors of an IMU, body axes of the record they are applied to.
@@ -47,12 +43,12 @@ class Calibration:
         Row i, column j: how much of axis j sensor i sees; the diagonal is zero.
     """
 
-    gyro_bias: Array = _zeros(3)
-    gyro_scale_factor: Array = _zeros(3)
-    gyro_misalignment: Array = _zeros(3, 3)
-    accel_bias: Array = _zeros(3)
-    accel_scale_factor: Array = _zeros(3)
-    accel_misalignment: Array = _zeros(3, 3)
+    gyro_bias: Array = field(default_factory=lambda: np.zeros(3))
+    gyro_scale_factor: Array = field(default_factory=lambda: np.zeros(3))
+    gyro_misalignment: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    accel_bias: Array = field(default_factory=lambda: np.zeros(3))
+    accel_scale_factor: Array = field(default_factory=lambda: np.zeros(3))
+    accel_misalignment: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:
         for group in DIMENSIONS:
@@ -92,9 +88,7 @@ class Calibration:
             for key, value in _items(entries, f"{file}: {group}"):
                 if key not in SHAPES:
                     raise DataError(f"{file}: key {group}.{key!r} is not known; known: {', '.join(SHAPES)}")
-                values[f"{group}_{key}"] = _array(
-                    value, SHAPES[key], DIMENSIONS[group][key], f"{file}: {group}.{key}"
-                )
+                values[f"{group}_{key}"] = _array(value, SHAPES[key], DIMENSIONS[group][key], f"{file}: {group}.{key}")
         try:
             return cls(**values)
         except UsageError as error:
@@ -110,7 +104,8 @@ class Calibration:
 
 def _corrected(measured: Array, bias: Array, scale_factor: Array, misalignment: Array) -> Array:
     matrix = np.eye(3) + np.diag(scale_factor) + misalignment
-    return np.linalg.solve(matrix, (measured - bias).T).T
+    corrected: Array = np.linalg.solve(matrix, (measured - bias).T).T
+    return corrected
 
 
 def _items(content: Any, where: str) -> list[tuple[str, Any]]:

@@ -72,10 +72,11 @@ def _folder() -> str:
 @contextmanager
 def _cache_folder(folder: str) -> Iterator[None]:
     """Numba's cache folder for the functions decorated inside; an environment's own choice is respected."""
-    before = numba.config.CACHE_DIR
+    config: Any = numba.config
+    before = config.CACHE_DIR
     if not before:
-        numba.config.CACHE_DIR = folder
+        config.CACHE_DIR = folder
     try:
         yield
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before

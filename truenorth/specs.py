@@ -74,7 +74,7 @@ class ImuSpec:
                 raise UsageError(f"IMU specification {self.name!r}: {item.name} is {value}; expected {wanted}")
 
     def to_mapping(self) -> dict[str, Any]:
-        """The specification as it stands in a file, exactly; only what differs from zero or infinity."""
+        """The specification as it stands in a file; only what differs from zero or infinity."""
         result: dict[str, Any] = {"name": self.name}
         for group in ("gyro", "accel"):
             values = {
@@ -214,8 +214,9 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
     if not path.is_file():
         near = get_close_matches(str(source), PRESETS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
+        presets = ", ".join(PRESETS)
         raise UsageError(
-            f"IMU specification {str(source)!r} is neither a preset ({', '.join(PRESETS)}) nor a file that can be read{hint}"
+            f"IMU specification {str(source)!r} is neither a preset ({presets}) nor a file that can be read{hint}"
         )
     return _from_mapping(read_mapping(path), str(path), path.stem)
 

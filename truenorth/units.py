@@ -272,13 +272,16 @@ def format(value: float, unit: str, digits: int | None = 6) -> str:
         In SI.
     unit : str
     digits : int or None
-        Significant digits; None takes the fewest that `parse` reads back to the same value.
+        Significant digits; None takes the fewest that `parse` reads back to the same value, to rounding (1e-15).
 
     Returns
     -------
     str
     """
     factor, _ = parse_unit(unit)
+    number = value / factor
     if digits is None:
-        digits = next((n for n in range(1, 17) if float(f"{value / factor:.{n}g}") * factor == value), 17)
-    return f"{value / factor:.{digits}g} {unit}"
+        rounded = (float(f"{number:.{n}g}") for n in range(1, 18))
+        nearest = next((r for r in rounded if math.isclose(r, number, rel_tol=1e-15)), number)
+        return f"{repr(nearest).removesuffix('.0')} {unit}"
+    return f"{number:.{digits}g} {unit}"

@@ -18,9 +18,7 @@ def test_agrees_with_allantools():
         import allantools
     rate = np.random.default_rng(1).standard_normal(5000).cumsum() * 0.01 + 3.0
     ours = overlapping_adev(rate, 0.02, taus=[0.02, 0.06, 1.0, 7.0, 40.0])
-    taus, deviation, _, _ = allantools.oadev(
-        rate, rate=50.0, data_type="freq", taus=[0.02, 0.06, 1.0, 7.0, 40.0]
-    )
+    taus, deviation, _, _ = allantools.oadev(rate, rate=50.0, data_type="freq", taus=[0.02, 0.06, 1.0, 7.0, 40.0])
     np.testing.assert_allclose(ours.tau, taus, rtol=1e-12)
     np.testing.assert_allclose(ours.deviation, deviation, rtol=1e-9)
 
@@ -36,9 +34,7 @@ def test_alternating_increments_are_quantisation():
     """Angles that alternate by +-q/2: the second difference is +-2q at odd steps and 0 at even ones."""
     increments = np.tile([1e-6, -1e-6], 500)
     allan = overlapping_adev(increments, 0.01, taus=[0.01, 0.02, 0.03], kind="increments")
-    np.testing.assert_allclose(
-        allan.deviation * allan.tau, [np.sqrt(2.0) * 1e-6, 0.0, np.sqrt(2.0) * 1e-6], atol=1e-12
-    )
+    np.testing.assert_allclose(allan.deviation * allan.tau, [np.sqrt(2.0) * 1e-6, 0.0, np.sqrt(2.0) * 1e-6], atol=1e-12)
 
 
 def test_rates_and_increments_give_the_same():
@@ -61,9 +57,7 @@ def test_white_noise_gives_its_density_with_honest_sigma():
     rng = np.random.default_rng(4)
     z = []
     for _ in range(50):
-        record = ImuRecord(
-            np.arange(5000) * 0.01, rng.standard_normal((5000, 3)), 7 * rng.standard_normal((5000, 3))
-        )
+        record = ImuRecord(np.arange(5000) * 0.01, rng.standard_normal((5000, 3)), 7 * rng.standard_normal((5000, 3)))
         gyro, accel = noise_coefficients(record)
         z.append((gyro.random_walk - 0.1) / gyro.random_walk_sigma)
         z.append((accel.random_walk - 0.7) / accel.random_walk_sigma)

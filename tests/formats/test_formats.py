@@ -36,9 +36,7 @@ def test_units_axes_and_names_by_options(record, tmp_path):
     if record.kind != "rates":
         pytest.skip("rates only")
     path = tmp_path / "log.csv"
-    table = np.column_stack(
-        [record.time, np.degrees(record.gyro @ FRD_TO_RFU), record.accel @ FRD_TO_RFU / 9.80665]
-    )
+    table = np.column_stack([record.time, np.degrees(record.gyro @ FRD_TO_RFU), record.accel @ FRD_TO_RFU / 9.80665])
     names = ["t", "wx", "wy", "wz", "ax", "ay", "az"]
     np.savetxt(path, table, delimiter=";", header=";".join(names), comments="", fmt="%.17g")
     ours = ["time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
@@ -49,7 +47,7 @@ def test_units_axes_and_names_by_options(record, tmp_path):
 
     (tmp_path / "log.yaml").write_text(f"columns: {columns}\nunits: 'deg/s,g'\naxes: FRD\n")
     _same(read_imu(path), read)
-    with pytest.raises(DataError, match="'wx'|gyro_x"):
+    with pytest.raises(DataError, match="gyro_x"):
         read_imu(path, columns={"time": "t"})
     (tmp_path / "log.yaml").write_text("colums: {}\n")
     with pytest.raises(DataError, match="colums"):
@@ -69,7 +67,9 @@ def test_a_rate_makes_the_time(record, tmp_path):
 
 def test_psins_text(record, tmp_path):
     path = tmp_path / "log.imu"
-    np.savetxt(path, np.column_stack([record.gyro, record.accel, record.time]), header="gx gy gz ax ay az t", fmt="%.17g")
+    np.savetxt(
+        path, np.column_stack([record.gyro, record.accel, record.time]), header="gx gy gz ax ay az t", fmt="%.17g"
+    )
     read = read_imu(path)
     assert read.kind == "increments"
     np.testing.assert_array_equal(read.gyro, record.gyro)
@@ -141,7 +141,11 @@ def test_ros_bags(tmp_path, version):
             sequence = (0,) if first else ()
             header = Header(*sequence, Time(stamp // 10**9, stamp % 10**9), "imu")
             message = Imu(header, Quaternion(0, 0, 0, 1), nine, Vector(*rate), nine, Vector(*force), nine)
-            raw = store.serialize_ros1(message, Imu.__msgtype__) if first else store.serialize_cdr(message, Imu.__msgtype__)
+            raw = (
+                store.serialize_ros1(message, Imu.__msgtype__)
+                if first
+                else store.serialize_cdr(message, Imu.__msgtype__)
+            )
             writer.write(connection, stamp, raw)
     read = read_imu(path)
     assert read.kind == "rates"

@@ -33,6 +33,7 @@ def at_epoch(
 
 
 def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array) -> Alignment:
+    """An answer in navigation axes, with biases as specified and no verdict yet."""
     prior = np.sqrt(spec_variance(spec))
     return Alignment(
         status="not_converged",
@@ -59,6 +60,7 @@ def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Arr
 
 
 def make_history(task: Task, fine: FineAlignment, used: ImuSpec) -> History:
+    """How a filter came to its answer, in navigation axes."""
     C_nb, covariance, floor = attitude_history(fine, task.position.lat)
     e = fine.estimates
     bias, variance = fine.nominal_bias + e.x[:, 6:], np.einsum("kii->ki", e.P)[:, 6:]

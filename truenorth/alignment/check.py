@@ -108,7 +108,7 @@ def fit_task_noise(
             silent,
             Q=sum((w * term.Q for w, term in used), silent.Q),
             R=sum((w * (term.R - np.eye(3)) for w, term in used), np.diag(R)),
-            S=sum((w * term.S for w, term in used), silent.S),
+            S=sum((w * term.S for w, term in used if term.S is not None), np.zeros_like(silent.H.swapaxes(1, 2))),
         )
 
     return fit_noise(build, white_variance(mean_velocity(integrals, C_n0_i, lat, alt)), usual)

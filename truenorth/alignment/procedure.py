@@ -108,7 +108,10 @@ def align(
     blind = is_blind(task.motion, check_means(task.means, position.lat, task.gravity))
     if blind:
         asked = "" if method == "auto" else f"{method} was asked for, but "
-        chosen, why = "analytic", f"{asked}the gyros do not see the earth turn: the mean force levels, nothing finds north"
+        chosen, why = (
+            "analytic",
+            f"{asked}the gyros do not see the earth turn: the mean force levels, nothing finds north",
+        )
         found = _align_level(task, spec)
     elif chosen == "analytic":
         found = _align_analytic(task, spec)

@@ -101,6 +101,7 @@ def level_of(f_b: Array) -> Array:
 
 
 def filter_interval(record: ImuRecord) -> float:
+    """One second, less for short logs, more for very long ones."""
     longest = max(FILTER_INTERVAL, record.duration / MOST_EPOCHS)
     return max(2.0 * record.interval, min(longest, record.duration / FEWEST_EPOCHS))
 

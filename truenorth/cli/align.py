@@ -185,11 +185,11 @@ def _print(result: Alignment, paths: list[Path]) -> None:
         ("gyro bias, deg/h", s["gyro_bias_deg_h"], s["gyro_bias_sigma_deg_h"], s["gyro_bias_estimated"]),
         ("accelerometer bias, ug", s["accel_bias_ug"], s["accel_bias_sigma_ug"], s["accel_bias_estimated"]),
     ):
-        shown = [
+        axes_shown = [
             f"{axis} {value:.4g} ± {sigma:.3g}" if ok else f"{axis} not estimated (± {sigma:.3g})"
             for axis, value, sigma, ok in zip("xyz", values, sigmas, known, strict=True)
         ]
-        console.print(f"{name}: {', '.join(shown)}", soft_wrap=True)
+        console.print(f"{name}: {', '.join(axes_shown)}", soft_wrap=True)
     console.print(f"attitude at {result.time:.3f} s, method {result.method}: {result.method_reason}", soft_wrap=True)
     console.print(f"IMU: {result.imu_source}", soft_wrap=True)
     for path in paths:

@@ -90,9 +90,7 @@ def read_imu(
     if path.is_file() and path.stat().st_size == 0:
         raise DataError(f"{path.name}: the file is empty; expected an IMU log")
     _check_content(path, chosen)
-    layout = layout_beside(
-        path, {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind}
-    )
+    layout = layout_beside(path, {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind})
     if chosen == "csv":
         from truenorth.formats import csv
 

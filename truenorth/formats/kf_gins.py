@@ -18,7 +18,9 @@ def read_text(path: Path, layout: Layout) -> ImuRecord:
     try:
         table = np.loadtxt(path, ndmin=2, comments=("%", "#"), encoding="utf-8")
     except (ValueError, UnicodeDecodeError) as error:
-        raise DataError(f"{path.name}: {error}; expected rows of t, three angle and three velocity increments") from None
+        raise DataError(
+            f"{path.name}: {error}; expected rows of t, three angle and three velocity increments"
+        ) from None
     if table.size == 0 or table.shape[1] < COLUMNS:
         found = table.shape[1] if table.size else "no"
         raise DataError(f"{path.name}: {found} columns; expected 7: t, three angle and three velocity increments")

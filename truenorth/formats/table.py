@@ -143,8 +143,7 @@ def _factor(unit: str, dimension: str) -> float:
 
 def _kind_of(names: list[str], layout: Layout, source: str) -> Literal["rates", "increments"]:
     scores: dict[Literal["rates", "increments"], int] = {
-        kind: sum(layout.columns.get(name, name) in names for name in COLUMNS[kind])
-        for kind in ("rates", "increments")
+        kind: sum(layout.columns.get(name, name) in names for name in COLUMNS[kind]) for kind in ("rates", "increments")
     }
     if max(scores.values()) == 0:
         raise DataError(

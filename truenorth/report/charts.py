@@ -37,7 +37,11 @@ def charts(result: Alignment) -> list[tuple[str, str, Any]]:
             "One-sigma of each angle; dotted, the part that sensor bias makes and waiting does not improve.",
             _sigmas(h, rows, t),
         ),
-        ("Gyro bias", "With one-sigma bands; a band as wide as at the start means not estimated.", _biases(h, rows, t, 0)),
+        (
+            "Gyro bias",
+            "With one-sigma bands; a band as wide as at the start means not estimated.",
+            _biases(h, rows, t, 0),
+        ),
         ("Accelerometer bias", "With one-sigma bands.", _biases(h, rows, t, 1)),
         (
             "Innovations",
@@ -97,9 +101,7 @@ def _line(figure: Any, row: int, t: Array, y: Array, colour: str, name: str, das
     import plotly.graph_objects as go
 
     figure.add_trace(
-        go.Scatter(
-            x=t, y=y, line={"color": colour, "width": 1.3, "dash": dash}, name=name, hovertemplate="%{y:.4g}"
-        ),
+        go.Scatter(x=t, y=y, line={"color": colour, "width": 1.3, "dash": dash}, name=name, hovertemplate="%{y:.4g}"),
         row=row,
         col=1,
     )
