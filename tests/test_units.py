@@ -96,7 +96,7 @@ def test_no_two_dimensions_are_the_same():
         ("0.01 deg/h", "frequency", ["angular rate", "frequency"]),  # an angle is no pure number
         ("1 /h", "angular_rate", ["0.01 deg/h"]),
         ("50 ug", "ratio", ["acceleration", "ppm"]),
-        ("10 ug/Hz", "velocity_random_walk", ["another dimension", "ug/sqrt(Hz)"]),
+        ("10 ug/Hz", "velocity_random_walk", ["speed", "ug/sqrt(Hz)"]),
         ("100 ppm", "angle", ["ratio", "angle"]),
         ("0.01", "angular_rate", ["no unit", "0.01 deg/h"]),
         (0.01, "angular_rate", ["no unit", "0.01 deg/h"]),

@@ -1,0 +1,119 @@
+"""IMU specifications: presets, files and back, and files with mistakes."""
+
+import math
+from dataclasses import fields
+
+import pytest
+
+from truenorth.errors import DataError, UsageError
+from truenorth.specs import PRESETS, ImuSpec, imu_spec
+
+DEG = math.pi / 180
+G = 9.80665
+
+
+def test_a_file_in_datasheet_units(tmp_path):
+    file = tmp_path / "fog.yaml"
+    file.write_text(
+        "name: my FOG\n"
+        "gyro: {bias: 0.01 deg/h, random_walk: 0.001 deg/√h, scale_factor: 5 ppm, misalignment: 2 arcsec,\n"
+        "       quantisation: 0.1 arcsec, range: 300 deg/s, bias_instability: 0.003 deg/h}\n"
+        "accel: {bias: 50 µg, random_walk: 10 ug/sqrt(Hz), quantisation: 0.001 m/s, range: 20 g}\n"
+        "correlation_time: 1 h\n",
+        encoding="utf-8",
+    )
+    spec = imu_spec(file)
+    assert spec.name == "my FOG"
+    expected = {
+        "gyro_bias": 0.01 * DEG / 3600,
+        "gyro_bias_instability": 0.003 * DEG / 3600,
+        "gyro_random_walk": 0.001 * DEG / 60,
+        "gyro_scale_factor": 5e-6,
+        "gyro_misalignment": 2 * DEG / 3600,
+        "gyro_quantisation": 0.1 * DEG / 3600,
+        "gyro_range": 300 * DEG,
+        "accel_bias": 50e-6 * G,
+        "accel_random_walk": 10e-6 * G,
+        "accel_bias_instability": 0.0,
+        "accel_scale_factor": 0.0,
+        "accel_misalignment": 0.0,
+        "accel_quantisation": 0.001,
+        "accel_range": 20 * G,
+        "correlation_time": 3600.0,
+    }
+    assert {item.name for item in fields(spec)} == {*expected, "name"}
+    for name, value in expected.items():
+        assert getattr(spec, name) == pytest.approx(value, rel=1e-14), name
+
+
+def test_presets_are_ordered_from_good_to_poor():
+    specs = [imu_spec(name) for name in ("navigation", "tactical", "industrial", "consumer")]
+    assert set(PRESETS) == {spec.name for spec in specs}
+    for key in ("gyro_bias", "gyro_random_walk", "gyro_bias_instability", "accel_bias", "accel_random_walk"):
+        values = [getattr(spec, key) for spec in specs]
+        assert values == sorted(values)
+        assert len(set(values)) == len(values)
+        assert values[0] > 0.0
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_written_and_read_back(name, tmp_path):
+    spec = imu_spec(name)
+    spec.to_yaml(tmp_path / "imu.yaml")
+    again = imu_spec(tmp_path / "imu.yaml")
+    assert again.name == spec.name
+    for item in fields(spec):
+        if item.name != "name":
+            assert getattr(again, item.name) == pytest.approx(getattr(spec, item.name), rel=2e-15)
+
+
+def test_a_written_file_reads_like_a_datasheet(tmp_path):
+    imu_spec("navigation").to_yaml(tmp_path / "imu.yaml")
+    text = (tmp_path / "imu.yaml").read_text()
+    assert "bias: 0.01 deg/h\n" in text
+    assert "random_walk: 10 ug/sqrt(Hz)\n" in text
+
+
+def test_a_specification_passes_through_and_a_mapping_is_read():
+    spec = ImuSpec(gyro_bias=1e-7)
+    assert imu_spec(spec) is spec
+    assert imu_spec({"gyro": {"bias": "1 deg/h"}}).gyro_bias == pytest.approx(DEG / 3600, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("gyro: {baias: 1 deg/h}", ["gyro.baias", "did you mean 'gyro.bias'"]),
+        ("gyros: {bias: 1 deg/h}", ["'gyros'", "did you mean 'gyro'"]),
+        ("gyro: {bias: 1 deg/sqrt(h)}", ["gyro.bias", "angular rate", "0.01 deg/h"]),
+        ("accel: {bias: 0.5}", ["accel.bias", "no unit", "50 ug"]),
+        ("accel: {bias: -1 mg}", ["accel.bias", "negative"]),
+        ("accel: {range: 0 g}", ["accel_range", "positive"]),
+        ("correlation_time: 0 s", ["correlation_time", "positive"]),
+        ("correlation_time: 300", ["correlation_time", "no unit", "300 s"]),
+        ("gyro: 1 deg/h", ["gyro", "expected keys"]),
+        ("- gyro", ["list"]),
+        ("gyro: {bias: 1 deg/h\naccel: {}", ["line 2", "not a YAML file"]),
+        ("gyro: {bias: 1 deg/h, bias: 2 deg/h}", ["line 1", "'bias' twice"]),
+    ],
+)
+def test_mistakes_in_a_file_are_named_with_file_and_key(text, said, tmp_path):
+    file = tmp_path / "imu.yaml"
+    file.write_text(text)
+    with pytest.raises(DataError) as error:
+        imu_spec(file)
+    for words in (str(file), *said):
+        assert words in str(error.value)
+
+
+def test_neither_preset_nor_file():
+    with pytest.raises(UsageError, match="did you mean 'navigation'"):
+        imu_spec("navigatoin")
+    with pytest.raises(UsageError, match="tactical"):
+        imu_spec("no/such/file.yaml")
+
+
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
+def test_a_sigma_is_zero_or_more_and_finite(value):
+    with pytest.raises(UsageError, match="gyro_bias"):
+        ImuSpec(gyro_bias=value)
