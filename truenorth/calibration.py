@@ -104,8 +104,7 @@ class Calibration:
 
 def _corrected(measured: Array, bias: Array, scale_factor: Array, misalignment: Array) -> Array:
     matrix = np.eye(3) + np.diag(scale_factor) + misalignment
-    corrected: Array = np.linalg.solve(matrix, (measured - bias).T).T
-    return corrected
+    return np.asarray(np.linalg.solve(matrix, (measured - bias).T).T, dtype=np.float64)
 
 
 def _items(content: Any, where: str) -> list[tuple[str, Any]]:
