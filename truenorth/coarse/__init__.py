@@ -2,7 +2,7 @@
 
 from truenorth.coarse.analytic import Means, analytic, means, two_position
 from truenorth.coarse.inertial import CoarseAttitude, dual_vector, estimate_latitude, oba
-from truenorth.coarse.uncertainty import coarse_covariance
+from truenorth.coarse.uncertainty import coarse_covariance, latitude_sigma
 from truenorth.coarse.wahba import q_method, triad
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "coarse_covariance",
     "dual_vector",
     "estimate_latitude",
+    "latitude_sigma",
     "means",
     "oba",
     "q_method",

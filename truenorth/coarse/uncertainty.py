@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.attitude import skew
-from truenorth.coarse.inertial import CoarseAttitude
+from truenorth.coarse.inertial import CoarseAttitude, latitude_gain
 from truenorth.inertial import InertialIntegrals, gravity_velocity
 from truenorth.models.static import StaticModel
 
@@ -66,7 +66,46 @@ def coarse_covariance(
     -------
     covariance, floor : (3, 3) arrays, rad^2
     """
-    C, Gv, Gp = coarse.C_n0_i, coarse.velocity_gain, coarse.position_gain
+    return _propagate(
+        coarse.velocity_gain, coarse.position_gain, coarse.C_n0_i, integrals, model, bias_covariance, disturbance
+    )
+
+
+def latitude_sigma(
+    lat: float,
+    alt: float,
+    C_n0_i: Array,
+    integrals: InertialIntegrals,
+    model: StaticModel,
+    bias_covariance: Array,
+    disturbance: Array,
+) -> float:
+    """One-sigma (rad) of :func:`truenorth.coarse.estimate_latitude`, from the same causes as the attitude's.
+
+    Parameters
+    ----------
+    lat, alt : float, rad and m
+        The estimated latitude.
+    C_n0_i : (3, 3) array
+        The attitude found with it.
+    integrals, model, bias_covariance, disturbance
+        As in :func:`coarse_covariance`.
+    """
+    gain = latitude_gain(integrals, lat, alt)[:, None, :]
+    variance, _ = _propagate(gain, np.zeros_like(gain), C_n0_i, integrals, model, bias_covariance, disturbance)
+    return float(np.sqrt(variance[0, 0]))
+
+
+def _propagate(
+    Gv: Array,
+    Gp: Array,
+    C: Array,
+    integrals: InertialIntegrals,
+    model: StaticModel,
+    bias_covariance: Array,
+    disturbance: Array,
+) -> tuple[Array, Array]:
+    """Covariance (m, m) of ``sum_k (Gv[k] dV[k] + Gp[k] dP[k])`` with gains (K+1, m, 3), and the biases' part of it."""
     t, T = integrals.time, integrals.intervals
     dv, dp = bias_response(integrals, C)
     B = np.einsum("kab,kbc->ac", Gv, dv) + np.einsum("kab,kbc->ac", Gp, dp)

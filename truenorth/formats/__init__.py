@@ -3,49 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
+from typing import Literal
 
-from truenorth.errors import DataError, UsageError
-from truenorth.formats.table import layout_beside
+from truenorth.errors import UsageError
+from truenorth.formats.detect import FORMATS, format_of
+from truenorth.formats.layout import layout_for
 from truenorth.records import ImuRecord
 
 __all__ = ["FORMATS", "read_imu", "write_imu"]
 
-FORMATS = ("csv", "parquet", "npz", "mat", "psins", "kf-gins", "kf-gins-binary", "ros")
-SUFFIXES = {
-    ".csv": "csv",
-    ".parquet": "parquet",
-    ".pq": "parquet",
-    ".npz": "npz",
-    ".mat": "mat",
-    ".imu": "psins",
-    ".txt": "kf-gins",
-    ".bin": "kf-gins-binary",
-    ".bag": "ros",
-    ".mcap": "ros",
-    ".db3": "ros",
+READERS = {
+    "csv": ("csv", "read"),
+    "parquet": ("parquet", "read"),
+    "npz": ("npz", "read"),
+    "mat": ("mat", "read"),
+    "psins": ("psins", "read"),
+    "kf-gins": ("kf_gins", "read_text"),
+    "kf-gins-binary": ("kf_gins", "read_binary"),
+    "ros": ("ros", "read"),
 }
-# What a file begins with tells what it is, whatever its name.
-MAGIC = (
-    (b"PAR1", "parquet"),
-    (b"PK\x03\x04", "npz"),
-    (b"MATLAB", "mat"),
-    (b"#ROSBAG", "ros"),
-    (b"\x89MCAP", "ros"),
-    (b"SQLite format 3", "ros"),
-)
+WRITERS = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
 
 
 def read_imu(
     path: str | PathLike[str],
     *,
     format: str | None = None,
-    units: str | None = None,
+    units: str | Mapping[str, str] | None = None,
     axes: str | None = None,
     rate: float | None = None,
     columns: Mapping[str, str] | None = None,
-    kind: str | None = None,
+    kind: Literal["rates", "increments"] | None = None,
     topic: str | None = None,
 ) -> ImuRecord:
     """Read an IMU log into SI units and right-forward-up body axes.
@@ -55,18 +46,22 @@ def read_imu(
     Parameters
     ----------
     path : path
+        A file, or the folder of a ROS 2 bag.
     format : str, optional
-        One of `FORMATS`; told by the suffix when left out.
-    units : str, optional
-        Of the gyro and accelerometer columns, such as ``"deg/s,g"``.
+        One of `FORMATS`; told by suffix and content when left out.
+    units : str or mapping, optional
+        Of the gyro and accelerometer columns and of time, such as ``"deg/s,g"``, ``"deg/s,g,ms"`` or
+        ``{"gyro": "0.05 deg/s", "time": "us"}`` (a number is the size of one count); SI where left out.
     axes : str, optional
         Where the log's x, y and z point, such as ``"FRD"``; RFU when left out (KF-GINS: FRD, ROS: FLU).
     rate : float, optional
-        Hz, for a log without time.
+        Hz, for a log without time: the first sample is then at ``1 / rate``.
     columns : mapping, optional
-        Our names (``time, gyro_x``, ...) to the log's; of ``.npz`` and ``.mat`` the variables.
+        Our names (``time, gyro_x``, ...) to the log's. In ``.npz`` and ``.mat`` files, variables: ``gyro`` and
+        ``accel`` (``dtheta`` and ``dvel``) to arrays of three columns, which may be a part of a larger one
+        (``"counts[0:3]"``, counted from 0), ``scale`` to what multiplies them, ``interval`` to the sampling interval.
     kind : {"rates", "increments"}, optional
-        Where the names of the columns do not tell.
+        What a row is, where the names of the columns do not tell or are wrong.
     topic : str, optional
         Of a ROS bag with several IMUs.
 
@@ -77,47 +72,24 @@ def read_imu(
     Raises
     ------
     UsageError
-        No such file, an unknown format, unit or axes.
+        No such file, an unknown format, column, unit or axes.
     DataError
-        Bad data: with file, line and column.
+        Bad data: with file, line (or row) and column.
     """
     path = Path(path)
-    if not path.exists():
-        raise UsageError(f"{path}: no such file")
-    chosen = format or _format_of(path)
-    if chosen not in FORMATS:
-        raise UsageError(f"format {chosen!r} is not known; choose one of {', '.join(FORMATS)}")
-    if path.is_file() and path.stat().st_size == 0:
-        raise DataError(f"{path.name}: the file is empty; expected an IMU log")
-    _check_content(path, chosen)
-    layout = layout_beside(path, {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind})
-    if chosen == "csv":
-        from truenorth.formats import csv
-
-        return csv.read(path, layout)
-    if chosen == "parquet":
-        from truenorth.formats import parquet
-
-        return parquet.read(path, layout)
-    if chosen in ("npz", "mat"):
-        from truenorth.formats import arrays
-
-        return arrays.read_npz(path, layout) if chosen == "npz" else arrays.read_mat(path, layout)
-    if chosen == "psins":
-        from truenorth.formats import psins
-
-        return psins.read(path, layout)
-    if chosen == "ros":
-        from truenorth.formats import ros
-
-        return ros.read(path, layout, topic)
-    from truenorth.formats import kf_gins
-
-    return kf_gins.read_text(path, layout) if chosen == "kf-gins" else kf_gins.read_binary(path, layout)
+    given = {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind, "topic": topic}
+    try:
+        module, function = READERS[format_of(path, format)]
+        reader = getattr(import_module(f"truenorth.formats.{module}"), function)
+        return reader(path, layout_for(path, given))
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
 def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:
     """Write a record as CSV, Parquet or npz, by the suffix; whole or not at all.
+
+    `read_imu` gives the same bits back, whatever the format.
 
     Raises
     ------
@@ -128,44 +100,7 @@ def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:
 
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in (".csv", ".parquet", ".npz"):
-        raise UsageError(f"{path}: cannot write {suffix or 'a file without a suffix'}; use .csv, .parquet or .npz")
+    if suffix not in WRITERS:
+        raise UsageError(f"{path}: cannot write {suffix or 'a file without a suffix'}; use {', '.join(WRITERS)}")
     with atomic_path(path) as temporary:
-        if suffix == ".csv":
-            from truenorth.formats import csv
-
-            csv.write(record, temporary)
-        elif suffix == ".parquet":
-            from truenorth.formats import parquet
-
-            parquet.write(record, temporary)
-        else:
-            from truenorth.formats import arrays
-
-            arrays.write_npz(record, temporary)
-
-
-def _format_of(path: Path) -> str:
-    if path.is_dir():
-        return "ros"
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise UsageError(
-            f"{path.name}: the suffix {suffix or '(none)'} names no format; rename it or give --format, one of "
-            f"{', '.join(FORMATS)}"
-        )
-    return SUFFIXES[suffix]
-
-
-def _check_content(path: Path, chosen: str) -> None:
-    if path.is_dir():
-        return
-    with path.open("rb") as file:
-        head = file.read(16)
-    found = next((name for magic, name in MAGIC if head.startswith(magic)), None)
-    binary = {"parquet", "npz", "mat", "ros"}
-    if found == chosen or (found is None and chosen not in binary):
-        return
-    what = f"holds {found} data" if found else "does not begin as such a file does"
-    advice = f"rename it or give --format {found}" if found else "name its format with --format"
-    raise DataError(f"{path.name}: read as {chosen}, but it {what}; {advice}")
+        import_module(f"truenorth.formats.{WRITERS[suffix]}").write(record, temporary)

@@ -1,18 +1,20 @@
-"""Parquet: the documented columns, or others by name; an index column `time` of pandas is a column like any other."""
+"""Parquet: the documented columns, or others by name; the index `time` of a pandas table is a column like any other."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.errors import DataError
-from truenorth.formats.table import Layout, record_from_columns
+from truenorth.formats.layout import Layout
+from truenorth.formats.table import choose, finish
 from truenorth.records import COLUMNS, ImuRecord
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
-    """Read a Parquet log.
+    """Read a Parquet log; only the columns that are needed.
 
     Raises
     ------
@@ -23,17 +25,22 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(path)
-    except (pa.ArrowInvalid, OSError) as error:
+        with pq.ParquetFile(path) as file:
+            choice = choose(file.schema_arrow.names, layout, path.name)
+            table = file.read(columns=choice.names, use_threads=False)
+    except (pa.ArrowException, OSError) as error:
         raise DataError(f"{path.name}: the Parquet file is damaged or cut short ({error}); write it anew") from None
 
-    def column(name: str) -> np.ndarray:
+    def column(name: str) -> NDArray[np.float64]:
         values = table.column(name)
         if not (pa.types.is_floating(values.type) or pa.types.is_integer(values.type)):
-            raise DataError(f"{path.name}: column {name} holds {values.type}; expected numbers")
+            wanted = "seconds, as numbers" if name == choice.time else "numbers"
+            raise DataError(f"{path.name}: column {name} holds {values.type}; expected {wanted}")
         return np.asarray(values.to_numpy(), dtype=np.float64)
 
-    return record_from_columns(table.column_names, column, layout, path.name)
+    time = None if choice.time is None else column(choice.time)
+    sensors = np.column_stack([column(name) for name in choice.sensors])
+    return finish(time, sensors[:, :3], sensors[:, 3:], choice.kind, layout, path.name, labels=choice.labels)
 
 
 def write(record: ImuRecord, path: Path) -> None:

@@ -1,24 +1,79 @@
-"""PSINS text ``.imu``: increments gx gy gz ax ay az [t] in rad and m/s, axes right-forward-up; % or # begins a comment."""
+"""PSINS ``.imu`` text: the toolbox's compact log file, or its array ``imu`` as plain rows.
+
+The compact form begins with a line that names itself a PSINS-format SIMU log. Three rows follow: attitude and velocity;
+latitude, longitude, height, t0 (s), sampling interval (ms), g; the size of one count of each sensor (arcsec, ug s). Then come
+whole counts, with the dither of the sampling time (us) in a seventh column or without (G. Yan, PSINS toolbox,
+imufile.m). The plain form has rows of gx gy gz ax ay az [t], increments in rad and m/s. Axes right-forward-up.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from truenorth.errors import DataError
-from truenorth.formats.table import Layout, finish
+from truenorth.formats.layout import Layout
+from truenorth.formats.table import finish
+from truenorth.formats.text import TextTable, bare_table, delimiter_of, is_comment, split
 from truenorth.records import ImuRecord
+from truenorth.units import parse_unit
+
+EXPECTED = "rows of gx gy gz ax ay az [t], increments in rad and m/s"
+ARCSEC = parse_unit("arcsec")[0]
+COLUMNS = ["gx", "gy", "gz", "ax", "ay", "az", "t"]
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
-    """Read a PSINS log; six columns need a rate."""
-    try:
-        table = np.loadtxt(path, ndmin=2, comments=("%", "#"), encoding="utf-8")
-    except (ValueError, UnicodeDecodeError) as error:
-        raise DataError(f"{path.name}: {error}; expected rows of gx gy gz ax ay az [t]") from None
-    if table.size == 0 or table.shape[1] not in (6, 7):
-        found = table.shape[1] if table.size else "no"
-        raise DataError(f"{path.name}: {found} columns; expected 6 or 7: gx gy gz ax ay az [t]")
-    time = table[:, 6] if table.shape[1] == 7 else None
-    return finish(time, table[:, :3], table[:, 3:6], "increments", layout, path.name)
+    """Read a PSINS log; six plain columns need a rate.
+
+    Raises
+    ------
+    DataError
+        Another number of columns, a header of other names, text in a number, NaN, time going back: with the line.
+    """
+    table, above = bare_table(path, EXPECTED)
+    count = len(table.names)
+    if count not in (6, 7):
+        raise DataError(f"{path.name}: {count} columns; expected 6 or 7: {EXPECTED}")
+    table = replace(table, names=COLUMNS[:count])
+    if above and "PSINS" in above[0] and "SIMU" in above[0]:
+        return _compact(table, layout)
+    for line in above:
+        names = split(line, delimiter_of(line))
+        if not is_comment(line) and len(names) == count and [n[:1].lower() for n in names[:6]] != list("gggaaa"):
+            raise DataError(f"{path.name}: the header {line.strip()!r} is not {EXPECTED}; give --format csv to read it")
+    values = table.read(table.names)
+    time = values[:, 6] if count == 7 else None
+    if time is not None and not np.all(np.diff(time) > 0) and np.all(np.diff(values[:, 0]) > 0):
+        raise DataError(f"{path.name}: time stands in the first column; expected {EXPECTED}: give --format kf-gins")
+    return finish(
+        time, values[:, :3], values[:, 3:6], layout.kind or "increments", layout, path.name,
+        labels=("t", *COLUMNS[:6]), place=table.place,
+    )  # fmt: skip
+
+
+def _compact(table: TextTable, layout: Layout) -> ImuRecord:
+    source = table.path.name
+    numbers = [number for number, _ in zip((n for n, _ in table.lines()), range(3))]
+    if len(numbers) < 3:
+        raise DataError(f"{source}: the three header rows of a PSINS log are not complete; the file is cut short")
+    rows = [
+        [float(cell) for cell in split(line.decode(), table.delimiter)] for _, (_, line) in zip(range(3), table.lines())
+    ]
+    t0, interval, g = rows[1][3], rows[1][4] * 1e-3, rows[1][5]
+    if not (interval > 0.0 and 9.0 < g < 10.0):
+        raise DataError(
+            f"{source}: line {numbers[1]}: sampling interval {interval * 1e3:g} ms and gravity {g:g} m/s^2 cannot be; "
+            "expected latitude, longitude, height, t0, interval (ms) and g as PSINS writes them"
+        )
+    data = replace(table, skip=numbers[2])
+    counts = data.read(data.names)
+    time = t0 + interval * np.arange(1.0, len(counts) + 1)
+    if len(data.names) == 7:
+        time = time + 1e-6 * np.cumsum(counts[:, 6])
+    gyro = counts[:, :3] * (np.array(rows[2][:3]) * ARCSEC)
+    accel = counts[:, 3:6] * (np.array(rows[2][3:6]) * 1e-6 * g)
+    labels = ("dt", *COLUMNS[:6])
+    return finish(time, gyro, accel, "increments", layout, source, labels=labels, place=data.place)

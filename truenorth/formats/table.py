@@ -1,94 +1,53 @@
-"""What every reader shares: a table of named columns becomes a checked `ImuRecord` in SI units and our axes."""
+"""What every reader shares: named columns of a log become a checked `ImuRecord` in SI units and our axes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
-from pathlib import Path
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError, UsageError
+from truenorth.formats.layout import ARRAY_ONLY, Kind, Layout
 from truenorth.records import COLUMNS, ImuRecord
-from truenorth.units import DIMENSIONS, parse_unit
+from truenorth.units import DIMENSIONS, parse_quantity, parse_unit
 
 Array = NDArray[np.float64]
 
-DIMENSION_OF = {"rates": ("angular_rate", "acceleration"), "increments": ("angle", "speed")}
+DIMENSION_OF: dict[Kind, Mapping[str, str]] = {
+    "rates": {"gyro": "angular_rate", "accel": "acceleration", "time": "time"},
+    "increments": {"gyro": "angle", "accel": "speed", "time": "time"},
+}
 
 
 @dataclass(frozen=True)
-class Layout:
-    """How a log is to be read; options of the call win over a YAML file beside the log.
+class Choice:
+    """The columns of a log that are needed, by the log's names."""
 
-    Attributes
-    ----------
-    columns : mapping
-        Our column name to the log's.
-    units : str or None
-        Units of gyro and accelerometer columns, such as ``"deg/s,g"``; SI when left out.
-    axes : str
-        Where x, y and z point, such as ``"FRD"``.
-    rate : float or None, Hz
-        For a log without a time column.
-    time_unit : str
-    kind : {"rates", "increments"} or None
-        Read off the column names when left out.
-    """
+    kind: Kind
+    time: str | None
+    sensors: tuple[str, ...]
 
-    columns: Mapping[str, str] = field(default_factory=dict)
-    units: str | None = None
-    axes: str = "RFU"
-    rate: float | None = None
-    time_unit: str = "s"
-    kind: Literal["rates", "increments"] | None = None
+    @property
+    def names(self) -> list[str]:
+        """Time, where there is one, and the six sensor columns."""
+        return [*([] if self.time is None else [self.time]), *self.sensors]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Seven names for messages."""
+        return (self.time or "time", *self.sensors)
 
 
-def layout_beside(path: Path, given: Mapping[str, Any]) -> Layout:
-    """The layout from ``LOG.yaml`` beside ``LOG.csv``, where it exists, with the options that were given on top.
-
-    Raises
-    ------
-    DataError
-        A key of the file that is not known; the message names file and key.
-    """
-    known = {item.name for item in fields(Layout)}
-    values: dict[str, Any] = {}
-    beside = path.with_suffix(".yaml")
-    if beside.is_file() and beside != path:
-        import yaml
-
-        try:
-            content = yaml.safe_load(beside.read_text(encoding="utf-8")) or {}
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise DataError(f"{beside}: not a YAML file: {error}") from None
-        if not isinstance(content, Mapping):
-            raise DataError(f"{beside}: expected keys such as columns, units, axes and rate, found {content!r}")
-        for key, value in content.items():
-            if key not in known:
-                raise DataError(f"{beside}: key {key!r} is not known; known: {', '.join(sorted(known))}")
-            values[key] = value
-    values |= {key: value for key, value in given.items() if value is not None}
-    return Layout(**values)
-
-
-def record_from_columns(
-    names: list[str],
-    get: Callable[[str], Array],
-    layout: Layout,
-    source: str,
-) -> ImuRecord:
-    """Pick, scale and turn the columns of a table.
+def choose(names: Sequence[str], layout: Layout, source: str) -> Choice:
+    """Find the columns that are needed among those there are.
 
     Parameters
     ----------
-    names : list of str
+    names : sequence of str
         The columns there are.
-    get : callable
-        Gives one column by its name in the log.
     layout : Layout
     source : str
         File name; messages begin with it.
@@ -96,75 +55,141 @@ def record_from_columns(
     Raises
     ------
     DataError
-        A column that is missing; the message lists those found and the nearest name.
+        A column that is missing or there twice; the message lists those found and the nearest name.
     """
-    kind = layout.kind or _kind_of(names, layout, source)
-    gyro, accel = (
-        np.column_stack([get(_named(name, names, layout, source)) for name in COLUMNS[kind][group]])
-        for group in (slice(0, 3), slice(3, 6))
-    )
+    for key in ARRAY_ONLY:
+        if key in layout.columns:
+            raise UsageError(
+                f"{source}: columns: {key!r} is for arrays; name single columns, such as gyro_x and accel_x"
+            )
+    kind = named_kind(lambda ours: layout.name(ours) in names or ours in layout.columns)
+    if kind is None:
+        raise DataError(
+            f"{source}: no column of an IMU among {', '.join(names) or '(none)'}; expected time, gyro_x .. accel_z (rates "
+            "in SI units) or dtheta_x .. dvel_z (increments), or name them with --columns or a YAML file beside the log"
+        )
     time = None
-    if layout.rate is None or layout.columns.get("time", "time") in names:
-        time = get(_named("time", names, layout, source)) * _factor(layout.time_unit, "time")
-    return finish(time, gyro, accel, kind, layout, source)
+    if layout.rate is None or layout.name("time") in names:
+        time = _found("time", names, layout, source)
+    sensors = tuple(_found(ours, names, layout, source) for ours in COLUMNS[kind])
+    return Choice(layout.kind or kind, time, sensors)
+
+
+def named_kind(there: Callable[[str], bool], columns: Mapping[Kind, Sequence[str]] = COLUMNS) -> Kind | None:
+    """Rates or increments, whichever has more of its columns there; None without any."""
+    rates, increments = (sum(map(there, columns[kind])) for kind in ("rates", "increments"))
+    if not rates and not increments:
+        return None
+    return "rates" if rates >= increments else "increments"
 
 
 def finish(
-    time: Array | None, gyro: Array, accel: Array, kind: Literal["rates", "increments"], layout: Layout, source: str
+    time: Array | None,
+    gyro: Array,
+    accel: Array,
+    kind: Kind,
+    layout: Layout,
+    source: str,
+    *,
+    axes: str = "RFU",
+    labels: Sequence[str] | None = None,
+    place: Callable[[int], str] = lambda row: f"row {row + 1}",
 ) -> ImuRecord:
-    """Units, axes and time of arrays that were read; the record checks itself."""
-    from truenorth.attitude import body_axes
+    """Check values as they were read, then give them our units, axes and time.
 
-    units = (layout.units or "").split(",") if layout.units else []
-    if units:
-        if len(units) != 2:
-            raise UsageError(f"units {layout.units!r}; expected two, of gyro and accelerometer, such as 'deg/s,g'")
-        gyro_dimension, accel_dimension = DIMENSION_OF[kind]
-        gyro = gyro * _factor(units[0], gyro_dimension)
-        accel = accel * _factor(units[1], accel_dimension)
+    Parameters
+    ----------
+    time : (N,) array or None
+        None is made from the rate; the first sample's interval ends at ``1 / rate``.
+    gyro, accel : (N, 3) arrays
+    kind : {"rates", "increments"}
+    layout : Layout
+    source : str
+    axes : str
+        The format's own, where the layout has none.
+    labels : sequence of str, optional
+        What the file calls time and the six columns.
+    place : callable
+        Where a row stands in the file, in words.
+
+    Raises
+    ------
+    DataError
+        A number that is not finite, or time that does not increase: with place and column of the file.
+    UsageError
+        A unit of another dimension, or no time and no rate.
+    """
+    labels = labels or ("time", *COLUMNS[kind])
+    for name, values in (("time", time), ("gyro", gyro), ("accel", accel)):
+        if values is not None:
+            first = {"time": 0, "gyro": 1, "accel": 4}[name]
+            _check_finite(values.reshape(len(values), -1), labels[first:], source, place)
     if time is None:
-        if layout.rate is None or not layout.rate > 0.0:
-            raise UsageError(f"{source}: no time column, and rate {layout.rate}; give the samples a second with --rate")
+        if layout.rate is None:
+            raise UsageError(f"{source}: no time in the log; give the samples a second with --rate")
         time = np.arange(1, len(gyro) + 1) / layout.rate
-    record = ImuRecord(time, gyro, accel, kind, source)
-    C = body_axes(layout.axes)
-    return record if np.array_equal(C, np.eye(3)) else record.rotated(C)
+    else:
+        _check_order(time, labels[0], source, place)
+        time = time * unit_factor("time", kind, layout)
+    record = ImuRecord(
+        time, gyro * unit_factor("gyro", kind, layout), accel * unit_factor("accel", kind, layout), kind, source
+    )
+    axes = (layout.axes or axes).strip().upper()
+    if axes == "RFU":
+        return record
+    from truenorth.attitude import body_axes  # compiled code: not for a log that needs no turning
+
+    return record.rotated(body_axes(axes))
 
 
-def _factor(unit: str, dimension: str) -> float:
-    factor, found = parse_unit(unit)
+def unit_factor(sensor: str, kind: Kind, layout: Layout) -> float:
+    """What a column is multiplied with: SI for one of its units, or for one count where a number stands before the unit."""
+    text = layout.units.get(sensor)
+    if text is None:
+        return 1.0
+    factor, found = parse_quantity(text) if text[:1].isdigit() or text[:1] == "." else parse_unit(text)
+    dimension = DIMENSION_OF[kind][sensor]
     wanted, example = DIMENSIONS[dimension]
     if found != wanted:
+        unit = example.partition(" ")[2]
         raise UsageError(
-            f"unit {unit.strip()!r} is not one of {dimension.replace('_', ' ')}; expected something like that of {example!r}"
+            f"units: {sensor} {kind if sensor != 'time' else ''} cannot be in {text!r}; expected a unit of "
+            f"{dimension.replace('_', ' ')}, such as {unit}"
         )
     return factor
 
 
-def _kind_of(names: list[str], layout: Layout, source: str) -> Literal["rates", "increments"]:
-    scores: dict[Literal["rates", "increments"], int] = {
-        kind: sum(layout.columns.get(name, name) in names for name in COLUMNS[kind]) for kind in ("rates", "increments")
-    }
-    if max(scores.values()) == 0:
-        raise DataError(
-            f"{source}: no column of an IMU: found {', '.join(names) or 'none'}; expected time, gyro_x .. accel_z (rates in "
-            "SI units) or dtheta_x .. dvel_z (increments), or name them with --columns or a YAML file beside the log"
-        )
-    return max(scores, key=lambda kind: scores[kind])
-
-
-def _named(name: str, names: list[str], layout: Layout, source: str) -> str:
-    wanted = layout.columns.get(name, name)
-    if wanted in names:
+def _found(ours: str, names: Sequence[str], layout: Layout, source: str) -> str:
+    wanted = layout.name(ours)
+    if names.count(wanted) == 1:
         return wanted
+    if wanted in names:
+        raise DataError(f"{source}: column {wanted!r} is there {names.count(wanted)} times; rename one")
     near = get_close_matches(wanted, names, n=1)
-    hint = f"; is it {near[0]!r}? Then --columns {name}={near[0]}" if near else ""
-    if name == "time":
+    hint = f"; is it {near[0]!r}? Then --columns {ours}={near[0]}" if near else ""
+    if ours == "time":
         hint += "; for a log without time give --rate"
     raise DataError(f"{source}: column {wanted!r} is missing; found {', '.join(names)}{hint}")
 
 
-def with_defaults(layout: Layout, **defaults: Any) -> Layout:
-    """A format's own layout where nobody asked for another."""
-    blank = Layout()
-    return replace(layout, **{k: v for k, v in defaults.items() if getattr(layout, k) == getattr(blank, k)})
+def _check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
+    if np.isfinite(values.sum()):  # one pass; a NaN or inf anywhere survives the sum
+        return
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        row, column = (int(i) for i in bad[0])
+        raise DataError(
+            f"{source}: {place(row)}, column {labels[column]}: {values[row, column]}; expected a finite number: remove "
+            "the row or repair the log"
+        )
+
+
+def _check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if bad.size:
+        k = int(bad[0]) + 1
+        what = "repeats" if time[k] == time[k - 1] else "goes back"
+        raise DataError(
+            f"{source}: {place(k)}, column {label}: time {what} ({time[k - 1]:.15g}, then {time[k]:.15g}); expected "
+            "strictly increasing time: sort the log or drop the repeated rows"
+        )

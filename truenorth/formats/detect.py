@@ -1,0 +1,111 @@
+"""What format a file is of: its suffix says, what it begins with must agree."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+from truenorth.errors import DataError, UsageError
+
+FORMATS = ("csv", "parquet", "npz", "mat", "psins", "kf-gins", "kf-gins-binary", "ros")
+SUFFIXES = {
+    ".csv": "csv",
+    ".tsv": "csv",
+    ".parquet": "parquet",
+    ".pq": "parquet",
+    ".npz": "npz",
+    ".mat": "mat",
+    ".imu": "psins",
+    ".txt": "kf-gins",
+    ".bin": "kf-gins-binary",
+    ".bag": "ros",
+    ".mcap": "ros",
+    ".db3": "ros",
+}
+BEGINNINGS = {
+    b"PAR1": "parquet",
+    b"PK\x03\x04": "npz",
+    b"MATLAB": "mat",
+    b"#ROSBAG": "ros",
+    b"\x89MCAP": "ros",
+    b"SQLite format 3": "ros",
+}
+FOREIGN = {
+    b"\x1f\x8b": "gzip data; unpack it first",
+    b"BZh": "bzip2 data; unpack it first",
+    b"\x28\xb5\x2f\xfd": "zstandard data; unpack it first",
+    b"\x89HDF": "HDF5 data; save it as .npz, .mat (version 7), .csv or .parquet",
+    b"\xd0\xcf\x11\xe0": "an Excel workbook; save its sheet as CSV",
+    b"\xff\xfe": "UTF-16 text; save it as UTF-8",
+    b"\xfe\xff": "UTF-16 text; save it as UTF-8",
+    b"%PDF": "a PDF document",
+}
+TEXT = ("csv", "psins", "kf-gins")
+HEAD = 4096
+
+
+def format_of(path: Path, given: str | None = None) -> str:
+    """The format of a log, one of `FORMATS`.
+
+    Parameters
+    ----------
+    path : Path
+        An existing file, or a folder (a ROS 2 bag).
+    given : str, optional
+        What the caller says; the content must still agree.
+
+    Raises
+    ------
+    UsageError
+        A format that does not exist, or a suffix that names none and a content that tells none.
+    DataError
+        An empty file, or one that is not what its suffix says.
+    """
+    if given is not None and given not in FORMATS:
+        raise UsageError(f"format {given!r} is not known; choose one of {', '.join(FORMATS)}")
+    if path.is_dir():
+        if given not in (None, "ros") or not (path / "metadata.yaml").is_file():
+            raise UsageError(f"{path}: a folder; only a ROS 2 bag is one (with metadata.yaml in it), name a file")
+        return "ros"
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    if not head:
+        raise DataError(f"{path.name}: the file is empty; expected an IMU log")
+    found = next((name for beginning, name in BEGINNINGS.items() if head.startswith(beginning)), None)
+    chosen = given or SUFFIXES.get(path.suffix.lower()) or found
+    foreign = next((what for beginning, what in FOREIGN.items() if head.startswith(beginning)), None)
+    if found == "npz" and not _is_npz(path):
+        found, foreign = None, "a zip archive, such as an Excel workbook; save its sheet as CSV, or unpack it"
+    if foreign is not None and not (chosen == "kf-gins-binary" and len(head) % 56 == 0):
+        raise DataError(f"{path.name}: holds {foreign}")
+    if chosen is None:
+        raise UsageError(
+            f"{path.name}: the suffix {path.suffix or '(none)'} names no format; give one with --format: "
+            f"{', '.join(FORMATS)}"
+        )
+    _check_content(path.name, head, chosen, found)
+    return chosen
+
+
+def _check_content(source: str, head: bytes, chosen: str, found: str | None) -> None:
+    if found is not None and found != chosen:
+        raise DataError(
+            f"{source}: read as {chosen}, but it holds {found} data; rename the file or give --format {found}"
+        )
+    if chosen in BEGINNINGS.values() and found is None:
+        raise DataError(
+            f"{source}: read as {chosen}, but it does not begin as such a file does; it is damaged, or another format: "
+            "give --format"
+        )
+    if chosen in TEXT and b"\0" in head:
+        raise DataError(f"{source}: read as {chosen}, which is text, but it holds binary data; give its --format")
+    if chosen == "kf-gins-binary" and all(byte in b"\t\n\r" or 32 <= byte < 127 for byte in head):
+        raise DataError(f"{source}: read as binary, but it holds text; give --format kf-gins or csv")
+
+
+def _is_npz(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return all(name.endswith(".npy") for name in archive.namelist())
+    except zipfile.BadZipFile:  # cut short: what the reader says about it is better
+        return True

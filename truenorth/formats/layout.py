@@ -1,0 +1,130 @@
+"""How a log is to be read: by the options of the call, and by a small YAML file beside the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+from truenorth.errors import DataError, UsageError
+from truenorth.records import COLUMNS
+from truenorth.yaml_file import read_mapping, unknown_key
+
+Kind = Literal["rates", "increments"]
+
+BLOCKS: dict[Kind, tuple[str, str]] = {"rates": ("gyro", "accel"), "increments": ("dtheta", "dvel")}
+ARRAY_ONLY = (*BLOCKS["rates"], *BLOCKS["increments"], "scale", "interval")
+KNOWN_COLUMNS = ("time", *COLUMNS["rates"], *COLUMNS["increments"], *ARRAY_ONLY)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a log is to be read.
+
+    Attributes
+    ----------
+    columns : mapping
+        Our column names to the log's. For ``.npz`` and ``.mat`` also ``gyro, accel`` (``dtheta, dvel``) to arrays of
+        three columns, ``scale`` to what the sensor values are multiplied with, and ``interval`` to the sampling interval.
+    units : mapping
+        Of ``gyro``, ``accel`` and ``time``; SI where left out. A number before the unit (``0.05 deg/s``) is the size of
+        one count.
+    axes : str or None
+        Where x, y and z point, such as ``"FRD"``; None leaves it to the format.
+    rate : float or None, Hz
+        For a log without time.
+    kind : {"rates", "increments"} or None
+        Told by the names of the columns when left out.
+    topic : str or None
+        Of a ROS bag with several IMUs.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    axes: str | None = None
+    rate: float | None = None
+    kind: Kind | None = None
+    topic: str | None = None
+
+    def name(self, ours: str) -> str:
+        """What the log calls one of our columns."""
+        return self.columns.get(ours, ours)
+
+
+def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:
+    """The layout in ``LOG.yaml`` beside ``LOG.csv``, where that exists, with the options of the call on top.
+
+    Raises
+    ------
+    DataError
+        A key of the file that is not known or holds a wrong value; the message names file and key.
+    UsageError
+        The same in the options of the call.
+    """
+    values: dict[str, Any] = {}
+    beside = path.with_suffix(".yaml")
+    if beside.is_file():
+        try:
+            values = _checked(read_mapping(beside))
+        except UsageError as error:
+            raise DataError(f"{beside} (the layout of {path.name}): {error}") from None
+    for key, value in _checked({k: v for k, v in given.items() if v is not None}).items():
+        values[key] = {**values.get(key, {}), **value} if isinstance(value, dict) else value
+    return Layout(**values)
+
+
+def _checked(content: Mapping[Any, Any]) -> dict[str, Any]:
+    known = [item.name for item in fields(Layout)]
+    values = dict(content)
+    for key in values:
+        if key not in known:
+            raise UsageError(unknown_key("layout", key, known))
+    if "columns" in values:
+        values["columns"] = _columns(values["columns"])
+    if "units" in values:
+        values["units"] = _units(values["units"])
+    if "rate" in values:
+        values["rate"] = _rate(values["rate"])
+    if values.get("kind", "rates") not in BLOCKS:
+        raise UsageError(f"kind {values['kind']!r} is not known; use rates or increments")
+    for key in ("axes", "topic"):
+        if not isinstance(values.get(key, ""), str):
+            raise UsageError(f"{key} is {values[key]!r}; expected text")
+    return values
+
+
+def _columns(value: Any) -> dict[str, str]:
+    if not isinstance(value, Mapping):
+        raise UsageError(f"columns are {value!r}; expected our names to the log's, such as gyro_x: wx")
+    for key in value:
+        if key not in KNOWN_COLUMNS:
+            raise UsageError(unknown_key("columns", key, KNOWN_COLUMNS))
+    return {key: str(name) for key, name in value.items()}
+
+
+def _units(value: Any) -> dict[str, str]:
+    names = ("gyro", "accel", "time")
+    if isinstance(value, str):
+        parts = [part.strip() for part in value.split(",")]
+        if len(parts) not in (2, 3) or not all(parts):
+            raise UsageError(
+                f"units {value!r}; expected those of gyro and accelerometer, such as 'deg/s,g' (or 'deg/s,g,ms')"
+            )
+        return dict(zip(names, parts))
+    if not isinstance(value, Mapping):
+        raise UsageError(f"units are {value!r}; expected text such as 'deg/s,g', or gyro: deg/s and accel: g")
+    for key in value:
+        if key not in names:
+            raise UsageError(unknown_key("units", key, names))
+    return {key: str(unit) for key, unit in value.items()}
+
+
+def _rate(value: Any) -> float:
+    from truenorth.units import parse
+
+    rate = parse(value, "frequency") if isinstance(value, str) else value
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < math.inf:
+        raise UsageError(f"rate is {value!r}; expected samples a second, such as 100")
+    return float(rate)
