@@ -5,6 +5,7 @@ Each command lives in a module of its own and imports its work when it runs, so 
 
 from __future__ import annotations
 
+import os
 import sys
 
 import typer
@@ -42,6 +43,8 @@ def _main(
 
 def main() -> None:
     """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
+    # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()
     except TruenorthError as error:

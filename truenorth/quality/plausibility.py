@@ -29,6 +29,8 @@ TURN_STEP = 0.5  # s, over which the turn of gravity is compared with the gyros
 LEAST_TURN = np.radians(0.5)  # rad, RMS of gravity's turn over TURN_STEP, for a judgement on the gyros
 AGREES = 0.8  # share of gravity's turn that the gyros must explain for a claim
 CONTRADICTS = 4.0  # times as much left unexplained as by another reading: the axes as given are wrong
+# A lever arm r accelerates in step with the sway and tilts apparent gravity by w^2 r/g: .3 for 3 m at 1 rad/s.
+SCALE_TOLERANCE = 0.35
 EQUAL = 0.02  # readings whose shares differ by less are equals
 RATE_RESOLVED = 0.05  # relative sigma of the mean rate, to compare it with the earth's
 RATE_SHARP = 0.01  # the same, to tell a unit by it
@@ -249,7 +251,7 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
             )
         )
         return True
-    if turning.agreement < AGREES or abs(turning.scale - 1.0) < 0.1:
+    if turning.agreement < AGREES or abs(turning.scale - 1.0) < SCALE_TOLERANCE:
         return turning.agreement >= AGREES
     found = f"the gyros turn {turning.scale:.3g} times as far as gravity in the accelerometers; expected 1"
     readings = [(1.0 / DEG, "in deg/s"), (3600.0 / DEG, "in deg/h"), (1000.0, "in mrad/s")]
