@@ -198,3 +198,14 @@ def test_at_the_pole_there_is_no_north():
     answer = align(log, pole, "navigation")
     assert answer.status == "not_observable"
     assert answer.summary()["heading_deg"] is None
+
+
+def test_convergence_ends_at_the_answer_without_the_bases_motion():
+    """What earlier epochs would have told of the final attitude: no trace of 10 deg of sway, and within the sigmas."""
+    log = simulate(SHIP, imu=imu_spec("navigation"), rate=50.0, duration=300.0, seed=4).record
+    answer = align(log, XIAN, "navigation")
+    angles, sigmas = answer.convergence
+    np.testing.assert_allclose(angles[-1], answer.euler, atol=1e-9)
+    late = slice(len(angles) // 2, None)
+    assert np.max(np.abs(angles[late] - answer.euler) / sigmas[late]) < 3.0
+    assert np.max(np.abs(np.degrees(angles[late, 1:] - answer.euler[1:]))) < 0.01

@@ -71,6 +71,9 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec) -> History:
         C_nb=C_nb,
         phi_covariance=covariance + task.deflection,
         phi_floor=floor + task.deflection,
+        departure=np.einsum(
+            "kji,kj->ki", earth_rotation(fine.integrals.time[1:], task.position.lat), fine.departures()
+        ),
         gyro_bias=bias[:, :3],
         gyro_bias_sigma=np.sqrt(variance[:, :3]),
         accel_bias=accel_bias,

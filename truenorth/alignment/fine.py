@@ -111,6 +111,14 @@ class FineAlignment:
         C_n0_b = dcm_from_rotation_vector(phi) @ self.C_n0_i @ C_ib
         return C_n0_b, J @ self.P @ J.T + walk, J @ self.floor[-1] @ J.T
 
+    def departures(self) -> Array:
+        """(K, 3) how far the attitude known at each epoch is off the final one at the same time: phi in ``n0``, rad."""
+        T = self.integrals.intervals[:, None, None]
+        turns = T * (self.C_n0_i @ self.integrals.C_mean)
+        # int from each epoch to the end of C_n0_b dt, with the final residual bias: the final answer carried back.
+        after = np.concatenate([np.cumsum(turns[:0:-1], axis=0)[::-1], np.zeros((1, 3, 3))])
+        return self.x[PHI] + after @ self.x[BG] - self.estimates.x[:, PHI]
+
     def _turned_between(self, time: float) -> Array:
         """``int C_n0_b dt`` from `time` to the last epoch; negative beyond it."""
         t, T = self.integrals.time, self.integrals.intervals

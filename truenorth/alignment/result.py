@@ -45,6 +45,8 @@ class History:
         Covariance of the misalignment (E, N, U), everything included.
     phi_floor : (K, 3, 3) array, rad^2
         The part of it that waiting does not improve.
+    departure : (K, 3) array, rad
+        Misalignment (E, N, U) of the attitude as known then against the final answer at the same time.
     gyro_bias, gyro_bias_sigma : (K, 3) arrays, rad/s
     accel_bias, accel_bias_sigma : (K, 3) arrays, m/s^2
     innovation, innovation_sigma : (K, 3) arrays, m/s
@@ -57,6 +59,7 @@ class History:
     C_nb: Array
     phi_covariance: Array
     phi_floor: Array
+    departure: Array
     gyro_bias: Array
     gyro_bias_sigma: Array
     accel_bias: Array
@@ -171,6 +174,18 @@ class Alignment:
     def roll(self) -> float:
         """Roll, right side down positive, rad."""
         return float(self.euler[2])
+
+    @cached_property
+    def convergence(self) -> tuple[Array, Array]:
+        """Heading, pitch and roll at the answer's epoch as each earlier epoch would have told them, and their sigmas.
+
+        (K, 3) arrays, rad: the base's own motion is taken out, so that convergence is seen on a swaying ship too.
+        """
+        if self.history is None:
+            raise ValueError(f"method {self.method!r} gives one answer and keeps no history")
+        J = euler_jacobian(self.C_nb)
+        sigma = np.sqrt(np.einsum("ij,kjl,il->ki", J, self.history.phi_covariance, J))
+        return self.euler + self.history.departure @ J.T, sigma
 
     @property
     def heading_known(self) -> bool:

@@ -36,18 +36,18 @@ def plot_alignment(result: Alignment) -> Figure:
         axes = figure.subplots(3, 2, sharex=True)
         late = slice(int(SETTLED_FROM * len(t)), None)
         floor = euler_sigma(h.C_nb, h.phi_floor)
+        values, sigmas = (np.degrees(x) for x in result.convergence)
         for i, angle in enumerate(ANGLES):
-            value = np.degrees(np.unwrap(h.euler[:, i]))
-            sigma = np.degrees(h.euler_sigma[:, i])
+            value, sigma = values[:, i], sigmas[:, i]
             ax = axes[i, 0]
             band(ax, t, value, sigma, color=COLOURS[i])
             low, high = np.min((value - sigma)[late]), np.max((value + sigma)[late])
             margin = 0.15 * max(high - low, 1e-9)
             ax.set_ylim(low - margin, high + margin)
             ax.set_ylabel(f"{angle}, deg")
-            trace(axes[0, 1], t, 60 * sigma, color=COLOURS[i], label=angle)
+            trace(axes[0, 1], t, 60 * np.degrees(h.euler_sigma[:, i]), color=COLOURS[i], label=angle)
             trace(axes[0, 1], t, 60 * np.degrees(floor[:, i]), color=COLOURS[i], linestyle=":")
-        axes[0, 0].set_title("Attitude with one-sigma band")
+        axes[0, 0].set_title("Attitude at the answer's epoch, as told at each time")
         axes[0, 1].set_title("One sigma; dotted: what waiting does not improve")
         axes[0, 1].set_yscale("log")
         axes[0, 1].set_ylabel("arcmin")

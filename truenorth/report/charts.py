@@ -28,9 +28,9 @@ def charts(result: Alignment) -> list[tuple[str, str, Any]]:
     return [
         (
             "Convergence",
-            "Heading, pitch and roll as known at each time, with one-sigma bands. A base that moves shows here as it moves. "
-            "Axes are scaled to the last three quarters of the log.",
-            _convergence(h, rows, t),
+            "Heading, pitch and roll at the answer's epoch, as each earlier time would have told them: with one-sigma "
+            "bands, the base's own motion taken out. Axes are scaled to the last three quarters of the log.",
+            _convergence(result, rows, t),
         ),
         (
             "How the uncertainty falls",
@@ -115,13 +115,12 @@ def _limits(middle: Array, half: Array) -> list[float]:
     return [low - margin, high + margin]
 
 
-def _convergence(h: History, rows: NDArray[np.intp], t: Array) -> Any:
+def _convergence(result: Alignment, rows: NDArray[np.intp], t: Array) -> Any:
     figure = _figure(3, 640, [f"{angle}, deg" for angle in ANGLES])
+    values, sigmas = (np.degrees(x) for x in result.convergence)
     for i, angle in enumerate(ANGLES):
-        value = np.degrees(np.unwrap(h.euler[:, i])) if angle != "pitch" else np.degrees(h.euler[:, i])
-        sigma = np.degrees(h.euler_sigma[:, i])
-        _band(figure, i + 1, t, value[rows], sigma[rows], COLOURS[i], angle)
-        figure.update_yaxes(range=_limits(value, sigma), row=i + 1, col=1)
+        _band(figure, i + 1, t, values[rows, i], sigmas[rows, i], COLOURS[i], angle)
+        figure.update_yaxes(range=_limits(values[:, i], sigmas[:, i]), row=i + 1, col=1)
     return figure
 
 

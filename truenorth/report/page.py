@@ -111,7 +111,7 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
     ]
     if np.all(np.isfinite(result.disturbance)):
         east, north, up = 1e3 * result.disturbance
-        facts.append(("Base's own motion", f"{east:.2g}, {north:.2g}, {up:.2g} mm/s RMS (east, north, up)"))
+        facts.append(("Base's own motion", f"{_short(east)}, {_short(north)}, {_short(up)} mm/s RMS (east, north, up)"))
     if result.pays_until is not None and result.heading_known:
         verb = "stopped paying after" if result.pays_until <= result.duration else "pays until about"
         facts.append(("More time", f"{verb} {result.pays_until:.0f} s: then heading's random part is half its floor"))
