@@ -190,7 +190,7 @@ def test_wrong_usage_is_exit_code_2(capsys, monkeypatch, log, arguments, words):
 def test_missing_file_and_missing_latitude(capsys, monkeypatch, log):
     code, _, err = run(capsys, monkeypatch, "align", "nowhere.csv", *WHERE)
     assert code == 2
-    assert "no such file" in err
+    assert "no such file" in err.lower()
     code, _, err = run(capsys, monkeypatch, "align", log)
     assert code == 2
     assert "--lat" in err
