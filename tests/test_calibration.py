@@ -50,6 +50,9 @@ def test_undoes_the_stated_errors(tmp_path, kind):
         ("wheel: {bias: [1 deg/h]}", ["wheel"]),
         ("accel: {misalignment: [[1 deg, 0 deg, 0 deg], [0 deg, 0 deg, 0 deg], [0 deg, 0 deg, 0 deg]]}", ["diagonal"]),
         ("[1, 2", ["YAML"]),
+        ("gyro: {scale_factor: [-100 %, 0 ppm, 0 ppm]}", ["gyro", "as large as what is measured"]),
+        ("gyro: {bias: [1, 2, 3]}", ["gyro.bias", "no unit"]),
+        ("gyro: 1 deg/h", ["gyro", "expected keys"]),
     ],
 )
 def test_bad_files_name_the_key(tmp_path, text, words):

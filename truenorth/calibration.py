@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from truenorth.errors import DataError, UsageError
 from truenorth.records import ImuRecord
-from truenorth.units import parse
+from truenorth.yaml_file import quantity, read_mapping, unknown_key
 
 Array = NDArray[np.float64]
 
@@ -60,6 +60,20 @@ class Calibration:
                 if key == "misalignment" and np.any(np.diag(value) != 0.0):
                     raise UsageError(f"calibration: {name} has a diagonal; what belongs there is scale_factor")
                 object.__setattr__(self, name, value)
+        for group in DIMENSIONS:
+            matrix = getattr(self, f"{group}_matrix")
+            if not np.linalg.det(matrix) > 0.5:  # 1 for an ideal IMU; at zero nothing could be undone
+                raise UsageError(f"calibration: the {group} errors are as large as what is measured: {matrix.tolist()}")
+
+    @property
+    def gyro_matrix(self) -> Array:
+        """(3, 3) ``I + S + M`` of the gyros."""
+        return np.eye(3) + np.diag(self.gyro_scale_factor) + self.gyro_misalignment
+
+    @property
+    def accel_matrix(self) -> Array:
+        """(3, 3) ``I + S + M`` of the accelerometers."""
+        return np.eye(3) + np.diag(self.accel_scale_factor) + self.accel_misalignment
 
     @classmethod
     def from_file(cls, path: str | PathLike[str]) -> Calibration:
@@ -72,22 +86,16 @@ class Calibration:
         DataError
             An unknown key, a wrong unit or shape; the message names file and key.
         """
-        import yaml
-
         file = Path(path)
-        if not file.is_file():
-            raise UsageError(f"{file}: no such calibration file")
-        try:
-            content = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise DataError(f"{file}: not a YAML file: {error}") from None
         values: dict[str, Array] = {}
-        for group, entries in _items(content, f"{file}"):
+        for group, entries in read_mapping(file).items():
             if group not in DIMENSIONS:
-                raise DataError(f"{file}: key {group!r} is not known; expected gyro and accel")
-            for key, value in _items(entries, f"{file}: {group}"):
+                raise DataError(unknown_key(str(file), group, DIMENSIONS))
+            if not isinstance(entries, Mapping):
+                raise DataError(f"{file}: {group}: expected keys such as bias and scale_factor, found {entries!r}")
+            for key, value in entries.items():
                 if key not in SHAPES:
-                    raise DataError(f"{file}: key {group}.{key!r} is not known; known: {', '.join(SHAPES)}")
+                    raise DataError(unknown_key(str(file), f"{group}.{key}", [f"{group}.{k}" for k in SHAPES]))
                 values[f"{group}_{key}"] = _array(value, SHAPES[key], DIMENSIONS[group][key], f"{file}: {group}.{key}")
         try:
             return cls(**values)
@@ -97,30 +105,20 @@ class Calibration:
     def apply(self, record: ImuRecord) -> ImuRecord:
         """The record as an IMU without these errors would have made it."""
         T = record.steps[:, None] if record.kind == "increments" else 1.0
-        gyro = _corrected(record.gyro, T * self.gyro_bias, self.gyro_scale_factor, self.gyro_misalignment)
-        accel = _corrected(record.accel, T * self.accel_bias, self.accel_scale_factor, self.accel_misalignment)
+        gyro = _corrected(record.gyro, T * self.gyro_bias, self.gyro_matrix)
+        accel = _corrected(record.accel, T * self.accel_bias, self.accel_matrix)
         return ImuRecord(record.time, gyro, accel, record.kind, record.source)
 
 
-def _corrected(measured: Array, bias: Array, scale_factor: Array, misalignment: Array) -> Array:
-    matrix = np.eye(3) + np.diag(scale_factor) + misalignment
+def _corrected(measured: Array, bias: Array, matrix: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix, (measured - bias).T).T, dtype=np.float64)
-
-
-def _items(content: Any, where: str) -> list[tuple[str, Any]]:
-    if not isinstance(content, Mapping):
-        raise DataError(f"{where}: expected keys and values, found {content!r}")
-    return [(str(key), value) for key, value in content.items()]
 
 
 def _array(value: Any, shape: tuple[int, ...], dimension: str, where: str) -> Array:
     def parsed(item: Any) -> Any:
         if isinstance(item, list):
             return [parsed(part) for part in item]
-        try:
-            return parse(item, dimension)
-        except UsageError as error:
-            raise DataError(f"{where}: {error}") from None
+        return quantity(item, dimension, where)
 
     quantities = parsed(value)
     try:

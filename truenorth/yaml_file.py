@@ -61,6 +61,6 @@ def quantity(text: Any, dimension: str, where: str) -> float:
 def unknown_key(where: str, key: Any, known: Iterable[str]) -> str:
     """The message for a key that nothing reads: the nearest known one, or all of them."""
     names = list(known)
-    near = get_close_matches(str(key), names, n=1)
+    near = get_close_matches(str(key), names, n=1, cutoff=0.75)
     advice = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(names)}"
     return f"{where}: key {key!r} is not known; {advice}"

@@ -32,9 +32,8 @@ def test_written_and_read_to_the_bit(record, tmp_path, suffix):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.parametrize("record", ["rates"], indirect=True)
 def test_units_axes_and_names_by_options(record, tmp_path):
-    if record.kind != "rates":
-        pytest.skip("rates only")
     path = tmp_path / "log.csv"
     table = np.column_stack([record.time, np.degrees(record.gyro @ FRD_TO_RFU), record.accel @ FRD_TO_RFU / 9.80665])
     names = ["t", "wx", "wy", "wz", "ax", "ay", "az"]

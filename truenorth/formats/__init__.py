@@ -101,6 +101,6 @@ def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in WRITERS:
-        raise UsageError(f"{path}: cannot write {suffix or 'a file without a suffix'}; use {', '.join(WRITERS)}")
+        raise UsageError(f"{path}: cannot write {suffix or 'a file without a suffix'}; use .csv, .parquet or .npz")
     with atomic_path(path) as temporary:
         import_module(f"truenorth.formats.{WRITERS[suffix]}").write(record, temporary)

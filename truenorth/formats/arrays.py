@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from truenorth.errors import DataError, UsageError
 from truenorth.formats.layout import BLOCKS, Kind, Layout
 from truenorth.formats.table import choose, finish, named_kind, unit_factor
-from truenorth.records import ImuRecord
+from truenorth.records import COLUMNS, ImuRecord
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def record_from_arrays(variables: Mapping[str, Any], layout: Layout, source: str
     time = None
     if "time" in layout.columns or "time" in variables:
         time = _part(variables, layout.name("time"), source)[0]
-        if time.size != len(time):
+        if time.size != max(time.shape):
             raise DataError(f"{source}: time {layout.name('time')!r} has shape {time.shape}; expected (N,)")
         time = time.reshape(-1)
     if not len(gyro) == len(accel) == (len(gyro) if time is None else len(time)):
@@ -58,6 +58,11 @@ def record_from_arrays(variables: Mapping[str, Any], layout: Layout, source: str
 def _record_from_vectors(variables: Mapping[str, Any], layout: Layout, source: str) -> ImuRecord:
     """A record of one variable for each column."""
     names = [name for name, value in variables.items() if np.ndim(value) == 1]
+    if not any(layout.name(ours) in names for kind in COLUMNS for ours in COLUMNS[kind]):
+        raise DataError(
+            f"{source}: no variables of an IMU; found {', '.join(variables) or 'none'}; expected time, gyro and accel, (N,) and "
+            "(N, 3), or dtheta and dvel, or name them with --columns gyro=...,accel=..."
+        )
     if layout.name("time") not in names:
         layout = _rated(variables, layout, source)
     columns = {ours: name for ours, name in layout.columns.items() if ours != "interval"}
@@ -115,13 +120,13 @@ def _block(variables: Mapping[str, Any], layout: Layout, ours: str, source: str)
     if "scale" not in layout.columns:
         return values
     scale = np.atleast_1d(_part(variables, layout.columns["scale"], source)[0])
-    part = scale if scale.size in (1, 3) else scale[columns]
-    if scale.ndim != 1 or part.size not in (1, 3):
+    width = np.shape(variables[reference.partition("[")[0].strip()])[-1] if columns != slice(None) else 3
+    if scale.shape not in ((1,), (width,)):
         raise DataError(
-            f"{source}: scale {layout.columns['scale']!r} has shape {scale.shape}; expected one value, or one for each "
-            f"column of {reference!r}"
+            f"{source}: scale {layout.columns['scale']!r} has shape {scale.shape}; expected one value, or one for each of "
+            f"the {width} columns of {reference.partition('[')[0]!r}"
         )
-    return values * part
+    return values * (scale[columns] if scale.size > 1 else scale)
 
 
 def _rated(variables: Mapping[str, Any], layout: Layout, source: str) -> Layout:

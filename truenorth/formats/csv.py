@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from truenorth.errors import DataError
+from truenorth.formats.arrow import table_of
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import choose, finish
 from truenorth.formats.text import TextTable, are_numbers, delimiter_of, first_lines, is_comment, split
@@ -34,15 +33,11 @@ def read(path: Path, layout: Layout) -> ImuRecord:
 
 def write(record: ImuRecord, path: Path) -> None:
     """Write a record with the documented columns; every number reads back to the same bits."""
-    import pyarrow as pa
     import pyarrow.csv as pc
 
-    names = ("time", *COLUMNS[record.kind])
-    values = np.column_stack([record.time, record.gyro, record.accel])
-    table = pa.table({name: values[:, i] for i, name in enumerate(names)})
     with path.open("wb") as file:
-        file.write((",".join(names) + "\n").encode())
-        pc.write_csv(table, file, pc.WriteOptions(include_header=False))
+        file.write((",".join(("time", *COLUMNS[record.kind])) + "\n").encode())
+        pc.write_csv(table_of(record), file, pc.WriteOptions(include_header=False))
 
 
 def _table(path: Path) -> TextTable:

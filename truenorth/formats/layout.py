@@ -14,7 +14,7 @@ from truenorth.yaml_file import read_mapping, unknown_key
 
 Kind = Literal["rates", "increments"]
 
-BLOCKS: dict[Kind, tuple[str, str]] = {"rates": ("gyro", "accel"), "increments": ("dtheta", "dvel")}
+BLOCKS: dict[str, tuple[str, str]] = {"rates": ("gyro", "accel"), "increments": ("dtheta", "dvel")}
 ARRAY_ONLY = (*BLOCKS["rates"], *BLOCKS["increments"], "scale", "interval")
 KNOWN_COLUMNS = ("time", *COLUMNS["rates"], *COLUMNS["increments"], *ARRAY_ONLY)
 
@@ -70,8 +70,7 @@ def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:
             values = _checked(read_mapping(beside))
         except UsageError as error:
             raise DataError(f"{beside} (the layout of {path.name}): {error}") from None
-    for key, value in _checked({k: v for k, v in given.items() if v is not None}).items():
-        values[key] = {**values.get(key, {}), **value} if isinstance(value, dict) else value
+    values |= _checked({key: value for key, value in given.items() if value is not None})
     return Layout(**values)
 
 

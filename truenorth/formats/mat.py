@@ -40,7 +40,7 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     except (ValueError, TypeError, OSError, EOFError, MatReadError, zlib.error) as error:
         raise DataError(f"{path.name}: the MATLAB file is damaged or cut short ({error}); write it anew") from None
     variables = _flat({name: value for name, value in content.items() if not name.startswith("__")})
-    if not layout.columns and np.shape(variables.get("imu"))[1:] == (7,):
+    if not layout.columns and np.shape(variables.get("imu", 0))[1:] == (7,):
         layout = replace(layout, columns=PSINS)
     return record_from_arrays(variables, layout, path.name)
 

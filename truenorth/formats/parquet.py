@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truenorth.errors import DataError
+from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import choose, finish
-from truenorth.records import COLUMNS, ImuRecord
+from truenorth.records import ImuRecord
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
@@ -31,23 +29,19 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     except (pa.ArrowException, OSError) as error:
         raise DataError(f"{path.name}: the Parquet file is damaged or cut short ({error}); write it anew") from None
 
-    def column(name: str) -> NDArray[np.float64]:
-        values = table.column(name)
-        if not (pa.types.is_floating(values.type) or pa.types.is_integer(values.type)):
+    for name in choice.names:
+        kind = table.schema.field(name).type
+        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
             wanted = "seconds, as numbers" if name == choice.time else "numbers"
-            raise DataError(f"{path.name}: column {name} holds {values.type}; expected {wanted}")
-        return np.asarray(values.to_numpy(), dtype=np.float64)
-
-    time = None if choice.time is None else column(choice.time)
-    sensors = np.column_stack([column(name) for name in choice.sensors])
-    return finish(time, sensors[:, :3], sensors[:, 3:], choice.kind, layout, path.name, labels=choice.labels)
+            raise DataError(f"{path.name}: column {name} holds {kind}; expected {wanted}")
+    values = to_numpy([table.column(name).cast(pa.float64()) for name in choice.names])
+    time = None if choice.time is None else values[:, 0]
+    gyro, accel = values[:, -6:-3], values[:, -3:]
+    return finish(time, gyro, accel, choice.kind, layout, path.name, labels=choice.labels)
 
 
 def write(record: ImuRecord, path: Path) -> None:
     """Write a record with the documented columns."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    values = np.column_stack([record.time, record.gyro, record.accel])
-    names = ("time", *COLUMNS[record.kind])
-    pq.write_table(pa.table({name: values[:, i] for i, name in enumerate(names)}), path)
+    pq.write_table(table_of(record), path)

@@ -75,7 +75,7 @@ def choose(names: Sequence[str], layout: Layout, source: str) -> Choice:
     return Choice(layout.kind or kind, time, sensors)
 
 
-def named_kind(there: Callable[[str], bool], columns: Mapping[Kind, Sequence[str]] = COLUMNS) -> Kind | None:
+def named_kind(there: Callable[[str], bool], columns: Mapping[str, Sequence[str]] = COLUMNS) -> Kind | None:
     """Rates or increments, whichever has more of its columns there; None without any."""
     rates, increments = (sum(map(there, columns[kind])) for kind in ("rates", "increments"))
     if not rates and not increments:
@@ -165,7 +165,9 @@ def _found(ours: str, names: Sequence[str], layout: Layout, source: str) -> str:
         return wanted
     if wanted in names:
         raise DataError(f"{source}: column {wanted!r} is there {names.count(wanted)} times; rename one")
-    near = get_close_matches(wanted, names, n=1)
+    taken = {layout.name(name) for columns in COLUMNS.values() for name in ("time", *columns)}
+    spare = {name.lower(): name for name in names if name not in taken}
+    near = [spare[name] for name in get_close_matches(wanted.lower(), spare, n=1)]
     hint = f"; is it {near[0]!r}? Then --columns {ours}={near[0]}" if near else ""
     if ours == "time":
         hint += "; for a log without time give --rate"
@@ -173,11 +175,9 @@ def _found(ours: str, names: Sequence[str], layout: Layout, source: str) -> str:
 
 
 def _check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
-    if np.isfinite(values.sum()):  # one pass; a NaN or inf anywhere survives the sum
-        return
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        row, column = (int(i) for i in bad[0])
+    finite = np.isfinite(values)
+    if not finite.all():
+        row, column = (int(i) for i in np.argwhere(~finite)[0])
         raise DataError(
             f"{source}: {place(row)}, column {labels[column]}: {values[row, column]}; expected a finite number: remove "
             "the row or repair the log"

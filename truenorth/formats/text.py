@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError
+from truenorth.formats.arrow import to_numpy
 
 Array = NDArray[np.float64]
 
@@ -88,7 +89,7 @@ class TextTable:
             raise self._first_fault(columns) or DataError(
                 f"{self.path.name}: not a table of numbers ({error})"
             ) from None
-        return np.column_stack([table.column(label).to_numpy() for label in wanted])
+        return to_numpy([table.column(label) for label in wanted])
 
     def _read_blanks(self, columns: list[int]) -> Array:
         options = {"skiprows": self.skip, "ndmin": 2, "comments": None, "encoding": "utf-8"}

@@ -1,0 +1,138 @@
+"""Variables of .npz and .mat: parts of arrays, counts with a scale, sampling interval; the real recordings as they are."""
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from tests import recordings
+from truenorth.errors import DataError, UsageError
+from truenorth.formats import read_imu
+
+TIME = np.arange(1, 8) / 100
+SENSORS = np.arange(42.0).reshape(7, 6) / 3
+
+
+@pytest.fixture(params=["npz", "mat"])
+def save(request, tmp_path):
+    def write(**variables):
+        path = tmp_path / f"log.{request.param}"
+        if request.param == "npz":
+            np.savez(path, **variables)
+        else:
+            savemat(path, variables)
+        return path
+
+    return write
+
+
+def assert_is(record, kind="rates"):
+    assert record.kind == kind
+    np.testing.assert_allclose(record.time, TIME, rtol=1e-15)
+    np.testing.assert_array_equal(np.hstack([record.gyro, record.accel]), SENSORS)
+
+
+def test_one_variable_for_each_sensor(save):
+    assert_is(read_imu(save(time=TIME, gyro=SENSORS[:, :3], accel=SENSORS[:, 3:])))
+    assert_is(read_imu(save(time=TIME, dtheta=SENSORS[:, :3], dvel=SENSORS[:, 3:])), "increments")
+    assert_is(read_imu(save(time=TIME, gyro=SENSORS[:, :3], accel=SENSORS[:, 3:]), kind="increments"), "increments")
+
+
+def test_arrays_that_lie_on_their_side(save):
+    assert_is(read_imu(save(time=TIME[None], gyro=SENSORS[:, :3].T, accel=SENSORS[:, 3:].T)))
+
+
+def test_one_variable_for_each_column(save):
+    names = ["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+    columns = dict(zip(names, SENSORS.T))
+    assert_is(read_imu(save(time=TIME, **columns)))
+    assert_is(read_imu(save(**columns), rate=100.0))
+    assert_is(read_imu(save(ts=0.01, **columns), columns={"interval": "ts"}))
+
+
+def test_parts_of_one_array(save):
+    path = save(mimu=np.column_stack([SENSORS, TIME]))
+    columns = {"dtheta": "mimu[0:3]", "dvel": "mimu[3:6]", "time": "mimu[6]"}
+    assert_is(read_imu(path, columns=columns), "increments")
+
+
+def test_counts_with_a_scale_and_an_interval(save):
+    counts = np.arange(42).reshape(7, 6)
+    path = save(counts=counts.astype(np.int16), scale=np.full(6, 1 / 3), ts=10.0)
+    columns = {"gyro": "counts[0:3]", "accel": "counts[3:6]", "scale": "scale", "interval": "ts"}
+    record = read_imu(path, columns=columns, units={"time": "ms"})
+    np.testing.assert_allclose(record.time, TIME, rtol=1e-14)
+    np.testing.assert_allclose(np.hstack([record.gyro, record.accel]), SENSORS, rtol=1e-15)
+    uneven = save(counts=counts, scale=np.array([1.0, 2, 3, 4, 5, 6]))
+    swapped = {"gyro": "counts[3:6]", "accel": "counts[0:3]", "scale": "scale"}
+    record = read_imu(uneven, columns=swapped, rate=100)
+    np.testing.assert_array_equal(record.gyro, counts[:, 3:] * [4, 5, 6])
+    np.testing.assert_array_equal(record.accel, counts[:, :3] * [1, 2, 3])
+
+
+def test_a_matlab_struct_and_the_array_of_psins(tmp_path):
+    path = tmp_path / "log.mat"
+    imu = np.column_stack([SENSORS, TIME])
+    savemat(path, {"imu": imu, "ts": 0.01})
+    assert_is(read_imu(path), "increments")
+    savemat(path, {"trj": {"imu": imu, "ts": 0.01}})
+    columns = {"dtheta": "trj.imu[0:3]", "dvel": "trj.imu[3:6]", "interval": "trj.ts"}
+    assert_is(read_imu(path, columns=columns), "increments")
+
+
+@pytest.mark.parametrize(
+    ("variables", "columns", "error", "words"),
+    [
+        ({"a": TIME}, {}, DataError, ["no variables of an IMU", "found a"]),
+        ({"gyro": SENSORS[:, :3]}, {"time": "t"}, DataError, ["'accel' is missing", "found gyro"]),
+        ({"gyro": SENSORS[:, :3], "acc": SENSORS[:, :3]}, {}, DataError, ["'accel' is missing", "is it 'acc'?"]),
+        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:, :3], "ts": 0.01}, {}, UsageError, ["interval", "'ts'", "--rate"]),
+        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:5, :3], "time": TIME}, {}, DataError, ["7 and 5 rows"]),
+        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:, :3], "time": TIME[:5]}, {}, DataError, ["time 5"]),
+        ({"gyro": SENSORS, "accel": SENSORS[:, :3], "time": TIME}, {}, DataError, ["(7, 6)", "gyro[0:3]"]),
+        ({"gyro": np.full((7, 3), "a"), "accel": SENSORS[:, :3], "time": TIME}, {}, DataError, ["'gyro'", "numbers"]),
+        ({"c": SENSORS, "time": TIME}, {"gyro": "c[0:3]", "accel": "c[4:7]"}, DataError, ["'c[4:7]'", "no such columns"]),
+        ({"c": SENSORS, "time": TIME}, {"gyro": "c[:3]", "accel": "c[3:6]"}, UsageError, ["'c[:3]'", "counts[0:3]"]),
+        ({"c": SENSORS, "s": TIME, "time": TIME}, {"gyro": "c[0:3]", "accel": "c[3:6]", "scale": "s"}, DataError,
+         ["scale 's'", "(7,)"]),
+        ({"gyro": np.where(np.arange(21) == 10, np.nan, 0.0).reshape(7, 3), "accel": SENSORS[:, :3], "time": TIME}, {},
+         DataError, ["row 4, column gyro_y", "nan"]),
+        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:, :3], "time": TIME[::-1].copy()}, {}, DataError,
+         ["row 2, column time", "goes back"]),
+    ],
+)  # fmt: skip
+def test_mistakes(save, variables, columns, error, words):
+    path = save(**variables)
+    with pytest.raises(error) as caught:
+        read_imu(path, columns=columns)
+    for word in (path.name, *words):
+        assert word in str(caught.value)
+
+
+def test_pickled_objects_are_never_loaded(tmp_path):
+    np.savez(tmp_path / "log.npz", gyro=np.array([{}], dtype=object))
+    with pytest.raises(DataError, match="cannot be loaded"):
+        read_imu(tmp_path / "log.npz")
+
+
+COUNTS = {"scale": "scale", "interval": "ts"}
+RECORDINGS = [
+    ("rlg_vehicle_xian/rlg_0_900s.npz", "rlg_vehicle_xian",
+     {"columns": {"dtheta": "counts[0:3]", "dvel": "counts[3:6]", **COUNTS}}),
+    ("fog_gps_xian/static_engine_0_68s.npz", "fog_gps_xian", {"columns": {"interval": "ts"}}),
+    ("static_adis16405/adis16405_unit1_10000s.npz", "static_adis16405",
+     {"columns": {"gyro": "counts[0:3]", "accel": "counts[3:6]", **COUNTS}, "units": "deg/s,g", "axes": "FRD"}),
+    ("stim300_cart_chicago/smooth_turn.npz", "stim300_cart_chicago",
+     {"columns": {"time": "imu_t", "gyro": "gyro_dps", "accel": "acc_g"}, "units": "deg/s,g"}),
+    ("mems_rotation_table/static_and_rotation_0_162s.npz", "mems_rotation_table",
+     {"columns": {"gyro": "counts[3:6]", "accel": "counts[0:3]", **COUNTS}, "units": "deg/s,g"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("file", "name", "options"), RECORDINGS, ids=[name for _, name, _ in RECORDINGS])
+def test_real_recordings_by_options_alone(file, name, options):
+    expected = getattr(recordings, name)()[0]
+    record = read_imu(recordings.DATA / file, **options)
+    assert record.kind == expected.kind
+    np.testing.assert_allclose(record.time, expected.time, rtol=1e-13)
+    np.testing.assert_allclose(record.gyro, expected.gyro, rtol=1e-13)
+    np.testing.assert_allclose(record.accel, expected.accel, rtol=1e-13)

@@ -1,0 +1,193 @@
+"""Every mistake in a log is one message: the file, the line, the column, what was found, what to do."""
+
+import gzip
+import zipfile
+
+import numpy as np
+import pytest
+
+from truenorth.errors import DataError, UsageError
+from truenorth.formats import read_imu, write_imu
+from truenorth.records import ImuRecord
+
+HEADER = "time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
+ROWS = [f"{k / 100:.2f},{k}e-6,2e-6,3e-6,0.1,0.2,9.8" for k in range(1, 8)]
+
+
+def says(path, *words, error=DataError, **options):
+    with pytest.raises(error) as caught:
+        read_imu(path, **options)
+    text = str(caught.value)
+    assert "\n" not in text.strip()
+    for word in (path.name, *words):
+        assert word in text, text
+
+
+def csv(folder, lines, name="log.csv", encoding="utf-8"):
+    path = folder / name
+    path.write_bytes("\n".join(lines).encode(encoding) + b"\n")
+    return path
+
+
+def changed(row, line):
+    rows = list(ROWS)
+    rows[row] = line
+    return [HEADER, *rows]
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (changed(3, "0.04,4e-6,oops,3e-6,0.1,0.2,9.8"), ["line 5", "gyro_y", "'oops'", "expected a number"]),
+        (changed(3, "0.04,4e-6,,3e-6,0.1,0.2,9.8"), ["line 5", "gyro_y", "''"]),
+        (changed(3, "0.04,4e-6,NaN,3e-6,0.1,0.2,9.8"), ["line 5", "gyro_y", "nan", "finite"]),
+        (changed(6, "0.07,4e-6,1,3e-6,0.1,0.2,-inf"), ["line 8", "accel_z", "-inf", "finite"]),
+        (changed(0, "nan,4e-6,1,3e-6,0.1,0.2,9.8"), ["line 2", "column time", "nan"]),
+        (changed(3, "0.02,4e-6,2e-6,3e-6,0.1,0.2,9.8"), ["line 5", "column time", "goes back", "0.03", "0.02"]),
+        (changed(3, "0.03,4e-6,2e-6,3e-6,0.1,0.2,9.8"), ["line 5", "column time", "repeats"]),
+        (changed(6, "0.07,4e-6,1"), ["line 8", "3 columns", "expected 7", "cut short"]),
+        (changed(2, "0.03,4e-6,1,2,3,4,5,6"), ["line 4", "8 columns", "expected 7"]),
+        ([HEADER, "", *ROWS[:2], "", "", "0.03,4e-6,oops,3e-6,0.1,0.2,9.8"], ["line 7", "gyro_y", "'oops'"]),
+        (["# from the lab", HEADER, "", *ROWS[:2], "", "0.03,1,nan,3,0.1,0.2,9.8"], ["line 7", "gyro_y", "nan"]),
+        ([HEADER.replace("gyro_y", "gyro_Y"), *ROWS], ["'gyro_y' is missing", "gyro_Y", "--columns gyro_y=gyro_Y"]),
+        ([HEADER.replace("time", "stamp"), *ROWS], ["'time' is missing", "found stamp, gyro_x", "--rate"]),
+        ([HEADER.replace("gyro_y", "gyro_x"), *ROWS], ["'gyro_x'", "2 times"]),
+        (["a,b,c", "1,2,3"], ["no column of an IMU", "a, b, c", "--columns"]),
+        (ROWS, ["line 1", "numbers, not names", HEADER]),
+        ([HEADER], ["no rows"]),
+        ([HEADER, "", ""], ["no rows"]),
+        ([HEADER, ROWS[0]], ["1 sample", "at least 2"]),
+        (["", ""], ["no header"]),
+        ([HEADER.replace(",", ";"), "0,01;1;2;3;4;5;6"], ["line 2", "column time", "'0,01'", "decimals with a point"]),
+        ([HEADER.replace(",", " "), "0.01 1 2 3 4 5 6", "0.02 1 2 x 4 5 6"], ["line 3", "gyro_z", "'x'"]),
+        ([HEADER.replace(",", " "), "0.01 1 2 3 4 5 6", "0.02 1 2 3 4"], ["line 3", "5 columns"]),
+        ([HEADER.replace(",", " "), "0.01 1 2 3 4 5 6", "0.02 1 2 nan 4 5 6"], ["line 3", "gyro_z", "nan"]),
+    ],
+)
+def test_csv(lines, words, tmp_path):
+    says(csv(tmp_path, lines), *words)
+
+
+def test_three_rows_are_a_record(tmp_path):
+    assert len(read_imu(csv(tmp_path, [HEADER, *ROWS[:3]]))) == 3
+
+
+def test_the_fault_is_named_as_the_log_names_its_columns(tmp_path):
+    lines = changed(3, "0.04,4e-6,nan,3e-6,0.1,0.2,9.8")
+    lines[0] = "t,wx,wy,wz,ax,ay,az"
+    ours = HEADER.split(",")
+    path = csv(tmp_path, lines)
+    says(path, "line 5", "column wy", columns=dict(zip(ours, lines[0].split(","))), axes="FRD")
+
+
+def test_what_is_in_columns_that_are_not_needed_does_not_matter(tmp_path):
+    rows = [f"{row},{word}" for row, word in zip(ROWS, ["fix", "", "nan", '"3"', "x", "y", "é"])]
+    assert len(read_imu(csv(tmp_path, [f"{HEADER},gnss", *rows], encoding="latin-1"))) == len(rows)
+    assert len(read_imu(csv(tmp_path, [f"{HEADER},", *(f"{row}," for row in ROWS)]))) == len(rows)
+    blanks = [line.replace(",", "  ") for line in (f"{HEADER},gnss", *(f"{row},fix" for row in ROWS))]
+    assert len(read_imu(csv(tmp_path, blanks))) == len(rows)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("mark", ["", "\ufeff", "# remarks, of someone\n", "\n"])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", " , "])
+def test_csv_as_programs_write_it(end, mark, delimiter, tmp_path):
+    path = tmp_path / "log.csv"
+    text = mark + "\n".join([HEADER, *ROWS]).replace(",", delimiter) + "\n"
+    path.write_bytes(text.replace("\n", end).encode())
+    record = read_imu(path)
+    assert record.time.tolist() == [k / 100 for k in range(1, 8)]
+    assert record.gyro[2].tolist() == [3e-6, 2e-6, 3e-6]
+
+
+def test_a_header_may_be_a_remark(tmp_path):
+    assert len(read_imu(csv(tmp_path, [f"# {HEADER}", *ROWS]))) == len(ROWS)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "npz", "mat", "imu", "txt", "bin", "bag", "mcap", "db3"])
+def test_an_empty_file(suffix, tmp_path):
+    path = tmp_path / f"log.{suffix}"
+    path.touch()
+    says(path, "empty")
+
+
+def contents(tmp_path):
+    record = ImuRecord(np.arange(1, 4) / 100, np.ones((3, 3)), np.ones((3, 3)))
+    write_imu(record, tmp_path / "a.parquet")
+    write_imu(record, tmp_path / "a.npz")
+    with zipfile.ZipFile(tmp_path / "book", "w") as archive:
+        archive.writestr("[Content_Types].xml", "<x/>")
+    return {
+        "csv": "\n".join([HEADER, *ROWS, ""]).encode(),
+        "parquet": (tmp_path / "a.parquet").read_bytes(),
+        "npz": (tmp_path / "a.npz").read_bytes(),
+        "gzip": gzip.compress(b"x" * 100),
+        "utf-16": HEADER.encode("utf-16"),
+        "xlsx": (tmp_path / "book").read_bytes(),
+        "doubles": np.arange(1, 57.0).tobytes(),
+        "mat": b"MATLAB 5.0 MAT-file" + bytes(200),
+        "rosbag": b"#ROSBAG V2.0\n" + bytes(200),
+        "random": np.random.default_rng(1).bytes(56 * 20),
+    }
+
+
+TRUE = {("csv", "csv"), ("parquet", "parquet"), ("npz", "npz"), ("doubles", "bin")}
+KINDS = ["csv", "parquet", "npz", "gzip", "utf-16", "xlsx", "doubles", "mat", "rosbag", "random"]
+SUFFIXES = ["csv", "parquet", "npz", "mat", "imu", "txt", "bin", "bag", "mcap", "db3"]
+
+
+@pytest.mark.parametrize(
+    ("content", "suffix"), [(kind, suffix) for kind in KINDS for suffix in SUFFIXES if (kind, suffix) not in TRUE]
+)
+def test_a_file_that_is_not_what_its_suffix_says(content, suffix, tmp_path):
+    path = tmp_path / f"log.{suffix}"
+    path.write_bytes(contents(tmp_path)[content])
+    says(path, error=(DataError, UsageError))
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "npz"])
+@pytest.mark.parametrize("part", [0.01, 0.3, 0.7, 0.99])
+def test_a_file_that_is_cut_short(suffix, part, tmp_path):
+    path = tmp_path / f"log.{suffix}"
+    write_imu(ImuRecord(np.arange(1, 400) / 100, np.ones((399, 3)), np.ones((399, 3))), path)
+    path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
+    says(path, "cut short")
+
+
+def test_damage_inside_an_archive(tmp_path):
+    path = tmp_path / "log.npz"
+    write_imu(ImuRecord(np.arange(1, 400) / 100, np.ones((399, 3)), np.ones((399, 3))), path)
+    data = bytearray(path.read_bytes())
+    data[900:1000] = bytes(100)
+    path.write_bytes(data)
+    says(path, "damaged")
+
+
+def test_parquet_with_other_types_and_gaps(tmp_path):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    names = HEADER.split(",")
+    columns = {name: pa.array([1.0, 2.0, 3.0]) for name in names}
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table({**columns, "gyro_y": pa.array([1.0, None, 3.0])}), path)
+    says(path, "row 2", "gyro_y", "nan")
+    pq.write_table(pa.table({**columns, "gyro_y": pa.array(["a", "b", "c"])}), path)
+    says(path, "gyro_y", "string", "numbers")
+    pq.write_table(pa.table({**columns, "time": pa.array([1, 2, 3], pa.timestamp("ns"))}), path)
+    says(path, "time", "timestamp", "seconds")
+    pq.write_table(pa.table({**columns, "time": pa.array([1, 2, 3], pa.int64()), "x": pa.array(["a", "b", "c"])}), path)
+    assert read_imu(path).time.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_paths_and_formats(tmp_path):
+    says(tmp_path / "none.csv", "No such file", error=UsageError)
+    (tmp_path / "folder").mkdir()
+    says(tmp_path / "folder", "folder", "metadata.yaml", error=UsageError)
+    says(csv(tmp_path, [HEADER, *ROWS], "log.dat"), ".dat", "--format", "csv", error=UsageError)
+    assert len(read_imu(tmp_path / "log.dat", format="csv")) == len(ROWS)
+    with pytest.raises(UsageError, match="choose one of csv"):
+        read_imu(tmp_path / "log.dat", format="text")
+
+
+def test_a_known_content_needs_no_suffix(tmp_path):
+    write_imu(ImuRecord(np.arange(1, 4) / 100, np.ones((3, 3)), np.ones((3, 3))), tmp_path / "a.parquet")
+    assert len(read_imu((tmp_path / "a.parquet").rename(tmp_path / "a.dat"))) == 3

@@ -1,0 +1,42 @@
+"""Arrow's columns and ours, by their memory: Arrow's own conversions import pandas, which takes longer than a log."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.records import COLUMNS, ImuRecord
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Array = NDArray[np.float64]
+
+
+def to_numpy(columns: list[pa.ChunkedArray]) -> Array:
+    """Columns of float64 side by side, (N, len(columns)); what is absent is NaN."""
+    values = np.empty((len(columns[0]), len(columns)))
+    for i, column in enumerate(columns):
+        start = 0
+        for chunk in column.chunks:
+            stop = start + len(chunk)
+            buffer = np.frombuffer(chunk.buffers()[1], dtype=np.float64)
+            values[start:stop, i] = buffer[chunk.offset : chunk.offset + len(chunk)]
+            if chunk.null_count:
+                values[start:stop, i][[not valid for valid in chunk.is_valid().to_pylist()]] = np.nan
+            start = stop
+    return values
+
+
+def table_of(record: ImuRecord) -> pa.Table:
+    """A record with the documented columns."""
+    import pyarrow as pa
+
+    values = np.column_stack([record.time, record.gyro, record.accel])
+    arrays = [
+        pa.Array.from_buffers(pa.float64(), len(values), [None, pa.py_buffer(np.ascontiguousarray(column))])
+        for column in values.T
+    ]
+    return pa.Table.from_arrays(arrays, names=["time", *COLUMNS[record.kind]])
