@@ -1,10 +1,14 @@
 """Every mistake in a log is one message: the file, the line, the column, what was found, what to do."""
 
+import contextlib
 import gzip
 import zipfile
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
 
 from truenorth.errors import DataError, UsageError
 from truenorth.formats import read_imu, write_imu
@@ -145,11 +149,16 @@ def test_a_file_that_is_not_what_its_suffix_says(content, suffix, tmp_path):
     says(path, error=(DataError, UsageError))
 
 
-@pytest.mark.parametrize("suffix", ["parquet", "npz"])
+@pytest.mark.parametrize("suffix", ["parquet", "npz", "mat", "mat compressed"])
 @pytest.mark.parametrize("part", [0.01, 0.3, 0.7, 0.99])
 def test_a_file_that_is_cut_short(suffix, part, tmp_path):
-    path = tmp_path / f"log.{suffix}"
-    write_imu(ImuRecord(np.arange(1, 400) / 100, np.ones((399, 3)), np.ones((399, 3))), path)
+    path = tmp_path / f"log.{suffix.split()[0]}"
+    record = ImuRecord(np.arange(1, 400) / 100, *np.random.default_rng(0).normal(size=(2, 399, 3)))
+    if path.suffix == ".mat":
+        arrays = {"time": record.time, "gyro": record.gyro, "accel": record.accel}
+        savemat(path, arrays, do_compression=suffix != "mat")
+    else:
+        write_imu(record, path)
     path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
     says(path, "cut short")
 
@@ -191,3 +200,26 @@ def test_paths_and_formats(tmp_path):
 def test_a_known_content_needs_no_suffix(tmp_path):
     write_imu(ImuRecord(np.arange(1, 4) / 100, np.ones((3, 3)), np.ones((3, 3))), tmp_path / "a.parquet")
     assert len(read_imu((tmp_path / "a.parquet").rename(tmp_path / "a.dat"))) == 3
+
+
+@pytest.mark.parametrize("suffix", ["csv", "txt", "imu", "bin", "npz", "parquet"])
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_whatever_is_damaged_is_a_record_or_an_error_of_ours(suffix, data, tmp_path_factory):
+    """MAT files are left out: SciPy's reader of them crashes the interpreter on some damaged ones."""
+    folder = tmp_path_factory.mktemp("fuzz")
+    whole = {
+        "csv": ("\n".join([HEADER, *ROWS]) + "\n").encode(),
+        "txt": ("\n".join(row.replace(",", " ") for row in ROWS) + "\n").encode(),
+        "imu": ("\n".join(" ".join([*row.split(",")[1:], row.split(",")[0]]) for row in ROWS) + "\n").encode(),
+        "bin": np.column_stack([np.arange(1.0, 9.0), np.ones((8, 6))]).tobytes(),
+    } | {name: content for name, content in contents(folder).items() if name in ("npz", "parquet")}
+    content = bytearray(whole[suffix])
+    for _ in range(data.draw(st.integers(1, 3))):
+        place = data.draw(st.integers(0, len(content)))
+        gone = data.draw(st.integers(0, 8))
+        content[place : place + gone] = data.draw(st.binary(max_size=8) | st.sampled_from([b"\n", b",", b"-", b"e9"]))
+    path = folder / f"log.{suffix}"
+    path.write_bytes(content)
+    with contextlib.suppress(DataError, UsageError):
+        assert np.isfinite(read_imu(path).gyro).all()

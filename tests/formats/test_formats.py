@@ -8,7 +8,6 @@ from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
 
 FRD_TO_RFU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-FLU_TO_RFU = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @pytest.fixture(params=["rates", "increments"])
@@ -108,51 +107,6 @@ def test_mat_and_npz_by_variable(record, tmp_path):
     np.savez(archive, **{gyro: record.gyro[:, :2], accel: record.accel, "time": record.time})
     with pytest.raises(DataError, match=r"\(200, 2\)"):
         read_imu(archive)
-
-
-@pytest.mark.parametrize("version", ["ros1", "ros2", "mcap"])
-def test_ros_bags(tmp_path, version):
-    pytest.importorskip("rosbags")
-    from rosbags.rosbag1 import Writer as Writer1
-    from rosbags.rosbag2 import StoragePlugin
-    from rosbags.rosbag2 import Writer as Writer2
-    from rosbags.typesys import Stores, get_typestore
-
-    rng = np.random.default_rng(4)
-    w, f = rng.standard_normal((2, 30, 3))
-    stamps = 1_700_000_000_000_000_000 + np.arange(30) * 5_000_000
-    first = version == "ros1"
-    store = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
-    types = store.types
-    Vector, Quaternion = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
-    Time, Header, Imu = (
-        types["builtin_interfaces/msg/Time"],
-        types["std_msgs/msg/Header"],
-        types["sensor_msgs/msg/Imu"],
-    )
-    nine = np.zeros(9)
-    path = tmp_path / ("log.bag" if first else "bag")
-    plugin = StoragePlugin.MCAP if version == "mcap" else StoragePlugin.SQLITE3
-    writer = Writer1(path) if first else Writer2(path, version=9, storage_plugin=plugin)
-    with writer:
-        connection = writer.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=store)
-        for stamp, rate, force in zip(stamps.tolist(), w, f, strict=True):
-            sequence = (0,) if first else ()
-            header = Header(*sequence, Time(stamp // 10**9, stamp % 10**9), "imu")
-            message = Imu(header, Quaternion(0, 0, 0, 1), nine, Vector(*rate), nine, Vector(*force), nine)
-            raw = (
-                store.serialize_ros1(message, Imu.__msgtype__)
-                if first
-                else store.serialize_cdr(message, Imu.__msgtype__)
-            )
-            writer.write(connection, stamp, raw)
-    read = read_imu(path)
-    assert read.kind == "rates"
-    np.testing.assert_allclose(read.time, np.arange(30) * 0.005, atol=1e-12)
-    np.testing.assert_allclose(read.gyro, w @ FLU_TO_RFU.T, atol=1e-15)
-    np.testing.assert_allclose(read.accel, f @ FLU_TO_RFU.T, atol=1e-15)
-    with pytest.raises(UsageError, match="/other"):
-        read_imu(path, topic="/other")
 
 
 @pytest.mark.parametrize("suffix", ["parquet", "npz", "mat", "bag"])

@@ -114,6 +114,22 @@ def fit_task_noise(
     return fit_noise(build, white_variance(mean_velocity(integrals, C_n0_i, lat, alt)), usual)
 
 
+def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogCheck:
+    """The filter's check, with those rates taken from the means that tell them better.
+
+    A filter that knows only that the base goes nowhere sees the vertical gyro bias badly; on a base that does not turn
+    either, the mean rate tells it at once. (On a swaying base coning gives the mean rate an offset, and it is not asked.)
+    """
+    if motion.overall not in ("still", "disturbed"):
+        return filtered
+    better = mean.rate_noise < filtered.rate_noise
+    return replace(
+        filtered,
+        rate_residual=np.where(better, mean.rate_residual, filtered.rate_residual),
+        rate_noise=np.where(better, mean.rate_noise, filtered.rate_noise),
+    )
+
+
 def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
     """Whether the mean rate of a base that does not turn is so far from the earth's that it holds no heading."""
     if motion.overall not in ("still", "disturbed"):

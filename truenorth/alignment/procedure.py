@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.answer import assemble, at_epoch, make_history, pays_until, without_heading
 from truenorth.alignment.bias import spec_variance, true_bias
-from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind
+from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import fine_align
 from truenorth.alignment.inference import allan_noise, infer_spec, noise_of, usual_noise
@@ -184,7 +184,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
     coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt)
-    check, noise = check_filter(task, coarse.C_n0_i, usual_noise())
+    filtered, noise = check_filter(task, coarse.C_n0_i, usual_noise())
+    check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     used, where = _specification(spec, check, noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
     if method != "kalman":

@@ -15,6 +15,7 @@ from truenorth.earth import EARTH_RATE
 Array = NDArray[np.float64]
 
 OUTLIER = 5.0  # sigmas by which a checkable component may miss its specification
+NEAR_POLE = 0.1  # cosine of the latitude (84 deg) from which the place, not the gyro, is what hides north
 LEVEL_LIMIT = np.radians(3.0)  # a tilt less certain than this is no level
 
 
@@ -69,7 +70,7 @@ def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, 
     horizontal = EARTH_RATE * np.cos(answer.position.lat)
     bias = float(np.max(answer.gyro_bias_prior))
     if floor > limit:
-        if bias / EARTH_RATE < limit:
+        if bias / EARTH_RATE < limit and np.cos(answer.position.lat) < NEAR_POLE:
             return "not_observable", (
                 f"at latitude {np.degrees(answer.position.lat):.3f} deg the earth turns by {horizontal / DEG_PER_HOUR:.3f} deg/h "
                 f"about the horizontal; gyro biases of {bias / DEG_PER_HOUR:.3g} deg/h hide true north there",

@@ -26,7 +26,7 @@ LABELS = (
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
-    """Read a bag: a ROS 1 ``.bag`` file, the folder of a ROS 2 bag or the file in it.
+    """Read a bag: a ROS 1 ``.bag`` file, the folder of a ROS 2 bag or one of the files in it (sqlite3, MCAP).
 
     Raises
     ------
@@ -40,9 +40,8 @@ def read(path: Path, layout: Layout) -> ImuRecord:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise UsageError("reading ROS bags needs the rosbags library: pip install 'truenorth[ros]'") from None
-    bag = _bag(path)
     try:
-        with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             topic = _topic(reader, layout.topic, path.name)
             chosen = [c for c in reader.connections if c.topic == topic and c.msgtype == IMU]
             rows = [_row(reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages(connections=chosen)]
@@ -59,17 +58,6 @@ def read(path: Path, layout: Layout) -> ImuRecord:
         time, values[:, :3], values[:, 3:], layout.kind or "rates", layout, path.name,
         axes="FLU", labels=LABELS, place=lambda row: f"message {row + 1} of {topic}",
     )  # fmt: skip
-
-
-def _bag(path: Path) -> Path:
-    """What the library wants: the file of ROS 1, the folder of ROS 2."""
-    if path.is_dir() or path.suffix == ".bag":
-        return path
-    if (path.parent / "metadata.yaml").is_file():
-        return path.parent
-    raise UsageError(
-        f"{path}: the file of a ROS 2 bag, but {path.parent} holds no metadata.yaml; `ros2 bag reindex` on that folder writes it"
-    )
 
 
 def _topic(reader: AnyReader, wanted: str | None, source: str) -> str:
