@@ -176,6 +176,7 @@ def test_wrong_axes_are_found(capsys, monkeypatch, log, tmp_path):
         (["--lat", "34", "--axes", "FFD"], ["FFD"]),
         (["--lat", "34", "--axes", "RFD"], ["left-handed"]),
         (["--lat", "34", "--units", "deg/s,deg"], ["deg"]),
+        (["--lat", "34", "--kind", "counts"], ["counts", "increments"]),
         (["--lat", "34", "--at", "500"], ["500", "0.05"]),
         (["--lat", "34", "--heading-limit", "-1"], ["heading limit"]),
     ],

@@ -5,6 +5,7 @@ Each command lives in a module of its own and imports its work when it runs, so 
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 
@@ -14,6 +15,8 @@ from truenorth import __version__
 from truenorth.cli.align import align
 from truenorth.cli.inspect import inspect
 from truenorth.errors import TruenorthError
+
+INTERRUPTED = 130
 
 app = typer.Typer(
     name="truenorth",
@@ -45,11 +48,15 @@ def main() -> None:
     """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still told
+            stream.reconfigure(errors="replace")
     try:
         app()
     except TruenorthError as error:
         print(f"truenorth: {error}", file=sys.stderr)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        print("truenorth: interrupted; nothing half-written is left", file=sys.stderr)
-        sys.exit(130)
+    except SystemExit as stop:
+        if stop.code == INTERRUPTED:  # typer has turned the interrupt into this
+            print("truenorth: interrupted; nothing half-written is left", file=sys.stderr)
+        raise

@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from truenorth.cli.reading import Axes, Columns, Format, From, Log, Rate, To, Units, read_log
+from truenorth.cli.console import make_console
+from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
     from truenorth.records import ImuRecord
 
+# The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
+\b
 Examples:
-
   truenorth align log.csv --lat 34.246 --lon 108.910 --alt 380
-
-  truenorth align log.csv --lat 34.246 --lon 108.910 --imu navigation -o result
-
-  truenorth align bag/ --lat 48.1 --lon 11.6 --axes FLU --from 10 --to 310 --json
-
-  truenorth align old.csv --lat -33.9 --lon 151.2 --units deg/s,g --rate 100 --imu my_imu.yaml
+  truenorth align log.csv --lat 34.246 --imu navigation -o result
+  truenorth align bag/ --lat 48.1 --axes FLU --from 10 --to 310 --json
+  truenorth align old.csv --lat -33.9 --units deg/s,g --rate 100
+  truenorth align log.csv --lat 34.246 --imu my_imu.yaml --method oba
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
@@ -50,6 +50,8 @@ def align(
     rate: Rate = None,
     columns: Columns = None,
     format: Format = None,
+    kind: Kind = None,
+    topic: Topic = None,
     start: From = None,
     stop: To = None,
     at: Annotated[
@@ -85,7 +87,16 @@ def align(
     with _progress(quiet=as_json) as tell:
         tell(f"reading {log.name}")
         record = read_log(
-            log, axes=axes, units=units, rate=rate, columns=columns, format=format, start=start, stop=stop
+            log,
+            axes=axes,
+            units=units,
+            rate=rate,
+            columns=columns,
+            format=format,
+            kind=kind,
+            topic=topic,
+            start=start,
+            stop=stop,
         )
         _refuse_implausible(record, position.lat, any_attitude, units_given=units is not None)
         from truenorth.alignment import align as align_record
@@ -146,24 +157,25 @@ def _progress(quiet: bool) -> Any:
 
     @contextmanager
     def spinner() -> Any:
-        from rich.console import Console
+        from rich.text import Text
 
-        with Console(stderr=True).status("starting") as status:
-            yield status.update
+        with make_console(stderr=True).status("starting") as status:
+            yield lambda stage: status.update(Text(stage))
 
     return spinner()
 
 
 def _print(result: Alignment, paths: list[Path]) -> None:
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    console = Console(highlight=False)
+    console = make_console()
     s = result.summary()
     colour = {"aligned": "green", "level_only": "yellow"}.get(result.status, "red")
-    console.print(f"[bold {colour}]{result.status}[/]  {result.source}, {result.duration:.1f} s", soft_wrap=True)
+    status = Text(result.status, style=f"bold {colour}")
+    console.print(status, f" {result.source}, {result.duration:.1f} s", soft_wrap=True)
     for reason in result.reasons:
-        console.print(f"  {reason}", markup=False, soft_wrap=True)
+        console.print(f"  {reason}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
     for title in ("", "deg", "one sigma, deg", "of it bias, deg"):
         table.add_column(title, justify="right" if title else "left")

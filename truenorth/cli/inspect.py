@@ -8,15 +8,17 @@ from typing import Annotated
 
 import typer
 
-from truenorth.cli.reading import Axes, Columns, Format, From, Log, Rate, To, Units, read_log
+from truenorth.cli.console import make_console
+from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
 
+FIGURES = (".png", ".svg", ".pdf")
+
+# The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
+\b
 Examples:
-
   truenorth inspect log.csv
-
   truenorth inspect log.csv --lat 34.2 --plot log.png
-
   truenorth inspect bag/ --axes FLU --json
 """
 
@@ -31,35 +33,50 @@ def inspect(
     rate: Rate = None,
     columns: Columns = None,
     format: Format = None,
+    kind: Kind = None,
+    topic: Topic = None,
     start: From = None,
     stop: To = None,
     plot: Annotated[Path | None, typer.Option(help="Write a figure (.png, .svg, .pdf).", show_default=False)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Look at a log: rate, gaps, frozen or saturated samples, likely unit and axes mistakes, motion, noise."""
-    import math
-
     from truenorth.atomic import atomic_path, writable_folder
+    from truenorth.errors import UsageError
+    from truenorth.position import Position
+
+    place = None if lat is None else Position.from_degrees(lat, 0.0, 0.0)
+    if plot is not None:
+        if plot.suffix.lower() not in FIGURES:
+            raise UsageError(f"--plot {plot}: cannot draw into this kind of file; use {', '.join(FIGURES)}")
+        writable_folder(plot.parent)
     from truenorth.quality import inspect as inspect_record
 
-    if plot is not None:
-        writable_folder(plot.parent)
-    record = read_log(log, axes=axes, units=units, rate=rate, columns=columns, format=format, start=start, stop=stop)
-    found = inspect_record(record, None if lat is None else math.radians(lat))
+    record = read_log(
+        log,
+        axes=axes,
+        units=units,
+        rate=rate,
+        columns=columns,
+        format=format,
+        kind=kind,
+        topic=topic,
+        start=start,
+        stop=stop,
+    )
+    found = inspect_record(record, None if place is None else place.lat)
     if plot is not None:
         with atomic_path(plot) as path:
             found.plot().savefig(path)
     if as_json:
         print(json.dumps(found.to_dict(), allow_nan=False))
         return
-    from rich.console import Console
-
-    console = Console(highlight=False)
+    console = make_console()
     console.print(found.table())
     colours = {"error": "red", "warning": "yellow", "note": "cyan"}
     for finding in found.findings:
-        console.print(f"[{colours[finding.severity]}]{finding.severity}[/] ", end="")
-        console.print(finding.message, markup=False, soft_wrap=True)
+        console.print(finding.severity, end=" ", style=colours[finding.severity])
+        console.print(finding.message, soft_wrap=True)
     if not found.findings:
         console.print("nothing wrong was found")
     if plot is not None:

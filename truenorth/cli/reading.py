@@ -36,6 +36,11 @@ Columns = Annotated[
 Format = Annotated[
     str | None, typer.Option("--format", help="Format, where the suffix does not tell.", show_default=False)
 ]
+Kind = Annotated[
+    str | None,
+    typer.Option(help="What a row is, where the names do not tell: rates or increments.", show_default=False),
+]
+Topic = Annotated[str | None, typer.Option(help="Topic of a ROS bag with several IMUs.", show_default=False)]
 From = Annotated[float | None, typer.Option("--from", help="Use the log from this time on, s.", show_default=False)]
 To = Annotated[float | None, typer.Option("--to", help="Use the log up to this time, s.", show_default=False)]
 
@@ -48,20 +53,38 @@ def read_log(
     rate: float | None,
     columns: str | None,
     format: str | None,
+    kind: str | None,
+    topic: str | None,
     start: float | None,
     stop: float | None,
 ) -> ImuRecord:
     """Read a log as the options say, and cut the window out of it."""
+    import math
+
     from truenorth.errors import UsageError
     from truenorth.formats import read_imu
 
+    for option, value in (("--from", start), ("--to", stop)):
+        if value is not None and not math.isfinite(value):
+            raise UsageError(f"{option} {value}: expected seconds on the log's clock")
+    if start is not None and stop is not None and start >= stop:
+        raise UsageError(f"--from {start:g} --to {stop:g}: the window ends before it begins")
     names: dict[str, str] | None = None
     if columns is not None:
         pairs = [pair.partition("=") for pair in columns.split(",")]
         if any(not equals or not ours.strip() or not theirs.strip() for ours, equals, theirs in pairs):
             raise UsageError(f"--columns {columns!r}: expected pairs such as time=t,gyro_x=wx")
         names = {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
-    record = read_imu(log, format=format, units=units, axes=axes, rate=rate, columns=names)
+    record = read_imu(
+        log,
+        format=format,
+        units=units,
+        axes=axes,
+        rate=rate,
+        columns=names,
+        kind=kind,  # type: ignore[arg-type]  # checked there, with the choices in the message
+        topic=topic,
+    )
     if start is not None or stop is not None:
         record = record.between(start, stop)
     return record
