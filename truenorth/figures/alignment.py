@@ -1,67 +1,121 @@
-"""The figure of an alignment: convergence of the three angles, their sigmas, innovations."""
+"""The figure of an alignment: convergence of the angles, their sigmas, biases, innovations and NIS."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truenorth.figures.style import COLOURS, REFERENCE, band, new_figure, style, trace
+from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
+from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, band, new_figure, style, trace
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from truenorth.alignment.result import Alignment
+    from truenorth.alignment.result import Alignment, History
 
-ANGLES = ("heading", "pitch", "roll")
-SETTLED_FROM = 0.25
+Array = NDArray[np.float64]
 
 
 def plot_alignment(result: Alignment) -> Figure:
-    """Draw convergence with one-sigma bands, sigmas with their floors, and innovations with two-sigma bounds.
+    """Draw convergence with one-sigma bands and floors, sigmas, biases, innovations over their sigmas, and NIS.
+
+    Parameters
+    ----------
+    result : Alignment
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Its `savefig` works without a display.
 
     Raises
     ------
     ValueError
         The method kept no history.
     """
-    from truenorth.alignment.result import euler_sigma
+    from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G
 
     h = result.history
     if h is None:
         raise ValueError(f"method {result.method!r} gives one answer and keeps no history to draw")
-    t = h.time
+    angles = courses(result)
     with style():
-        figure = new_figure(11.0, 7.5)
-        axes = figure.subplots(3, 2, sharex=True)
-        late = slice(int(SETTLED_FROM * len(t)), None)
-        floor = euler_sigma(h.C_nb, h.phi_floor)
-        values, sigmas = (np.degrees(x) for x in result.convergence)
-        for i, angle in enumerate(ANGLES):
-            value, sigma = values[:, i], sigmas[:, i]
-            ax = axes[i, 0]
-            band(ax, t, value, sigma, color=COLOURS[i])
-            low, high = np.min((value - sigma)[late]), np.max((value + sigma)[late])
-            margin = 0.15 * max(high - low, 1e-9)
-            ax.set_ylim(low - margin, high + margin)
-            ax.set_ylabel(f"{angle}, deg")
-            trace(axes[0, 1], t, 60 * np.degrees(h.euler_sigma[:, i]), color=COLOURS[i], label=angle)
-            trace(axes[0, 1], t, 60 * np.degrees(floor[:, i]), color=COLOURS[i], linestyle=":")
-        axes[0, 0].set_title("Attitude at the answer's epoch, as told at each time")
-        axes[0, 1].set_title("One sigma; dotted: what waiting does not improve")
-        axes[0, 1].set_yscale("log")
-        axes[0, 1].set_ylabel("arcmin")
-        axes[0, 1].legend(ncols=3)
-        for i, axis in enumerate(("east", "north")):
-            ax = axes[i + 1, 1]
-            bound = 2e3 * h.innovation_sigma[:, i]
-            trace(ax, t, 1e3 * h.innovation[:, i], color=COLOURS[i])
-            for sign in (1, -1):
-                trace(ax, t, sign * bound, color=REFERENCE, linestyle=":")
-            ax.set_ylim(-1.6 * np.max(bound[late]), 1.6 * np.max(bound[late]))
-            ax.set_ylabel(f"{axis}, mm/s")
-        axes[1, 1].set_title("Innovations with two-sigma bounds")
-        for ax in axes[2]:
+        figure = new_figure(12.0, 10.5)
+        columns = figure.add_gridspec(1, 2)
+        left, right = columns[0].subgridspec(len(angles) + 1, 1), columns[1].subgridspec(4, 1)
+        convergence = [figure.add_subplot(left[i]) for i in range(len(angles))]
+        nis = figure.add_subplot(left[len(angles)])
+        sigmas, gyro, accel, innovations = (figure.add_subplot(right[i]) for i in range(4))
+
+        for i, (ax, course) in enumerate(zip(convergence, angles)):
+            _converge(ax, h.time, course, COLOURS[i])
+        convergence[0].set_title("Attitude as told at each time, ±1σ (dark: floor)")
+        _sigmas(sigmas, h.time, angles)
+        _biases(gyro, h.time, h.gyro_bias / DEG_PER_HOUR, h.gyro_bias_sigma / DEG_PER_HOUR)
+        gyro.set_title("Gyro bias, ±1σ")
+        gyro.set_ylabel("deg/h")
+        gyro.legend(ncols=3, loc="upper right")
+        _biases(accel, h.time, h.accel_bias / MICRO_G, h.accel_bias_sigma / MICRO_G)
+        accel.set_title("Accelerometer bias, ±1σ")
+        accel.set_ylabel("µg")
+        _innovations(innovations, h)
+        _nis(nis, h)
+        for ax in figure.axes:
+            ax.set_xlim(h.time[0], h.time[-1])
+            ax.tick_params(labelbottom=ax in (nis, innovations))
+        for ax in (nis, innovations):
             ax.set_xlabel("time, s")
         figure.suptitle(f"{result.source}: {result.status}, method {result.method}", x=0.01, ha="left")
     return figure
+
+
+def _converge(ax: Axes, t: Array, course: Course, colour: str) -> None:
+    value, sigma, floor = (np.degrees(x) for x in (course.value, course.sigma, course.floor))
+    band(ax, t, value, sigma, color=colour)
+    band(ax, t, value, floor, color=colour)
+    ax.set_ylim(*settled_limits(value, sigma))
+    ax.set_ylabel(f"{course.name}, deg")
+
+
+def _sigmas(ax: Axes, t: Array, angles: list[Course]) -> None:
+    for colour, course in zip(COLOURS, angles):
+        trace(ax, t, 60 * np.degrees(course.sigma), color=colour, label=course.name)
+        trace(ax, t, 60 * np.degrees(course.floor), color=colour, linestyle=":")
+    ax.set_yscale("log")
+    ax.set_ylim(bottom=0.5 * 60 * np.degrees(min(course.floor[-1] for course in angles)))
+    ax.set_title("One sigma (dotted: floor, waiting does not help)")
+    ax.set_ylabel("arcmin")
+    ax.legend(ncols=3, loc="upper right")
+
+
+def _biases(ax: Axes, t: Array, bias: Array, sigma: Array) -> None:
+    for axis, colour in enumerate(COLOURS[:3]):
+        band(ax, t, bias[:, axis], sigma[:, axis], color=colour)
+        ax.lines[-1].set_label(AXES_NAMES[axis])
+    limits = [settled_limits(bias[:, axis], sigma[:, axis]) for axis in range(3)]
+    ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+
+
+def _innovations(ax: Axes, h: History) -> None:
+    for axis, name in enumerate(("east", "north", "up")):
+        ratio = h.innovation[:, axis] / h.innovation_sigma[:, axis]
+        trace(ax, h.time, ratio, color=COLOURS[axis], label=name, linewidth=0.8)
+    for level, dashes in ((2.0, ":"), (3.0, "--")):
+        for sign in (1.0, -1.0):
+            ax.axhline(sign * level, color=REFERENCE, linestyle=dashes, linewidth=1.0)
+    ax.set_ylim(-5.0, 5.0)
+    ax.set_title("Velocity innovations over their σ (lines: 2σ, 3σ)")
+    ax.set_ylabel("sigmas")
+    ax.legend(ncols=3, loc="upper right")
+
+
+def _nis(ax: Axes, h: History) -> None:
+    t, mean, low, high = averaged_nis(h)
+    trace(ax, t, mean, color=COLOURS[0], marker=".", markersize=3.0)
+    ax.axhspan(low, high, color=REFERENCE, alpha=0.12, linewidth=0.0)
+    ax.set_ylim(0.0, max(1.3 * high, float(np.quantile(mean, 0.98)) if mean.size else 0.0))
+    ax.set_title(f"NIS, mean of {NIS_BLOCK} epochs (grey: 95 % band)")
+    ax.set_ylabel("NIS")
