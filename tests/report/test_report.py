@@ -45,7 +45,7 @@ def test_files(aligned, tmp_path):
 def test_the_page_says_what_the_result_says(aligned, tmp_path):
     path = write_report(aligned, tmp_path / "report.html")
     page = path.read_text()
-    assert path.stat().st_size < 6.5e6
+    assert path.stat().st_size < 5.5e6
     assert f"{np.degrees(aligned.heading):.4f}°" in page
     assert "Aligned" in page
     for reason in aligned.reasons:
@@ -54,6 +54,68 @@ def test_the_page_says_what_the_result_says(aligned, tmp_path):
     assert "a <log>" not in page
     body = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert not re.search(r"(src|href)\s*=\s*[\"']https?:", body)
+
+
+def test_the_page_asks_nothing_of_the_network(aligned, tmp_path):
+    """Outside the scripts no address at all, no link, import or frame; plotly's own text is inside."""
+    page = write_report(aligned, tmp_path / "report.html").read_text()
+    outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert not re.search(r"https?:|<link|<iframe|@import|url\(", outside)
+    assert not re.search(r"<script[^>]+src", page)
+    assert "Plotly.newPlot" in page
+
+
+def test_the_page_shows_all_that_led_to_the_answer(aligned, tmp_path):
+    page = write_report(aligned, tmp_path / "report.html").read_text()
+    for title in ("Convergence", "How the uncertainty falls", "Gyro bias", "Accelerometer bias", "Innovations"):
+        assert f"<h2>{title}</h2>" in page
+    for words in ("Floor", "dashed three sigma", "95 % band", "Angle random walk", "Velocity random walk", "20 Hz"):
+        assert words in page
+    assert "More time" in page
+    assert page.index('class="badge"') < page.index("<h2>Attitude") < page.index("<h2>Convergence")
+    assert page.index("<h2>Normalised") < page.index("<h2>The log's health")
+
+
+def test_near_the_vertical_the_combination_comes_first(tmp_path):
+    log = simulate(rest(PLACE, 1.0, np.radians(89.0)), rate=20.0, duration=120.0, imu=imu_spec("navigation"), seed=1)
+    result = align(log.record, PLACE, "navigation")
+    page = write_report(result, tmp_path / "report.html").read_text()
+    assert page.index("Heading minus roll") < page.index("<td>Heading</td>")
+    assert f"{np.degrees(result.azimuth[1]):.4f}°" in page
+    assert "belong together" in page
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(1000.0, "1000"), (30001.0, "30000"), (3.57e-5, "0.0000357"), (-12.19, "-12.2"), (0.0, "0")]
+)
+def test_figures_have_no_exponent(value, shown):
+    from truenorth.report.page import _short
+
+    assert _short(value) == shown
+
+
+def test_a_result_without_history_leaves_none_of_an_earlier_one(aligned, levelled, tmp_path):
+    """Else the folder would hold the summary of one log beside the history of another."""
+    save_alignment(aligned, tmp_path)
+    assert (tmp_path / "history.parquet").exists()
+    assert [p.name for p in save_alignment(levelled, tmp_path)] == ["summary.json", "report.html"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report.html", "summary.json"]
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
+def test_an_interrupt_leaves_the_earlier_files_together(aligned, levelled, tmp_path, monkeypatch, stop):
+    import truenorth.report.page
+
+    save_alignment(levelled, tmp_path)
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+
+    def interrupted(result):
+        raise stop
+
+    monkeypatch.setattr(truenorth.report.page, "alignment_page", interrupted)
+    with pytest.raises(stop):
+        save_alignment(aligned, tmp_path)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
 
 
 def test_a_refused_heading_is_refused_on_the_page(levelled, tmp_path):

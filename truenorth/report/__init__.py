@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +36,9 @@ def write_report(result: Alignment, path: str | PathLike[str]) -> Path:
 def save_alignment(result: Alignment, folder: str | PathLike[str]) -> list[Path]:
     """Write summary.json, history.parquet (where there is a history) and report.html; each whole or not at all.
 
+    All are written before the first takes its name, so that an interrupt leaves the files of an earlier result
+    together; its history.parquet is removed where this result has none.
+
     Returns
     -------
     list of Path
@@ -45,13 +49,17 @@ def save_alignment(result: Alignment, folder: str | PathLike[str]) -> list[Path]
     UsageError
         The folder cannot be written to.
     """
+    from truenorth.report.page import alignment_page
+
     target = writable_folder(folder)
-    written = [target / "summary.json"]
-    with atomic_path(written[0]) as temporary:
-        temporary.write_text(json.dumps(result.summary(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    if result.history is not None:
-        written.append(target / "history.parquet")
-        with atomic_path(written[-1]) as temporary:
-            result.to_frame().to_parquet(temporary)
-    written.append(write_report(result, target / "report.html"))
-    return written
+    summary, history, report = (target / name for name in ("summary.json", "history.parquet", "report.html"))
+    with ExitStack() as files:
+        text = json.dumps(result.summary(), indent=2, allow_nan=False) + "\n"
+        files.enter_context(atomic_path(summary)).write_text(text, encoding="utf-8")
+        if result.history is not None:
+            result.to_frame().to_parquet(files.enter_context(atomic_path(history)))
+        files.enter_context(atomic_path(report)).write_text(alignment_page(result), encoding="utf-8")
+    if result.history is None:
+        history.unlink(missing_ok=True)
+        return [summary, report]
+    return [summary, history, report]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G
+from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, UNIFORM_SIGMA
 from truenorth.report.charts import charts
-from truenorth.units import format as quantity
+from truenorth.units import parse_unit
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -20,6 +20,7 @@ VERDICTS = {
     "not_observable": ("bad", "Heading not observable"),
     "inconsistent": ("bad", "The data contradict a base that stays"),
 }
+CHART_OPTIONS = {"displaylogo": False, "responsive": True}
 MOTION_COLOURS = {
     "still": "#cfe8cf",
     "disturbed": "#f6e3b4",
@@ -39,7 +40,7 @@ def alignment_page(result: Alignment) -> str:
         loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     shown = [
-        (title, caption, figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False}))
+        (title, caption, figure.to_html(full_html=False, include_plotlyjs=False, config=CHART_OPTIONS))
         for title, caption, figure in charts(result)
     ]
     from truenorth import __version__
@@ -74,25 +75,33 @@ def _numbers(result: Alignment) -> list[dict[str, str]]:
         )
     if result.near_vertical:
         name, value, sigma = result.azimuth
-        rows.append(
+        rows.insert(  # first: heading and roll by themselves mean little there
+            0,
             {
                 "name": name.replace("_", " ").capitalize(),
                 "value": f"{np.degrees(value):.4f}°" if result.heading_known else "refused",
                 "sigma": _angle(sigma),
                 "floor": _angle(float(np.sqrt(result.phi_floor[2, 2]))),
-            }
+            },
         )
     return rows
 
 
 def _angle(x: float) -> str:
+    if x > 0.99 * UNIFORM_SIGMA:
+        return "unknown"
     degrees = float(np.degrees(x))
     return f"{degrees:.2f}°" if degrees >= 1.0 else f"{degrees:.4f}° ({degrees * 60:.2f}′)"
 
 
 def _short(x: float) -> str:
     """Three significant digits, never with an exponent."""
-    return f"{x:.3g}" if abs(x) < 1000.0 else f"{x:.0f}"
+    return str(np.format_float_positional(x, precision=3, fractional=False, trim="-"))
+
+
+def _quantity(value: float, unit: str) -> str:
+    """An SI value in a datasheet unit, spelt for reading."""
+    return f"{_short(value / parse_unit(unit)[0])} {unit.replace('ug', 'µg').replace('sqrt(h)', '√h').replace('sqrt(Hz)', '√Hz')}"
 
 
 def _facts(result: Alignment) -> list[tuple[str, str]]:
@@ -104,9 +113,9 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
         ("Method", f"{result.method}: {result.method_reason}"),
         (
             "IMU",
-            f"{result.imu_source}: gyro bias {quantity(imu.gyro_bias, 'deg/h', 3)}, "
-            f"{quantity(imu.gyro_random_walk, 'deg/sqrt(h)', 3)}; accelerometer bias {_short(imu.accel_bias / MICRO_G)} µg, "
-            f"{quantity(imu.accel_random_walk, 'ug/sqrt(Hz)', 3)} (one sigma)",
+            f"{result.imu_source}: gyro bias {_quantity(imu.gyro_bias, 'deg/h')}, "
+            f"random walk {_quantity(imu.gyro_random_walk, 'deg/sqrt(h)')}; accelerometer bias "
+            f"{_quantity(imu.accel_bias, 'ug')}, random walk {_quantity(imu.accel_random_walk, 'ug/sqrt(Hz)')} (one sigma)",
         ),
     ]
     if np.all(np.isfinite(result.disturbance)):
@@ -164,14 +173,39 @@ def _health(result: Alignment) -> dict[str, Any] | None:
         for r in found.regimes
     ]
     facts = [
-        ("Rate", f"{d['rate_hz']:.4g} Hz, jitter {d['jitter_rms_ms']:.2g} ms RMS"),
-        ("Gaps", str(len(d["gaps"]))),
+        ("Rate", f"{d['rate_hz']:.4g} Hz, jitter {d['jitter_rms_ms']:.3f} ms RMS"),
+        ("Gaps", _gaps(d["gaps"])),
         ("Repeated rows", str(d["repeated_rows"])),
         ("Saturated rows", str(sum(d["saturated_rows"]))),
     ]
+    noise = d["noise"]
     return {
         "findings": found.findings,
         "stretches": stretches,
         "legend": {s["kind"]: s["colour"] for s in stretches},
         "facts": facts,
+        "noise": [] if noise is None else _densities(noise),
+        "noise_from": "" if noise is None else f"{noise['motion']}, {noise['from_s']:.0f} to {noise['to_s']:.0f} s",
     }
+
+
+def _gaps(gaps: list[dict[str, float]]) -> str:
+    if not gaps:
+        return "0"
+    longest = max(gaps, key=lambda gap: gap["length_s"])
+    return f"{len(gaps)}, the longest {longest['length_s']:.3g} s at {longest['time_s']:.1f} s"
+
+
+def _densities(noise: dict[str, Any]) -> list[dict[str, Any]]:
+    """Noise of each axis; a term that the log does not resolve is left out."""
+    rows = []
+    for words, key, unit in (
+        ("Angle random walk", "angle_random_walk_deg_sqrt_h", "deg/√h"),
+        ("Gyro bias instability", "gyro_bias_instability_deg_h", "deg/h"),
+        ("Velocity random walk", "velocity_random_walk_ug_sqrt_hz", "µg/√Hz"),
+        ("Accelerometer bias instability", "accel_bias_instability_ug", "µg"),
+    ):
+        values = [_short(value) if value else "–" for value in noise[key]]
+        if any(noise[key]):
+            rows.append({"name": words, "axes": values, "unit": unit})
+    return rows
