@@ -44,10 +44,11 @@ def main() -> int:
     found = json.loads((FOLDER / "result" / "summary.json").read_text())
     truth = simulation.motion.states(found["time_s"])  # which the command never saw
     angles = np.degrees(np.ravel(euler_from_dcm(truth.C_nb)))
-    print(f"\n{'':9}{'found':>12}{'truth':>12}{'error':>12}{'one sigma':>12}   (deg)")
+    print(f"\n{'':9}{'found':>12}{'truth':>12}{'error':>12}{'one sigma':>12}{'error/sigma':>13}   (deg)")
     for name, true in zip(("heading", "pitch", "roll"), angles, strict=True):
         value, sigma = found[f"{name}_deg"], found[f"{name}_sigma_deg"]
-        print(f"{name:9}{value:12.4f}{true:12.4f}{value - true:12.4f}{sigma:12.4f}")
+        error = (value - true + 180.0) % 360.0 - 180.0  # 359.9 is 0.1 off north, not 359.9
+        print(f"{name:9}{value:12.4f}{true:12.4f}{error:12.4f}{sigma:12.4f}{error / sigma:13.2f}")
     print(f"\nreport: {FOLDER / 'result' / 'report.html'}")
     return 0
 

@@ -243,6 +243,18 @@ def test_inspect(capsys, monkeypatch, log, tmp_path):
     assert "Hz" in out
 
 
+def test_near_the_vertical_the_combination_is_told_with_its_floor(capsys, monkeypatch, tmp_path):
+    path = tmp_path / "up.csv"
+    motion = rest(PLACE, np.radians(77.0), np.radians(89.0))
+    write_imu(simulate(motion, rate=20.0, duration=120.0, imu=imu_spec("navigation"), seed=6).record, path)
+    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, "--imu", "navigation")
+    assert code == 0
+    row = next(line for line in out.splitlines() if line.startswith("heading minus roll"))
+    value, sigma, floor = map(float, row.split()[3:])
+    assert abs(value - 77.0) < 4 * sigma < 1.0
+    assert 0.0 < floor <= sigma
+
+
 def test_help_shows_examples(capsys, monkeypatch):
     for command in ("align", "inspect"):
         code, out, _ = run(capsys, monkeypatch, command, "--help")
@@ -258,24 +270,87 @@ def test_a_refused_alignment_is_exit_code_4_and_still_json(capsys, monkeypatch, 
     assert json.loads(out)["status"] == "inconsistent"
 
 
-HEAVY = ("numba", "numpy", "pandas", "matplotlib", "plotly", "dask", "pydantic", "scipy", "pyarrow")
+def start(folder: Path, *arguments: str, **options) -> subprocess.Popen:
+    code = "from truenorth.cli import main; main()"
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=folder, **pipes, **options)
 
 
-@pytest.mark.parametrize("statement", ["import truenorth", "import truenorth.cli"])
-def test_importing_stays_light(statement):
-    code = f"import sys; {statement}; print([m for m in {HEAVY!r} if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+def test_an_interrupt_is_exit_code_130_and_no_half_result(log, tmp_path):
+    """Interrupted as the report is made: one line, no traceback, none of the three files."""
+    code = (
+        "import os, signal, sys, truenorth.report.page as page\n"
+        "page.alignment_page = lambda result: os.kill(os.getpid(), signal.SIGINT)\n"
+        "from truenorth.cli import main; main()"
+    )
+    command = [sys.executable, "-c", code, "align", str(log), *WHERE, "-o", str(tmp_path / "result")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert done.stderr.strip() == "truenorth: interrupted; nothing half-written is left"
+    assert list((tmp_path / "result").iterdir()) == []
 
 
-def test_public_names_are_what_they_say():
-    import truenorth
+def test_an_unexpected_error_keeps_its_traceback(log):
+    code = (
+        "import truenorth.alignment as a\n"
+        "def broken(*args, **kwargs): raise ZeroDivisionError('a bug of ours')\n"
+        "a.align = broken\n"
+        "from truenorth.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "align", str(log), *WHERE], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+    assert "ZeroDivisionError: a bug of ours" in done.stderr
 
-    for name in truenorth.__all__:
-        assert getattr(truenorth, name) is not None
-    assert set(truenorth.__all__) <= set(dir(truenorth))
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = truenorth.nothing
+
+def test_brackets_in_names_are_no_markup(capsys, monkeypatch, log, tmp_path):
+    odd = tmp_path / "run[red]1.csv"
+    odd.write_bytes(log.read_bytes())
+    folder = tmp_path / "out[" / "b]"  # "[/b]" would close a tag that was never opened
+    code, out, _ = run(capsys, monkeypatch, "align", odd, *WHERE, "-o", folder)
+    assert code == 0
+    assert "run[red]1.csv" in out
+    assert f"wrote {folder / 'report.html'}" in out
+    code, out, _ = run(capsys, monkeypatch, "inspect", odd)
+    assert code == 0
+    assert "run[red]1.csv" in out
+
+
+def test_a_terminal_without_plus_minus_still_gets_the_answer(log, tmp_path):
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    process = start(tmp_path, "align", str(log), *WHERE, env=environment)
+    out, err = process.communicate()
+    assert process.returncode == 0, err
+    assert "heading" in out
+
+
+def test_messages_leave_the_json_alone(capsys, monkeypatch, log):
+    """The latitude warning goes to standard error; standard output is one object on one line."""
+    code, out, err = run(capsys, monkeypatch, "align", log, "--lat", "10", "--imu", "navigation", "--json")
+    assert code == 4
+    assert err.startswith("truenorth: warning: ")
+    assert "latitude" in err
+    assert len(out.splitlines()) == 1
+    assert json.loads(out)["lat_deg"] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--plot", "log.txt"], ["--plot log.txt", ".png"]),
+        (["--lat", "95"], ["latitude 95"]),
+        (["--from", "50", "--to", "20"], ["--from 50 --to 20"]),
+        (["--to", "nan"], ["--to nan"]),
+    ],
+)
+def test_wrong_usage_of_inspect(capsys, monkeypatch, log, arguments, words):
+    code, out, err = run(capsys, monkeypatch, "inspect", log, *arguments)
+    assert (code, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+    for word in words:
+        assert word in err
 
 
 def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):

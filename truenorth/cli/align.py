@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -76,8 +77,6 @@ def align(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying."""
-    import math
-
     from truenorth.atomic import writable_folder
     from truenorth.position import Position
 
@@ -177,21 +176,15 @@ def _print(result: Alignment, paths: list[Path]) -> None:
     for reason in result.reasons:
         console.print(f"  {reason}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
-    for title in ("", "deg", "one sigma, deg", "of it bias, deg"):
+    for title in ("", "deg", "one sigma, deg", "floor, deg"):
         table.add_column(title, justify="right" if title else "left")
-    for name in ("heading", "pitch", "roll"):
+    floors = {name: s[f"{name}_sigma_floor_deg"] for name in ("heading", "pitch", "roll")}
+    if result.near_vertical:  # first: heading and roll by themselves mean little there
+        floors = {result.azimuth[0]: math.degrees(math.sqrt(result.phi_floor[2, 2])), **floors}
+    for name, floor in floors.items():
         value = s[f"{name}_deg"]
-        table.add_row(
-            name,
-            "refused" if value is None else f"{value:.4f}",
-            f"{s[f'{name}_sigma_deg']:.4f}",
-            f"{s[f'{name}_sigma_floor_deg']:.4f}",
-        )
-    if result.near_vertical:
-        name, value, sigma = result.azimuth
-        degrees = 57.29577951308232
-        shown = f"{value * degrees:.4f}" if result.heading_known else "refused"
-        table.add_row(name.replace("_", " "), shown, f"{sigma * degrees:.4f}", "")
+        shown = "refused" if value is None else f"{value:.4f}"
+        table.add_row(name.replace("_", " "), shown, f"{s[f'{name}_sigma_deg']:.4f}", f"{floor:.4f}")
     console.print(table)
     for name, values, sigmas, known in (
         ("gyro bias, deg/h", s["gyro_bias_deg_h"], s["gyro_bias_sigma_deg_h"], s["gyro_bias_estimated"]),

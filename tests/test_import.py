@@ -1,0 +1,71 @@
+"""What starts every run stays light: the package, the program and its help load no numerical or plotting library."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+HEAVY = ("numba", "numpy", "scipy", "pandas", "pyarrow", "pydantic", "matplotlib", "plotly", "jinja2", "dask", "yaml")
+OF_TYPER = ("pydantic",)  # typer itself loads it once it reads the options of a command
+BUDGET = 0.4  # s of wall clock, interpreter start included
+
+HELP = "import sys; sys.argv = ['truenorth', {arguments}]\nfrom truenorth.cli import main\ntry: main()\nexcept SystemExit: pass"
+STARTS = {
+    "the package": "import truenorth",
+    "the program": "import truenorth.cli",
+    "its help": HELP.format(arguments="'--help'"),
+    "a command's help": HELP.format(arguments="'align', '--help'"),
+    "its version": HELP.format(arguments="'--version'"),
+}
+
+
+def run(code: str) -> str:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("what", STARTS)
+def test_nothing_heavy_is_loaded(what):
+    heavy = [m for m in HEAVY if not (what == "a command's help" and m in OF_TYPER)]
+    code = f"{STARTS[what]}\nimport sys; print('loaded:', [m for m in {heavy!r} if m in sys.modules])"
+    assert run(code).splitlines()[-1] == "loaded: []"
+
+
+@pytest.mark.parametrize("what", ["the package", "its help"])
+def test_it_starts_within_its_budget(what):
+    """The best of five: a busy machine delays a start, it never hastens one."""
+
+    def once() -> float:
+        begin = time.perf_counter()
+        run(STARTS[what])
+        return time.perf_counter() - begin
+
+    assert min(once() for _ in range(5)) < BUDGET
+
+
+def test_public_names_are_what_they_say():
+    import truenorth
+
+    for name in truenorth.__all__:
+        assert getattr(truenorth, name) is not None
+    assert set(truenorth.__all__) <= set(dir(truenorth))
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = truenorth.nothing
+
+
+def test_the_names_of_type_checkers_are_those_of_the_program():
+    """The list for the eye, the homes, and the imports under TYPE_CHECKING name the same things."""
+    import ast
+    from pathlib import Path
+
+    import truenorth
+
+    tree = ast.parse(Path(truenorth.__file__).read_text(encoding="utf-8"))
+    guarded = next(node for node in tree.body if isinstance(node, ast.If))
+    seen = {
+        (alias.name, node.module) for node in guarded.body if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
+    assert seen == {(name, f"truenorth.{home}") for name, home in truenorth._HOMES.items()}
+    assert truenorth.__all__ == sorted(truenorth._HOMES)
