@@ -11,10 +11,24 @@ from numpy.typing import NDArray
 from truenorth.errors import UsageError
 from truenorth.records import ImuRecord
 from truenorth.simulation.imu_errors import TrueErrors, apply_errors
-from truenorth.simulation.motion import MotionStates, Sway, Tone, rest
+from truenorth.simulation.motion import Motion, MotionStates
+from truenorth.simulation.sway import Disturbed, Sway, rest
+from truenorth.simulation.tones import Tone
 from truenorth.specs import ImuSpec
 
-__all__ = ["IdealLog", "MotionStates", "Simulation", "Sway", "Tone", "TrueErrors", "ideal_log", "rest", "simulate"]
+__all__ = [
+    "Disturbed",
+    "IdealLog",
+    "Motion",
+    "MotionStates",
+    "Simulation",
+    "Sway",
+    "Tone",
+    "TrueErrors",
+    "ideal_log",
+    "rest",
+    "simulate",
+]
 
 Array = NDArray[np.float64]
 
@@ -25,12 +39,12 @@ class IdealLog:
 
     Attributes
     ----------
-    motion : Sway
+    motion : Motion
     edges : (N+1,) array, s
     dtheta, dvel : (N, 3) arrays, rad and m/s
     """
 
-    motion: Sway
+    motion: Motion
     edges: Array
     dtheta: Array
     dvel: Array
@@ -48,13 +62,13 @@ class Simulation:
     Attributes
     ----------
     record : ImuRecord
-    motion : Sway
+    motion : Motion
         The truth at any time: ``motion.states(t)``.
     errors : TrueErrors
     """
 
     record: ImuRecord
-    motion: Sway
+    motion: Motion
     errors: TrueErrors
 
     @property
@@ -63,7 +77,7 @@ class Simulation:
         return self.motion.states(self.record.time)
 
 
-def ideal_log(motion: Sway, *, rate: float, duration: float, start: float = 0.0) -> IdealLog:
+def ideal_log(motion: Motion, *, rate: float, duration: float, start: float = 0.0) -> IdealLog:
     """Increments of an ideal IMU.
 
     Raises
@@ -78,7 +92,7 @@ def ideal_log(motion: Sway, *, rate: float, duration: float, start: float = 0.0)
 
 
 def simulate(
-    motion: Sway | IdealLog,
+    motion: Motion | IdealLog,
     *,
     rate: float = 100.0,
     duration: float = 600.0,
@@ -93,7 +107,7 @@ def simulate(
 
     Parameters
     ----------
-    motion : Sway or IdealLog
+    motion : Motion or IdealLog
         An ideal log that was made before saves its time; it brings its own rate, duration and start.
     rate : float, Hz
     duration : float, s

@@ -1,132 +1,24 @@
-"""Motion of a base, analytic: rest and sway, with the rates, forces and increments that an ideal IMU measures.
+"""Motion of an IMU on the ellipsoid: from angles and the path of a centre to rates, forces and increments.
 
-Increments are integrals of the analytic rate and specific force over each interval by Gauss-Legendre quadrature of four
-nodes: exact to rounding for any motion of many samples a period.
+A motion gives its angles, velocity and acceleration in closed form; rate and specific force follow by rigid-body
+kinematics. Increments are their integrals over each interval by Gauss-Legendre quadrature of four nodes: exact to
+rounding for any motion of many samples a period.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.attitude import dcm_from_euler
 from truenorth.earth import earth_rate_n, gravity_n, radii, transport_rate_n
-from truenorth.position import Position
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 BLOCK = 4096  # intervals at once: keeps the work arrays in the cache
-
-
-@dataclass(frozen=True)
-class Tone:
-    """One sinusoid, ``amplitude * cos(2 pi t / period + phase)``.
-
-    Attributes
-    ----------
-    amplitude : float, rad or m
-    period : float, s
-    phase : float, rad
-    """
-
-    amplitude: float
-    period: float
-    phase: float = 0.0
-
-
-@dataclass(frozen=True)
-class Sway:
-    """A base that sways about a fixed place; without tones, a base at rest.
-
-    Attributes
-    ----------
-    position : Position
-        Of the centre of rotation.
-    heading, pitch, roll : float, rad
-        Mean attitude.
-    heading_tones, pitch_tones, roll_tones : tuple of Tone
-        Angles are the mean plus ``sum A cos(w t + phase)``.
-    east_tones, north_tones, up_tones : tuple of Tone
-        The centre's displacement is ``sum A sin(w t + phase)``, its velocity ``sum A w cos(w t + phase)``.
-    lever_arm : (3,) sequence, m
-        From the centre of rotation to the IMU, body axes.
-    """
-
-    position: Position
-    heading: float = 0.0
-    pitch: float = 0.0
-    roll: float = 0.0
-    heading_tones: tuple[Tone, ...] = ()
-    pitch_tones: tuple[Tone, ...] = ()
-    roll_tones: tuple[Tone, ...] = ()
-    east_tones: tuple[Tone, ...] = ()
-    north_tones: tuple[Tone, ...] = ()
-    up_tones: tuple[Tone, ...] = ()
-    lever_arm: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
-
-    def states(self, t: ArrayLike) -> MotionStates:
-        """Attitude, velocity, position, rate and specific force at any times (s)."""
-        t = np.asarray(t, dtype=np.float64)
-        h, dh, ddh = _angle(self.heading, self.heading_tones, t)
-        p, dp, ddp = _angle(self.pitch, self.pitch_tones, t)
-        r, dr, ddr = _angle(self.roll, self.roll_tones, t)
-        C_nb = dcm_from_euler(h, p, r)
-        sp, cp, sr, cr = np.sin(p), np.cos(p), np.sin(r), np.cos(r)
-        # C_nb = Rz(-h) Rx(p) Ry(r) differentiated, and differentiated again.
-        w_nb = np.stack([cr * dp + sr * cp * dh, dr - sp * dh, sr * dp - cr * cp * dh], -1)
-        dw_nb = np.stack(
-            [
-                cr * ddp - sr * dr * dp + sr * cp * ddh + (cr * cp * dr - sr * sp * dp) * dh,
-                ddr - sp * ddh - cp * dp * dh,
-                sr * ddp + cr * dr * dp - cr * cp * ddh + (sr * cp * dr + cr * sp * dp) * dh,
-            ],
-            -1,
-        )
-        arm = np.asarray(self.lever_arm, dtype=np.float64)
-        turning = np.cross(w_nb, arm)
-        s, v, a = (np.stack(x, -1) for x in zip(*(_shift(k, t) for k in self._shifts), strict=True))
-        s = s + (C_nb @ arm)
-        v = v + _apply(C_nb, turning)
-        a = a + _apply(C_nb, np.cross(dw_nb, arm) + np.cross(w_nb, turning))
-
-        place = self.position
-        R_M, R_N = radii(place.lat)  # displacements are metres: the radii change by a part in 1e9
-        lat = place.lat + s[..., 1] / (R_M + place.alt)
-        lon = place.lon + s[..., 0] / ((R_N + place.alt) * np.cos(place.lat))
-        alt = place.alt + s[..., 2]
-        w_ie, w_en = earth_rate_n(lat), transport_rate_n(lat, alt, v)
-        f_n = a + np.cross(2 * w_ie + w_en, v) - gravity_n(lat, alt)
-        C_bn = np.swapaxes(C_nb, -1, -2)
-        return MotionStates(
-            time=t,
-            C_nb=C_nb,
-            v_n=v,
-            lat=lat,
-            lon=lon,
-            alt=alt,
-            w_ib_b=w_nb + _apply(C_bn, w_ie + w_en),
-            f_b=_apply(C_bn, f_n),
-        )
-
-    @property
-    def _shifts(self) -> tuple[tuple[Tone, ...], ...]:
-        return self.east_tones, self.north_tones, self.up_tones
-
-    def increments(self, edges: Array) -> tuple[Array, Array]:
-        """Integrals of rate and specific force between successive `edges` (N+1,), as (N, 3) rad and m/s."""
-        count = len(edges) - 1
-        dtheta, dvel = np.empty((count, 3)), np.empty((count, 3))
-        for first in range(0, count, BLOCK):
-            rows = slice(first, min(first + BLOCK, count))
-            start, length = edges[rows], np.diff(edges[first : rows.stop + 1])
-            nodes = start[:, None] + 0.5 * length[:, None] * (1.0 + NODES)
-            at = self.states(nodes)
-            weights = 0.5 * length[:, None] * WEIGHTS
-            dtheta[rows] = np.einsum("kn,kni->ki", weights, at.w_ib_b)
-            dvel[rows] = np.einsum("kn,kni->ki", weights, at.f_b)
-        return dtheta, dvel
 
 
 @dataclass(frozen=True)
@@ -141,6 +33,8 @@ class MotionStates:
     lat, lon, alt : (...) arrays, rad and m
     w_ib_b : (..., 3) array, rad/s
     f_b : (..., 3) array, m/s^2
+    dw_ib_b : (..., 3) array, rad/s^2
+        Angular acceleration.
     """
 
     time: Array
@@ -151,33 +45,128 @@ class MotionStates:
     alt: Array
     w_ib_b: Array
     f_b: Array
+    dw_ib_b: Array
 
 
-def rest(position: Position, heading: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Sway:
-    """A base at rest; angles in rad."""
-    return Sway(position, heading, pitch, roll)
+@dataclass(frozen=True)
+class Kinematics:
+    """Motion of the body and of its centre, as a kind of motion gives it.
+
+    Attributes
+    ----------
+    angles, rates, accelerations : (3, ...) arrays, rad, rad/s, rad/s^2
+        Heading, pitch, roll and their derivatives.
+    lat, lon, alt : (...) arrays
+        Of the centre.
+    v, a : (..., 3) arrays, m/s and m/s^2
+        Its velocity in n, and the derivative of those components.
+    """
+
+    angles: Array
+    rates: Array
+    accelerations: Array
+    lat: Array
+    lon: Array
+    alt: Array
+    v: Array
+    a: Array
 
 
-def _angle(mean: float, tones: tuple[Tone, ...], t: Array) -> tuple[Array, Array, Array]:
-    value, rate, acceleration = np.full_like(t, mean), np.zeros_like(t), np.zeros_like(t)
-    for tone in tones:
-        w = 2 * np.pi / tone.period
-        cosine, sine = np.cos(w * t + tone.phase), np.sin(w * t + tone.phase)
-        value += tone.amplitude * cosine
-        rate -= tone.amplitude * w * sine
-        acceleration -= tone.amplitude * w**2 * cosine
-    return value, rate, acceleration
+class Motion(ABC):
+    """A motion known at any time.
+
+    Kinds of motion define :meth:`kinematics`, those with corners also :attr:`breaks`, and those whose IMU moves in the
+    body :meth:`arm`.
+    """
+
+    @abstractmethod
+    def kinematics(self, t: Array) -> Kinematics:
+        """Angles and the centre's path at times `t` (s), of any shape."""
+
+    def arm(self, t: Array) -> tuple[Array, Array, Array]:
+        """From the centre to the IMU, body axes, (..., 3) m, and its two derivatives."""
+        fixed = np.asarray(getattr(self, "lever_arm", (0.0, 0.0, 0.0)), dtype=np.float64)
+        still = np.zeros((*np.shape(t), 3))
+        return still + fixed, still, still
+
+    @property
+    def breaks(self) -> Array:
+        """Times where a higher derivative jumps, s: quadrature does not step across them."""
+        return np.empty(0)
+
+    def states(self, t: ArrayLike) -> MotionStates:
+        """Attitude, velocity, position, rate and specific force at any times (s)."""
+        t = np.asarray(t, dtype=np.float64)
+        k = self.kinematics(t)
+        C_nb = dcm_from_euler(*k.angles)
+        w_nb, dw_nb = _body_rates(k.angles, k.rates, k.accelerations)
+        arm, d_arm, dd_arm = self.arm(t)
+        turning = np.cross(w_nb, arm) + d_arm
+        s = _apply(C_nb, arm)
+        v = k.v + _apply(C_nb, turning)
+        a = k.a + _apply(C_nb, np.cross(dw_nb, arm) + np.cross(w_nb, turning + d_arm) + dd_arm)
+
+        R_M, R_N = radii(k.lat)  # arms are metres: the radii change by a part in 1e9
+        lat = k.lat + s[..., 1] / (R_M + k.alt)
+        lon = k.lon + s[..., 0] / ((R_N + k.alt) * np.cos(k.lat))
+        alt = k.alt + s[..., 2]
+        w_ie, w_en = earth_rate_n(lat), transport_rate_n(lat, alt, v)
+        f_n = a + np.cross(2 * w_ie + w_en, v) - gravity_n(lat, alt)
+        C_bn = np.swapaxes(C_nb, -1, -2)
+        w_in_b = _apply(C_bn, w_ie + w_en)
+        # The rate of n changes with acceleration; what it changes by the change of latitude, (v/R)^2, is left out.
+        dw_in_b = _apply(C_bn, transport_rate_n(lat, alt, a)) - np.cross(w_nb, w_in_b)
+        return MotionStates(
+            time=t,
+            C_nb=C_nb,
+            v_n=v,
+            lat=lat,
+            lon=lon,
+            alt=alt,
+            w_ib_b=w_nb + w_in_b,
+            f_b=_apply(C_bn, f_n),
+            dw_ib_b=dw_nb + dw_in_b,
+        )
+
+    def increments(self, edges: Array) -> tuple[Array, Array]:
+        """Integrals of rate and specific force between successive `edges` (N+1,), as (N, 3) rad and m/s."""
+        inside = self.breaks[(self.breaks > edges[0]) & (self.breaks < edges[-1])]
+        if inside.size:
+            finer = np.union1d(edges, inside)
+            first = np.searchsorted(finer, edges[:-1])
+            dtheta, dvel = self._integrals(finer)
+            return np.add.reduceat(dtheta, first), np.add.reduceat(dvel, first)
+        return self._integrals(edges)
+
+    def _integrals(self, edges: Array) -> tuple[Array, Array]:
+        count = len(edges) - 1
+        dtheta, dvel = np.empty((count, 3)), np.empty((count, 3))
+        for first in range(0, count, BLOCK):
+            rows = slice(first, min(first + BLOCK, count))
+            start, length = edges[rows], np.diff(edges[first : rows.stop + 1])
+            at = self.states(start[:, None] + 0.5 * length[:, None] * (1.0 + NODES))
+            weights = 0.5 * length[:, None] * WEIGHTS
+            dtheta[rows] = np.einsum("kn,kni->ki", weights, at.w_ib_b)
+            dvel[rows] = np.einsum("kn,kni->ki", weights, at.f_b)
+        return dtheta, dvel
 
 
-def _shift(tones: tuple[Tone, ...], t: Array) -> tuple[Array, Array, Array]:
-    value, rate, acceleration = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
-    for tone in tones:
-        w = 2 * np.pi / tone.period
-        cosine, sine = np.cos(w * t + tone.phase), np.sin(w * t + tone.phase)
-        value += tone.amplitude * sine
-        rate += tone.amplitude * w * cosine
-        acceleration -= tone.amplitude * w**2 * sine
-    return value, rate, acceleration
+def _body_rates(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
+    """``w_nb_b`` and its derivative, (..., 3): ``C_nb = Rz(-h) Rx(p) Ry(r)`` differentiated once and twice."""
+    _, p, r = angles
+    dh, dp, dr = rates
+    ddh, ddp, ddr = accelerations
+    sp, cp, sr, cr = np.sin(p), np.cos(p), np.sin(r), np.cos(r)
+    w_nb = np.stack([cr * dp + sr * cp * dh, dr - sp * dh, sr * dp - cr * cp * dh], -1)
+    dw_nb = np.stack(
+        [
+            cr * ddp - sr * dr * dp + sr * cp * ddh + (cr * cp * dr - sr * sp * dp) * dh,
+            ddr - sp * ddh - cp * dp * dh,
+            sr * ddp + cr * dr * dp - cr * cp * ddh + (sr * cp * dr + cr * sp * dp) * dh,
+        ],
+        -1,
+    )
+    return w_nb, dw_nb
 
 
 def _apply(C: Array, v: Array) -> Array:

@@ -1,0 +1,161 @@
+"""A base at rest or swaying about a fixed place, and any other motion disturbed by sway or vibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.earth import radii
+from truenorth.errors import UsageError
+from truenorth.position import Position
+from truenorth.simulation.motion import Kinematics, Motion
+from truenorth.simulation.profile import Profile, pulse
+from truenorth.simulation.tones import Tone, Triple, cosines, sines
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sway(Motion):
+    """A base that sways about a fixed place; without tones, a base at rest.
+
+    Attributes
+    ----------
+    position : Position
+        Of the centre of rotation.
+    heading, pitch, roll : float, rad
+        Mean attitude.
+    heading_tones, pitch_tones, roll_tones : tuple of Tone
+        Angles are the mean plus ``sum A cos(w t + phase)``.
+    east_tones, north_tones, up_tones : tuple of Tone
+        The centre's displacement is ``sum A sin(w t + phase)``, its velocity ``sum A w cos(w t + phase)``.
+    lever_arm : (3,) sequence, m
+        From the centre of rotation to the IMU, body axes.
+    """
+
+    position: Position
+    heading: float = 0.0
+    pitch: float = 0.0
+    roll: float = 0.0
+    heading_tones: tuple[Tone, ...] = ()
+    pitch_tones: tuple[Tone, ...] = ()
+    roll_tones: tuple[Tone, ...] = ()
+    east_tones: tuple[Tone, ...] = ()
+    north_tones: tuple[Tone, ...] = ()
+    up_tones: tuple[Tone, ...] = ()
+    lever_arm: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
+
+    def kinematics(self, t: Array) -> Kinematics:
+        """Mean attitude and place, and the tones about them."""
+        angles = (
+            cosines(self.heading_tones, t, self.heading),
+            cosines(self.pitch_tones, t, self.pitch),
+            cosines(self.roll_tones, t, self.roll),
+        )
+        shifts = [sines(tones, t) for tones in (self.east_tones, self.north_tones, self.up_tones)]
+        s, v, a = (np.stack(x, -1) for x in zip(*shifts, strict=True))
+        values, rates, accelerations = (np.stack(x) for x in zip(*angles, strict=True))
+        place = self.position
+        still = np.zeros_like(t)
+        lat, lon, alt = displaced(place.lat + still, place.lon + still, place.alt + still, s)
+        return Kinematics(values, rates, accelerations, lat, lon, alt, v, a)
+
+
+def rest(position: Position, heading: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Sway:
+    """A base at rest; angles in rad."""
+    return Sway(position, heading, pitch, roll)
+
+
+@dataclass(frozen=True)
+class Disturbed(Motion):
+    """Another motion with sway or vibration on top.
+
+    Attributes
+    ----------
+    motion : Motion
+    heading_tones, pitch_tones, roll_tones : tuple of Tone, rad
+        Added to the angles.
+    east_tones, north_tones, up_tones : tuple of Tone, m
+        Displacement of the centre, ``sum A sin(w t + phase)``.
+    mount_tones : three tuples of Tone, m
+        Displacement of the IMU in the body (right, forward, up), ``sum A cos(w t + phase)``: what an engine does.
+    window : (3,) floats or None, s
+        Start, stop, and the time of fading in and out; always when left out.
+
+    Raises
+    ------
+    UsageError
+        A window shorter than its two fadings.
+    """
+
+    motion: Motion
+    heading_tones: tuple[Tone, ...] = ()
+    pitch_tones: tuple[Tone, ...] = ()
+    roll_tones: tuple[Tone, ...] = ()
+    east_tones: tuple[Tone, ...] = ()
+    north_tones: tuple[Tone, ...] = ()
+    up_tones: tuple[Tone, ...] = ()
+    mount_tones: tuple[tuple[Tone, ...], tuple[Tone, ...], tuple[Tone, ...]] = ((), (), ())
+    window: tuple[float, float, float] | None = None
+    _envelope: Profile | None = field(init=False, repr=False, compare=False, default=None)
+
+    def __post_init__(self) -> None:
+        if self.window is None:
+            return
+        start, stop, fade = self.window
+        if not (fade > 0 and stop - start >= 2 * fade):
+            raise UsageError(
+                f"window from {start:g} s to {stop:g} s with a fading of {fade:g} s; expected a positive fading and a "
+                "window of twice its length at least"
+            )
+        object.__setattr__(self, "_envelope", pulse(start, stop, fade))
+
+    @property
+    def breaks(self) -> Array:
+        """Those of the motion beneath and of the window."""
+        own = np.empty(0) if self._envelope is None else self._envelope.breaks
+        return np.union1d(self.motion.breaks, own)
+
+    def kinematics(self, t: Array) -> Kinematics:
+        """The motion beneath plus the tones."""
+        base = self.motion.kinematics(t)
+        turns = (self.heading_tones, self.pitch_tones, self.roll_tones)
+        angles = [self._faded(cosines(tones, t), t) for tones in turns]
+        shifts = [self._faded(sines(x, t), t) for x in (self.east_tones, self.north_tones, self.up_tones)]
+        s, v, a = (np.stack(x, -1) for x in zip(*shifts, strict=True))
+        values, rates, accelerations = (np.stack(x) for x in zip(*angles, strict=True))
+        lat, lon, alt = displaced(base.lat, base.lon, base.alt, s)
+        return Kinematics(
+            base.angles + values,
+            base.rates + rates,
+            base.accelerations + accelerations,
+            lat,
+            lon,
+            alt,
+            base.v + v,
+            base.a + a,
+        )
+
+    def arm(self, t: Array) -> tuple[Array, Array, Array]:
+        """The arm of the motion beneath plus the vibration of the mount."""
+        fixed = self.motion.arm(t)
+        if not any(self.mount_tones):
+            return fixed
+        moving = [self._faded(cosines(tones, t), t) for tones in self.mount_tones]
+        r, dr, ddr = (f + np.stack(x, -1) for f, x in zip(fixed, zip(*moving, strict=True), strict=True))
+        return r, dr, ddr
+
+    def _faded(self, signal: Triple, t: Array) -> Triple:
+        if self._envelope is None:
+            return signal
+        x, dx, ddx = signal
+        e, de, dde = self._envelope(t)
+        return e * x, de * x + e * dx, dde * x + 2 * de * dx + e * ddx
+
+
+def displaced(lat: Array, lon: Array, alt: Array, s: Array) -> tuple[Array, Array, Array]:
+    """Latitude, longitude, height after a displacement `s` (..., 3) of metres along E, N, U."""
+    R_M, R_N = radii(lat)
+    return lat + s[..., 1] / (R_M + alt), lon + s[..., 0] / ((R_N + alt) * np.cos(lat)), alt + s[..., 2]
