@@ -7,6 +7,7 @@ rounding for any motion of many samples a period.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -94,6 +95,11 @@ class Motion(ABC):
         """Times where a higher derivative jumps, s: quadrature does not step across them."""
         return np.empty(0)
 
+    @property
+    def shortest_period(self) -> float:
+        """Of the fastest oscillation, s: quadrature steps are an eighth of it at most."""
+        return float("inf")
+
     def states(self, t: ArrayLike) -> MotionStates:
         """Attitude, velocity, position, rate and specific force at any times (s)."""
         t = np.asarray(t, dtype=np.float64)
@@ -131,6 +137,10 @@ class Motion(ABC):
     def increments(self, edges: Array) -> tuple[Array, Array]:
         """Integrals of rate and specific force between successive `edges` (N+1,), as (N, 3) rad and m/s."""
         inside = self.breaks[(self.breaks > edges[0]) & (self.breaks < edges[-1])]
+        parts = math.ceil(8 * float(np.max(np.diff(edges))) / self.shortest_period)
+        if parts > 1:
+            fractions = np.arange(1, parts) / parts
+            inside = np.union1d(inside, (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel())
         if inside.size:
             finer = np.union1d(edges, inside)
             first = np.searchsorted(finer, edges[:-1])

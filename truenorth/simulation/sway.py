@@ -12,7 +12,7 @@ from truenorth.errors import UsageError
 from truenorth.position import Position
 from truenorth.simulation.motion import Kinematics, Motion
 from truenorth.simulation.profile import Profile, pulse
-from truenorth.simulation.tones import Tone, Triple, cosines, sines
+from truenorth.simulation.tones import Tone, Triple, cosines, shortest, sines
 
 Array = NDArray[np.float64]
 
@@ -46,6 +46,12 @@ class Sway(Motion):
     north_tones: tuple[Tone, ...] = ()
     up_tones: tuple[Tone, ...] = ()
     lever_arm: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
+
+    @property
+    def shortest_period(self) -> float:
+        """Of all tones, s."""
+        turns = (self.heading_tones, self.pitch_tones, self.roll_tones)
+        return shortest(*turns, self.east_tones, self.north_tones, self.up_tones)
 
     def kinematics(self, t: Array) -> Kinematics:
         """Mean attitude and place, and the tones about them."""
@@ -117,6 +123,13 @@ class Disturbed(Motion):
         """Those of the motion beneath and of the window."""
         own = np.empty(0) if self._envelope is None else self._envelope.breaks
         return np.union1d(self.motion.breaks, own)
+
+    @property
+    def shortest_period(self) -> float:
+        """Of the motion beneath and all tones, s."""
+        turns = (self.heading_tones, self.pitch_tones, self.roll_tones)
+        own = shortest(*turns, self.east_tones, self.north_tones, self.up_tones, *self.mount_tones)
+        return min(self.motion.shortest_period, own)
 
     def kinematics(self, t: Array) -> Kinematics:
         """The motion beneath plus the tones."""

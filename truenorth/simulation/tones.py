@@ -46,6 +46,11 @@ class Tone:
             )
 
 
+def shortest(*tones: Sequence[Tone]) -> float:
+    """The shortest period of all, s; infinite without any."""
+    return min((tone.period for group in tones for tone in group), default=math.inf)
+
+
 def cosines(tones: Sequence[Tone], t: Array, mean: float = 0.0) -> Triple:
     """``mean + sum A cos(w t + phase)`` and its two derivatives, each of the shape of `t`."""
     return _sum(tones, t, mean, 0.0)
