@@ -122,6 +122,7 @@ DIMENSIONS: dict[str, tuple[Dimension, str]] = {
     "frequency": (_dimension(time=-1), "100 Hz"),
     "ratio": (_dimension(), "100 ppm"),
     "temperature": (_dimension(temperature=1), "20 degC"),
+    "acceleration_density": (_dimension(0, 2, -3), "0.01 g^2/Hz"),
     "rate_per_acceleration": (_dimension(1, -1, 1), "1 deg/h/g"),
     "rate_per_temperature": (_dimension(1, time=-1, temperature=-1), "0.1 deg/h/degC"),
     "acceleration_per_temperature": (_dimension(0, 1, -2, -1), "10 ug/degC"),

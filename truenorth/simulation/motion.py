@@ -108,14 +108,9 @@ class Motion(ABC):
         w_nb, dw_nb = _body_rates(k.angles, k.rates, k.accelerations)
         arm, d_arm, dd_arm = self.arm(t)
         turning = np.cross(w_nb, arm) + d_arm
-        s = _apply(C_nb, arm)
-        v = k.v + _apply(C_nb, turning)
-        a = k.a + _apply(C_nb, np.cross(dw_nb, arm) + np.cross(w_nb, turning + d_arm) + dd_arm)
-
-        R_M, R_N = radii(k.lat)  # arms are metres: the radii change by a part in 1e9
-        lat = k.lat + s[..., 1] / (R_M + k.alt)
-        lon = k.lon + s[..., 0] / ((R_N + k.alt) * np.cos(k.lat))
-        alt = k.alt + s[..., 2]
+        centripetal = np.cross(dw_nb, arm) + np.cross(w_nb, turning + d_arm) + dd_arm
+        away = _apply(C_nb, arm), _apply(C_nb, turning), _apply(C_nb, centripetal)
+        lat, lon, alt, v, a = displaced((k.lat, k.lon, k.alt, k.v, k.a), away)
         w_ie, w_en = earth_rate_n(lat), transport_rate_n(lat, alt, v)
         f_n = a + np.cross(2 * w_ie + w_en, v) - gravity_n(lat, alt)
         C_bn = np.swapaxes(C_nb, -1, -2)
@@ -159,6 +154,45 @@ class Motion(ABC):
             dtheta[rows] = np.einsum("kn,kni->ki", weights, at.w_ib_b)
             dvel[rows] = np.einsum("kn,kni->ki", weights, at.f_b)
         return dtheta, dvel
+
+
+Path = tuple[Array, Array, Array, Array, Array]  # latitude, longitude, height, velocity, its derivative
+
+
+def displaced(path: Path, away: tuple[Array, Array, Array]) -> Path:
+    """The path of a point at a displacement of metres from another one.
+
+    The displacement is taken along E, N, U of the first point's own local level; velocity is what the changes of latitude,
+    longitude and height amount to on the curved earth where the second point is, so that position, velocity and force stay
+    derivatives of each other: at 200 m/s an arm of 3 m makes .1 mm/s of difference.
+
+    Parameters
+    ----------
+    path : tuple
+        Of the first point: lat, lon, alt (...), v and dv/dt (..., 3).
+    away : three (..., 3) arrays, m, m/s, m/s^2
+        The displacement with its derivatives.
+    """
+    lat, lon, alt, v, a = path
+    R_M, R_N = radii(lat)
+    R_M, R_N, tan = R_M + alt, R_N + alt, np.tan(lat)
+    (sE, sN, sU), (dE, dN, dU), _ = (np.moveaxis(x, -1, 0) for x in away)
+    plane, change = v + away[1], a + away[2]
+    # v_N = (R_M + h + s_U) d/dt (L + s_N/(R_M + h)), v_E = (R_N + h + s_U) cos(L + ..) d/dt (l + s_E/((R_N + h) cos L)),
+    # to first order in s/R.
+    widening, widens = v[..., 2] - v[..., 1] * tan, a[..., 2] - a[..., 1] * tan
+    east, d_east = sU - sN * tan, dU - dN * tan
+    v_E = plane[..., 0] + (east * plane[..., 0] - sE * widening) / R_N
+    v_N = plane[..., 1] + (sU * plane[..., 1] - sN * v[..., 2]) / R_M
+    a_E = change[..., 0] + (d_east * plane[..., 0] + east * change[..., 0] - dE * widening - sE * widens) / R_N
+    a_N = change[..., 1] + (dU * plane[..., 1] + sU * change[..., 1] - dN * v[..., 2] - sN * a[..., 2]) / R_M
+    return (
+        lat + sN / R_M,
+        lon + sE / (R_N * np.cos(lat)),
+        alt + sU,
+        np.stack([v_E, v_N, plane[..., 2]], -1),
+        np.stack([a_E, a_N, change[..., 2]], -1),
+    )
 
 
 def _body_rates(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import radii
 from truenorth.errors import UsageError
 from truenorth.position import Position
-from truenorth.simulation.motion import Kinematics, Motion
+from truenorth.simulation.motion import Kinematics, Motion, displaced
 from truenorth.simulation.profile import Profile, pulse
 from truenorth.simulation.tones import Tone, Triple, cosines, shortest, sines
 
@@ -61,12 +60,12 @@ class Sway(Motion):
             cosines(self.roll_tones, t, self.roll),
         )
         shifts = [sines(tones, t) for tones in (self.east_tones, self.north_tones, self.up_tones)]
-        s, v, a = (np.stack(x, -1) for x in zip(*shifts, strict=True))
+        east_north_up, velocity, acceleration = (np.stack(x, -1) for x in zip(*shifts, strict=True))
         values, rates, accelerations = (np.stack(x) for x in zip(*angles, strict=True))
-        place = self.position
-        still = np.zeros_like(t)
-        lat, lon, alt = displaced(place.lat + still, place.lon + still, place.alt + still, s)
-        return Kinematics(values, rates, accelerations, lat, lon, alt, v, a)
+        place, still, at_rest = self.position, np.zeros_like(t), np.zeros((*t.shape, 3))
+        fixed = place.lat + still, place.lon + still, place.alt + still, at_rest, at_rest
+        path = displaced(fixed, (east_north_up, velocity, acceleration))
+        return Kinematics(values, rates, accelerations, *path)
 
 
 def rest(position: Position, heading: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Sway:
@@ -137,19 +136,10 @@ class Disturbed(Motion):
         turns = (self.heading_tones, self.pitch_tones, self.roll_tones)
         angles = [self._faded(cosines(tones, t), t) for tones in turns]
         shifts = [self._faded(sines(x, t), t) for x in (self.east_tones, self.north_tones, self.up_tones)]
-        s, v, a = (np.stack(x, -1) for x in zip(*shifts, strict=True))
+        east_north_up, velocity, acceleration = (np.stack(x, -1) for x in zip(*shifts, strict=True))
         values, rates, accelerations = (np.stack(x) for x in zip(*angles, strict=True))
-        lat, lon, alt = displaced(base.lat, base.lon, base.alt, s)
-        return Kinematics(
-            base.angles + values,
-            base.rates + rates,
-            base.accelerations + accelerations,
-            lat,
-            lon,
-            alt,
-            base.v + v,
-            base.a + a,
-        )
+        path = displaced((base.lat, base.lon, base.alt, base.v, base.a), (east_north_up, velocity, acceleration))
+        return Kinematics(base.angles + values, base.rates + rates, base.accelerations + accelerations, *path)
 
     def arm(self, t: Array) -> tuple[Array, Array, Array]:
         """The arm of the motion beneath plus the vibration of the mount."""
@@ -166,9 +156,3 @@ class Disturbed(Motion):
         x, dx, ddx = signal
         e, de, dde = self._envelope(t)
         return e * x, de * x + e * dx, dde * x + 2 * de * dx + e * ddx
-
-
-def displaced(lat: Array, lon: Array, alt: Array, s: Array) -> tuple[Array, Array, Array]:
-    """Latitude, longitude, height after a displacement `s` (..., 3) of metres along E, N, U."""
-    R_M, R_N = radii(lat)
-    return lat + s[..., 1] / (R_M + alt), lon + s[..., 0] / ((R_N + alt) * np.cos(lat)), alt + s[..., 2]

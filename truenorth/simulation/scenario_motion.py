@@ -1,0 +1,468 @@
+"""Motions and disturbances as a scenario file describes them.
+
+A motion is built by ``build(position, arm, rng, folder)``: `arm` (m, body axes) goes from its centre to the IMU, `rng` draws
+what the file leaves to chance, `folder` is where the file's own relative paths begin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from truenorth.position import Position
+from truenorth.schema import (
+    Acceleration,
+    AccelerationDensity,
+    Angle,
+    AngularRate,
+    Frequency,
+    Length,
+    Ratio,
+    Speed,
+    Strict,
+    Time,
+)
+from truenorth.simulation import manoeuvres
+from truenorth.simulation.course import Leg, course, ring
+from truenorth.simulation.motion import Motion
+from truenorth.simulation.route import Driving, WayPoint, route
+from truenorth.simulation.sea import COMPONENTS, Hull, WaveSpectrum, narrow_band, sea_motion
+from truenorth.simulation.sway import Disturbed, Sway
+from truenorth.simulation.tones import Tone
+from truenorth.simulation.turntable import Hold, turntable
+from truenorth.simulation.vibration import random_vibration, sine_vibration
+from truenorth.simulation.waypoints import read_waypoints
+
+Arm = tuple[float, float, float]
+Rng = np.random.Generator
+
+
+class _Tone(Strict):
+    """A sinusoid, or narrow-band swell where rms and bandwidth are given."""
+
+    period: Time
+    phase: Angle | None = None
+    bandwidth: Ratio | None = None
+    components: int = Field(COMPONENTS, ge=1, le=1000)
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        amplitude, rms = getattr(self, "amplitude", None), getattr(self, "rms", None)
+        sine = amplitude is not None and rms is None and self.bandwidth is None
+        swell = rms is not None and self.bandwidth is not None and amplitude is None and self.phase is None
+        if sine == swell:
+            raise ValueError("expected amplitude, period, phase for a sinusoid, or rms, period, bandwidth for swell")
+        return self
+
+    def tones(self, rng: Rng) -> tuple[Tone, ...]:
+        """One tone, or the components of the swell; a phase left out is drawn."""
+        rms, bandwidth = getattr(self, "rms", None), self.bandwidth
+        if rms is not None and bandwidth is not None:
+            return narrow_band(rms, self.period, bandwidth, rng, self.components)
+        phase = rng.uniform(0, 2 * math.pi) if self.phase is None else self.phase
+        return (Tone(getattr(self, "amplitude", 0.0), self.period, phase),)
+
+
+class AngleTone(_Tone):
+    """Of an angle, ``amplitude cos(2 pi t/period + phase)``."""
+
+    amplitude: Angle | None = None
+    rms: Angle | None = None
+
+
+class LengthTone(_Tone):
+    """Of a displacement, ``amplitude sin(2 pi t/period + phase)``."""
+
+    amplitude: Length | None = None
+    rms: Length | None = None
+
+
+class Tones(Strict):
+    """Sway of the angles about their mean, and of the centre about its place."""
+
+    heading: tuple[AngleTone, ...] = ()
+    pitch: tuple[AngleTone, ...] = ()
+    roll: tuple[AngleTone, ...] = ()
+    east: tuple[LengthTone, ...] = ()
+    north: tuple[LengthTone, ...] = ()
+    up: tuple[LengthTone, ...] = ()
+
+    def tones(self, rng: Rng) -> dict[str, Any]:
+        """By the names that motions take."""
+        return {
+            f"{name}_tones": tuple(tone for item in getattr(self, name) for tone in item.tones(rng))
+            for name in Tones.model_fields
+        }
+
+
+class HullShape(Strict):
+    """See :class:`truenorth.simulation.sea.Hull`."""
+
+    length: Length = 100.0
+    beam: Length = 16.0
+    roll_period: Time = 10.0
+    pitch_period: Time = 6.0
+    heave_period: Time = 6.5
+    roll_damping: float = 0.08
+    pitch_damping: float = 0.35
+    heave_damping: float = 0.35
+    yaw_gain: float = 0.3
+
+
+class Waves(Strict):
+    """The sea: by its significant height and peak period, or by the wind that has raised it; `direction` it runs to."""
+
+    direction: Angle
+    height: Length | None = None
+    period: Time | None = None
+    peakedness: float = 3.3
+    wind: Speed | None = None
+    components: int = Field(COMPONENTS, ge=1, le=1000)
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        measured = self.height is not None and self.period is not None and self.wind is None
+        blown = self.wind is not None and self.height is None and self.period is None
+        if measured == blown:
+            raise ValueError("expected height and period, or wind alone")
+        return self
+
+    def tones(self, hull: HullShape, heading: float, speed: float, rng: Rng) -> dict[str, Any]:
+        """Of a ship on a heading (rad) at a speed (m/s)."""
+        if self.wind is not None:
+            spectrum = WaveSpectrum.of_wind(self.wind)
+        else:
+            spectrum = WaveSpectrum(float(self.height or 0.0), float(self.period or 0.0), self.peakedness)
+        return sea_motion(
+            spectrum,
+            Hull(**hull.__dict__),
+            rng,
+            direction=self.direction,
+            heading=heading,
+            speed=speed,
+            components=self.components,
+        )
+
+
+class RestMotion(Strict):
+    """A base that stands still."""
+
+    kind: Literal["rest"]
+    heading: Angle = 0.0
+    pitch: Angle = 0.0
+    roll: Angle = 0.0
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        return Sway(position, self.heading, self.pitch, self.roll, lever_arm=arm)
+
+
+class SwayMotion(Strict):
+    """A base that sways by given tones."""
+
+    kind: Literal["sway"]
+    heading: Angle = 0.0
+    pitch: Angle = 0.0
+    roll: Angle = 0.0
+    tones: Tones
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        return Sway(position, self.heading, self.pitch, self.roll, lever_arm=arm, **self.tones.tones(rng))
+
+
+class SeaMotion(Strict):
+    """A ship that lies in waves."""
+
+    kind: Literal["sea"]
+    heading: Angle = 0.0
+    waves: Waves
+    hull: HullShape = HullShape()
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        return Sway(position, self.heading, lever_arm=arm, **self.waves.tones(self.hull, self.heading, 0.0, rng))
+
+
+class RingMotion(Strict):
+    """A vehicle on a ring track."""
+
+    kind: Literal["ring"]
+    radius: Length
+    speed: Speed
+    heading: Angle = 0.0
+    clockwise: bool = True
+    wait: Time = 0.0
+    acceleration: Acceleration = 1.0
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        own = {name: value for name, value in self.__dict__.items() if name != "kind"}
+        return ring(position, lever_arm=arm, **own)
+
+
+class Straight(Strict):
+    """Straight on, or standing, for a time."""
+
+    kind: Literal["straight"]
+    duration: Time
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s)."""
+        return manoeuvres.straight(self.duration)
+
+
+class Turn(Strict):
+    """A level turn, clockwise positive."""
+
+    kind: Literal["turn"]
+    angle: Angle
+    rate: AngularRate
+    bank: Literal["flat", "coordinated"] = "flat"
+    onset: Time = 2.0
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s)."""
+        return manoeuvres.turn(self.angle, self.rate, self.bank, self.onset)
+
+
+class STurn(Strict):
+    """Out to one side and back, to the other and back."""
+
+    kind: Literal["s_turn"]
+    angle: Angle
+    rate: AngularRate
+    times: int = Field(1, ge=1)
+    bank: Literal["flat", "coordinated"] = "coordinated"
+    onset: Time = 2.0
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s)."""
+        return manoeuvres.s_turn(self.angle, self.rate, self.times, self.bank, self.onset)
+
+
+class Accelerate(Strict):
+    """To another speed, higher or lower."""
+
+    kind: Literal["accelerate"]
+    to: Speed
+    acceleration: Acceleration
+    onset: Time = 2.0
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s)."""
+        return manoeuvres.accelerate(self.to, self.acceleration, speed, self.onset)
+
+
+class Climb(Strict):
+    """Up (or down) at a slope for a time, and level again."""
+
+    kind: Literal["climb"]
+    slope: Angle
+    duration: Time
+    rate: AngularRate = math.radians(2.0)
+    onset: Time = 1.0
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s)."""
+        return manoeuvres.climb(self.slope, self.duration, self.rate, self.onset)
+
+
+class WingRock(Strict):
+    """Straight on, rolling from side to side."""
+
+    kind: Literal["wing_rock"]
+    duration: Time
+    amplitude: Angle
+    period: Time
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s); the rolling comes on top."""
+        return manoeuvres.straight(self.duration)
+
+
+Manoeuvre = Annotated[Straight | Turn | STurn | Accelerate | Climb | WingRock, Field(discriminator="kind")]
+
+
+class LegsMotion(Strict):
+    """Manoeuvres one after the other: a flight, a ship under way, a drive."""
+
+    kind: Literal["legs"]
+    heading: Angle = 0.0
+    speed: Speed = 0.0
+    legs: tuple[Manoeuvre, ...] = Field(min_length=1)
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        legs: list[Leg] = []
+        rocks: list[tuple[float, WingRock]] = []
+        speed = self.speed
+        for item in self.legs:
+            if isinstance(item, WingRock):
+                rocks.append((manoeuvres.length(legs), item))
+            legs += item.legs(speed)
+            speed = next((leg.speed for leg in reversed(legs) if leg.speed is not None), self.speed)
+        motion: Motion = course(position, legs, heading=self.heading, speed=self.speed, lever_arm=arm)
+        for start, rock in rocks:
+            motion = manoeuvres.wing_rock(motion, start, start + rock.duration, rock.amplitude, rock.period)
+        return motion
+
+
+class Point(Strict):
+    """A way-point."""
+
+    lat: Angle
+    lon: Angle
+    alt: Length = 0.0
+    speed: Speed | None = None
+    stop: Time = 0.0
+
+
+class DrivingStyle(Strict):
+    """See :class:`truenorth.simulation.route.Driving`."""
+
+    speed: Speed = 15.0
+    acceleration: Acceleration = 1.5
+    lateral_acceleration: Acceleration = 2.0
+    radius: Length = 15.0
+    smallest_radius: Length = 4.0
+    onset: Time = 1.0
+
+
+class RouteMotion(Strict):
+    """A land vehicle along way-points, given here or in a CSV or GPX file; the scenario's position is not used."""
+
+    kind: Literal["route"]
+    points: tuple[Point, ...] = ()
+    file: str | None = None
+    spacing: Length | None = None
+    driving: DrivingStyle = DrivingStyle()
+    wait: Time = 0.0
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if bool(self.points) == (self.file is not None):
+            raise ValueError("expected points, or the file (.csv or .gpx) that holds them")
+        return self
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        points = [WayPoint(**point.__dict__) for point in self.points]
+        if self.file is not None:
+            points = read_waypoints(folder / self.file, self.spacing)
+        return route(points, Driving(**self.driving.__dict__), wait=self.wait, lever_arm=arm)
+
+
+class TablePosition(Strict):
+    """A position of a turntable."""
+
+    duration: Time
+    heading: Angle = 0.0
+    pitch: Angle = 0.0
+    roll: Angle = 0.0
+
+
+class TurntableMotion(Strict):
+    """A turntable going through positions."""
+
+    kind: Literal["turntable"]
+    positions: tuple[TablePosition, ...] = Field(min_length=1)
+    rate: AngularRate = math.radians(10.0)
+    onset: Time = 0.5
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        holds = [Hold(**item.__dict__) for item in self.positions]
+        return turntable(position, holds, rate=self.rate, onset=self.onset, lever_arm=arm)
+
+
+MotionModel = Annotated[
+    RestMotion | SwayMotion | SeaMotion | RingMotion | LegsMotion | RouteMotion | TurntableMotion,
+    Field(discriminator="kind"),
+]
+
+
+# From when to when a disturbance lasts, and in what time it comes and goes.
+Window = tuple[Time, Time, Time]
+
+
+class SwayDisturbance(Strict):
+    """Tones on top of a motion."""
+
+    kind: Literal["sway"]
+    tones: Tones
+    window: Window | None = None
+
+    def build(self, motion: Motion, rng: Rng) -> Motion:
+        """The disturbed motion."""
+        return Disturbed(motion, **self.tones.tones(rng), window=self.window)
+
+
+class SeaDisturbance(Strict):
+    """Waves under a ship under way; `heading` and `speed` are those at which it meets them."""
+
+    kind: Literal["sea"]
+    heading: Angle
+    speed: Speed
+    waves: Waves
+    hull: HullShape = HullShape()
+    window: Window | None = None
+
+    def build(self, motion: Motion, rng: Rng) -> Motion:
+        """The disturbed motion."""
+        tones = self.waves.tones(self.hull, self.heading, self.speed, rng)
+        return Disturbed(motion, **tones, window=self.window)
+
+
+class Sine(Strict):
+    """One sinusoid of an engine: peak acceleration along body axes (right, forward, up)."""
+
+    frequency: Frequency
+    acceleration: tuple[Acceleration, Acceleration, Acceleration]
+
+
+class SpectrumPoint(Strict):
+    """A break point of a power spectral density."""
+
+    frequency: Frequency
+    density: AccelerationDensity
+
+
+class Vibration(Strict):
+    """Vibration of the IMU in the vehicle: sinusoids, and random vibration alike on the three axes."""
+
+    kind: Literal["vibration"]
+    sines: tuple[Sine, ...] = ()
+    random: tuple[SpectrumPoint, ...] = ()
+    components: int = Field(64, ge=1, le=1000)
+    window: Window | None = None
+
+    def build(self, motion: Motion, rng: Rng) -> Motion:
+        """The disturbed motion."""
+        axes: list[tuple[Tone, ...]] = []
+        for axis in range(3):
+            tones = [
+                sine_vibration(sine.acceleration[axis], sine.frequency, rng.uniform(0, 2 * math.pi))
+                for sine in self.sines
+            ]
+            if self.random:
+                table = [(point.frequency, point.density) for point in self.random]
+                tones += random_vibration(table, rng, self.components)
+            axes.append(tuple(tones))
+        right, forward, up = axes
+        return Disturbed(motion, mount_tones=(right, forward, up), window=self.window)
+
+
+Disturbance = Annotated[SwayDisturbance | SeaDisturbance | Vibration, Field(discriminator="kind")]
+
+
+def disturbed(motion: Motion, disturbances: Sequence[Any], generators: Sequence[Rng]) -> Motion:
+    """A motion with all disturbances, each drawn from a generator of its own."""
+    for item, rng in zip(disturbances, generators, strict=True):
+        motion = item.build(motion, rng)
+    return motion
