@@ -8,7 +8,7 @@ from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.errors import UsageError
 from truenorth.position import Position
 from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
-from truenorth.simulation.imu_errors import STREAMS, apply_errors
+from truenorth.simulation.imu_errors import apply_errors
 from truenorth.specs import ImuSpec, imu_spec
 from truenorth.strapdown import NavigationState, mechanise
 
@@ -118,7 +118,7 @@ def test_same_seed_same_bits_and_runs_do_not_know_each_other():
     assert not np.array_equal(alone.gyro, other.gyro)
 
 
-@pytest.mark.parametrize("term", sorted({name.split("_", 1)[1] for name in STREAMS}))
+@pytest.mark.parametrize("term", ["bias", "random_walk", "bias_instability", "scale_factor", "misalignment"])
 def test_switching_a_term_off_leaves_the_others_draws(term):
     """The difference with and without a term is that term alone, on a base of zeros and unit force."""
     from dataclasses import replace

@@ -11,28 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.simulation.streams import STREAMS, stream
 from truenorth.specs import ImuSpec
 
 Array = NDArray[np.float64]
-
-# Streams by term; never renumbered, so that a seed keeps its data.
-STREAMS = {
-    "gyro_bias": 0,
-    "accel_bias": 1,
-    "gyro_random_walk": 2,
-    "accel_random_walk": 3,
-    "gyro_bias_instability": 4,
-    "accel_bias_instability": 5,
-    "gyro_scale_factor": 6,
-    "accel_scale_factor": 7,
-    "gyro_misalignment": 8,
-    "accel_misalignment": 9,
-}
-
-
-def stream(seed: int, scenario: int, run: int, number: int) -> np.random.Generator:
-    """The random generator of one term of one run."""
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(scenario, run, number))))
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,11 @@
-"""Motion of an IMU on the ellipsoid: from angles and the path of a centre to rates, forces and increments.
+"""Motion of an IMU on the ellipsoid: from angles and the path of a centre to rates and forces.
 
 A motion gives its angles, velocity and acceleration in closed form; rate and specific force follow by rigid-body
-kinematics. Increments are their integrals over each interval by Gauss-Legendre quadrature of four nodes: exact to
-rounding for any motion of many samples a period.
+kinematics. Their integrals over each sampling interval are taken in :mod:`truenorth.simulation.sensing`.
 """
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -18,8 +16,6 @@ from truenorth.attitude import dcm_from_euler
 from truenorth.earth import earth_rate_n, gravity_n, radii, transport_rate_n
 
 Array = NDArray[np.float64]
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-BLOCK = 4096  # intervals at once: keeps the work arrays in the cache
 
 
 @dataclass(frozen=True)
@@ -128,32 +124,6 @@ class Motion(ABC):
             f_b=_apply(C_bn, f_n),
             dw_ib_b=dw_nb + dw_in_b,
         )
-
-    def increments(self, edges: Array) -> tuple[Array, Array]:
-        """Integrals of rate and specific force between successive `edges` (N+1,), as (N, 3) rad and m/s."""
-        inside = self.breaks[(self.breaks > edges[0]) & (self.breaks < edges[-1])]
-        parts = math.ceil(8 * float(np.max(np.diff(edges))) / self.shortest_period)
-        if parts > 1:
-            fractions = np.arange(1, parts) / parts
-            inside = np.union1d(inside, (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel())
-        if inside.size:
-            finer = np.union1d(edges, inside)
-            first = np.searchsorted(finer, edges[:-1])
-            dtheta, dvel = self._integrals(finer)
-            return np.add.reduceat(dtheta, first), np.add.reduceat(dvel, first)
-        return self._integrals(edges)
-
-    def _integrals(self, edges: Array) -> tuple[Array, Array]:
-        count = len(edges) - 1
-        dtheta, dvel = np.empty((count, 3)), np.empty((count, 3))
-        for first in range(0, count, BLOCK):
-            rows = slice(first, min(first + BLOCK, count))
-            start, length = edges[rows], np.diff(edges[first : rows.stop + 1])
-            at = self.states(start[:, None] + 0.5 * length[:, None] * (1.0 + NODES))
-            weights = 0.5 * length[:, None] * WEIGHTS
-            dtheta[rows] = np.einsum("kn,kni->ki", weights, at.w_ib_b)
-            dvel[rows] = np.einsum("kn,kni->ki", weights, at.f_b)
-        return dtheta, dvel
 
 
 Path = tuple[Array, Array, Array, Array, Array]  # latitude, longitude, height, velocity, its derivative
