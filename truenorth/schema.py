@@ -23,8 +23,11 @@ class _Unit(str):
     """Marks an annotation as a quantity: an example for messages."""
 
 
-def _quantity(dimension: str, unit: str) -> Any:
-    """The annotation of a value given as text with a unit: SI inside, `unit` when it is written again."""
+def _quantity(dimension: str, unit: str, si: str) -> Any:
+    """The annotation of a value given as text with a unit: SI inside, `unit` when it is written again.
+
+    What is written reads back to the same bits: in SI where `unit` would round.
+    """
 
     def read(text: Any) -> float:
         try:
@@ -33,20 +36,21 @@ def _quantity(dimension: str, unit: str) -> Any:
             raise ValueError(str(error)) from None
 
     def write(value: float) -> str:
-        return format_quantity(value, unit, digits=None)
+        text = format_quantity(value, unit, digits=None)
+        return text if parse(text, dimension) == value else f"{value!r} {si}"
 
     return Annotated[float, BeforeValidator(read), PlainSerializer(write), _Unit(DIMENSIONS[dimension][1])]
 
 
-Angle = _quantity("angle", "deg")
-AngularRate = _quantity("angular_rate", "deg/s")
-Length = _quantity("length", "m")
-Speed = _quantity("speed", "m/s")
-Acceleration = _quantity("acceleration", "m/s^2")
-AccelerationDensity = _quantity("acceleration_density", "g^2/Hz")
-Time = _quantity("time", "s")
-Frequency = _quantity("frequency", "Hz")
-Ratio = _quantity("ratio", "1")
+Angle = _quantity("angle", "deg", "rad")
+AngularRate = _quantity("angular_rate", "deg/s", "rad/s")
+Length = _quantity("length", "m", "m")
+Speed = _quantity("speed", "m/s", "m/s")
+Acceleration = _quantity("acceleration", "m/s^2", "m/s^2")
+AccelerationDensity = _quantity("acceleration_density", "g^2/Hz", "m^2/s^3")
+Time = _quantity("time", "s", "s")
+Frequency = _quantity("frequency", "Hz", "Hz")
+Ratio = _quantity("ratio", "%", "1")
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -62,71 +66,71 @@ def validated(model: type[M], content: Any, where: str) -> M:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        problems = error.errors(include_url=False)
+        # Keys that nothing reads first: a misspelt key is often what another one that is missing was meant to be.
+        problems = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
         more = f" ({len(problems) - 1} more after this)" if len(problems) > 1 else ""
         raise DataError(_message(model, content, problems[0], where) + more) from None
 
 
 def _message(model: type[BaseModel], content: Any, problem: Any, where: str) -> str:
-    path, known, example = _locate(model, content, problem["loc"])
-    if problem["type"] == "extra_forbidden":
-        return unknown_key(where, path, [path[: path.rfind(".") + 1] + key for key in known])
-    if problem["type"] == "missing":
-        such = f", such as {example!r}" if example else ""
-        return f"{where}: {path} is missing; expected {path.rpartition('.')[2]}: ...{such}"
-    if problem["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        kinds = problem["ctx"].get("expected_tags", ", ".join(map(repr, known)))
-        found = (
-            f"{path}.kind: {problem['ctx']['tag']!r} is not known"
-            if "tag" in problem["ctx"]
-            else f"{path}.kind is missing"
-        )
+    path, beside, field = _locate(model, content, problem["loc"])
+    kind = problem["type"]
+    if kind == "extra_forbidden":
+        parent = path[: path.rfind(".") + 1]
+        return unknown_key(where, path, [parent + key for key in beside])
+    if kind == "missing":
+        example = next((str(x) for x in getattr(field, "metadata", ()) if isinstance(x, _Unit)), None)
+        such = f", such as {path.rpartition('.')[2]}: {example}" if example else ""
+        return f"{where}: {path} is missing; give it{such}"
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        kinds = ", ".join(repr(_kind(m)) for m in models_in(getattr(field, "annotation", None)))
+        tag = problem["ctx"].get("tag")
+        found = f"{path}.kind is missing" if tag is None else f"{path}.kind: {tag!r} is not known"
         return f"{where}: {found}; expected one of {kinds}"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        keys = ", ".join(_fields(getattr(field, "annotation", None)))
+        return f"{where}: {path}: {problem['input']!r}; expected a mapping of the keys {keys}"
     text = problem["msg"].removeprefix("Value error, ")
     if text.startswith("Input should be "):
-        text = f"{problem['input']!r}; expected {text.removeprefix('Input should be ')}"
+        text = f"{problem['input']!r}; expected {text.removeprefix('Input should be ').removeprefix('a valid ')}"
     return f"{where}: {path}: {text}" if path else f"{where}: {text}"
 
 
-def _locate(model: type[BaseModel], content: Any, loc: tuple[int | str, ...]) -> tuple[str, list[str], str | None]:
-    """Path of a key as a person writes it, the keys known beside it, and an example of its value.
+def _locate(model: type[BaseModel], content: Any, loc: tuple[int | str, ...]) -> tuple[str, list[str], Any]:
+    """Path of a key as a person writes it, the keys known beside it, and its field, if there is one.
 
     The library's location holds the tag of each union that it went through; the path of a person does not.
     """
-    path, known, example = "", list(model.model_fields), None
-    at: Any = model
+    path, beside, field = "", list(model.model_fields), None
+    at: list[type[BaseModel]] = [model]
     for step in loc:
-        if isinstance(content, Mapping) and step == content.get("kind") and step not in _fields(at):
-            at = next((m for m in _models(at) if _kind(m) == step), at)
-            known = _fields(at)
+        if len(at) > 1 and isinstance(content, Mapping) and step == content.get("kind"):
+            at = [m for m in at if _kind(m) == step]
             continue
-        known = _fields(at) or known
-        path += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if path else str(step)
-        field = next((m.model_fields[step] for m in _models(at) if step in m.model_fields), None)
-        if field is not None:
-            example = next((str(x) for x in field.metadata if isinstance(x, _Unit)), None)
-            at = field.annotation
-        elif not isinstance(step, int):
-            at = None
+        path += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if path else step
+        if isinstance(step, str):
+            beside = list(dict.fromkeys(name for m in at for name in m.model_fields))
+            field = next((m.model_fields[step] for m in at if step in m.model_fields), None)
+            at = [] if field is None else list(models_in(field.annotation))
         try:
             content = content[step]
         except (KeyError, IndexError, TypeError):
             content = None
-    return path, known, example
+    return path, beside, field
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
     """The models that can stand where an annotation is."""
     if isinstance(annotation, type) and get_origin(annotation) is None:
         if issubclass(annotation, BaseModel):
             yield annotation
         return
     for part in get_args(annotation):
-        yield from _models(part)
+        yield from models_in(part)
 
 
 def _fields(annotation: Any) -> list[str]:
-    return list(dict.fromkeys(name for m in _models(annotation) for name in m.model_fields))
+    return list(dict.fromkeys(name for m in models_in(annotation) for name in m.model_fields))
 
 
 def _kind(model: type[BaseModel]) -> Any:

@@ -1,4 +1,4 @@
-"""The command line: `truenorth align`, `truenorth inspect`.
+"""The command line: `truenorth align`, `truenorth inspect`, `truenorth simulate`.
 
 Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
@@ -14,6 +14,7 @@ import typer
 from truenorth import __version__
 from truenorth.cli.align import align
 from truenorth.cli.inspect import inspect
+from truenorth.cli.simulate import simulate
 from truenorth.errors import TruenorthError
 
 INTERRUPTED = 130
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 app.command("align")(align)
 app.command("inspect")(inspect)
+app.command("simulate")(simulate)
 
 
 def _version(wanted: bool) -> None:

@@ -352,10 +352,15 @@ class RouteMotion(Strict):
 
     def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
         """The motion."""
-        points = [WayPoint(**point.__dict__) for point in self.points]
-        if self.file is not None:
-            points = read_waypoints(folder / self.file, self.spacing)
+        points = [WayPoint(**point.__dict__) for point in self.with_points(folder).points]
         return route(points, Driving(**self.driving.__dict__), wait=self.wait, lever_arm=arm)
+
+    def with_points(self, folder: Path) -> Self:
+        """The same route, its points read from the file."""
+        if self.file is None:
+            return self
+        points = tuple(Point.model_construct(**vars(p)) for p in read_waypoints(folder / self.file, self.spacing))
+        return self.model_copy(update={"points": points, "file": None, "spacing": None})
 
 
 class TablePosition(Strict):

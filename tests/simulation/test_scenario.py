@@ -1,0 +1,199 @@
+"""Scenario files: what they say, what is refused with which words, and the folder that a run becomes."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+import truenorth
+from truenorth.cli import app
+from truenorth.errors import DataError, UsageError
+from truenorth.schema import Strict
+from truenorth.simulation.scenario import Scenario, read_scenario, shipped
+from truenorth.simulation.scenario_motion import RouteMotion
+
+BASE = {
+    "name": "base",
+    "duration": "20 s",
+    "rate": "50 Hz",
+    "position": {"lat": "45 deg", "lon": "10 deg"},
+    "motion": {"kind": "rest"},
+}
+PAPERS = {"rotary_ship", "transfer_flat_turn", "marine_damping", "static_kalman", "odometer_ring"}
+EVERYDAY = {"van", "quay", "take_off", "auv", "table"}
+
+
+def run(*arguments: str):
+    return CliRunner().invoke(app, ["simulate", *arguments])
+
+
+def test_five_papers_and_five_everyday_scenarios_ship():
+    assert set(shipped()) == PAPERS | EVERYDAY
+    assert all(shipped().values())
+
+
+@pytest.mark.parametrize("name", sorted(PAPERS | EVERYDAY))
+def test_a_shipped_scenario_runs_and_reads_back_from_its_resolved_file(name):
+    scenario = read_scenario(name)
+    again = read_scenario(scenario.to_mapping())
+    assert again.model_dump(exclude={"imu"}) == scenario.model_dump(exclude={"imu"})
+    assert again.imu_spec == scenario.imu_spec
+    short = scenario.model_copy(update={"duration": 20.0})
+    first, second, other = (
+        short.simulate(),
+        again.model_copy(update={"duration": 20.0}).simulate(),
+        short.simulate(run=1),
+    )
+    np.testing.assert_array_equal(first.record.gyro, second.record.gyro)
+    np.testing.assert_array_equal(first.record.accel, second.record.accel)
+    assert not np.array_equal(first.record.gyro, other.record.gyro)
+    assert scenario.is_drawn == (repr(short.build_motion(run=0)) != repr(short.build_motion(run=1)))
+
+
+def test_a_disturbance_draws_apart_from_the_others():
+    """Taking one away leaves the draws of those before it, and of the sensors, as they were."""
+    swell = {"kind": "sway", "tones": {"roll": [{"rms": "1 deg", "period": "6 s", "bandwidth": "15 %"}]}}
+    engine = {"kind": "vibration", "sines": [{"frequency": "30 Hz", "acceleration": ["1 mg", "1 mg", "1 mg"]}]}
+    both = read_scenario(BASE | {"disturbances": [swell, engine]}).build_motion(seed=3)
+    one = read_scenario(BASE | {"disturbances": [swell]}).build_motion(seed=3)
+    assert both.motion == one
+
+
+def test_a_route_comes_from_a_file_beside_the_scenario(tmp_path):
+    (tmp_path / "way.csv").write_text("lat,lon\n45.0,10.0\n45.001,10.0\n45.001,10.002\n")
+    content = {**BASE, "motion": {"kind": "route", "file": "way.csv"}}
+    del content["position"]
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(content))
+    scenario = read_scenario(tmp_path / "s.yaml")
+    resolved = read_scenario(scenario.to_mapping())  # needs the file no more
+    assert isinstance(resolved.motion, RouteMotion)
+    assert len(resolved.motion.points) == 3
+    np.testing.assert_array_equal(resolved.simulate().record.gyro, scenario.simulate().record.gyro)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"duration": "5 m"}, r"duration: '5 m' is a quantity of length; a quantity of time"),
+        ({"duration": "-5 s"}, r"duration: -5; expected a positive value"),
+        ({"duration": 5}, r"duration: 5 has no unit"),
+        ({"durration": "5 s"}, r"key 'durration' is not known; did you mean 'duration'"),
+        ({"motion": {"kind": "rings"}}, r"motion.kind: 'rings' is not known; expected one of 'rest', 'sway'"),
+        ({"motion": {"heading": "1 deg"}}, r"motion.kind is missing; expected one of 'rest'"),
+        ({"motion": {"kind": "ring", "speed": "5 m/s"}}, r"motion.radius is missing; give it, such as radius: "),
+        ({"motion": {"kind": "ring", "speed": "5 m/s", "radus": "9 m"}}, r"'motion.radus' is not known; did you mean"),
+        ({"motion": {"kind": "rest", "heading": "1 m"}}, r"motion.heading: '1 m'"),
+        (
+            {"motion": {"kind": "legs", "legs": [{"kind": "straight", "duration": "1 s"}, {"kind": "turn"}]}},
+            r"motion.legs\[2\].angle is missing",
+        ),
+        (
+            {"motion": {"kind": "sway", "tones": {"roll": [{"period": "3 s"}]}}},
+            r"motion.tones.roll\[1\]: expected amplitude, period, phase for a sinusoid, or rms",
+        ),
+        (
+            {"motion": {"kind": "sea", "waves": {"direction": "1 deg", "height": "1 m"}}},
+            r"motion.waves: expected height",
+        ),
+        ({"motion": 3}, r"motion"),
+        ({"position": "here"}, r"position: 'here'; expected a mapping of the keys lat, lon, alt"),
+        ({"seed": -1}, r"seed: -1; expected greater than or equal to 0"),
+        ({"imu": {"gyro": {"bias": "-3 deg/h"}}}, r"imu: .*gyro.bias: '-3 deg/h' is negative"),
+        ({"imu": "navigatoin"}, r"imu: .*did you mean 'navigation'"),
+        ({"output": "both"}, r"output: 'both'; expected 'increments' or 'rates'"),
+    ],
+)
+def test_a_mistake_is_told_by_the_path_of_its_key(change, words):
+    with pytest.raises(DataError, match=words):
+        read_scenario(BASE | change)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"position": None}, "position is missing"),
+        ({"position": {"lat": "95 deg"}}, "position: latitude 95 deg"),
+        (
+            {"motion": {"kind": "legs", "legs": [{"kind": "turn", "angle": "9 deg", "rate": "-1 deg/s"}]}},
+            "motion: turn of",
+        ),
+        ({"motion": {"kind": "route", "points": [{"lat": "1 deg", "lon": "1 deg"}]}}, "motion: route of 1"),
+        ({"motion": {"kind": "route", "file": "none.csv"}}, "motion: none.csv: cannot be read"),
+        (
+            {"disturbances": [{"kind": "vibration", "random": [{"frequency": "9 Hz", "density": "1 g^2/Hz"}]}]},
+            "disturbances: vibration spectrum",
+        ),
+    ],
+)
+def test_an_impossible_motion_is_told_when_it_is_built(change, words):
+    with pytest.raises(DataError, match=words):
+        read_scenario(BASE | change).build_motion()
+
+
+def test_quantities_are_never_bare_numbers():
+    """Every number with a dimension in the schema takes text with a unit; what is left is dimensionless."""
+
+    def bare(model: type[Strict], path: str, seen: set[type]) -> list[str]:
+        from truenorth.schema import models_in
+
+        found = []
+        for name, field in model.model_fields.items():
+            if field.annotation is float and not field.metadata:
+                found.append(name)
+            for inner in models_in(field.annotation):
+                if inner not in seen:
+                    seen.add(inner)
+                    found += bare(inner, f"{path}.{name}", seen)
+        return found
+
+    dimensionless = {"peakedness", "roll_damping", "pitch_damping", "heave_damping", "yaw_gain"}
+    assert set(bare(Scenario, "", set())) <= dimensionless
+
+
+def test_the_command_writes_a_folder_that_reads_back(tmp_path):
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(BASE | {"imu": "tactical", "seed": 5}))
+    result = run(str(tmp_path / "s.yaml"), "-o", str(tmp_path / "out"))
+    assert result.exit_code == 0, result.output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"imu.parquet", "truth.parquet", "scenario.yaml", "summary.json", "figure.png"}
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["seed"], summary["run"], summary["samples"]) == (5, 0, 1000)
+    record = truenorth.read_imu(tmp_path / "out" / "imu.parquet")
+    again = read_scenario(tmp_path / "out" / "scenario.yaml").simulate()
+    np.testing.assert_array_equal(record.gyro, again.record.gyro)
+    np.testing.assert_allclose(again.errors.gyro_bias, summary["true_errors"]["gyro_bias"], rtol=0)
+
+
+def test_many_runs_and_csv(tmp_path):
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(BASE | {"imu": "tactical"}))
+    result = run(
+        str(tmp_path / "s.yaml"), "-o", str(tmp_path / "out"), "--runs", "3", "--run", "4", "--csv", "--no-plot"
+    )
+    assert result.exit_code == 0, result.output
+    assert [path.name for path in sorted((tmp_path / "out").iterdir())] == ["run_0004", "run_0005", "run_0006"]
+    alone = run(str(tmp_path / "s.yaml"), "-o", str(tmp_path / "alone"), "--run", "5", "--csv", "--no-plot")
+    assert alone.exit_code == 0
+    for name in ("imu.csv", "truth.csv"):
+        assert (tmp_path / "out" / "run_0005" / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
+
+
+def test_list_and_show():
+    assert "quay" in run("--list").output
+    shown = yaml.safe_load(run("van", "--show").output)
+    assert shown["motion"]["driving"]["lateral_acceleration"] == "2.5 m/s^2"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ([], UsageError, "no scenario"),
+        (["van"], UsageError, "no output folder"),
+        (["vann", "-o", "x"], UsageError, "did you mean 'van'"),
+    ],
+)
+def test_wrong_usage(arguments, error, words):
+    result = run(*arguments)
+    assert isinstance(result.exception, error)
+    assert words in str(result.exception)

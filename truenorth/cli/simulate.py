@@ -1,0 +1,98 @@
+"""`truenorth simulate`: from a scenario file to logs, truth and a figure."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from truenorth.cli.console import make_console
+
+# The \b keeps the lines as they are, ready to be copied.
+EXAMPLES = """
+\b
+Examples:
+  truenorth simulate --list
+  truenorth simulate quay -o quay
+  truenorth simulate my_scenario.yaml -o result --seed 7 --csv
+  truenorth simulate van -o runs --runs 20 --no-plot
+  truenorth simulate van --show > my_scenario.yaml
+
+Exit codes: 0 done; 2 wrong usage; 3 a scenario with a mistake.
+"""
+
+
+def simulate(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help="A YAML file, or the name of a scenario that ships with us.", show_default=False),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the results.", show_default=False)
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="In place of the scenario's own.", show_default=False)] = None,
+    run: Annotated[int, typer.Option(min=0, help="Number of the run; it draws its own errors.")] = 0,
+    runs: Annotated[
+        int | None,
+        typer.Option(min=1, help="So many runs from --run on, each in a folder of its own.", show_default=False),
+    ] = None,
+    csv: Annotated[bool, typer.Option("--csv", help="Logs and truth as CSV instead of Parquet.")] = False,
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Also draw figure.png.")] = True,
+    list_: Annotated[bool, typer.Option("--list", help="List the scenarios that ship with us.")] = False,
+    show: Annotated[
+        bool, typer.Option("--show", help="Print the scenario with all its defaults; simulate nothing.")
+    ] = False,
+) -> None:
+    """Simulate a scenario: the IMU's log and those of its aiding sensors, and the truth that made them."""
+    from truenorth.errors import UsageError
+    from truenorth.simulation.scenario import read_scenario, shipped
+
+    console = make_console()
+    if list_:
+        width = max(map(len, shipped()))
+        for name, description in shipped().items():
+            console.print(f"{name:{width}}  {description}", soft_wrap=True)
+        return
+    if scenario is None:
+        raise UsageError("no scenario; name a YAML file or one of those that `truenorth simulate --list` shows")
+    chosen = read_scenario(scenario)
+    if show:
+        import yaml
+
+        print(yaml.safe_dump(chosen.to_mapping(), sort_keys=False, allow_unicode=True, width=110), end="")
+        return
+    if output is None:
+        raise UsageError("no output folder; name one with -o")
+    from truenorth.atomic import writable_folder
+    from truenorth.simulation.folder import save_run
+
+    writable_folder(output)  # before the work, not after it
+    drawn_with = chosen.seed if seed is None else seed
+    numbers = range(run, run + (1 if runs is None else runs))
+    shared = None if chosen.is_drawn or len(numbers) == 1 else chosen.ideal()
+    paths: list[Path] = []
+    for number in _with_bar(numbers):
+        simulated = chosen.simulate(seed=drawn_with, run=number, ideal=shared)
+        folder = output if runs is None else output / f"run_{number:04d}"
+        suffix: Any = "csv" if csv else "parquet"
+        paths = save_run(chosen, simulated, folder, seed=drawn_with, run=number, suffix=suffix, plot=plot)
+    if runs is None:
+        for path in paths:
+            console.print(f"wrote {path}", soft_wrap=True)
+    else:
+        console.print(f"wrote {len(numbers)} runs into {output}", soft_wrap=True)
+
+
+def _with_bar(numbers: range) -> Iterable[int]:
+    """The runs, with a progress bar on standard error where there are several and a person looks at it."""
+    if len(numbers) == 1 or not sys.stderr.isatty():
+        return numbers
+    from rich.progress import track
+
+    return track(numbers, description="simulating", console=make_console(stderr=True))
+
+
+simulate.__doc__ = f"{simulate.__doc__}\n{EXAMPLES}"

@@ -1,0 +1,116 @@
+"""One page on a simulated log: where the base went, how it moved and lay, and what the sensors give."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from truenorth.attitude import euler_from_dcm
+from truenorth.earth import radii
+from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
+from truenorth.units import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from truenorth.simulation.motion import MotionStates
+    from truenorth.simulation.runs import Simulation
+
+Array = NDArray[np.float64]
+SAMPLES = 20_000  # of the truth, evenly; enough for a page
+
+
+def plot_simulation(simulation: Simulation, title: str = "") -> Figure:
+    """Draw the track, speed and height, attitude, rates and specific forces of one run.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    record = simulation.record
+    times = record.time[np.unique(np.linspace(0, len(record) - 1, SAMPLES).astype(np.intp))]
+    truth = simulation.motion.states(times)
+    span = float(times[-1] - times[0])
+    unit, name = (3600.0, "h") if span > 3 * 3600 else (1.0, "s")
+    with style():
+        figure = new_figure(12.0, 8.5)
+        columns = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
+        left, right = columns[0].subgridspec(3, 1, height_ratios=[2.0, 1.0, 1.0]), columns[1].subgridspec(4, 1)
+        _track(figure.add_subplot(left[0]), truth)
+        speed = figure.add_subplot(left[1])
+        height = figure.add_subplot(left[2], sharex=speed)
+        trace(speed, times / unit, np.linalg.norm(truth.v_n, axis=1), color=COLOURS[0])
+        trace(height, times / unit, truth.alt, color=COLOURS[2])
+        speed.set(title="Speed", ylabel="m/s")
+        height.set(title="Height above the ellipsoid", ylabel="m", xlabel=f"time, {name}")
+        rows = [figure.add_subplot(right[0])]
+        rows += [figure.add_subplot(right[k], sharex=rows[0]) for k in range(1, 4)]
+        _attitude(rows[0], rows[1], times / unit, truth)
+        step = record.interval if record.kind == "increments" else 1.0
+        _signals(rows[2], record.time / unit, np.degrees(record.gyro / step), "Gyros", "deg/s")
+        _signals(rows[3], record.time / unit, record.accel / step / STANDARD_GRAVITY, "Accelerometers", "g")
+        rows[3].set_xlabel(f"time, {name}")
+        for ax in (speed, *rows[:3]):
+            ax.tick_params(labelbottom=False)
+        figure.suptitle(title or record.source, ha="left", x=0.01, fontsize=11)
+    return figure
+
+
+def _track(ax: Axes, truth: MotionStates) -> None:
+    """East and north of the first position, in metres or kilometres, to one scale."""
+    R_M, R_N = radii(truth.lat[0])
+    east = (truth.lon - truth.lon[0]) * (R_N + truth.alt[0]) * np.cos(truth.lat)
+    north = (truth.lat - truth.lat[0]) * (R_M + truth.alt[0])
+    extent = float(max(np.ptp(east), np.ptp(north)))
+    factor, unit = (1e-3, "km") if extent > 3e3 else (1.0, "m")
+    if extent < 1e-6:
+        ax.plot(0.0, 0.0, "o", color=COLOURS[0])
+        ax.set(xlim=(-1, 1), ylim=(-1, 1))
+    else:
+        ax.plot(east * factor, north * factor, color=COLOURS[0])
+        ax.plot(east[0] * factor, north[0] * factor, "o", color=COLOURS[2], label="start")
+        ax.plot(east[-1] * factor, north[-1] * factor, "s", color=COLOURS[1], label="end")
+        ax.legend()
+        ax.margins(0.08)
+    ax.set_aspect("equal", adjustable="datalim")
+    place = f"{abs(np.degrees(truth.lat[0])):.4f} {'N' if truth.lat[0] >= 0 else 'S'}, "
+    place += f"{abs(np.degrees(truth.lon[0])):.4f} {'E' if truth.lon[0] >= 0 else 'W'}"
+    ax.set(title=f"Track of the IMU, from {place}", xlabel=f"east, {unit}", ylabel=f"north, {unit}")
+
+
+def _attitude(heading_axes: Axes, tilt_axes: Axes, time: Array, truth: MotionStates) -> None:
+    heading, pitch, roll = (np.degrees(x) for x in euler_from_dcm(truth.C_nb))
+    heading = np.mod(heading, 360.0)
+    jumps = np.flatnonzero(np.abs(np.diff(heading)) > 180.0)
+    shown = np.insert(heading, jumps + 1, np.nan)  # no line across the page from 360 to 0
+    heading_axes.plot(np.insert(time, jumps + 1, time[jumps]), shown, color=COLOURS[0])
+    if np.ptp(heading) > 180.0:
+        heading_axes.set(ylim=(0, 360), yticks=(0, 90, 180, 270, 360))
+    heading_axes.set(title="Heading, true", ylabel="deg")
+    trace(tilt_axes, time, pitch, color=COLOURS[0], label="pitch")
+    trace(tilt_axes, time, roll, color=COLOURS[1], label="roll")
+    tilt_axes.set(title="Pitch and roll, true", ylabel="deg")
+    _legend(tilt_axes, 2)
+
+
+def _signals(ax: Axes, time: Array, values: Array, title: str, unit: str) -> None:
+    upright = unit == "g" and abs(float(np.median(values[:, 2])) - 1.0) < 0.2
+    for axis in range(3):
+        less_gravity = axis == 2 and upright  # or the vertical axis would flatten the others
+        label = f"{AXES_NAMES[axis]} − 1 g" if less_gravity else AXES_NAMES[axis]
+        trace(ax, time, values[:, axis] - less_gravity, color=COLOURS[axis], label=label, linewidth=0.8)
+    ax.axhline(0.0, color=REFERENCE, linewidth=0.6)
+    ax.set(title=f"{title}, as the IMU gives them", ylabel=unit)
+    _legend(ax, 3)
+
+
+def _legend(ax: Axes, columns: int) -> None:
+    """On the title's line, where no trace can run through it."""
+    ax.legend(ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)

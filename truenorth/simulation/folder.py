@@ -1,0 +1,124 @@
+"""A simulated run as a folder: the logs, the truth, the scenario with all its defaults, and where the numbers came from."""
+
+from __future__ import annotations
+
+import json
+import platform
+from contextlib import ExitStack
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from truenorth import __version__, write_imu
+from truenorth.atomic import atomic_path, writable_folder
+from truenorth.attitude import euler_from_dcm
+from truenorth.simulation.motion import MotionStates
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from truenorth.simulation.runs import Simulation
+    from truenorth.simulation.scenario import Scenario
+
+Suffix = Literal["parquet", "csv"]
+
+
+def save_run(
+    scenario: Scenario,
+    simulation: Simulation,
+    folder: str | PathLike[str],
+    *,
+    seed: int,
+    run: int = 0,
+    suffix: Suffix = "parquet",
+    plot: bool = True,
+) -> list[Path]:
+    """Write a run; the same scenario, seed and run give the same bytes of logs and truth.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    simulation : Simulation
+    folder : path
+    seed, run : int
+        That the run was made with.
+    suffix : {"parquet", "csv"}
+        Of the logs and the truth.
+    plot : bool
+        Also figure.png.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    UsageError
+        The folder cannot be written to.
+    """
+    import yaml
+
+    target = writable_folder(folder)
+    names = [f"imu.{suffix}", f"truth.{suffix}", "scenario.yaml", "summary.json"]
+    paths = [target / name for name in names]
+    with ExitStack() as files:
+        imu, truth, resolved, summary = (files.enter_context(atomic_path(path)) for path in paths)
+        write_imu(simulation.record, imu)
+        _write_table(truth_frame(simulation.truth), truth)
+        text = yaml.safe_dump(scenario.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
+        resolved.write_text(text, encoding="utf-8")
+        facts = json.dumps(_facts(scenario, simulation, seed, run), indent=2, allow_nan=False)
+        summary.write_text(f"{facts}\n", encoding="utf-8")
+        if plot:
+            from truenorth.figures.simulation import plot_simulation
+
+            paths.append(target / "figure.png")
+            title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
+            plot_simulation(simulation, title).savefig(files.enter_context(atomic_path(paths[-1])))
+    return paths
+
+
+def truth_frame(states: MotionStates) -> pd.DataFrame:
+    """True motion as a table with the documented columns, angles in degrees, index ``time``."""
+    import pandas as pd
+
+    heading, pitch, roll = (np.degrees(x) for x in euler_from_dcm(states.C_nb))
+    columns = {
+        "lat": np.degrees(states.lat),
+        "lon": np.degrees(states.lon),
+        "alt": states.alt,
+        **{f"V{axis}": states.v_n[:, i] for i, axis in enumerate("ENU")},
+        "roll": roll,
+        "pitch": pitch,
+        "heading": np.mod(heading, 360.0),
+    }
+    return pd.DataFrame(columns, index=pd.Index(states.time, name="time"))
+
+
+def _write_table(table: pd.DataFrame, path: Path) -> None:
+    if path.suffix == ".parquet":
+        table.to_parquet(path)
+    else:
+        table.to_csv(path, float_format="%.17g")
+
+
+def _facts(scenario: Scenario, simulation: Simulation, seed: int, run: int) -> dict[str, Any]:
+    errors = simulation.errors
+    return {
+        "scenario": scenario.name,
+        "seed": seed,
+        "run": run,
+        "samples": len(simulation.record),
+        "duration_s": scenario.duration,
+        "rate_hz": scenario.rate,
+        "kind": simulation.record.kind,
+        "imu": scenario.imu_spec.name,
+        "true_errors": {name: np.asarray(value).tolist() for name, value in vars(errors).items() if value is not None},
+        "true_errors_unit": "SI: rad/s, m/s^2",
+        "truenorth": __version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+    }
