@@ -65,16 +65,23 @@ def check_means(m: Means, lat: float, g: float) -> LogCheck:
     )
 
 
-def check_filter(task: Task, C_n0_i: Array, usual: StaticModel) -> tuple[LogCheck, StaticModel]:
-    """What the inertial frame tells of the biases and random walks: a filter that believes in no specification."""
+def check_filter(
+    task: Task, C_n0_i: Array, usual: StaticModel, known: StaticModel | None = None
+) -> tuple[LogCheck, StaticModel]:
+    """What the inertial frame tells of the biases and random walks: a filter that believes in no specified bias.
+
+    The random walks are fitted about the usual ones, unless they are known.
+    """
     # Loose where the log can answer, held where tilt or heading would take the blame.
     C_n_b = C_n0_i.T
     P = np.zeros((6, 6))
     P[:3, :3] = C_n_b @ np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2]) @ C_n_b.T
     P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
-    fine = fine_align(task.record, C_n0_i, task.position, usual, P, task.interval)
-    noise = fit_task_noise(task, fine.integrals, fine.C_n0_i, fine.system.P0, usual)
-    fine = fine_align(task.record, fine.C_n0_i, task.position, noise, P, task.interval)
+    noise = usual if known is None else known
+    fine = fine_align(task.record, C_n0_i, task.position, noise, P, task.interval)
+    if known is None:
+        noise = fit_task_noise(task, fine.integrals, fine.C_n0_i, fine.system.P0, usual)
+        fine = fine_align(task.record, fine.C_n0_i, task.position, noise, P, task.interval)
 
     lat = task.position.lat
     C = earth_rotation(fine.integrals.time[-1], lat).T @ fine.C_n0_i @ fine.integrals.C_ib[-1]

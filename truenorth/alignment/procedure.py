@@ -184,7 +184,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
     coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt)
-    filtered, noise = check_filter(task, coarse.C_n0_i, usual_noise())
+    filtered, noise = check_filter(task, coarse.C_n0_i, usual_noise(), None if spec is None else noise_of(spec))
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     used, where = _specification(spec, check, noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
