@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment, align
     from truenorth.calibration import Calibration
+    from truenorth.campaign import run_campaign
     from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
     from truenorth.formats import read_imu, write_imu
     from truenorth.position import Position
@@ -36,6 +37,7 @@ _HOMES = {
     "imu_spec": "specs",
     "inspect": "quality",
     "read_imu": "formats",
+    "run_campaign": "campaign",
     "simulate": "simulation",
     "write_imu": "formats",
     "write_report": "report",
@@ -55,6 +57,7 @@ __all__ = [
     "imu_spec",
     "inspect",
     "read_imu",
+    "run_campaign",
     "simulate",
     "write_imu",
     "write_report",

@@ -1,4 +1,4 @@
-"""The command line: `truenorth align`, `truenorth inspect`, `truenorth simulate`.
+"""The command line: `truenorth align`, `inspect`, `simulate`, `campaign`.
 
 Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
@@ -13,6 +13,7 @@ import typer
 
 from truenorth import __version__
 from truenorth.cli.align import align
+from truenorth.cli.campaign import campaign
 from truenorth.cli.inspect import inspect
 from truenorth.cli.simulate import simulate
 from truenorth.errors import TruenorthError
@@ -31,6 +32,7 @@ app = typer.Typer(
 app.command("align")(align)
 app.command("inspect")(inspect)
 app.command("simulate")(simulate)
+app.command("campaign")(campaign)
 
 
 def _version(wanted: bool) -> None:

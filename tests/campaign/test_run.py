@@ -1,0 +1,235 @@
+"""Campaigns: the same numbers wherever they are worked out; nothing lost, nothing twice, whatever kills them."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from tests.campaign.test_plan import PLAN, REST
+from truenorth.campaign import outcomes, read_campaign, read_plan, read_table, run_campaign
+from truenorth.campaign.execution import work
+from truenorth.campaign.store import Block, Store, opened
+from truenorth.cli import app
+from truenorth.errors import DataError, UsageError
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    return run_campaign(PLAN, folder)
+
+
+def test_every_run_of_every_method_is_there_once(undisturbed):
+    table = undisturbed.table
+    assert len(table[table["quantity"] == "outcome"]) == 6 * 2
+    assert not table.duplicated(["case", "method", "run", "time_s", "quantity"]).any()
+    assert set(table["quantity"]) >= {
+        "outcome",
+        "phi_e",
+        "phi_n",
+        "phi_u",
+        "level",
+        "nees",
+        "gyro_bias_x",
+        "accel_bias_z",
+    }
+
+
+def test_a_shard_is_plain_parquet(undisturbed):
+    shard = sorted((undisturbed.folder / "runs").iterdir())[0]
+    assert shard.name == "case0000_run000000-000001.parquet"
+    assert list(pd.read_parquet(shard).columns)[:4] == ["case", "method", "run", "time_s"]
+
+
+def test_processes_give_the_bits_of_one_process(undisturbed, tmp_path):
+    pd.testing.assert_frame_equal(run_campaign(PLAN, tmp_path, workers=2).table, undisturbed.table, check_exact=True)
+
+
+def test_a_dask_cluster_gives_the_same_bits(undisturbed, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        table = run_campaign(PLAN, tmp_path, scheduler=cluster.scheduler_address).table
+    pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
+
+
+def test_blocks_do_not_change_the_numbers(undisturbed, tmp_path):
+    pd.testing.assert_frame_equal(
+        run_campaign(PLAN | {"block": 5}, tmp_path).table, undisturbed.table, check_exact=True
+    )
+
+
+def test_more_runs_are_added_to_those_that_are_there(undisturbed, tmp_path):
+    run_campaign(PLAN | {"runs": 3}, tmp_path)
+    before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    more = run_campaign(PLAN, tmp_path)
+    pd.testing.assert_frame_equal(more.table, undisturbed.table, check_exact=True)
+    after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    assert before.items() <= after.items()
+
+
+def test_what_is_missing_is_worked_out_in_blocks(tmp_path):
+    store = Store(tmp_path)
+    store.runs.mkdir()
+    for name in ("case0000_run000002-000003.parquet", "case0001_run000000-000009.parquet", ".case0001.5.part.parquet"):
+        (store.runs / name).touch()
+    assert store.missing(2, 12, 5) == [
+        Block(0, 0, 1),
+        Block(0, 4, 4),
+        Block(0, 5, 9),
+        Block(0, 10, 11),
+        Block(1, 10, 11),
+    ]
+
+
+def test_methods_meet_the_same_data_and_points_of_the_grid_the_same_draws(tmp_path):
+    """Twice the bias sigma: the bias that is drawn, here the error of a method that does not estimate it, is twice as large."""
+    grid = {"imu.gyro.bias": ["0.01 deg/h", "0.02 deg/h"]}
+    table = run_campaign(PLAN | {"grid": grid}, tmp_path).table
+    bias = table[table["quantity"] == "gyro_bias_x"].pivot_table(
+        index="run", columns=["case", "method"], values="value"
+    )
+    np.testing.assert_allclose(bias[(1, "oba")], 2 * bias[(0, "oba")], rtol=1e-12)
+    np.testing.assert_array_equal(bias[(0, "oba")], bias[(0, "inertial")])
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path):
+    short = REST | {"duration": "0.5 s"}
+    table = run_campaign(PLAN | {"scenarios": [short, REST], "methods": ["oba"]}, tmp_path).table
+    ends = outcomes(table)
+    assert list(ends["runs"]) == [6, 6]
+    assert ends["status"][0] == "failed"
+    assert "AlignmentError" in ends["reason"][0]
+    assert ends["status"][1] == "aligned"
+
+
+def test_a_second_process_is_refused(tmp_path):
+    plan = read_plan(PLAN)
+    with opened(tmp_path, plan), pytest.raises(UsageError, match="another process works on this folder"):
+        run_campaign(plan, tmp_path)
+
+
+def test_another_plan_is_refused(undisturbed):
+    with pytest.raises(UsageError, match="holds the runs of another plan"):
+        run_campaign(PLAN | {"seed": 9}, undisturbed.folder)
+
+
+def test_a_full_disk_stops_with_a_message_and_leaves_what_was_done(tmp_path, monkeypatch):
+    import pyarrow.parquet as pq
+
+    write, written = pq.write_table, []
+
+    def full(table, path):
+        if len(written) == 2:
+            raise OSError(28, "No space left on device")
+        written.append(path)
+        write(table, path)
+
+    monkeypatch.setattr(pq, "write_table", full)
+    with pytest.raises(UsageError, match="No space left on device"):
+        run_campaign(PLAN, tmp_path)
+    assert len(list((tmp_path / "runs").iterdir())) == 2  # and nothing half-written
+
+
+def test_a_damaged_shard_is_named(tmp_path):
+    run_campaign(PLAN | {"runs": 2}, tmp_path)
+    shard = next((tmp_path / "runs").iterdir())
+    shard.write_bytes(shard.read_bytes()[:100])
+    with pytest.raises(DataError, match=shard.name):
+        read_table(tmp_path)
+
+
+def test_no_cluster(tmp_path):
+    with pytest.raises(UsageError, match="no Dask scheduler answers there"):
+        run_campaign(PLAN, tmp_path, scheduler="tcp://127.0.0.1:1")
+
+
+def _killed_and_resumed(folder, kills, undisturbed, seed):
+    """Start the command, kill it -9 at random moments, start it again; then to the end."""
+    (folder / "plan.yaml").write_text(yaml.safe_dump(PLAN))
+    command = [
+        sys.executable,
+        "-m",
+        "truenorth",
+        "campaign",
+        str(folder / "plan.yaml"),
+        "-o",
+        str(folder / "out"),
+        "--workers",
+        "1",
+    ]
+    chance = random.Random(seed)
+    for _ in range(kills):
+        process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        time.sleep(chance.uniform(0.5, 4.0))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    pd.testing.assert_frame_equal(read_table(folder / "out"), undisturbed.table, check_exact=True)
+    assert not [path for path in (folder / "out" / "runs").iterdir() if "part" in path.name]
+
+
+def test_killed_and_started_again_it_ends_as_if_nothing_had_been(undisturbed, tmp_path):
+    _killed_and_resumed(tmp_path, 2, undisturbed, 1)
+
+
+@pytest.mark.slow
+def test_killed_at_twenty_moments(undisturbed, tmp_path):
+    _killed_and_resumed(tmp_path, 20, undisturbed, 2)
+
+
+def test_a_worker_that_dies_is_replaced(undisturbed, tmp_path, monkeypatch):
+    """The first worker process to touch the marker's place kills itself, once."""
+    marker = tmp_path / "dying"
+    marker.touch()
+    monkeypatch.setenv("TRUENORTH_TEST_MARKER", str(marker))
+    monkeypatch.setattr("truenorth.campaign.execution.work", dying_work)
+    table = run_campaign(PLAN, tmp_path / "out", workers=2).table
+    assert not marker.exists()
+    pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
+
+
+def dying_work(plan, block):
+    from pathlib import Path
+
+    marker = Path(os.environ["TRUENORTH_TEST_MARKER"])
+    try:
+        marker.unlink()
+    except FileNotFoundError:
+        return work(plan, block)
+    os.kill(os.getpid(), signal.SIGKILL)
+    return None
+
+
+def test_the_command_writes_tables_figures_and_a_page(tmp_path):
+    plan = PLAN | {"times": ["20 s"], "grid": {"imu.gyro.bias": ["0.01 deg/h", "0.1 deg/h"]}, "runs": 4}
+    (tmp_path / "p.yaml").write_text(yaml.safe_dump(plan))
+    result = CliRunner().invoke(
+        app, ["campaign", str(tmp_path / "p.yaml"), "-o", str(tmp_path / "out"), "--workers", "1"]
+    )
+    assert result.exit_code == 0, result.output
+    assert "heading RMS" in result.output
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    figures = {"distribution.png", "overview.png", "convergence.png", "requirement_imu_gyro_bias.png"}
+    assert names >= figures | {
+        "summary.csv",
+        "comparison.csv",
+        "outcomes.csv",
+        "report.html",
+        "plan.yaml",
+        "manifest.json",
+    }
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert page.count("data:image/png;base64") == len(figures)
+    assert "http" not in page.split("<pre")[0]
+    again = read_campaign(tmp_path / "out")
+    assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))

@@ -1,0 +1,5 @@
+"""`python -m truenorth`: the command line."""
+
+from truenorth.cli import main
+
+main()

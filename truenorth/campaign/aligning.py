@@ -1,0 +1,110 @@
+"""What a campaign does with a run: simulate it, align it by every method, and hold the answers against the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truenorth.alignment import Alignment, align
+from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G
+from truenorth.attitude import rotation_vector_from_dcm
+from truenorth.campaign.rows import Row
+from truenorth.position import Position
+from truenorth.specs import ImuSpec, imu_spec
+
+if TYPE_CHECKING:
+    from truenorth.campaign.plan import Case, MethodPlan, Plan
+    from truenorth.simulation.runs import Simulation
+
+ARCMIN = math.radians(1.0) / 60.0
+KNOWN = ("aligned", "level_only", "not_converged", "not_observable", "inconsistent")
+
+
+def align_runs(plan: Plan, case: Case, runs: Sequence[int]) -> list[Row]:
+    """Rows of some runs of a case.
+
+    What fails, fails as a row: its status is ``failed``, its reason the message.
+
+    Parameters
+    ----------
+    plan : Plan
+    case : Case
+    runs : sequence of int
+
+    Returns
+    -------
+    list of Row
+    """
+    scenario = case.built
+    shared = None
+    rows: list[Row] = []
+    for run in runs:
+        try:
+            if shared is None and not scenario.is_drawn:
+                shared = scenario.ideal()
+            simulated = scenario.simulate(seed=plan.seed, run=run, number=case.scenario_number, ideal=shared)
+        except Exception as error:
+            rows += [
+                _failure(case, method.name, run, time, error)
+                for method in plan.methods
+                for time in (*plan.times, scenario.duration)
+            ]
+            continue
+        for method in plan.methods:
+            spec = _spec_for(method, scenario.imu_spec)
+            for time in (*plan.times, scenario.duration):
+                rows += _aligned(plan, case, run, method, spec, simulated, time)
+    return rows
+
+
+def _aligned(
+    plan: Plan, case: Case, run: int, method: MethodPlan, spec: ImuSpec | None, simulated: Simulation, time: float
+) -> list[Row]:
+    try:
+        record = simulated.record.between(None, case.built.start + time * (1 + 1e-12))
+        start = simulated.motion.states(np.array(case.built.start))
+        place = Position(float(start.lat), float(start.lon), float(start.alt))
+        answer = align(record, place, spec, method.method, heading_limit=plan.heading_limit)
+    except Exception as error:
+        return [_failure(case, method.name, run, time, error)]
+    outcome = Row(
+        case.number, method.name, run, time, "outcome", status=answer.status, reason="; ".join(answer.reasons)
+    )
+    errors = (
+        Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
+        for quantity, value, sigma, unit in _errors(answer, simulated)
+    )
+    return [outcome, *errors]
+
+
+def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, float, float, str]]:
+    """Quantity, error, sigma and unit of what an alignment found."""
+    true = simulated.motion.states(np.array(answer.time))
+    phi = -rotation_vector_from_dcm(answer.C_nb @ true.C_nb.T)  # C_hat = (I - [phi x]) C
+    sigma = np.sqrt(np.diag(answer.phi_covariance))
+    usable = 3 if answer.heading_known else 2
+    for axis, name in enumerate(("phi_e", "phi_n", "phi_u")[:usable]):
+        yield name, float(phi[axis]) / ARCMIN, float(sigma[axis]) / ARCMIN, "arcmin"
+    level = math.hypot(phi[0], phi[1]) / ARCMIN
+    yield "level", level, math.hypot(sigma[0], sigma[1]) / ARCMIN, "arcmin"
+    block = answer.phi_covariance[:usable, :usable]
+    yield "nees", float(phi[:usable] @ np.linalg.solve(block, phi[:usable])) / usable, math.nan, "1"
+    for what, found, spread, drawn, unit, scale in (
+        ("gyro_bias", answer.gyro_bias, answer.gyro_bias_sigma, simulated.errors.gyro_bias, "deg/h", DEG_PER_HOUR),
+        ("accel_bias", answer.accel_bias, answer.accel_bias_sigma, simulated.errors.accel_bias, "ug", MICRO_G),
+    ):
+        for axis, letter in enumerate("xyz"):
+            yield f"{what}_{letter}", float(found[axis] - drawn[axis]) / scale, float(spread[axis]) / scale, unit
+
+
+def _failure(case: Case, method: str, run: int, time: float, error: Exception) -> Row:
+    return Row(case.number, method, run, time, "outcome", status="failed", reason=f"{type(error).__name__}: {error}")
+
+
+def _spec_for(method: MethodPlan, simulated: ImuSpec) -> ImuSpec | None:
+    if method.imu == "simulated":
+        return simulated
+    return None if method.imu == "none" else imu_spec(method.imu)

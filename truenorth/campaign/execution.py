@@ -1,0 +1,157 @@
+"""Where blocks are worked on: in this process, in processes of this machine, or on a Dask cluster. The bits are the same."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
+
+from truenorth.campaign.plan import Plan, read_plan
+from truenorth.campaign.store import Block
+from truenorth.errors import UsageError
+
+AHEAD = 2  # blocks under way for each worker: memory stays bounded, and no worker waits
+ATTEMPTS = 3  # for a block whose worker was lost
+# Each worker is one thread: more would only get in each other's way.
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+
+
+def work(plan: dict[str, Any], block: Block) -> Any:
+    """Rows of a block as an Arrow table; what runs in a worker."""
+    from truenorth.campaign.aligning import align_runs
+    from truenorth.campaign.rows import table_of
+
+    built = _plan_of(_Frozen(plan))
+    return table_of(align_runs(built, built.cases[block.case], range(block.first, block.last + 1)))
+
+
+class _Frozen:
+    """A plan's mapping that compares by its text, so that a worker builds each plan once."""
+
+    def __init__(self, mapping: dict[str, Any]) -> None:
+        import json
+
+        self.mapping = mapping
+        self.text = json.dumps(mapping, sort_keys=True)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Frozen) and self.text == other.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+
+@lru_cache(maxsize=4)
+def _plan_of(frozen: _Frozen) -> Plan:
+    return read_plan(frozen.mapping)
+
+
+def in_this_process(plan: Plan, blocks: Sequence[Block]) -> Iterator[tuple[Block, Any]]:
+    """Blocks with their tables, one after the other."""
+    mapping = plan.to_mapping()
+    for block in blocks:
+        yield block, work(mapping, block)
+
+
+def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[tuple[Block, Any]]:
+    """Blocks with their tables as they are done, by processes of this machine.
+
+    A worker that dies takes the pool with it: a new pool goes on with what was under way.
+
+    Raises
+    ------
+    UsageError
+        Workers die again and again.
+    """
+    mapping, left, attempts = plan.to_mapping(), list(blocks), dict.fromkeys(blocks, 0)
+    while left:
+        with _one_thread_each(), _pool(workers) as pool:
+            under_way: dict[Future[Any], Block] = {}
+            try:
+                while left or under_way:
+                    while left and len(under_way) < AHEAD * workers:
+                        block = left.pop(0)
+                        under_way[pool.submit(work, mapping, block)] = block
+                    done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        result = future.result()
+                        yield under_way.pop(future), result
+            except BrokenProcessPool:
+                lost = list(under_way.values())
+                for block in lost:
+                    attempts[block] += 1
+                    if attempts[block] >= ATTEMPTS:
+                        raise UsageError(
+                            f"worker processes were killed {ATTEMPTS} times on runs {block.first} to {block.last} of case "
+                            f"{block.case}; is there enough memory? Fewer --workers or a smaller block need less"
+                        ) from None
+                left = lost + left
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool of spawned processes; on the way out, an interrupt does not wait for the blocks under way."""
+    import multiprocessing
+
+    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Set for the workers, which read it when they start."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[tuple[Block, Any]]:
+    """Blocks with their tables as they are done, by the workers of a Dask cluster, which have truenorth installed.
+
+    Raises
+    ------
+    UsageError
+        Dask is not installed, or no scheduler answers.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise UsageError("a cluster needs Dask: pip install 'truenorth[cluster]'") from None
+    try:
+        client = Client(scheduler, timeout="5s", set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise UsageError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
+    with client:
+        plan_there = client.scatter(plan.to_mapping(), broadcast=True)
+        ahead = AHEAD * max(1, sum(client.nthreads().values()))
+        left = list(blocks)
+
+        def submit(block: Block) -> Any:
+            return client.submit(
+                work, plan_there, block, key=f"{plan.fingerprint[:12]}-{block.shard}", pure=False, retries=ATTEMPTS
+            )
+
+        under_way = {submit(block): block for block in left[:ahead]}
+        left = left[ahead:]
+        results = as_completed(list(under_way), loop=client.loop, with_results=True)
+        for future, result in results:
+            block = under_way.pop(future)
+            if left:
+                following = submit(left[0])
+                under_way[following] = left.pop(0)
+                results.add(following)
+            yield block, result

@@ -1,0 +1,224 @@
+"""The plan of a campaign: scenarios x parameter grid x methods x runs.
+
+name: which_gyro
+runs: 200
+scenarios: [static_kalman]
+grid:
+imu.gyro.bias: [0.003 deg/h, 0.01 deg/h, 0.03 deg/h]
+methods: [kalman, oba]
+times: [120 s, 300 s]
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import itertools
+import json
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, PrivateAttr, field_validator
+
+from truenorth.errors import DataError, TruenorthError
+from truenorth.schema import Angle, Strict, Time, validated
+from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.specs import PRESETS
+from truenorth.yaml_file import read_mapping
+
+
+class MethodPlan(Strict):
+    """A method of alignment under a name of its own.
+
+    Attributes
+    ----------
+    name : str
+    method : str
+        As :func:`truenorth.align` takes it.
+    imu : "simulated", "none", preset, file or mapping
+        The specification that the method is given: that of the simulated IMU, none (it then asks the log), or another one.
+    """
+
+    name: str = Field(min_length=1)
+    method: Literal["auto", "analytic", "inertial", "oba", "kalman"]
+    imu: str | dict[str, Any] = "simulated"
+
+
+class Case(Strict):
+    """A scenario at one point of the grid.
+
+    Attributes
+    ----------
+    number : int
+    scenario_number : int
+        Of the scenario in the plan: points of the grid share its random numbers, so that they compare like with like.
+    parameters : dict
+        Values of the grid, by path.
+    scenario : dict
+        The scenario as it stands in a file.
+    """
+
+    number: int
+    scenario_number: int
+    parameters: dict[str, Any]
+    scenario: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """In words, for tables and figures."""
+        values = [f"{path.rpartition('.')[2]} {value}" for path, value in self.parameters.items()]
+        return ", ".join([str(self.scenario["name"]), *values])
+
+    @cached_property
+    def built(self) -> Scenario:
+        """The scenario, validated."""
+        return read_scenario(self.scenario)
+
+
+class Plan(Strict):
+    """What a plan file holds.
+
+    Attributes
+    ----------
+    name, description : str
+    runs, seed : int
+        Run k does not depend on their number.
+    block : int
+        Runs that are worked on and written together.
+    scenarios : list of name, file or mapping
+    grid : mapping of path to list
+        Dotted paths into the scenario.
+    methods : list of name or mapping
+    times : list of s
+        Also align the log up to each of these; the whole of it always.
+    heading_limit : float, rad
+    """
+
+    name: str = Field(min_length=1)
+    description: str = ""
+    runs: int = Field(ge=1)
+    seed: int = Field(0, ge=0)
+    block: int = Field(20, ge=1)
+    scenarios: tuple[str | dict[str, Any], ...] = Field(min_length=1)
+    grid: dict[str, tuple[Any, ...]] = Field(default_factory=dict)
+    methods: tuple[MethodPlan, ...] = Field(min_length=1)
+    times: tuple[Time, ...] = ()
+    heading_limit: Angle = math.radians(5.0)
+    _folder: Path = PrivateAttr(default_factory=Path)
+    _source: str = PrivateAttr(default="plan")
+
+    @field_validator("methods", mode="before")
+    @classmethod
+    def _by_name(cls, value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"{value!r}; expected a list of methods")
+        return [{"name": item, "method": item} if isinstance(item, str) else item for item in value]
+
+    @field_validator("grid")
+    @classmethod
+    def _not_empty(cls, value: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
+        for path, values in value.items():
+            if not values:
+                raise ValueError(f"{path} has no values; expected a list of one or more")
+        return value
+
+    @cached_property
+    def cases(self) -> tuple[Case, ...]:
+        """Every scenario at every point of the grid.
+
+        Raises
+        ------
+        DataError
+            A scenario with a mistake, or a path of the grid that leads nowhere.
+        """
+        result: list[Case] = []
+        for number, source in enumerate(self.scenarios):
+            base = self._scenario(source)
+            for values in itertools.product(*self.grid.values()):
+                parameters = dict(zip(self.grid, values, strict=True))
+                scenario = copy.deepcopy(base)
+                for path, value in parameters.items():
+                    self._put(scenario, path, value)
+                case = Case(number=len(result), scenario_number=number, parameters=parameters, scenario=scenario)
+                try:
+                    built = case.built
+                except TruenorthError as error:
+                    raise DataError(f"{self._source}: {case.name}: {error}") from None
+                for time in self.times:
+                    if not 0 < time <= built.duration:
+                        raise DataError(
+                            f"{self._source}: times: {time:g} s; expected a time within the {built.duration:g} s of {case.name}"
+                        )
+                result.append(case)
+        return tuple(result)
+
+    def _scenario(self, source: str | dict[str, Any]) -> dict[str, Any]:
+        beside = self._folder / source if isinstance(source, str) else None
+        try:
+            scenario = read_scenario(beside if beside is not None and beside.is_file() else source)
+        except TruenorthError as error:
+            raise DataError(f"{self._source}: scenarios: {error}") from None
+        resolved = scenario.to_mapping()
+        if isinstance(resolved.get("imu"), str):  # a preset: the grid can then reach its terms
+            resolved["imu"] = {"name": resolved["imu"], **copy.deepcopy(PRESETS[resolved["imu"]])}
+        return resolved
+
+    def _put(self, scenario: dict[str, Any], path: str, value: Any) -> None:
+        at: Any = scenario
+        *above, last = path.split(".")
+        for key in above:
+            at = at.get(key) if isinstance(at, Mapping) else None
+            if not isinstance(at, dict):
+                raise DataError(
+                    f"{self._source}: grid: {path!r} leads nowhere in scenario {scenario['name']!r}: it has no {key!r} with keys "
+                    "below it"
+                )
+        at[last] = value
+
+    def with_runs(self, runs: int) -> Plan:
+        """The same plan with another number of runs."""
+        other = self.model_copy(update={"runs": runs})
+        other._folder, other._source = self._folder, self._source
+        return other
+
+    def to_mapping(self) -> dict[str, Any]:
+        """The plan with all its defaults, its scenarios written out: a file that needs no other file."""
+        resolved = self.model_dump(mode="json")
+        resolved["scenarios"] = [self._scenario(source) for source in self.scenarios]
+        return resolved
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Of all that decides the numbers; the number of runs, the block and the words do not."""
+        content = {k: v for k, v in self.to_mapping().items() if k not in ("runs", "block", "name", "description")}
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def read_plan(source: str | PathLike[str] | Mapping[str, Any] | Plan) -> Plan:
+    """A plan from a YAML file or a mapping.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be opened.
+    DataError
+        A key, unit or value that is wrong: the message names the file and the key's path.
+    """
+    if isinstance(source, Plan):
+        return source
+    if isinstance(source, Mapping):
+        plan = validated(Plan, dict(source), "plan")
+    else:
+        path = Path(source)
+        plan = validated(Plan, read_mapping(path), str(path))
+        plan._folder, plan._source = path.parent, str(path)
+    names = [method.name for method in plan.methods]
+    for name in names:
+        if names.count(name) > 1:
+            raise DataError(f"{plan._source}: methods: two are named {name!r}; give each a name of its own")
+    plan.cases  # noqa: B018  # built now, so that mistakes are told before the work
+    return plan

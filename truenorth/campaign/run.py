@@ -1,0 +1,137 @@
+"""`run_campaign`: work on what is left of a plan, write it block by block, and give back the campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from truenorth.campaign.execution import in_processes, in_this_process, on_cluster
+from truenorth.campaign.plan import Plan, read_plan
+from truenorth.campaign.store import opened, read_table
+from truenorth.errors import UsageError
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign's folder, read.
+
+    Attributes
+    ----------
+    plan : Plan
+    folder : Path
+    """
+
+    plan: Plan
+    folder: Path
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Every row: case, method, run, time_s, quantity, value (estimated minus true), sigma, unit, status, reason."""
+        return read_table(self.folder, self.plan.runs)
+
+    @cached_property
+    def summary(self) -> pd.DataFrame:
+        """Statistics over runs of each quantity; see :func:`truenorth.campaign.summarise`."""
+        from truenorth.campaign.summary import summarise
+
+        return summarise(self.table, names=self.case_names)
+
+    @cached_property
+    def comparison(self) -> pd.DataFrame:
+        """Methods in pairs on the same data; see :func:`truenorth.campaign.compare`."""
+        from truenorth.campaign.comparison import compare
+
+        return compare(self.table, names=self.case_names, methods=[method.name for method in self.plan.methods])
+
+    @property
+    def case_names(self) -> dict[int, str]:
+        """Names of the cases by their number."""
+        return {case.number: case.name for case in self.plan.cases}
+
+    def plot(self) -> dict[str, Figure]:
+        """Figures by name: convergence, distributions, overview and, where the plan has a grid, requirement."""
+        from truenorth.figures.campaign import plot_campaign
+
+        return plot_campaign(self)
+
+    def save(self) -> list[Path]:
+        """Write summary.csv, comparison.csv, the figures and report.html into the folder; return their paths."""
+        from truenorth.report.campaign import save_campaign
+
+        return save_campaign(self)
+
+
+def run_campaign(
+    plan: Plan | str | PathLike[str] | Mapping[str, Any],
+    folder: str | PathLike[str],
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> Campaign:
+    """Work on a plan; what a folder already holds of it is not done again.
+
+    Parameters
+    ----------
+    plan : Plan, path or mapping
+    folder : path
+    workers : int
+        1 works in this process; more are processes of this machine. (They are spawned: a script that asks for them needs
+        ``if __name__ == "__main__":``.)
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://host:port``; its workers are used instead.
+    progress : callable, optional
+        Called with the runs done and the runs in all, cases counted apart.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    UsageError
+        A folder of another plan or under work by another process, no cluster, a disk that is full: what is done stays.
+    DataError
+        A plan with a mistake.
+    """
+    if workers < 1:
+        raise UsageError(f"workers {workers}; expected 1 or more")
+    plan = read_plan(plan)
+    tell = progress or (lambda done, total: None)
+    total = plan.runs * len(plan.cases)
+    with opened(folder, plan) as store:
+        blocks = store.missing(len(plan.cases), plan.runs, plan.block)
+        done = total - sum(block.last - block.first + 1 for block in blocks)
+        tell(done, total)
+        if scheduler is not None:
+            results = on_cluster(plan, blocks, scheduler)
+        elif workers == 1:
+            results = in_this_process(plan, blocks)
+        else:
+            results = in_processes(plan, blocks, min(workers, max(1, len(blocks))))
+        for block, table in results:
+            store.write(block, table)
+            done += block.last - block.first + 1
+            tell(done, total)
+    return Campaign(plan, Path(folder))
+
+
+def read_campaign(folder: str | PathLike[str]) -> Campaign:
+    """A campaign from its folder, as far as it has been worked on.
+
+    Raises
+    ------
+    UsageError
+        The folder holds no plan.yaml.
+    """
+    return Campaign(read_plan(Path(folder) / "plan.yaml"), Path(folder))

@@ -1,0 +1,184 @@
+"""The folder of a campaign: Parquet shards, each written whole; a lock; the plan and where the numbers came from.
+
+plan.yaml       the plan with its scenarios written out
+manifest.json   fingerprint of the plan, versions, platform
+runs/           case0000_run000000-000019.parquet ...: which runs are done is what stands there
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from truenorth import __version__
+from truenorth.atomic import atomic_path, writable_folder
+from truenorth.errors import DataError, UsageError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from truenorth.campaign.plan import Plan
+
+_SHARD = re.compile(r"case(\d+)_run(\d+)-(\d+)\.parquet")
+
+
+class Block(NamedTuple):
+    """Runs of a case that are worked on together: `first` to `last`, both included."""
+
+    case: int
+    first: int
+    last: int
+
+    @property
+    def shard(self) -> str:
+        """Name of its file."""
+        return f"case{self.case:04d}_run{self.first:06d}-{self.last:06d}.parquet"
+
+    def __len__(self) -> int:
+        return self.last - self.first + 1
+
+
+class Store:
+    """The folder of one campaign; make it by :func:`opened`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.runs = folder / "runs"
+
+    def done(self) -> set[tuple[int, int]]:
+        """Pairs of case and run whose shard stands."""
+        pairs: set[tuple[int, int]] = set()
+        for path in self.runs.glob("case*.parquet"):
+            match = _SHARD.fullmatch(path.name)
+            if match:
+                case, first, last = map(int, match.groups())
+                pairs.update((case, run) for run in range(first, last + 1))
+        return pairs
+
+    def missing(self, cases: int, runs: int, block: int) -> list[Block]:
+        """What is left to do, in blocks of neighbouring runs."""
+        done = self.done()
+        blocks: list[Block] = []
+        for case in range(cases):
+            for first in range(0, runs, block):
+                left = [run for run in range(first, min(first + block, runs)) if (case, run) not in done]
+                edges = np.flatnonzero(np.diff(left) > 1) + 1
+                blocks += [Block(case, int(p[0]), int(p[-1])) for p in np.split(np.array(left), edges) if p.size]
+        return blocks
+
+    def write(self, block: Block, table: Any) -> None:
+        """Write a block's rows, whole or not at all."""
+        import pyarrow.parquet as pq
+
+        with atomic_path(self.runs / block.shard) as temporary:
+            pq.write_table(table, temporary)
+
+    def table(self, runs: int | None = None) -> pd.DataFrame:
+        """All rows, in the order of cases, runs, methods and times as they were planned; those of the first `runs` runs.
+
+        Raises
+        ------
+        DataError
+            A shard that is damaged: the message names it.
+        """
+        return read_table(self.folder, runs)
+
+
+@contextmanager
+def opened(folder: str | os.PathLike[str], plan: Plan) -> Iterator[Store]:
+    """The store of a plan, locked for this process.
+
+    Raises
+    ------
+    UsageError
+        Another process works on the folder, or it holds another plan, or one made with another version.
+    """
+    target = writable_folder(folder)
+    with _locked(target / ".lock"):
+        store = Store(target)
+        writable_folder(store.runs)
+        for stray in store.runs.glob(".*.part.parquet"):  # of a process that was killed
+            stray.unlink(missing_ok=True)
+        _claim(target, plan)
+        yield store
+
+
+def _claim(folder: Path, plan: Plan) -> None:
+    """Check that the folder is this plan's, or make it so."""
+    import numba
+    import yaml
+
+    manifest = folder / "manifest.json"
+    if manifest.is_file():
+        held = json.loads(manifest.read_text(encoding="utf-8"))
+        if held.get("plan_sha256") != plan.fingerprint:
+            raise UsageError(
+                f"{folder}: holds the runs of another plan (see its plan.yaml); name another folder with -o"
+            )
+        if held.get("truenorth") != __version__:
+            raise UsageError(
+                f"{folder}: was begun with truenorth {held.get('truenorth')}, this is {__version__}; finish it with that "
+                "version, or name another folder with -o"
+            )
+    text = yaml.safe_dump(plan.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
+    with atomic_path(folder / "plan.yaml") as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    if not manifest.is_file():
+        facts = {
+            "plan_sha256": plan.fingerprint,
+            "seed": plan.seed,
+            "truenorth": __version__,
+            "numpy": np.__version__,
+            "numba": numba.__version__,
+            "python": platform.python_version(),
+            "platform": f"{platform.system()} {platform.machine()}",
+        }
+        with atomic_path(manifest) as temporary:
+            temporary.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold a lock that the system takes back when the process ends, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # Windows: no advisory locks; two processes on one folder are then the user's to avoid
+        yield
+        return
+    with path.open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise UsageError(
+                f"{path.parent}: another process works on this folder; wait for it, or name another with -o"
+            ) from None
+        yield
+
+
+def read_table(folder: str | os.PathLike[str], runs: int | None = None) -> pd.DataFrame:
+    """The rows of a campaign's folder; see :meth:`Store.table`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from truenorth.campaign.rows import SCHEMA
+
+    tables = []
+    for path in sorted((Path(folder) / "runs").glob("case*.parquet")):
+        try:
+            tables.append(pq.read_table(path).cast(SCHEMA))
+        except (pa.ArrowException, OSError) as error:
+            raise DataError(f"{path}: the shard is damaged ({error}); remove it and run the campaign again") from None
+    if not tables:
+        raise DataError(f"{folder}: no runs; expected a campaign's folder with runs/case....parquet")
+    table = pa.concat_tables(tables, promote_options="default").unify_dictionaries().to_pandas()
+    table = table if runs is None else table[table["run"] < runs]
+    order = table["case"].to_numpy(np.int64) * (int(table["run"].max()) + 1) + table["run"].to_numpy(np.int64)
+    return table.iloc[np.argsort(order, kind="stable")].reset_index(drop=True)

@@ -1,0 +1,147 @@
+"""Statistics over the runs of a campaign: how large the errors are, how sure that is, and whether sigma is honest.
+
+Source of the bands: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+section 5.4; of the intervals: B. Efron, R. J. Tibshirani, *An Introduction to the Bootstrap*, 1993, ch. 13 (percentiles).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.analysis.consistency import chi_square_quantile
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+RESAMPLES = 1000
+LEVEL = 0.95
+KEYS = ["case", "method", "time_s", "quantity"]
+VECTOR_SIZE = 3  # attitude errors in the normalised square of a row `nees`, which is its mean over them
+
+
+def summarise(table: pd.DataFrame, names: Mapping[int, str] | None = None, level: float = LEVEL) -> pd.DataFrame:
+    """One row for each case, method, time and quantity.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of a campaign.
+    names : mapping, optional
+        Of the cases by number.
+    level : float
+        Of intervals and bands.
+
+    Returns
+    -------
+    DataFrame
+        ``runs`` (with a value), ``failed``; ``rms`` with its bootstrap interval ``rms_low, rms_high``; ``mean, median, p95, max``
+        (the last three of the magnitude); ``sigma`` (root mean square of what was claimed), ``rms_over_sigma`` (of the errors
+        each over its own sigma) and its band ``ratio_low, ratio_high`` for honest sigmas. For `nees`, ``mean`` and its band.
+    """
+    import pandas as pd
+
+    outcomes = table[table["quantity"] == "outcome"]
+    failed = (outcomes["status"] == "failed").groupby([outcomes[k] for k in KEYS[:3]], observed=True).sum()
+    rows = []
+    for key, group in _groups(table[table["quantity"] != "outcome"]):
+        values, sigmas = group["value"].to_numpy(float), group["sigma"].to_numpy(float)
+        rows.append(
+            dict(zip(KEYS, key, strict=True))
+            | {"unit": str(group["unit"].iloc[0]), "runs": len(values), "failed": int(failed.get(key[:3], 0))}
+            | _statistics(values, sigmas, key[3] == "nees", level)
+        )
+    result = pd.DataFrame(rows)
+    if names is not None and len(result):
+        result.insert(1, "name", result["case"].map(dict(names)))
+    return result
+
+
+def outcomes(table: pd.DataFrame, names: Mapping[int, str] | None = None) -> pd.DataFrame:
+    """How many runs ended how: one row for each case, method, time and status, with the commonest reason."""
+    import pandas as pd
+
+    rows = table[table["quantity"] == "outcome"]
+    result = []
+    for key, group in rows.groupby(["case", "method", "time_s", "status"], observed=True, sort=False):
+        reasons = group["reason"].value_counts()
+        result.append((*key, len(group), reasons.index[0] if len(reasons) else ""))
+    frame = pd.DataFrame(result, columns=["case", "method", "time_s", "status", "runs", "reason"])
+    if names is not None:
+        frame.insert(1, "name", frame["case"].map(dict(names)))
+    return frame
+
+
+def time_to_converge(table: pd.DataFrame, quantity: str, limit: float) -> pd.DataFrame:
+    """For each case, method and run the first planned time from which on the error stays within a limit.
+
+    Parameters
+    ----------
+    table : DataFrame
+    quantity : str
+    limit : float
+        In the quantity's unit.
+
+    Returns
+    -------
+    DataFrame
+        case, method, run, time_s (infinite where it never does).
+    """
+    import pandas as pd
+
+    rows = table[table["quantity"] == quantity]
+    result = []
+    for (case, method, run), group in rows.groupby(["case", "method", "run"], observed=True, sort=False):
+        ordered = group.sort_values("time_s")
+        inside = np.abs(ordered["value"].to_numpy(float)) <= limit
+        outside = np.flatnonzero(~inside)
+        first = outside[-1] + 1 if outside.size else 0
+        times = ordered["time_s"].to_numpy(float)
+        result.append((case, method, run, times[first] if first < times.size else math.inf))
+    return pd.DataFrame(result, columns=["case", "method", "run", "time_s"])
+
+
+def bootstrap_rms(values: Array, level: float = LEVEL) -> tuple[float, float]:
+    """Percentile interval of the root mean square; the resampling has a seed of its own, so that it repeats."""
+    if values.size < 2:
+        return math.nan, math.nan
+    rng = np.random.default_rng(values.size)
+    counts = rng.multinomial(values.size, np.full(values.size, 1 / values.size), size=RESAMPLES)
+    squares = counts @ values**2 / values.size
+    low, high = np.quantile(squares, [0.5 - 0.5 * level, 0.5 + 0.5 * level])
+    return math.sqrt(low), math.sqrt(high)
+
+
+def _groups(rows: pd.DataFrame) -> Iterator[tuple[tuple[Any, ...], pd.DataFrame]]:
+    for key, group in rows.groupby(KEYS, observed=True, sort=False):
+        yield tuple(key) if isinstance(key, tuple) else (key,), group
+
+
+def _statistics(values: Array, sigmas: Array, nees: bool, level: float) -> dict[str, float]:
+    n, magnitude = values.size, np.abs(values)
+    tails = np.array([0.5 - 0.5 * level, 0.5 + 0.5 * level])
+    result = {
+        "rms": float(np.sqrt(np.mean(values**2))),
+        "mean": float(np.mean(values)),
+        "median": float(np.median(magnitude)),
+        "p95": float(np.quantile(magnitude, 0.95)),
+        "max": float(np.max(magnitude)),
+    }
+    result["rms_low"], result["rms_high"] = bootstrap_rms(values, level)
+    if nees:
+        band = chi_square_quantile(tails, VECTOR_SIZE * n) / (VECTOR_SIZE * n)
+        return result | {"ratio_low": float(band[0]), "ratio_high": float(band[1])}
+    if not np.all(sigmas > 0):
+        return result
+    band = np.sqrt(chi_square_quantile(tails, n) / n)
+    return result | {
+        "sigma": float(np.sqrt(np.mean(sigmas**2))),
+        "rms_over_sigma": float(np.sqrt(np.mean((values / sigmas) ** 2))),
+        "ratio_low": float(band[0]),
+        "ratio_high": float(band[1]),
+    }
