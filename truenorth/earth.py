@@ -26,15 +26,24 @@ CENTRIFUGAL_RATIO = 0.00344978650684  # m = w^2 a^2 b / GM
 
 
 def radii(lat: Any) -> tuple[Any, Any]:
-    """Meridian and prime-vertical radius of curvature, m."""
-    W2 = 1.0 - ECCENTRICITY_SQUARED * np.sin(lat) ** 2
+    """Meridian and prime-vertical radius of curvature, m, at geodetic latitude (rad)."""
+    return radii_at(np.sin(lat) ** 2)
+
+
+def radii_at(s2: Any) -> tuple[Any, Any]:
+    """Meridian and prime-vertical radius of curvature, m, where the sine of latitude has the square `s2`."""
+    W2 = 1.0 - ECCENTRICITY_SQUARED * s2
     R_N = SEMI_MAJOR / np.sqrt(W2)
     return R_N * (1.0 - ECCENTRICITY_SQUARED) / W2, R_N
 
 
 def normal_gravity(lat: Any, alt: Any) -> Any:
     """Normal gravity, m/s^2, downward positive, at geodetic latitude (rad) and height (m)."""
-    s2 = np.sin(lat) ** 2
+    return normal_gravity_at(np.sin(lat) ** 2, alt)
+
+
+def normal_gravity_at(s2: Any, alt: Any) -> Any:
+    """Normal gravity, m/s^2, downward positive, where the sine of latitude has the square `s2`, at a height (m)."""
     surface = GRAVITY_EQUATOR * (1.0 + SOMIGLIANA * s2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * s2)
     h = alt / SEMI_MAJOR
     return surface * (1.0 - 2.0 * (1.0 + FLATTENING + CENTRIFUGAL_RATIO - 2.0 * FLATTENING * s2) * h + 3.0 * h * h)

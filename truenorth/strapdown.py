@@ -45,8 +45,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_normal_gravity = compiled(earth.normal_gravity, inline="always")
-_radii = compiled(earth.radii, inline="always")
+_normal_gravity_at = compiled(earth.normal_gravity_at, inline="always")
+_radii_at = compiled(earth.radii_at, inline="always")
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ def _mechanise(
         mid_lat = lat + half * vN / earth.SEMI_MAJOR  # to 1 % of half a step: millimetres
         mid_alt = alt + half * vU
         sin_lat, cos_lat = math.sin(mid_lat), math.cos(mid_lat)
-        R_M, R_N = _radii(mid_lat)
+        R_M, R_N = _radii_at(sin_lat * sin_lat)
         wieN, wieU = w_ie * cos_lat, w_ie * sin_lat
         wenE = -mN / (R_M + mid_alt)
         wenN = mE / (R_N + mid_alt)
@@ -293,7 +293,7 @@ def _mechanise(
         coriolis = cross((wenE, 2.0 * wieN + wenN, 2.0 * wieU + wenU), (mE, mN, mU))
         dE = f[0] - 0.5 * turn[0] - coriolis[0] * T
         dN = f[1] - 0.5 * turn[1] - coriolis[1] * T
-        dU = f[2] - 0.5 * turn[2] - (coriolis[2] + _normal_gravity(mid_lat, mid_alt)) * T
+        dU = f[2] - 0.5 * turn[2] - (coriolis[2] + _normal_gravity_at(sin_lat * sin_lat, mid_alt)) * T
         if fixed_altitude:
             dU = -vU
         aE, aN, aU = dE / T, dN / T, dU / T

@@ -1,0 +1,92 @@
+"""Measurement rows against finite differences of the predicted measurement itself."""
+
+import numpy as np
+import pytest
+
+from truenorth import wander
+from truenorth.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.filters.recursion import workspace
+from truenorth.linalg import padded
+from truenorth.models.ins import BG, Extra, InsModel
+from truenorth.navigation import kernel
+from truenorth.navigation.aiding import Aiding, state
+from truenorth.navigation.driver import _sources, with_states
+
+LAT, LON, ALT = 1.2, -2.0, 500.0
+MODEL = InsModel(0.0, 0.0, extras=(Extra("slow gyro bias", np.full(3, 1e-6), 300.0),))
+W_B = np.array([0.3, -0.2, 0.5])
+
+
+def _aiding(kind):
+    states = {}
+    roles = {
+        "position": ("lever arm", "lag"),
+        "velocity": ("lever arm", "lag"),
+        "body velocity": ("lever arm", "scale", "mounting", "bias", "lag"),
+        "height": ("bias",),
+        "rotation": (),
+    }[kind]
+    for role in roles:
+        length = {"lever arm": 3, "mounting": 2, "bias": 1 if kind == "height" else 3}.get(role, 1)
+        states |= state("sensor", role, np.ones(length))
+    measured = {"position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0]}.get(kind, [1.0, 2.0, 3.0])
+    C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
+    return Aiding("sensor", kind, [0.0], [measured], [[1.0] * 3], np.array([1.0, -2.0, 3.0]), C_mb, states)
+
+
+def _predicted(kind, dx):
+    """z and H of a state that is off by `dx`."""
+    source = _aiding(kind)
+    model = with_states(MODEL, [source])
+    n = model.states
+    s = wander.state_at(dcm_from_euler(0.4, 0.1, -0.2), [60.0, 30.0, 2.0], LAT, LON, ALT)
+    # Let w wander, so that it is not ENU.
+    turn = np.array([np.cos(0.3), 0.0, 0.0, np.sin(0.3)])
+    from scipy.spatial.transform import Rotation
+
+    spin = Rotation.from_quat(np.roll(turn, -1))
+    s[wander.PLACE] = np.roll((Rotation.from_quat(np.roll(s[wander.PLACE], -1)) * spin).as_quat(), 1)
+    s[wander.ATTITUDE] = np.roll((spin.inv() * Rotation.from_quat(np.roll(s[wander.ATTITUDE], -1))).as_quat(), 1)
+    s[wander.VELOCITY] = spin.inv().apply(s[wander.VELOCITY])
+    s[wander.ACCELERATION] = [1.0, -2.0, 0.5]
+    aux = np.zeros(n)
+    for role, extra in source.states.items():  # small-angle mounting is exact for small assumed angles only
+        aux[model.slice_of(extra.name)] = 1e-4 if role == "mounting" else 0.02
+    x = -dx.copy()
+    kernel.feed_back(s, aux, n, x)
+    sums = kernel.Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1))
+    means = kernel.Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1))
+    kernel.set_matrix(s, sums.C_now)
+    means.vectors[2] = W_B + dx[BG] + dx[model.slice_of("slow gyro bias")]
+    w = workspace(padded(n), 3)
+    compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False)
+    kernel.measure(
+        s, sums, means, _sources([source], model), 0, compiled_model, source.measured[0], aux, np.zeros((3, 3)), w
+    )
+    return w.z.copy(), w.H[:, :n].copy(), n
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity", "body velocity", "height", "rotation"])
+def test_row_is_the_derivative_of_the_prediction(kind):
+    """Central differences; steps small enough that what is left is of the second order of a small step.
+
+    The lag enters multiplied by the change of what is measured, whose own change with attitude the row leaves out: its
+    assumed value here is 20 ms, so 2 % of the effect of acceleration is granted.
+    """
+    z, H, n = _predicted(kind, np.zeros(18 + _extra_states(kind)))
+    rows = np.isfinite(z)
+    assert rows.sum() == (1 if kind == "height" else 3)
+    steps = np.repeat([1e-5, 1e-3, 10.0, 1e-6, 1e-4], 3)
+    steps = np.concatenate([steps, np.full(3, 1e-6), np.full(n - 18, 1e-4)])
+    for state_number in range(n):
+        dx = np.zeros(n)
+        dx[state_number] = steps[state_number]
+        plus, minus = _predicted(kind, dx)[0], _predicted(kind, -dx)[0]
+        expected = (plus - minus)[rows] / (2 * steps[state_number])
+        scale = max(np.abs(H[rows]).max(axis=0)[state_number], np.abs(expected).max())
+        atol = 2e-3 * scale + 1e-9 + (0.05 if kind == "body velocity" and state_number < 3 else 0.0)
+        np.testing.assert_allclose(H[rows, state_number], expected, rtol=0, atol=atol, err_msg=f"state {state_number}")
+
+
+def _extra_states(kind):
+    return {"position": 4, "velocity": 4, "body velocity": 10, "height": 1, "rotation": 0}[kind]

@@ -1,0 +1,148 @@
+"""What GNSS tells an INS: position and velocity of an antenna, written once, as compiled functions of one epoch.
+
+A row is *predicted less measured*, so that ``z = H x + noise`` with the states of :mod:`truenorth.models.ins` (errors
+computed minus true; what is left of a parameter, true minus assumed). With the lever arm l (body axes) and the clock lag
+tau (the measurement shows the antenna as it was tau before its time stamp):
+
+    position   z = dp - tau dv + (C l) x phi - C dl + v dtau
+    velocity   z = dv + u x phi + C (eps x l) - C (w x dl) + a dtau,   u = C (w x l)
+
+Rows are in ENU. A velocity is told in the axes at the true place; those at the computed place are turned against them
+by the convergence of the meridians, ``tan L dp_E/R`` about up.
+
+Source: P. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd ed. (2013), sec.
+14.3.2 and 14.3.3; signs mapped to ours.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from truenorth.attitude import cross, rotate
+from truenorth.compiled import compiled
+from truenorth.wander import curvature, earth_axis
+
+_PHI, _DV, _DP, _BG = 0, 3, 6, 9
+
+
+@compiled
+def azimuth(s: Any) -> Any:
+    """Direction of north in w: its sine and cosine, x and y; at the pole itself y is called north."""
+    axis = earth_axis(s)
+    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    if level == 0.0:
+        return 0.0, 1.0
+    return axis[0] / level, axis[1] / level
+
+
+@compiled
+def into_north(s: Any, H: Any, z: Any) -> None:
+    """Turn three rows along w into east, north, up."""
+    sine, cosine = azimuth(s)
+    for j in range(H.shape[1]):
+        x, y = H[0, j], H[1, j]
+        H[0, j] = cosine * x - sine * y
+        H[1, j] = sine * x + cosine * y
+    x, y = z[0], z[1]
+    z[0] = cosine * x - sine * y
+    z[1] = sine * x + cosine * y
+
+
+@compiled
+def position_row(s: Any, C: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any) -> None:
+    """Position of an antenna.
+
+    Parameters
+    ----------
+    s : (24,) array
+        The state, see :mod:`truenorth.wander`.
+    C : (3, 3) array
+        ``C_wb``.
+    arm : tuple of 3, m
+        IMU to antenna, body axes.
+    lag : float, s
+    at_arm, at_lag : int
+        The first state of lever arm and lag; -1: none.
+    measured : (3,) array
+        Latitude, longitude (rad), height (m).
+    H : (3, N) array
+        Zeros; filled in.
+    z : (3,) array, m
+        Filled in.
+    """
+    lat, lon = measured[0], measured[1]
+    level = math.cos(lat)
+    back = (s[7], -s[8], -s[9], -s[10])
+    n = rotate(back, (level * math.cos(lon), level * math.sin(lon), math.sin(lat)))
+    # The measured place's normal leans by K dr from ours.
+    Kxx, Kxy, Kyy = curvature(earth_axis(s), s[11])
+    determinant = Kxx * Kyy - Kxy * Kxy
+    out = (
+        C[0, 0] * arm[0] + C[0, 1] * arm[1] + C[0, 2] * arm[2],
+        C[1, 0] * arm[0] + C[1, 1] * arm[1] + C[1, 2] * arm[2],
+        C[2, 0] * arm[0] + C[2, 1] * arm[1] + C[2, 2] * arm[2],
+    )
+    z[0] = -(Kyy * n[0] - Kxy * n[1]) / determinant + out[0] - lag * s[4]
+    z[1] = -(Kxx * n[1] - Kxy * n[0]) / determinant + out[1] - lag * s[5]
+    z[2] = s[11] - measured[2] + out[2] - lag * s[6]
+    for j in range(3):
+        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
+        c = cross(out, e)
+        for i in range(3):
+            H[i, _PHI + j] = c[i]
+            H[i, _DP + j] = e[i]
+            H[i, _DV + j] = -lag * e[i]
+            if at_arm >= 0:
+                H[i, at_arm + j] = -C[i, j]
+        if at_lag >= 0:
+            H[j, at_lag] = s[4 + j]
+    into_north(s, H, z)
+
+
+@compiled
+def velocity_row(
+    s: Any, C: Any, w_b: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any
+) -> None:
+    """Velocity of an antenna, east, north, up, m/s; as :func:`position_row`.
+
+    Parameters
+    ----------
+    w_b : tuple of 3, rad/s
+        Rate of the body against the earth, body axes.
+    """
+    u_b = cross(w_b, arm)
+    u = (
+        C[0, 0] * u_b[0] + C[0, 1] * u_b[1] + C[0, 2] * u_b[2],
+        C[1, 0] * u_b[0] + C[1, 1] * u_b[1] + C[1, 2] * u_b[2],
+        C[2, 0] * u_b[0] + C[2, 1] * u_b[1] + C[2, 2] * u_b[2],
+    )
+    sine, cosine = azimuth(s)
+    axis = earth_axis(s)
+    Kxx, Kxy, Kyy = curvature(axis, s[11])
+    # Curvature along east, and with it the convergence of the meridians a metre eastwards.
+    east = cosine * cosine * Kxx - 2.0 * sine * cosine * Kxy + sine * sine * Kyy
+    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    convergence = 0.0
+    if level > 0.0:
+        convergence = axis[2] / level * east
+    for j in range(3):
+        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
+        c = cross(u, e)
+        g, m = cross(e, arm), cross(w_b, e)
+        for i in range(3):
+            H[i, _PHI + j] = c[i]
+            H[i, _DV + j] = e[i]
+            H[i, _BG + j] = C[i, 0] * g[0] + C[i, 1] * g[1] + C[i, 2] * g[2]
+            if at_arm >= 0:
+                H[i, at_arm + j] = -(C[i, 0] * m[0] + C[i, 1] * m[1] + C[i, 2] * m[2])
+        if at_lag >= 0:
+            H[j, at_lag] = s[12 + j]
+        z[j] = s[4 + j] + u[j] - lag * s[12 + j]
+    H[0, _DP] = convergence * cosine * z[1]
+    H[0, _DP + 1] = -convergence * sine * z[1]
+    H[1, _DP] = -convergence * cosine * z[0]
+    H[1, _DP + 1] = convergence * sine * z[0]
+    into_north(s, H, z)
+    for j in range(3):
+        z[j] -= measured[j]

@@ -1,0 +1,98 @@
+"""What an odometer or a Doppler log tells an INS: velocity in the vehicle's axes, scale and mounting angles unknown.
+
+The sensor's axes m are the vehicle's (x right, y forward, z up), turned against the IMU's body by ``C_mb`` and displaced
+by a lever arm l. What it shows, with the scale factor k, the mounting angles mu left in ``C_mb`` (``C_mb true = (I - [mu
+x]) C_mb assumed``; that about the forward axis cannot be seen from forward motion and is no state), a constant error and a lag:
+
+    y = (1 + k) C_mb u + bias - tau dy/dt,   u = C' v + w x l
+    z = y_hat - y = (1 + k) C_mb (C' dv - C' v x phi + eps x l - w x dl) - y/(1+k) dk - y x dmu - dbias + dy/dt dtau
+
+A wheel does not slide sideways nor leave the road: components 0 of y are measurements too (non-holonomic constraint).
+
+Source: P. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd ed. (2013), sec.
+15.2.3, 15.4.1 and 6.3; signs mapped to ours.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from truenorth.attitude import cross
+from truenorth.compiled import compiled
+
+_PHI, _DV, _BG = 0, 3, 9
+
+
+@compiled
+def body_velocity_row(
+    s: Any,
+    C: Any,
+    w_b: Any,
+    C_mb: Any,
+    arm: Any,
+    scale: float,
+    bias: Any,
+    lag: float,
+    at_arm: int,
+    at_scale: int,
+    at_mount: int,
+    at_bias: int,
+    at_lag: int,
+    measured: Any,
+    H: Any,
+    z: Any,
+) -> None:
+    """Velocity in the vehicle's axes.
+
+    Parameters
+    ----------
+    s : (24,) array
+        The state, see :mod:`truenorth.wander`.
+    C : (3, 3) array
+        ``C_wb``.
+    w_b : tuple of 3, rad/s
+        Rate of the body against the earth, body axes.
+    C_mb : (3, 3) array
+        Body to vehicle axes, as assumed now.
+    arm, scale, bias, lag
+        As assumed now: m in body axes, 1, m/s, s.
+    at_arm, at_scale, at_mount, at_bias, at_lag : int
+        The first state of each; -1: none. The mounting angles are those about x and z.
+    measured : (3,) array, m/s
+        Right, forward, up.
+    H : (3, N) array
+        Zeros; filled in.
+    z : (3,) array, m/s
+        Filled in.
+    """
+    gain = 1.0 + scale
+    v = (s[4], s[5], s[6])
+    u = cross(w_b, arm)
+    y = (0.0, 0.0, 0.0)
+    for k in range(3):
+        along = C[0, k] * v[0] + C[1, k] * v[1] + C[2, k] * v[2] + u[k]
+        y = (y[0] + C_mb[0, k] * along, y[1] + C_mb[1, k] * along, y[2] + C_mb[2, k] * along)
+    for j in range(3):
+        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
+        tilt, turn, sweep, mount = cross(v, e), cross(e, arm), cross(w_b, e), cross(y, e)
+        for i in range(3):
+            for k in range(3):
+                M = gain * C_mb[i, k]
+                H[i, _DV + j] += M * C[j, k]
+                H[i, _PHI + j] -= M * (C[0, k] * tilt[0] + C[1, k] * tilt[1] + C[2, k] * tilt[2])
+                H[i, _BG + j] += M * turn[k]
+                if at_arm >= 0:
+                    H[i, at_arm + j] -= M * sweep[k]
+            if at_mount >= 0 and j != 1:
+                H[i, at_mount + j // 2] = -gain * mount[i]
+        if at_scale >= 0:
+            H[j, at_scale] = -y[j]
+        if at_bias >= 0:
+            H[j, at_bias + j] = -1.0
+    for i in range(3):
+        change = 0.0
+        for j in range(3):
+            change += H[i, _DV + j] * s[12 + j]
+        if at_lag >= 0:
+            H[i, at_lag] = change
+        z[i] = gain * y[i] + bias[i] - lag * change - measured[i]

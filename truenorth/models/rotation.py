@@ -1,0 +1,42 @@
+"""What it tells an INS that its base does not turn: the gyros show the earth's rate and their own errors, nothing else.
+
+    z = w_hat - C' w_ie = eps + C' (w_ie x phi)
+
+The white noise of the gyros over the interval is both the row's noise and the process noise of phi; the two are
+treated as independent, which costs nothing where the base's own unrest is the larger part.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from truenorth.attitude import cross
+from truenorth.compiled import compiled
+
+_PHI, _BG = 0, 9
+
+
+@compiled
+def rotation_row(C: Any, w_b: Any, w_ie: Any, H: Any, z: Any) -> None:
+    """Mean rate of a base that does not turn.
+
+    Parameters
+    ----------
+    C : (3, 3) array
+        ``C_wb``.
+    w_b : tuple of 3, rad/s
+        Mean of ``w_ib_b`` as computed over the interval.
+    w_ie : tuple of 3, rad/s
+        The earth's rate, level frame.
+    H : (3, N) array
+        Zeros; filled in.
+    z : (3,) array, rad/s
+        Filled in.
+    """
+    for j in range(3):
+        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
+        c = cross(w_ie, e)
+        for i in range(3):
+            H[i, _PHI + j] = C[0, i] * c[0] + C[1, i] * c[1] + C[2, i] * c[2]
+        H[j, _BG + j] = 1.0
+        z[j] = w_b[j] - (C[0, j] * w_ie[0] + C[1, j] * w_ie[1] + C[2, j] * w_ie[2])

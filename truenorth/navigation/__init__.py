@@ -1,0 +1,1 @@
+"""Navigation: from an alignment onward, free inertial or aided."""

@@ -1,0 +1,66 @@
+"""Smoothing of a closed loop: each output given the measurements of the whole log.
+
+Corrections fed back make the loop's errors those of a linear filter less what it has corrected so far, ``x_c``. With
+``z = nu + H x_c`` (innovation and what was corrected) the same linear filter is run again and smoothed by
+:func:`truenorth.filters.smoother`; its answer less ``x_c`` is what is left of the error at each epoch.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth import wander
+from truenorth.filters import LinearSystem
+from truenorth.filters.smoother import smoother
+from truenorth.navigation import kernel
+
+if TYPE_CHECKING:
+    from truenorth.navigation.driver import Timeline
+
+Array = NDArray[np.float64]
+
+
+def smoothed(plan: Timeline, kept: kernel.Kept, P0: Array) -> tuple[Array, Array, Array]:
+    """State, sensors and covariance (along w) at each output, smoothed.
+
+    Parameters
+    ----------
+    plan : Timeline
+    kept : kernel.Kept
+        Of a run made for smoothing: with its links from event to event.
+    P0 : (n, n) array
+        Covariance at the beginning.
+
+    Returns
+    -------
+    state : (J, 12) array
+    sensors : (J, n) array
+    P : (J, n, n) array
+    """
+    linked = (plan.source >= 0) | plan.output
+    innovation, used = kept.innovation[linked], kept.verdict[linked] == kernel.USED
+    count, n = len(innovation), len(P0)
+    corrected = np.zeros((count, n))  # after each event
+    z = np.full((count, 3), np.nan)
+    x = np.zeros(n)
+    for k in range(count):
+        x = kept.Phi[k] @ x
+        if used[k]:
+            z[k] = innovation[k] + kept.H[k] @ x
+        x = x + kept.dx[k]
+        corrected[k] = x
+    R = np.zeros((count, 3, 3))
+    R[:, range(3), range(3)] = np.where(np.isfinite(z), plan.variance[linked], 1.0)
+    system = LinearSystem(Phi=kept.Phi, Q=kept.Q, H=kept.H, R=R, z=z, x0=np.zeros(n), P0=P0)
+    answer = smoother(system)
+    out = plan.output[linked]
+    left = answer.x[out] - corrected[out]
+    state, sensors = kept.state.copy(), kept.aux.copy()
+    full = np.zeros((len(state), wander.LENGTH))
+    full[:, : state.shape[1]] = state
+    for k in range(len(state)):
+        kernel.feed_back(full[k], sensors[k], n, left[k].copy())
+    return full[:, : state.shape[1]], sensors, answer.P[out]
