@@ -16,7 +16,15 @@ if TYPE_CHECKING:
     from truenorth.formats import read_imu, write_imu
     from truenorth.position import Position
     from truenorth.quality import inspect
-    from truenorth.records import ImuRecord
+    from truenorth.records import (
+        GnssRecord,
+        HeightRecord,
+        ImuRecord,
+        MasterRecord,
+        OdometerRecord,
+        Trajectory,
+        VelocityRecord,
+    )
     from truenorth.report import write_report
     from truenorth.simulation import simulate
     from truenorth.specs import ImuSpec, imu_spec
@@ -28,11 +36,17 @@ _HOMES = {
     "AlignmentError": "errors",
     "Calibration": "calibration",
     "DataError": "errors",
+    "GnssRecord": "records",
+    "HeightRecord": "records",
     "ImuRecord": "records",
     "ImuSpec": "specs",
+    "MasterRecord": "records",
+    "OdometerRecord": "records",
     "Position": "position",
+    "Trajectory": "records",
     "TruenorthError": "errors",
     "UsageError": "errors",
+    "VelocityRecord": "records",
     "align": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
@@ -48,11 +62,17 @@ __all__ = [
     "AlignmentError",
     "Calibration",
     "DataError",
+    "GnssRecord",
+    "HeightRecord",
     "ImuRecord",
     "ImuSpec",
+    "MasterRecord",
+    "OdometerRecord",
     "Position",
+    "Trajectory",
     "TruenorthError",
     "UsageError",
+    "VelocityRecord",
     "align",
     "imu_spec",
     "inspect",

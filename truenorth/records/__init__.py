@@ -1,0 +1,21 @@
+"""Records: measurements in SI units and our axes, checked when they are made."""
+
+from truenorth.records.base import GAP_FACTOR, Record
+from truenorth.records.gnss import GnssRecord, HeightRecord
+from truenorth.records.imu import COLUMNS, ImuRecord
+from truenorth.records.odometer import OdometerRecord
+from truenorth.records.poses import MasterRecord, Trajectory
+from truenorth.records.velocity import VelocityRecord
+
+__all__ = [
+    "COLUMNS",
+    "GAP_FACTOR",
+    "GnssRecord",
+    "HeightRecord",
+    "ImuRecord",
+    "MasterRecord",
+    "OdometerRecord",
+    "Record",
+    "Trajectory",
+    "VelocityRecord",
+]

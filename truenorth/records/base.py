@@ -1,0 +1,234 @@
+"""What all records share: their checks, windows of time, clock offsets, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import DataError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+GAP_FACTOR = 1.5  # a step of more than 1.5 nominal intervals has lost at least one sample
+
+
+class Record:
+    """Measurements over time: a frozen dataclass with ``time`` (N,), ``source``, and arrays of N rows.
+
+    Kinds of record say what the columns of each array are called in :meth:`groups`, which arrays may be left out
+    (`OPTIONAL`) and which may hold NaN for what is absent in a row (`PARTIAL`).
+    """
+
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset()
+    PARTIAL: ClassVar[frozenset[str]] = frozenset()
+
+    time: Array
+    source: str
+
+    def groups(self) -> Mapping[str, Sequence[str]]:
+        """Arrays of the record, each with the names of its columns: one means (N,), three (N, 3), nine (N, 3, 3)."""
+        raise NotImplementedError
+
+    def __post_init__(self) -> None:
+        groups = {name: columns for name, columns in self.groups().items() if self._holds(name)}
+        for name in ("time", *groups):
+            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            if array.flags.writeable:
+                array = array.view()
+                array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        _check_shapes(self, groups)
+        _check_time(self.time, self.source)
+        for name, columns in groups.items():
+            _check_finite(getattr(self, name), columns, self.source, name in self.PARTIAL)
+
+    def _holds(self, name: str) -> bool:
+        """Whether an array is there."""
+        return name not in self.OPTIONAL or getattr(self, name) is not None
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @cached_property
+    def interval(self) -> float:
+        """Nominal sampling interval, s: the median step."""
+        return float(np.median(np.diff(self.time)))
+
+    @property
+    def rate(self) -> float:
+        """Nominal sampling rate, Hz."""
+        return 1.0 / self.interval
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s, the interval of the first row included."""
+        return float(self.time[-1] - self.time[0]) + self.interval
+
+    @cached_property
+    def steps(self) -> Array:
+        """(N,) length of the interval that ends at each row, s; the first row's is the nominal one."""
+        steps = np.empty(len(self.time))
+        steps[0] = self.interval
+        np.subtract(self.time[1:], self.time[:-1], out=steps[1:])
+        return steps
+
+    @cached_property
+    def gaps(self) -> NDArray[np.intp]:
+        """Rows that follow a gap: their step is longer than 1.5 nominal intervals."""
+        return np.flatnonzero(self.steps > GAP_FACTOR * self.interval)
+
+    def between(self, start: float | None = None, stop: float | None = None) -> Self:
+        """Rows with ``start <= time <= stop``, as a record of its own.
+
+        Raises
+        ------
+        DataError
+            The window holds fewer than two rows.
+        """
+        first = 0 if start is None else int(np.searchsorted(self.time, start, "left"))
+        last = len(self) if stop is None else int(np.searchsorted(self.time, stop, "right"))
+        if last - first < 2:
+            raise DataError(
+                f"{self.source}: no samples between {start} s and {stop} s; the record runs from "
+                f"{self.time[0]:g} s to {self.time[-1]:g} s, choose a window inside it"
+            )
+        return self[first:last]
+
+    def __getitem__(self, rows: slice) -> Self:
+        names = ("time", *(name for name in self.groups() if self._holds(name)))
+        return self._with(**{name: getattr(self, name)[rows] for name in names})
+
+    def shifted(self, offset: float) -> Self:
+        """The same measurements with `offset` (s) added to their times: for logs of two clocks."""
+        return self._with(time=self.time + offset)
+
+    def _with(self, **changes: Any) -> Self:
+        return replace(self, **changes)  # type: ignore[type-var]
+
+    def columns(self) -> dict[str, Array]:
+        """The documented columns of tables and files by name, in their units (SI but for angles, which are in deg)."""
+        table: dict[str, Array] = {}
+        for name, columns in self.groups().items():
+            if self._holds(name):
+                values = getattr(self, name).reshape(len(self), -1)
+                table |= {column: values[:, i] for i, column in enumerate(columns)}
+        return table
+
+    def to_frame(self) -> pd.DataFrame:
+        """A pandas table with index ``time`` and the documented columns."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns(), pd.Index(self.time, name="time"))
+
+
+def check_range(record: Record, name: str, low: float, high: float, advice: str) -> None:
+    """Refuse what lies outside ``low <= value <= high``; NaN passes.
+
+    Raises
+    ------
+    DataError
+        With source, row and column.
+    """
+    if getattr(record, name) is None:
+        return
+    columns = record.groups()[name]
+    values = getattr(record, name).reshape(len(record), -1)
+    bad = np.argwhere((values < low) | (values > high))
+    if bad.size:
+        row, i = bad[0]
+        raise DataError(
+            f"{record.source}: row {row + 1}, column {columns[i]}: {values[row, i]:g}; expected {low:g} to {high:g}: {advice}"
+        )
+
+
+def check_positive(record: Record, *names: str) -> None:
+    """Refuse standard deviations that are zero or negative; NaN, which says that none is known, passes.
+
+    Raises
+    ------
+    DataError
+        With source, row and column.
+    """
+    for name in names:
+        if getattr(record, name) is None:
+            continue
+        values = getattr(record, name).reshape(len(record), -1)
+        bad = np.argwhere(values <= 0.0)
+        if bad.size:
+            row, i = bad[0]
+            raise DataError(
+                f"{record.source}: row {row + 1}, column {record.groups()[name][i]}: {values[row, i]:g}; expected a standard "
+                "deviation above zero, or NaN where none is known"
+            )
+
+
+def check_together(record: Record, *names: str) -> None:
+    """Refuse a record that has some of these arrays and not the others.
+
+    Raises
+    ------
+    DataError
+        It names both.
+    """
+    missing = [name for name in names if getattr(record, name) is None]
+    if missing and len(missing) < len(names):
+        there = ", ".join(name for name in names if name not in missing)
+        raise DataError(f"{record.source}: {there} without {', '.join(missing)}; expected all of them or none")
+
+
+def _check_shapes(record: Record, groups: Mapping[str, Sequence[str]]) -> None:
+    inner = {"time": (), **{name: _inner(columns) for name, columns in groups.items()}}
+    shapes = {name: getattr(record, name).shape for name in inner}
+    rows = shapes["time"][0] if len(shapes["time"]) == 1 else -1
+    if rows < 0 or any(shapes[name] != (rows, *shape) for name, shape in inner.items()):
+        wanted = [f"(N{''.join(f', {n}' for n in shape)}{'' if shape else ','})" for shape in inner.values()]
+        raise DataError(
+            f"{record.source}: {_listed(inner)} have the shapes {_listed(map(str, shapes.values()))}; expected {_listed(wanted)}"
+        )
+    if rows < 2:
+        raise DataError(f"{record.source}: {rows} sample(s); at least 2 are needed")
+
+
+def _inner(columns: Sequence[str]) -> tuple[int, ...]:
+    """Shape of one row of an array with these columns."""
+    return {1: (), 9: (3, 3)}.get(len(columns), (len(columns),))
+
+
+def _listed(items: Any) -> str:
+    *first, last = items
+    return f"{', '.join(first)} and {last}" if first else str(last)
+
+
+def _check_time(time: Array, source: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(time))
+    if bad.size:
+        raise DataError(f"{source}: row {bad[0] + 1}, column time: {time[bad[0]]}; expected a finite number")
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if bad.size:
+        k = int(bad[0]) + 1
+        what = "repeats" if time[k] == time[k - 1] else "goes back"
+        raise DataError(
+            f"{source}: row {k + 1}, column time: time {what} ({time[k - 1]:.6f} s, then {time[k]:.6f} s); expected "
+            "strictly increasing seconds: sort the log or drop the repeated rows"
+        )
+
+
+def _check_finite(values: Array, columns: Sequence[str], source: str, partial: bool) -> None:
+    if np.isfinite(values.sum()):  # one pass; a NaN or inf anywhere survives the sum
+        return
+    values = values.reshape(len(values), -1)
+    bad = np.argwhere(np.isinf(values) if partial else ~np.isfinite(values))
+    if bad.size:
+        row, i = bad[0]
+        wanted = "a finite number, or NaN where there is none" if partial else "a finite number"
+        raise DataError(
+            f"{source}: row {row + 1}, column {columns[i]}: {values[row, i]}; expected {wanted}: remove the row or repair "
+            "the log"
+        )

@@ -1,0 +1,66 @@
+"""The IMU's record: angular rates and specific forces, or their increments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.errors import DataError
+from truenorth.records.base import Record
+
+Array = NDArray[np.float64]
+
+COLUMNS = {
+    "rates": ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"),
+    "increments": ("dtheta_x", "dtheta_y", "dtheta_z", "dvel_x", "dvel_y", "dvel_z"),
+}
+
+
+@dataclass(frozen=True)
+class ImuRecord(Record):
+    """Angular rates and specific forces of one IMU, or their increments.
+
+    Parameters
+    ----------
+    time : (N,) array, s
+        Strictly increasing. A rate row is the instantaneous rate at its time; an increment row is the integral
+        over the interval that *ends* at its time.
+    gyro : (N, 3) array
+        ``w_ib_b`` in rad/s, or its increment in rad; body axes RFU (x right, y forward, z up).
+    accel : (N, 3) array
+        Specific force ``f_b`` in m/s^2, or its increment in m/s.
+    kind : {"rates", "increments"}
+        What a row is.
+    source : str
+        Where the record came from (a file name); messages begin with it.
+
+    Raises
+    ------
+    DataError
+        Wrong shapes, fewer than two rows, a number that is not finite, or time that does not increase: the
+        message names the source, the row (1 is the first sample) and the column.
+    """
+
+    time: Array
+    gyro: Array
+    accel: Array
+    kind: Literal["rates", "increments"] = "rates"
+    source: str = field(default="IMU record", compare=False)
+
+    def groups(self) -> Mapping[str, Sequence[str]]:
+        """``gyro`` and ``accel`` with the columns of the kind."""
+        return {"gyro": COLUMNS[self.kind][:3], "accel": COLUMNS[self.kind][3:]}
+
+    def __post_init__(self) -> None:
+        if self.kind not in COLUMNS:
+            raise DataError(f"{self.source}: kind {self.kind!r} is not known; use 'rates' or 'increments'")
+        super().__post_init__()
+
+    def rotated(self, C_new_old: ArrayLike) -> ImuRecord:
+        """The same measurements in other body axes: ``v_new = C_new_old @ v_old``."""
+        C = np.asarray(C_new_old, dtype=np.float64)
+        return ImuRecord(self.time, self.gyro @ C.T, self.accel @ C.T, self.kind, self.source)
