@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, Alignment, Status
-from truenorth.earth import EARTH_RATE
+from truenorth.earth import EARTH_RATE, normal_gravity
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,13 @@ def _contradictions(answer: Alignment, around: Circumstances) -> list[str]:
                 f"specification ({answer.imu_source}) allows {bias / DEG_PER_HOUR:.3g} deg/h: check --lat, the "
                 "units, and the specification"
             )
-    accel = float(np.max(answer.accel_bias_prior))
+    # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
+    accel = float(
+        np.hypot(
+            np.max(answer.accel_bias_prior),
+            answer.imu.accel_scale_factor * float(normal_gravity(answer.position.lat, answer.position.alt)),
+        )
+    )
     if abs(check.force_residual) > OUTLIER * np.hypot(accel, check.force_noise):
         found.append(
             f"the mean specific force misses gravity by {check.force_residual / MICRO_G:.0f} ug, where the specification "
