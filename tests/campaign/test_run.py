@@ -233,3 +233,12 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     assert "http" not in page.split("<pre")[0]
     again = read_campaign(tmp_path / "out")
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
+
+
+def test_the_bound_is_not_beaten_and_nearly_reached(tmp_path):
+    """100 still runs, a filter that is told the truth: RMS over the Cramer-Rao bound within its 99.9 % band of 1."""
+    plan = PLAN | {"runs": 100, "block": 50, "methods": ["kalman"]}
+    table = run_campaign(plan, tmp_path, workers=2).summary.set_index("quantity")
+    for quantity in ("phi_e", "phi_n", "phi_u"):
+        ratio = table.loc[quantity, "rms"] / table.loc[quantity, "bound"]
+        assert 1 - 3.3 / np.sqrt(200) < ratio < 1 + 3.3 / np.sqrt(200)

@@ -56,9 +56,8 @@ class Task:
 
     @property
     def deflection(self) -> Array:
-        """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would."""
-        J = static_jacobian(self.position.lat, self.gravity)[:, :2] * (DEFLECTION * self.gravity)
-        return J @ J.T
+        """(3, 3) covariance of phi from the deflection of the vertical."""
+        return deflection_covariance(self.position.lat, self.gravity)
 
     def in_navigation_axes(self, covariance_n0: Array, time: float) -> Array:
         """Turn a covariance of phi from n0 to n at a time since the start of the log."""
@@ -124,3 +123,9 @@ def bridged(record: ImuRecord) -> ImuRecord:
     scale = np.ones(len(record))
     scale[gaps] = steps[gaps]
     return replace(record, gyro=record.gyro * scale[:, None], accel=record.accel * scale[:, None])
+
+
+def deflection_covariance(lat: float, g: float) -> Array:
+    """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would."""
+    J = static_jacobian(lat, g)[:, :2] * (DEFLECTION * g)
+    return J @ J.T

@@ -41,10 +41,15 @@ class Campaign:
 
     @cached_property
     def summary(self) -> pd.DataFrame:
-        """Statistics over runs of each quantity; see :func:`truenorth.campaign.summarise`."""
+        """Statistics over runs of each quantity; see :func:`truenorth.campaign.summarise`.
+
+        Beside the attitude errors stands the Cramer-Rao ``bound`` of the case, see :mod:`truenorth.campaign.bound`.
+        """
+        from truenorth.campaign.bound import bounds
         from truenorth.campaign.summary import summarise
 
-        return summarise(self.table, names=self.case_names)
+        table = summarise(self.table, names=self.case_names)
+        return table.merge(bounds(self.plan), how="left", on=["case", "time_s", "quantity"])
 
     @cached_property
     def comparison(self) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""The command line: `truenorth align`, `inspect`, `simulate`, `campaign`.
+"""The command line: `truenorth align`, `inspect`, `simulate`, `campaign`, `tune`.
 
 Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
@@ -16,6 +16,7 @@ from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.inspect import inspect
 from truenorth.cli.simulate import simulate
+from truenorth.cli.tune import tune
 from truenorth.errors import TruenorthError
 
 INTERRUPTED = 130
@@ -33,6 +34,7 @@ app.command("align")(align)
 app.command("inspect")(inspect)
 app.command("simulate")(simulate)
 app.command("campaign")(campaign)
+app.command("tune")(tune)
 
 
 def _version(wanted: bool) -> None:

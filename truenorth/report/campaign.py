@@ -33,6 +33,7 @@ COLUMNS = {
     "interval": "95 % interval",
     "median": "median",
     "p95": "95th percentile",
+    "bound": "Cramer-Rao bound",
     "sigma": "claimed sigma",
     "rms_over_sigma": "RMS/sigma",
     "band": "95 % band",

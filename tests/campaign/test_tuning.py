@@ -1,0 +1,72 @@
+"""Tuning: what it searches, how it judges, what it refuses."""
+
+import math
+
+import pandas as pd
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from tests.campaign.test_plan import REST
+from truenorth.campaign.tuning import _score, read_search, tune
+from truenorth.cli import app
+from truenorth.errors import DataError
+from truenorth.specs import imu_spec
+
+STILL = REST | {"imu": {"gyro": {"bias": "0.01 deg/h", "random_walk": "0.003 deg/sqrt(h)"}, "accel": {"bias": "50 ug"}}}
+SEARCH = {
+    "name": "s",
+    "scenario": STILL,
+    "method": "oba",
+    "search": {"gyro.bias": ["0.001 deg/h", "1 deg/h"]},
+    "runs": 12,
+    "trials": 6,
+}
+
+
+def test_the_same_search_gives_the_same_answer_and_judges_on_other_data():
+    pytest.importorskip("optuna")
+    first, second = tune(SEARCH), tune(SEARCH)
+    pd.testing.assert_frame_equal(first.trials, second.trials, check_exact=True)
+    assert list(first.judged["seed"]) == [1, 1]
+    assert list(first.judged["specification"]) == ["tuned", "simulated IMU's own"]
+    assert len(first.trials) == 6
+    scores = [_score(row, 12) for row in first.trials.to_dict("records")]
+    best = first.trials.loc[scores.index(min(scores))]
+    assert first.spec.gyro_bias == pytest.approx(best["gyro.bias"], rel=1e-3)
+    assert first.spec.gyro_random_walk == pytest.approx(imu_spec(STILL["imu"]).gyro_random_walk)
+
+
+def test_a_dishonest_or_silent_specification_scores_worse():
+    honest = {"answers": 10, "rms": 5.0, "rms_over_sigma": 1.0, "ratio_low": 0.6, "ratio_high": 1.4}
+    honest |= {"nees": 1.0, "nees_low": 0.7, "nees_high": 1.4}
+    assert _score(honest, 10) == 5.0
+    assert _score(honest | {"nees": 2.8}, 10) == pytest.approx(5.0 * (1 + 10 * math.log(2)))
+    assert _score(honest | {"rms_over_sigma": 0.3}, 10) == pytest.approx(5.0 * (1 + 10 * math.log(2)))
+    assert _score(honest | {"answers": 5}, 10) == pytest.approx(20.0)
+    assert _score({"answers": 0}, 10) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"search": {"gyro.bais": ["1 deg/h", "2 deg/h"]}}, "'gyro.bais' is not known; did you mean 'gyro.bias'"),
+        ({"search": {"gyro.bias": ["1 deg/h", "2 ug"]}}, "search.gyro.bias: '2 ug'"),
+        ({"search": {"gyro.bias": ["2 deg/h", "1 deg/h"]}}, "the smaller first"),
+        ({"search": {}}, "search"),
+        ({"trials": 0}, "trials: 0"),
+    ],
+)
+def test_a_mistake_is_told_by_its_key(change, words):
+    with pytest.raises(DataError, match=words):
+        read_search(SEARCH | change)
+
+
+def test_the_command(tmp_path):
+    pytest.importorskip("optuna")
+    (tmp_path / "s.yaml").write_text(yaml.safe_dump(SEARCH | {"trials": 2, "runs": 4}))
+    result = CliRunner().invoke(app, ["tune", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert "which the search never saw" in result.output
+    assert imu_spec(tmp_path / "out" / "tuned.yaml").name == "tuned"
+    assert len(pd.read_csv(tmp_path / "out" / "trials.csv")) == 2
