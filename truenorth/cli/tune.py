@@ -47,12 +47,10 @@ def tune(
     console = make_console()
     for row in result.judged.to_dict("records"):
         verdict = "honest" if row["in_band"] else "not honest"
-        errors = f"RMS {row['rms']:.3g} arcmin ({row['rms_low']:.3g} to {row['rms_high']:.3g}), RMS/sigma {row['rms_over_sigma']:.2f}"
+        errors = f"RMS {row['rms']:.3g} arcmin ({row['rms_low']:.3g} to {row['rms_high']:.3g})"
+        honesty = f"RMS/sigma {row['rms_over_sigma']:.2f}, NEES {row['nees']:.2f}: {verdict}"
         data = f"{row['answers']} runs of seed {row['seed']}, which the search never saw"
-        console.print(
-            f"{row['specification']}: {chosen.quantity} {errors}, NEES {row['nees']:.2f}: {verdict}; {data}",
-            soft_wrap=True,
-        )
+        console.print(f"{row['specification']}: {chosen.quantity} {errors}, {honesty}; {data}", soft_wrap=True)
     for path in result.save(output):
         console.print(f"wrote {path}", soft_wrap=True)
 
