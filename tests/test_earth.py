@@ -122,3 +122,21 @@ def test_arrays_are_the_scalars_and_kernels_the_same_bits_to_rounding():
             (earth.gravity_n(lat, alt), earth.gravity_n(lat[k], alt[k])),
         ):
             np.testing.assert_allclose(many[k], one, rtol=1e-15)
+
+
+@given(latitudes, st.floats(-3.1, 3.1), st.floats(-10e3, 1000e3))
+def test_earth_fixed_and_back(lat, lon, alt):
+    place = earth.ecef_from_geodetic(lat, lon, alt)
+    np.testing.assert_allclose(place, ecef(lat, lon, alt), rtol=1e-15)
+    again = earth.geodetic_from_ecef(place)
+    np.testing.assert_allclose(again[:2], [lat, lon], atol=3e-15)
+    assert again[2] == pytest.approx(alt, abs=1e-8)
+
+
+@given(latitudes, st.floats(-3.1, 3.1))
+def test_axes_are_the_derivatives_of_the_place(lat, lon):
+    R_M, R_N = earth.radii(lat)
+    h = 1e-4
+    step = [(0, h / (R_N * np.cos(lat)), 0), (h / R_M, 0, 0), (0, 0, h)]
+    moved = [ecef(lat + a, lon + b, c) - ecef(lat - a, lon - b, -c) for a, b, c in step]
+    np.testing.assert_allclose(np.array(moved).T / (2 * h), earth.ecef_axes(lat, lon), atol=1e-4)

@@ -13,7 +13,17 @@ if TYPE_CHECKING:
     from truenorth.calibration import Calibration
     from truenorth.campaign import run_campaign
     from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
-    from truenorth.formats import read_imu, write_imu
+    from truenorth.formats import (
+        read_gnss,
+        read_height,
+        read_imu,
+        read_master,
+        read_odometer,
+        read_trajectory,
+        read_velocity,
+        write_imu,
+        write_record,
+    )
     from truenorth.position import Position
     from truenorth.quality import inspect
     from truenorth.records import (
@@ -50,10 +60,17 @@ _HOMES = {
     "align": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
+    "read_gnss": "formats",
+    "read_height": "formats",
     "read_imu": "formats",
+    "read_master": "formats",
+    "read_odometer": "formats",
+    "read_trajectory": "formats",
+    "read_velocity": "formats",
     "run_campaign": "campaign",
     "simulate": "simulation",
     "write_imu": "formats",
+    "write_record": "formats",
     "write_report": "report",
 }
 
@@ -76,10 +93,17 @@ __all__ = [
     "align",
     "imu_spec",
     "inspect",
+    "read_gnss",
+    "read_height",
     "read_imu",
+    "read_master",
+    "read_odometer",
+    "read_trajectory",
+    "read_velocity",
     "run_campaign",
     "simulate",
     "write_imu",
+    "write_record",
     "write_report",
 ]
 

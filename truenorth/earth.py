@@ -65,3 +65,43 @@ def gravity_n(lat: Any, alt: Any) -> Array:
     """Normal gravity as a vector in n, (..., 3) m/s^2."""
     g = normal_gravity(lat, alt)
     return np.stack([np.zeros_like(g), np.zeros_like(g), -g], axis=-1)
+
+
+def ecef_from_geodetic(lat: Any, lon: Any, alt: Any) -> Array:
+    """Cartesian earth-fixed coordinates, (..., 3) m, of latitude, longitude (rad) and height (m)."""
+    _, R_N = radii(lat)
+    across = (R_N + alt) * np.cos(lat)
+    up = (R_N * (1.0 - ECCENTRICITY_SQUARED) + alt) * np.sin(lat)
+    return np.stack([across * np.cos(lon), across * np.sin(lon), up], axis=-1)
+
+
+def geodetic_from_ecef(place: Array) -> tuple[Array, Array, Array]:
+    """Latitude, longitude (rad) and height (m) of Cartesian earth-fixed coordinates (..., 3), m.
+
+    Bowring's parametric latitude, iterated three times: within 1e-15 rad and 1e-8 m up to 1000 km of height (B. Bowring,
+    Survey Review 23 (1976)).
+    """
+    x, y, z = np.moveaxis(np.asarray(place, dtype=np.float64), -1, 0)
+    across = np.hypot(x, y)
+    minor = SEMI_MAJOR * (1.0 - FLATTENING)
+    second = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
+    beta = np.arctan2(SEMI_MAJOR * z, minor * across)
+    lat = beta
+    for _ in range(3):
+        lat = np.arctan2(
+            z + second * minor * np.sin(beta) ** 3, across - ECCENTRICITY_SQUARED * SEMI_MAJOR * np.cos(beta) ** 3
+        )
+        beta = np.arctan2((1.0 - FLATTENING) * np.sin(lat), np.cos(lat))
+    s, c = np.sin(lat), np.cos(lat)
+    alt = across * c + z * s - SEMI_MAJOR * np.sqrt(1.0 - ECCENTRICITY_SQUARED * s * s)
+    return lat, np.arctan2(y, x), alt
+
+
+def ecef_axes(lat: Any, lon: Any) -> Array:
+    """``C_en``, (..., 3, 3): turns east, north, up into earth-fixed axes."""
+    sl, cl, so, co = np.sin(lat), np.cos(lat), np.sin(lon), np.cos(lon)
+    zero = np.zeros_like(sl * so)
+    east = np.stack([-so + zero, co + zero, zero], -1)
+    north = np.stack([-sl * co, -sl * so, cl + zero], -1)
+    up = np.stack([cl * co, cl * so, sl + zero], -1)
+    return np.stack([east, north, up], -1)

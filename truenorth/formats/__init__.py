@@ -1,4 +1,4 @@
-"""Readers and writers of IMU logs, one format a file."""
+"""Readers and writers of logs of the IMU and of aiding sensors, one format a file."""
 
 from __future__ import annotations
 
@@ -9,11 +9,24 @@ from pathlib import Path
 from typing import Literal
 
 from truenorth.errors import UsageError
+from truenorth.formats.aiding import read_height, read_master, read_odometer, read_trajectory, read_velocity
 from truenorth.formats.detect import FORMATS, format_of
+from truenorth.formats.gnss import read_gnss
 from truenorth.formats.layout import layout_for
-from truenorth.records import ImuRecord
+from truenorth.records import ImuRecord, Record
 
-__all__ = ["FORMATS", "read_imu", "write_imu"]
+__all__ = [
+    "FORMATS",
+    "read_gnss",
+    "read_height",
+    "read_imu",
+    "read_master",
+    "read_odometer",
+    "read_trajectory",
+    "read_velocity",
+    "write_imu",
+    "write_record",
+]
 
 READERS = {
     "csv": ("csv", "read"),
@@ -90,6 +103,20 @@ def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:
     """Write a record as CSV, Parquet or npz, by the suffix; whole or not at all.
 
     `read_imu` gives the same bits back, whatever the format.
+
+    Raises
+    ------
+    UsageError
+        Another suffix, or a folder that cannot be written to.
+    """
+    write_record(record, path)
+
+
+def write_record(record: Record, path: str | PathLike[str]) -> None:
+    """Write a record of any kind as CSV, Parquet or npz, by the suffix; whole or not at all.
+
+    The columns are the documented ones of :meth:`truenorth.records.Record.to_frame`; the reader of the kind gives the same
+    record back: to the bit, but for angles, which stand in degrees and come back to rounding.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.records import COLUMNS, ImuRecord
+from truenorth.records import Record
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -30,13 +30,13 @@ def to_numpy(columns: list[pa.ChunkedArray]) -> Array:
     return values
 
 
-def table_of(record: ImuRecord) -> pa.Table:
+def table_of(record: Record) -> pa.Table:
     """A record with the documented columns."""
     import pyarrow as pa
 
-    values = np.column_stack([record.time, record.gyro, record.accel])
+    columns = {"time": record.time, **record.columns()}
     arrays = [
-        pa.Array.from_buffers(pa.float64(), len(values), [None, pa.py_buffer(np.ascontiguousarray(column))])
-        for column in values.T
+        pa.Array.from_buffers(pa.float64(), len(record), [None, pa.py_buffer(np.ascontiguousarray(column))])
+        for column in columns.values()
     ]
-    return pa.Table.from_arrays(arrays, names=["time", *COLUMNS[record.kind]])
+    return pa.Table.from_arrays(arrays, names=list(columns))

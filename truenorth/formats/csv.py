@@ -9,7 +9,9 @@ from truenorth.formats.arrow import table_of
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import choose, finish
 from truenorth.formats.text import TextTable, are_numbers, delimiter_of, first_lines, is_comment, split
-from truenorth.records import COLUMNS, ImuRecord
+from truenorth.records import COLUMNS, ImuRecord, Record
+
+IMU_HEADER = ",".join(("time", *COLUMNS["rates"]))
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
@@ -23,7 +25,7 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     DataError
         No header, a missing column, text in a number, a short row, NaN or inf, time going back: with line and column.
     """
-    table = _table(path)
+    table = open_table(path)
     choice = choose(table.names, layout, path.name)
     values = table.read(choice.names)
     time = None if choice.time is None else values[:, 0]
@@ -31,16 +33,24 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     return finish(time, gyro, accel, choice.kind, layout, path.name, labels=choice.labels, place=table.place)
 
 
-def write(record: ImuRecord, path: Path) -> None:
+def write(record: Record, path: Path) -> None:
     """Write a record with the documented columns; every number reads back to the same bits."""
     import pyarrow.csv as pc
 
+    table = table_of(record)
     with path.open("wb") as file:
-        file.write((",".join(("time", *COLUMNS[record.kind])) + "\n").encode())
-        pc.write_csv(table_of(record), file, pc.WriteOptions(include_header=False))
+        file.write((",".join(table.column_names) + "\n").encode())
+        pc.write_csv(table, file, pc.WriteOptions(include_header=False))
 
 
-def _table(path: Path) -> TextTable:
+def open_table(path: Path, example: str = IMU_HEADER) -> TextTable:
+    """Where the numbers of a CSV file stand, and what its columns are called.
+
+    Raises
+    ------
+    DataError
+        No header of names; the message gives `example`.
+    """
     remark = ""
     for number, line in first_lines(path):
         if is_comment(line):
@@ -54,6 +64,6 @@ def _table(path: Path) -> TextTable:
             return TextTable(path, split(remark, delimiter_of(remark)), delimiter, number - 1)
         raise DataError(
             f"{path.name}: line {number} holds numbers, not names; expected a header above it such as "
-            "time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z: add one"
+            f"{example}: add one"
         )
-    raise DataError(f"{path.name}: no header; expected a line such as time,gyro_x,...,accel_z, and numbers below it")
+    raise DataError(f"{path.name}: no header; expected a line such as {example}, and numbers below it")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from truenorth.errors import DataError, UsageError
 
-FORMATS = ("csv", "parquet", "npz", "mat", "psins", "kf-gins", "kf-gins-binary", "ros")
 SUFFIXES = {
     ".csv": "csv",
     ".tsv": "csv",
@@ -21,6 +21,16 @@ SUFFIXES = {
     ".bag": "ros",
     ".mcap": "ros",
     ".db3": "ros",
+}
+FORMATS = tuple(dict.fromkeys(SUFFIXES.values()))
+AIDING_SUFFIXES = {
+    ".csv": "csv",
+    ".tsv": "csv",
+    ".txt": "csv",
+    ".parquet": "parquet",
+    ".pq": "parquet",
+    ".npz": "npz",
+    ".mat": "mat",
 }
 BEGINNINGS = {
     b"PAR1": "parquet",
@@ -44,8 +54,10 @@ TEXT = ("csv", "psins", "kf-gins")
 HEAD = 4096
 
 
-def format_of(path: Path, given: str | None = None) -> str:
-    """The format of a log, one of `FORMATS`.
+def format_of(
+    path: Path, given: str | None = None, suffixes: Mapping[str, str] = SUFFIXES, what: str = "an IMU log"
+) -> str:
+    """The format of a log, one of those that `suffixes` name.
 
     Parameters
     ----------
@@ -53,6 +65,10 @@ def format_of(path: Path, given: str | None = None) -> str:
         An existing file, or a folder (a ROS 2 bag).
     given : str, optional
         What the caller says; the content must still agree.
+    suffixes : mapping
+        Formats by suffix.
+    what : str
+        Is expected, in words.
 
     Raises
     ------
@@ -61,8 +77,11 @@ def format_of(path: Path, given: str | None = None) -> str:
     DataError
         An empty file, or one that is not what its suffix says.
     """
-    if given is not None and given not in FORMATS:
-        raise UsageError(f"format {given!r} is not known; choose one of {', '.join(FORMATS)}")
+    formats = tuple(dict.fromkeys(suffixes.values()))
+    if given is not None and given not in formats:
+        raise UsageError(f"format {given!r} is not known; choose one of {', '.join(formats)}")
+    if path.is_dir() and "ros" not in formats:
+        raise UsageError(f"{path}: a folder; name a file")
     if path.is_dir():
         if given not in (None, "ros") or not (path / "metadata.yaml").is_file():
             raise UsageError(f"{path}: a folder; only a ROS 2 bag is one (with metadata.yaml in it), name a file")
@@ -70,9 +89,9 @@ def format_of(path: Path, given: str | None = None) -> str:
     with path.open("rb") as file:
         head = file.read(HEAD)
     if not head:
-        raise DataError(f"{path.name}: the file is empty; expected an IMU log")
+        raise DataError(f"{path.name}: the file is empty; expected {what}")
     found = next((name for beginning, name in BEGINNINGS.items() if head.startswith(beginning)), None)
-    chosen = given or SUFFIXES.get(path.suffix.lower()) or found
+    chosen = given or suffixes.get(path.suffix.lower()) or found
     foreign = next((what for beginning, what in FOREIGN.items() if head.startswith(beginning)), None)
     if found == "npz" and not _is_npz(path):
         found, foreign = None, "a zip archive, such as an Excel workbook; save its sheet as CSV, or unpack it"
@@ -81,8 +100,10 @@ def format_of(path: Path, given: str | None = None) -> str:
     if chosen is None:
         raise UsageError(
             f"{path.name}: the suffix {path.suffix or '(none)'} names no format; give one with --format: "
-            f"{', '.join(FORMATS)}"
+            f"{', '.join(formats)}"
         )
+    if chosen not in formats:
+        raise DataError(f"{path.name}: holds {chosen} data; expected {what}: {', '.join(formats)}")
     _check_content(path.name, head, chosen, found)
     return chosen
 

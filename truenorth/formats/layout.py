@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -63,15 +63,36 @@ def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:
     UsageError
         The same in the options of the call.
     """
+    return Layout(**options_for(path, given, _checked))
+
+
+def options_for(
+    path: Path, given: Mapping[str, Any], checked: Callable[[Mapping[Any, Any]], dict[str, Any]]
+) -> dict[str, Any]:
+    """The options in the YAML file beside a log with those of the call, where they are not None, on top.
+
+    Parameters
+    ----------
+    path : Path
+    given : mapping
+    checked : callable
+        Refuses what is wrong with a UsageError, and gives the rest in the form that readers want.
+
+    Raises
+    ------
+    DataError
+        Something is wrong in the file; the message names it.
+    UsageError
+        The same in the options of the call.
+    """
     values: dict[str, Any] = {}
     beside = path.with_suffix(".yaml")
     if beside.is_file():
         try:
-            values = _checked(read_mapping(beside))
+            values = checked(read_mapping(beside))
         except UsageError as error:
             raise DataError(f"{beside} (the layout of {path.name}): {error}") from None
-    values |= _checked({key: value for key, value in given.items() if value is not None})
-    return Layout(**values)
+    return values | checked({key: value for key, value in given.items() if value is not None})
 
 
 def _checked(content: Mapping[Any, Any]) -> dict[str, Any]:

@@ -28,6 +28,20 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     DataError
         A damaged file, one of version 7.3, or variables that are missing or have other shapes.
     """
+    variables = variables_of(path)
+    if not layout.columns and np.shape(variables.get("imu", 0))[1:] == (7,):
+        layout = replace(layout, columns=PSINS)
+    return record_from_arrays(variables, layout, path.name)
+
+
+def variables_of(path: Path) -> dict[str, Any]:
+    """The variables of a file by name, fields of structs as ``trj.imu``.
+
+    Raises
+    ------
+    DataError
+        A damaged file, or one of version 7.3.
+    """
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
@@ -39,10 +53,7 @@ def read(path: Path, layout: Layout) -> ImuRecord:
         ) from None
     except (ValueError, TypeError, OSError, EOFError, MatReadError, zlib.error) as error:
         raise DataError(f"{path.name}: the MATLAB file is damaged or cut short ({error}); write it anew") from None
-    variables = _flat({name: value for name, value in content.items() if not name.startswith("__")})
-    if not layout.columns and np.shape(variables.get("imu", 0))[1:] == (7,):
-        layout = replace(layout, columns=PSINS)
-    return record_from_arrays(variables, layout, path.name)
+    return _flat({name: value for name, value in content.items() if not name.startswith("__")})
 
 
 def _flat(content: dict[str, Any]) -> dict[str, Any]:

@@ -123,13 +123,13 @@ def finish(
     for name, values in (("time", time), ("gyro", gyro), ("accel", accel)):
         if values is not None:
             first = {"time": 0, "gyro": 1, "accel": 4}[name]
-            _check_finite(values.reshape(len(values), -1), labels[first:], source, place)
+            check_finite(values.reshape(len(values), -1), labels[first:], source, place)
     if time is None:
         if layout.rate is None:
             raise UsageError(f"{source}: no time in the log; give the samples a second with --rate")
         time = np.arange(1, len(gyro) + 1) / layout.rate
     else:
-        _check_order(time, labels[0], source, place)
+        check_order(time, labels[0], source, place)
         time = time * unit_factor("time", kind, layout)
     record = ImuRecord(
         time, gyro * unit_factor("gyro", kind, layout), accel * unit_factor("accel", kind, layout), kind, source
@@ -174,7 +174,8 @@ def _found(ours: str, names: Sequence[str], layout: Layout, source: str) -> str:
     raise DataError(f"{source}: column {wanted!r} is missing; found {', '.join(names)}{hint}")
 
 
-def _check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
+def check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
+    """Refuse NaN and inf among the columns (N, len(labels)) of a file, by place and column."""
     finite = np.isfinite(values)
     if not finite.all():
         row, column = (int(i) for i in np.argwhere(~finite)[0])
@@ -184,7 +185,8 @@ def _check_finite(values: Array, labels: Sequence[str], source: str, place: Call
         )
 
 
-def _check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:
+def check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:
+    """Refuse time that does not increase, by its place in the file."""
     bad = np.flatnonzero(np.diff(time) <= 0)
     if bad.size:
         k = int(bad[0]) + 1

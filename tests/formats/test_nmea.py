@@ -1,0 +1,102 @@
+"""NMEA 0183: sentences of one epoch make a row; midnight passes; damage is named."""
+
+from functools import reduce
+
+import numpy as np
+import pytest
+
+import truenorth
+from truenorth.errors import DataError
+
+
+def sentence(body):
+    return f"${body}*{reduce(lambda a, b: a ^ b, body.encode(), 0):02X}"
+
+
+def gga(time, quality=1):
+    return sentence(f"GPGGA,{time},4807.038,N,01131.000,W,{quality},08,0.9,545.4,M,46.9,M,,")
+
+
+def rmc(time, status="A", speed="022.4", course="084.4"):
+    return sentence(f"GNRMC,{time},{status},4807.038,N,01131.000,W,{speed},{course},230394,003.1,W")
+
+
+def vtg(speed, course):
+    return sentence(f"GPVTG,{course},T,,M,{speed},N,{float(speed) * 1.852:.1f},K")
+
+
+def read(tmp_path, lines, name="log.nmea"):
+    path = tmp_path / name
+    path.write_bytes("\r\n".join(lines).encode() + b"\r\n")
+    return truenorth.read_gnss(path)
+
+
+def test_the_example_of_the_standard(tmp_path):
+    lines = [
+        gga("123519.50"),
+        sentence("GPGSA,A,3,04,05,,09,12,,,24,,,,,2.5,1.3,2.1"),
+        rmc("123519.50"),
+        gga("123520"),
+        vtg("10", "180"),
+    ]
+    assert lines[0].endswith("*" + lines[0][-2:])
+    record = read(tmp_path, lines)
+    np.testing.assert_allclose(record.time, [45319.5, 45320.0])
+    np.testing.assert_allclose(np.degrees(record.lat), 48 + 7.038 / 60, rtol=1e-15)
+    np.testing.assert_allclose(np.degrees(record.lon), -(11 + 31 / 60), rtol=1e-15)
+    np.testing.assert_allclose(record.alt, 545.4 + 46.9)
+    knot, course = 1852 / 3600, np.radians(84.4)
+    np.testing.assert_allclose(record.v_n[0, :2], 22.4 * knot * np.array([np.sin(course), np.cos(course)]))
+    np.testing.assert_allclose(record.v_n[1, :2], [0, -10 * knot], atol=1e-12)
+    assert np.isnan(record.v_n[:, 2]).all()
+    assert record.dop[0, 0] == 0.9
+    assert record.quality.tolist() == [1, 1]
+
+
+def test_standing_no_fix_and_midnight(tmp_path):
+    lines = [
+        rmc("", "V", "", ""),
+        vtg("5", "90"),  # of an epoch whose time is not known
+        gga("235959", 0),
+        rmc("235959", "V", "", ""),
+        rmc("000000", "A", "0", ""),
+        rmc("000001", "A", "1", "90"),
+    ]
+    record = read(tmp_path, lines)
+    assert record.time.tolist() == [86399.0, 86400.0, 86401.0]
+    assert record.has_position.tolist() == [False, True, True]
+    assert record.has_velocity.tolist() == [False, True, True]
+    assert record.v_n[1, :2].tolist() == [0.0, 0.0]
+
+
+def test_the_content_tells_and_broken_ends_are_passed_over(tmp_path):
+    lines = ["038,N,01131.000,W,1,08*00", gga("120000"), gga("120001"), gga("120002")[:40]]
+    assert len(read(tmp_path, lines, "log.txt")) == 2
+    assert len(read(tmp_path, [gga("120000")[:-9] + "*00", *lines[1:]], "log.txt")) == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (gga("120001").replace("545.4", "545.5"), ["line 2", "checksum", "damaged"]),
+        (gga("12x001"), ["line 2, GGA: time '12x001'"]),
+        (gga("250001"), ["line 2, GGA: time '250001'", "hhmmss"]),
+        (
+            sentence("GPGGA,120001,4807.038,X,01131.000,W,1,08,0.9,545.4,M,46.9,M,,"),
+            ["line 2, GGA: lat", "'X'", "N or S"],
+        ),
+        (sentence("GPGGA,120001,4807.038,N"), ["line 2: 4 fields", "cut short"]),
+        (rmc("120001", speed="fast"), ["line 2, RMC: speed 'fast'"]),
+        (gga("115959"), ["row 2, column time", "goes back"]),
+    ],
+)
+def test_damage_is_named(line, words, tmp_path):
+    with pytest.raises(DataError) as caught:
+        read(tmp_path, [gga("120000"), line, gga("120002")])
+    for word in ("log.nmea", *words):
+        assert word in str(caught.value), caught.value
+
+
+def test_too_little(tmp_path):
+    with pytest.raises(DataError, match=r"1 epoch\(s\)"):
+        read(tmp_path, [gga("120000"), rmc("120000")])

@@ -1,0 +1,361 @@
+"""Readers of aiding logs: odometer, velocity log, GNSS receiver, master INS, trajectory, height.
+
+CSV (comma, semicolon, tab or blanks), Parquet, npz and mat files of named columns. A YAML file beside the log (``LOG.yaml``
+for ``LOG.csv``) may hold the same options as the call; those of the call win.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import DataError, UsageError
+from truenorth.formats.detect import AIDING_SUFFIXES, format_of
+from truenorth.formats.layout import options_for
+from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, columns_of, find
+from truenorth.formats.table import check_order
+from truenorth.records import HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
+
+Array = NDArray[np.float64]
+FilePath = str | PathLike[str]
+Pairs = str | Mapping[str, str]
+
+COUNTS = ("pulses", "distance", "pulses_total", "distance_total", "speed")
+ODOMETER = (
+    TIME,
+    Quantity("pulses", aliases=("counts", "ticks")),
+    Quantity("pulses_unsigned"),
+    Quantity("pulses_total", aliases=("counts_total", "ticks_total", "encoder")),
+    Quantity("distance", "length", "m", ("increment",)),
+    Quantity("distance_unsigned", "length", "m"),
+    Quantity("distance_total", "length", "m", ("mileage", "odometer")),
+    Quantity("speed", "speed", "m/s", ("velocity", "v", "wheel_speed")),
+    Quantity("speed_unsigned", "speed", "m/s"),
+    Quantity("pulse_size", "length", "m"),
+)
+BODY = (
+    Quantity("v_right", "speed", "m/s", ("v_starboard",), ("v_left", "v_port"), "velocity"),
+    Quantity("v_forward", "speed", "m/s", ("v_ahead", "v_surge", "speed"), ("v_back", "v_astern"), "velocity"),
+    Quantity("v_up", "speed", "m/s", (), ("v_down",), "velocity"),
+)
+AXES = tuple(Quantity(f"v_{axis}", "speed", "m/s", (f"v{axis}",), (), "velocity") for axis in "xyz")
+NAVIGATION = (
+    Quantity("VE", "speed", "m/s", ("v_east", "vel_e", "v_e"), ("v_west",), "velocity"),
+    Quantity("VN", "speed", "m/s", ("v_north", "vel_n", "v_n"), ("v_south",), "velocity"),
+    Quantity("VU", "speed", "m/s", ("vel_u", "v_u", "v_upward"), ("VD", "vel_d", "v_d", "v_downward"), "velocity"),
+)
+PLACE = (
+    Quantity("lat", "angle", "deg", ("latitude",), (), "position"),
+    Quantity("lon", "angle", "deg", ("longitude", "lng"), (), "position"),
+    Quantity("alt", "length", "m", ("altitude", "height", "h", "hgt", "ellipsoidal_height"), ("depth",), "height"),
+)
+ANGLES = (
+    Quantity("heading", "angle", "deg", ("heading_cw",), ("yaw_ccw",), "attitude"),
+    Quantity("pitch", "angle", "deg", (), (), "attitude"),
+    Quantity("roll", "angle", "deg", (), (), "attitude"),
+)
+QUATERNION = tuple(Quantity(f"q_{axis}", aliases=(f"q{axis}",)) for axis in "wxyz")
+SENSORS = (
+    *(Quantity(f"gyro_{axis}", "angular_rate", "rad/s", (), (), "gyro") for axis in "xyz"),
+    *(Quantity(f"accel_{axis}", "acceleration", "m/s^2", (), (), "accel") for axis in "xyz"),
+)
+
+
+def sigmas(names: Sequence[str], dimension: str, unit: str, group: str) -> tuple[Quantity, ...]:
+    """The standard deviations of columns."""
+    return tuple(
+        Quantity(f"sigma_{name}", dimension, unit, (f"{name}_sigma", f"{name}_std"), (), group) for name in names
+    )
+
+
+POSES = (TIME, *PLACE, *NAVIGATION, *ANGLES, *QUATERNION)
+
+
+def read_odometer(
+    path: FilePath,
+    *,
+    format: str | None = None,
+    columns: Pairs | None = None,
+    units: Pairs | None = None,
+    pulse_size: float | str | None = None,
+    signed: bool | None = None,
+) -> OdometerRecord:
+    """Read an odometer's log.
+
+    Columns ``time`` and one of ``pulses, distance`` (of the interval that ends at each row), ``pulses_total,
+    distance_total`` (counted from the start: the first row only says where it stood), ``speed``; with several the first of these,
+    or the one that `columns` names. Names that end in ``_unsigned`` say that reverse driving has no sign.
+
+    Parameters
+    ----------
+    path : path
+    format : {"csv", "parquet", "npz", "mat"}, optional
+        Told by the suffix when left out.
+    columns : mapping or str, optional
+        Our names to the log's, such as ``"time=odo_t,speed=odo_speed"``.
+    units : mapping or str, optional
+        By column, such as ``"speed=km/h,time=ms"``; they win over those in the header; SI where neither says.
+    pulse_size : float or str, optional
+        Metres a pulse, or text with a unit, such as ``"2 cm"``; wins over a column ``pulse_size``.
+    signed : bool, optional
+        Whether reverse driving is negative; told by the names when left out, and true without a word.
+
+    Raises
+    ------
+    UsageError
+        No such file, an unknown format, column or unit.
+    DataError
+        Bad data: with file, line (or row) and column.
+    """
+    found, others = open_log(
+        path, format, ODOMETER, {"columns": columns, "units": units, "pulse_size": pulse_size, "signed": signed}
+    )
+    asked = [name for name in COUNTS if {name, f"{name}_unsigned"} & found.asked]
+    present = [name for name in COUNTS if found.has(name) or found.has(f"{name}_unsigned")]
+    if not present:
+        raise found.missing("time and one of " + ", ".join(COUNTS))
+    chosen = (asked or present)[0]
+    name = chosen if found.has(chosen) else f"{chosen}_unsigned"
+    found.require(name)
+    time, values = found.values["time"], found.values[name]
+    check_order(time, found.labels["time"], found.source, found.place)
+    kind: Any = chosen.removesuffix("_total")
+    if chosen.endswith("_total"):
+        time, values = time[1:], np.diff(values)
+    is_signed = others.get("signed")
+    size = _pulse_size(found, others.get("pulse_size")) if kind == "pulses" else None
+    return OdometerRecord(
+        time, values, kind, size, name == chosen if is_signed is None else is_signed, source=found.source
+    )
+
+
+def read_velocity(
+    path: FilePath,
+    *,
+    format: str | None = None,
+    columns: Pairs | None = None,
+    units: Pairs | None = None,
+    axes: str | None = None,
+    frame: Literal["body", "navigation"] | None = None,
+) -> VelocityRecord:
+    """Read the log of a Doppler or speed log, or of any reference velocity.
+
+    Columns ``time`` and ``v_right, v_forward, v_up`` (any of them; ``speed`` is the forward one), or ``v_x, v_y, v_z`` with
+    `axes`, or ``VE, VN, VU`` (``VD`` is the negative of the last); with ``sigma_`` before their names their standard
+    deviations. Empty cells are absent values.
+
+    Parameters
+    ----------
+    path, format, columns, units
+        As for :func:`read_odometer`.
+    axes : str, optional
+        Where x, y and z point, such as ``"FRD"``; RFU when left out.
+    frame : {"body", "navigation"}, optional
+        Where a log has columns of both.
+
+    Raises
+    ------
+    UsageError, DataError
+        As for :func:`read_odometer`.
+    """
+    names = {"body": [q.name for q in BODY], "navigation": [q.name for q in NAVIGATION]}
+    three = sigmas([*names["body"], *names["navigation"]], "speed", "m/s", "sigma")
+    quantities = (TIME, *BODY, *AXES, *NAVIGATION, *three)
+    found, others = open_log(
+        path, format, quantities, {"columns": columns, "units": units, "axes": axes, "frame": frame}
+    )
+    frames = [key for key, of in names.items() if any(found.has(name) for name in of)]
+    if any(found.has(q.name) for q in AXES):
+        velocity = _turned(found.stack(*(q.name for q in AXES)), others.get("axes"))
+        frames = frames or ["body"]
+    chosen: Any = others.get("frame") or (frames[0] if len(frames) == 1 else None)
+    if not frames:
+        raise found.missing("time and v_forward (with v_right, v_up), or VE, VN, VU")
+    if chosen not in frames:
+        raise UsageError(
+            f"{found.source}: columns of the frames {' and '.join(frames)}; say which with frame (body or navigation)"
+        )
+    given = found.stack(*names[chosen])
+    return made(
+        found,
+        VelocityRecord,
+        velocity=velocity if given is None else given,
+        frame=chosen,
+        sigma=known(found.stack(*(f"sigma_{name}" for name in names[chosen]))),
+    )
+
+
+def read_height(
+    path: FilePath, *, format: str | None = None, columns: Pairs | None = None, units: Pairs | None = None
+) -> HeightRecord:
+    """Read the log of a barometer or another sensor of height: ``time``, ``alt``, and ``sigma_U`` where there is one.
+
+    Raises
+    ------
+    UsageError, DataError
+        As for :func:`read_odometer`.
+    """
+    height = replace(PLACE[2], aliases=(*PLACE[2].aliases, "baro", "baro_alt"))
+    quantities = (TIME, height, *sigmas(["U"], "length", "m", "sigma"))
+    found, _ = open_log(path, format, quantities, {"columns": columns, "units": units})
+    if not found.has("alt"):
+        raise found.missing("time and alt")
+    found.require("alt")
+    return made(found, HeightRecord, alt=found.values["alt"], sigma=known(found.values.get("sigma_U")))
+
+
+def read_master(
+    path: FilePath,
+    *,
+    format: str | None = None,
+    columns: Pairs | None = None,
+    units: Pairs | None = None,
+    axes: str | None = None,
+) -> MasterRecord:
+    """Read the solution of a master INS.
+
+    Columns ``time`` and attitude (``heading, pitch, roll`` in degrees, heading clockwise from north, or ``yaw_ccw``; or
+    ``q_w, q_x, q_y, q_z``, which turns right-forward-up into east-north-up), velocity (``VE, VN, VU`` or ``VD``), position
+    (``lat, lon`` in degrees, ``alt``), and the master's own ``gyro_x .. accel_z``; each group whole or not at all.
+
+    Parameters
+    ----------
+    path, format, columns, units
+        As for :func:`read_odometer`; `units` also by group: ``"attitude=rad,position=rad"``.
+    axes : str, optional
+        Where x, y and z of the master's gyros and accelerometers point; RFU when left out.
+
+    Raises
+    ------
+    UsageError, DataError
+        As for :func:`read_odometer`.
+    """
+    found, others = open_log(path, format, (*POSES, *SENSORS), {"columns": columns, "units": units, "axes": axes})
+    values = _poses(found)
+    for ours, sensor in (("w_ib_b", "gyro"), ("f_b", "accel")):
+        values[ours] = _turned(whole(found, *(f"{sensor}_{axis}" for axis in "xyz")), others.get("axes"))
+    if values["C_nb"] is None and values["v_n"] is None:
+        raise found.missing("time and attitude (heading, pitch, roll) or velocity (VE, VN, VU) or both")
+    return made(found, MasterRecord, **values)
+
+
+def read_trajectory(
+    path: FilePath, *, format: str | None = None, columns: Pairs | None = None, units: Pairs | None = None
+) -> Trajectory:
+    """Read a trajectory: truth or a solution, such as the ``truth.parquet`` of a simulated run.
+
+    Columns ``time, lat, lon, alt, VE, VN, VU, roll, pitch, heading`` (or ``q_w .. q_z``), angles in degrees.
+
+    Raises
+    ------
+    UsageError, DataError
+        As for :func:`read_odometer`.
+    """
+    found, _ = open_log(path, format, POSES, {"columns": columns, "units": units})
+    values = _poses(found)
+    for name, what in (("C_nb", "heading, pitch, roll"), ("v_n", "VE, VN, VU"), ("lat", "lat, lon, alt")):
+        if values[name] is None:
+            raise found.missing(what)
+    return made(found, Trajectory, **values)
+
+
+def open_log(
+    path: FilePath, format: str | None, quantities: Sequence[Quantity], given: Mapping[str, Any]
+) -> tuple[Found, Mapping[str, Any]]:
+    """What a log has of some quantities, and the options that only its kind has.
+
+    Raises
+    ------
+    UsageError, DataError
+        As for :func:`read_odometer`.
+    """
+    path = Path(path)
+    known_keys = [key for key in given if key not in ("columns", "units")]
+    try:
+        chosen = format_of(path, format, AIDING_SUFFIXES, "a log of named columns")
+        values = options_for(path, given, lambda content: checked_options(content, quantities, known_keys))
+        others = {key: value for key, value in values.items() if key in known_keys}
+        options = Options(values.get("columns", {}), values.get("units", {}), others)
+        example = ",".join(q.name for q in quantities[:4])
+        return find(columns_of(path, chosen, example), quantities, options), others
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def known(sigma: Array | None) -> Array | None:
+    """Standard deviations, where zero and less say that none is known; None without a single one."""
+    if sigma is None:
+        return None
+    positive = np.where(sigma > 0.0, sigma, np.nan)
+    return positive if np.isfinite(positive).any() else None
+
+
+def made(found: Found, kind: type[Any], **values: Any) -> Any:
+    """A record of a kind; time is checked first, so that its faults are named by their place in the file."""
+    time = found.values["time"]
+    check_order(time, found.labels["time"], found.source, found.place)
+    return kind(time=time, source=found.source, **values)
+
+
+def whole(found: Found, *names: str) -> Array | None:
+    """Columns that are all there, and hold a number in every row; None where none of them is."""
+    if not any(found.has(name) for name in names):
+        return None
+    absent = [name for name in names if not found.has(name)]
+    if absent:
+        raise DataError(f"{found.source}: {', '.join(names)} without {', '.join(absent)}; expected all of them or none")
+    found.require(*names)
+    return found.stack(*names)
+
+
+def _poses(found: Found) -> dict[str, Any]:
+    from truenorth.attitude import dcm_from_euler, dcm_from_quaternion
+
+    angles, q = whole(found, "heading", "pitch", "roll"), whole(found, "q_w", "q_x", "q_y", "q_z")
+    C_nb = None
+    if q is not None:
+        norm = np.linalg.norm(q, axis=1)
+        bad = np.flatnonzero(~(np.abs(norm - 1.0) < 1e-3))
+        if bad.size:
+            raise DataError(
+                f"{found.source}: {found.place(int(bad[0]))}: a quaternion of norm {norm[bad[0]]:.6g}; expected 1: repair the log"
+            )
+        C_nb = dcm_from_quaternion(q / norm[:, None])
+    elif angles is not None:
+        C_nb = dcm_from_euler(*angles.T)
+    place = whole(found, "lat", "lon", "alt")
+    lat, lon, alt = (None, None, None) if place is None else place.T
+    return {"C_nb": C_nb, "v_n": whole(found, "VE", "VN", "VU"), "lat": lat, "lon": lon, "alt": alt}
+
+
+def _turned(values: Array | None, axes: str | None) -> Array | None:
+    """Columns x, y, z along right, forward, up; NaN stays with its axis."""
+    if values is None or axes is None:
+        return values
+    from truenorth.attitude import body_axes
+
+    C = body_axes(axes)
+    source = np.abs(C).argmax(axis=1)
+    return values[:, source] * C[np.arange(3), source]
+
+
+def _pulse_size(found: Found, given: float | str | None) -> float | None:
+    if given is not None:
+        from truenorth.units import parse
+
+        return parse(given, "length") if isinstance(given, str) else float(given)
+    if not found.has("pulse_size"):
+        raise UsageError(f"{found.source}: pulses without their size; give pulse_size, such as '2 cm'")
+    found.require("pulse_size")
+    sizes = np.unique(found.values["pulse_size"])
+    if len(sizes) > 1:
+        raise DataError(
+            f"{found.source}: column {found.labels['pulse_size']}: {sizes[:3]} ...; expected one size throughout"
+        )
+    return float(sizes[0])

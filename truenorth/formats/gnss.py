@@ -1,0 +1,158 @@
+"""Reader of GNSS logs: named columns in geodetic, earth-fixed or local coordinates, or NMEA 0183."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import UsageError
+from truenorth.formats.aiding import NAVIGATION, PLACE, FilePath, Pairs, known, made, open_log, sigmas
+from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
+from truenorth.formats.quantities import TIME, Found, Quantity
+from truenorth.position import Position
+from truenorth.records import GnssRecord
+
+Array = NDArray[np.float64]
+
+EARTH_FIXED = tuple(Quantity(f"ecef_{axis}", "length", "m", (), (), "ecef") for axis in "xyz")
+EARTH_FIXED_VELOCITY = tuple(Quantity(f"ecef_v{axis}", "speed", "m/s", (), (), "ecef_velocity") for axis in "xyz")
+LOCAL = (
+    Quantity("east", "length", "m", ("pos_e",), ("west",), "local"),
+    Quantity("north", "length", "m", ("pos_n",), ("south",), "local"),
+    Quantity("up", "length", "m", ("pos_u",), ("down", "pos_d"), "local"),
+)
+TRACK = (
+    Quantity("speed", "speed", "m/s", ("ground_speed", "sog")),
+    Quantity("course", "angle", "deg", ("track", "cog", "course_over_ground")),
+)
+SIGMAS = (
+    *sigmas(["E", "N", "U"], "length", "m", "sigma"),
+    *sigmas(["VE", "VN", "VU"], "speed", "m/s", "sigma_velocity"),
+    *sigmas([q.name for q in EARTH_FIXED], "length", "m", "sigma"),
+    *sigmas([q.name for q in EARTH_FIXED_VELOCITY], "speed", "m/s", "sigma_velocity"),
+)
+RECEIVER = (Quantity("hdop"), Quantity("vdop"), Quantity("quality", aliases=("fix", "fix_quality")))
+QUANTITIES = (TIME, *PLACE, *NAVIGATION, *TRACK, *SIGMAS, *RECEIVER, *EARTH_FIXED, *EARTH_FIXED_VELOCITY, *LOCAL)
+
+
+def read_gnss(
+    path: FilePath,
+    *,
+    format: str | None = None,
+    columns: Pairs | None = None,
+    units: Pairs | None = None,
+    origin: Position | None = None,
+) -> GnssRecord:
+    """Read the log of a GNSS receiver: CSV, Parquet, npz, mat, or NMEA 0183 (GGA, RMC, VTG).
+
+    Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
+    up`` (or ``down``) from an `origin`; velocity as ``VE, VN, VU`` (or ``VD``), ``ecef_vx, ecef_vy, ecef_vz``, or ``speed`` and
+    ``course``; standard deviations with ``sigma_`` before the names (``sigma_E, sigma_N, sigma_U`` of the position; of earth-fixed
+    ones the correlation between the axes is not known and taken as none); ``hdop, vdop, quality``. Empty cells are absent
+    values; a standard deviation of zero is an unknown one. Rows of quality 0 (no fix) lose their position and velocity.
+
+    Parameters
+    ----------
+    path, format, columns, units
+        As for :func:`truenorth.read_odometer`; `units` also by group: ``"position=rad"``.
+    origin : Position, optional
+        Of local coordinates, which are taken in its tangent plane.
+
+    Returns
+    -------
+    GnssRecord
+        Time is that of the file; in NMEA logs seconds from midnight (UTC) of the first day.
+
+    Raises
+    ------
+    UsageError
+        No such file, an unknown format, column or unit; local coordinates without an origin.
+    DataError
+        Bad data: with file, line (or row) and column.
+    """
+    path = Path(path)
+    try:
+        if format == "nmea" or (format is None and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))):
+            return read_nmea(path)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
+    found, _ = open_log(path, format, QUANTITIES, {"columns": columns, "units": units})
+    values = _geodetic(found) or _earth_fixed(found) or _local(found, origin)
+    track = _velocity(found)
+    if not values and track is None:
+        raise found.missing("time and lat, lon, alt, or VE, VN, VU")
+    absent = np.full(len(found.values["time"]), np.nan)
+    values = {"lat": absent, "lon": absent, "alt": absent, "v_n": track} | values
+    no_fix = found.values.get("quality", absent) == 0
+    for name in ("lat", "lon", "alt", "v_n"):
+        if values[name] is not None and no_fix.any():
+            values[name] = np.where(no_fix if values[name].ndim == 1 else no_fix[:, None], np.nan, values[name])
+    values.setdefault("position_sigma", known(found.stack("sigma_E", "sigma_N", "sigma_U")))
+    values.setdefault("velocity_sigma", known(found.stack("sigma_VE", "sigma_VN", "sigma_VU")))
+    dop = known(found.stack("hdop", "vdop"))
+    return made(found, GnssRecord, **values, dop=dop, quality=found.values.get("quality"))
+
+
+def _geodetic(found: Found) -> dict[str, Any]:
+    if not found.has("lat", "lon"):
+        return {}
+    absent = np.full(len(found.values["time"]), np.nan)
+    return {"lat": found.values["lat"], "lon": found.values["lon"], "alt": found.values.get("alt", absent)}
+
+
+def _earth_fixed(found: Found) -> dict[str, Any]:
+    """Place, velocity and their sigmas from earth-fixed coordinates."""
+    place = [q.name for q in EARTH_FIXED]
+    if not found.has(*place):
+        return {}
+    from truenorth.earth import ecef_axes, geodetic_from_ecef
+
+    lat, lon, alt = geodetic_from_ecef(np.column_stack([found.values[name] for name in place]))
+    C_ne = np.swapaxes(ecef_axes(lat, lon), -1, -2)
+    values: dict[str, Any] = {"lat": lat, "lon": lon, "alt": alt}
+    velocity = [q.name for q in EARTH_FIXED_VELOCITY]
+    v_e = found.stack(*velocity)
+    if v_e is not None:
+        values["v_n"] = np.einsum("kij,kj->ki", C_ne, v_e)
+    for ours, names in (("position_sigma", place), ("velocity_sigma", velocity)):
+        sigma = known(found.stack(*(f"sigma_{name}" for name in names)))
+        if sigma is not None:
+            values[ours] = np.sqrt(np.einsum("kij,kj->ki", C_ne**2, sigma**2))
+    return values
+
+
+def _local(found: Found, origin: Position | None) -> dict[str, Any]:
+    """Place from metres east, north, up of an origin."""
+    if not found.has("east", "north"):
+        return {}
+    if origin is None:
+        raise UsageError(
+            f"{found.source}: local coordinates without an origin; give origin=Position.from_degrees(lat, lon, alt)"
+        )
+    from truenorth.earth import ecef_axes, ecef_from_geodetic, geodetic_from_ecef
+
+    away = found.stack("east", "north", "up")
+    assert away is not None
+    flat = np.nan_to_num(away)  # without a height the place is that at the origin's
+    start = ecef_from_geodetic(origin.lat, origin.lon, origin.alt)
+    lat, lon, alt = geodetic_from_ecef(start + flat @ ecef_axes(origin.lat, origin.lon).T)
+    here = np.isfinite(away[:, :2]).all(axis=1)
+    return {
+        "lat": np.where(here, lat, np.nan),
+        "lon": np.where(here, lon, np.nan),
+        "alt": np.where(here & np.isfinite(away[:, 2]), alt, np.nan),
+    }
+
+
+def _velocity(found: Found) -> Array | None:
+    """Velocity in n, from its components or from speed and course."""
+    v_n = found.stack("VE", "VN", "VU")
+    if v_n is None and found.has("speed", "course"):
+        speed, course = found.values["speed"], found.values["course"]
+        # A receiver that stands still leaves its course empty.
+        course = np.where((speed == 0.0) & np.isnan(course), 0.0, course)
+        v_n = np.column_stack([speed * np.sin(course), speed * np.cos(course), np.full(len(speed), np.nan)])
+    return v_n

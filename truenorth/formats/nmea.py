@@ -1,0 +1,159 @@
+"""NMEA 0183: sentences GGA (position), RMC (position, speed, course, date) and VTG (speed, course) of any talker."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from truenorth.errors import DataError
+from truenorth.records import GnssRecord
+
+NMEA_SUFFIXES = (".nmea", ".nma")
+KNOT = 1852.0 / 3600.0
+DAY = 86400.0
+HEAD = 4096
+KINDS = (b"GGA", b"RMC", b"VTG")
+
+
+def is_nmea(path: Path) -> bool:
+    """Whether a file begins with sentences of this kind."""
+    with path.open("rb") as file:
+        lines = file.read(HEAD).splitlines()
+    return any(line[:1] == b"$" and line[3:6] in KINDS and b"," in line for line in lines)
+
+
+def read_nmea(path: Path) -> GnssRecord:
+    """Read a log of NMEA sentences; what is not GGA, RMC or VTG is passed over, and so are broken sentences at both ends.
+
+    Sentences of one epoch make one row: position, height above the ellipsoid (height above the geoid plus the geoid's), quality
+    and HDOP from GGA, velocity from RMC (or from the VTG that follows). Time is in seconds from midnight UTC of the first day.
+
+    Raises
+    ------
+    DataError
+        A wrong checksum, a field that is no number, no sentence of these kinds: with the line.
+    """
+    rows: dict[float, dict[str, float]] = {}
+    time, day, clock = math.nan, 0.0, math.nan
+    for number, kind, cells in _sentences(path):
+        where = f"{path.name}: line {number}, {kind}"
+        if kind == "VTG":
+            if math.isfinite(time) and len(cells) > 6:
+                _velocity(rows[time], _number(cells[5], where, "speed"), _number(cells[1], where, "course"))
+            continue
+        if not cells[1]:  # before its first fix a receiver does not know the time
+            time = math.nan
+            continue
+        now = _clock(cells[1], where)
+        if now < clock - DAY / 2:
+            day += DAY
+        clock = now
+        time = day + now
+        row = rows.setdefault(time, {})
+        if kind == "GGA":
+            row |= _place(cells, 2, where)
+            row["quality"] = _number(cells[6], where, "quality")
+            row["hdop"] = _number(cells[8], where, "HDOP")
+            row["alt"] = _number(cells[9], where, "altitude") + _number(cells[11] or "0", where, "geoid separation")
+            if row["quality"] == 0:
+                row |= {"lat": math.nan, "lon": math.nan, "alt": math.nan}
+        elif cells[2] == "A":
+            if "lat" not in row:
+                row |= _place(cells, 3, where)
+            _velocity(row, _number(cells[7], where, "speed"), _number(cells[8], where, "course"))
+    if len(rows) < 2:
+        raise DataError(f"{path.name}: {len(rows)} epoch(s) of GGA or RMC sentences; at least 2 are needed")
+    return _record(rows, path.name)
+
+
+def _record(rows: dict[float, dict[str, float]], source: str) -> GnssRecord:
+    def column(name: str) -> Any:
+        return np.array([row.get(name, math.nan) for row in rows.values()])
+
+    v_n = np.column_stack([column("VE"), column("VN"), np.full(len(rows), math.nan)])
+    hdop = column("hdop")
+    dop = np.column_stack([np.where(hdop > 0, hdop, math.nan), np.full(len(rows), math.nan)])
+    quality = column("quality")
+    return GnssRecord(
+        time=np.array(list(rows)),
+        lat=column("lat"),
+        lon=column("lon"),
+        alt=column("alt"),
+        v_n=v_n if np.isfinite(v_n).any() else None,
+        dop=dop if np.isfinite(dop).any() else None,
+        quality=quality if np.isfinite(quality).any() else None,
+        source=source,
+    )
+
+
+def _sentences(path: Path) -> Iterator[tuple[int, str, list[str]]]:
+    """Line number, kind and fields of each sentence that is wanted."""
+    lines = path.read_bytes().splitlines()
+    for number, line in enumerate(lines, 1):
+        start = line.find(b"$")
+        if start < 0 or line[start + 3 : start + 6] not in KINDS:
+            continue
+        body, star, check = line[start + 1 :].partition(b"*")
+        end = number in (1, len(lines))
+        if star:
+            found = reduce(lambda a, b: a ^ b, body, 0)
+            if check[:2].upper() != b"%02X" % found:
+                if end:
+                    continue
+                raise DataError(
+                    f"{path.name}: line {number}: checksum {check[:2].decode(errors='replace')!r}; expected {found:02X}: the "
+                    "sentence is damaged, remove the line"
+                )
+        cells = body.decode("ascii", "replace").split(",")
+        kind = cells[0][2:]
+        wanted = {"GGA": 12, "RMC": 9, "VTG": 6}[kind]
+        if len(cells) >= wanted:
+            yield number, kind, cells
+        elif not end:
+            raise DataError(
+                f"{path.name}: line {number}: {len(cells)} fields; expected {wanted} of {kind}: the sentence is cut short"
+            )
+
+
+def _number(text: str, where: str, what: str) -> float:
+    try:
+        return float(text) if text else math.nan
+    except ValueError:
+        raise DataError(f"{where}: {what} {text!r}; expected a number") from None
+
+
+def _clock(text: str, where: str) -> float:
+    """Seconds of the day of ``hhmmss.ss``."""
+    value = _number(text, where, "time")
+    hours, minutes, seconds = value // 10000, value // 100 % 100, float(text[4:] or "nan")
+    if not (0 <= hours < 24 and minutes < 60 and seconds < 61):
+        raise DataError(f"{where}: time {text!r}; expected hhmmss.ss")
+    return 3600.0 * hours + 60.0 * minutes + seconds
+
+
+def _place(cells: list[str], first: int, where: str) -> dict[str, float]:
+    """Latitude and longitude from ``ddmm.mmmm, N, dddmm.mmmm, E``."""
+    result = {}
+    for name, at, digits, positive, negative in (("lat", first, 2, "N", "S"), ("lon", first + 2, 3, "E", "W")):
+        text, side = cells[at : at + 2]
+        if not text:
+            result[name] = math.nan
+            continue
+        angle = _number(text[:digits], where, name) + _number(text[digits:], where, name) / 60.0
+        if side not in (positive, negative):
+            raise DataError(f"{where}: {name} on the side {side!r}; expected {positive} or {negative}")
+        result[name] = math.radians(angle if side == positive else -angle)
+    return result
+
+
+def _velocity(row: dict[str, float], knots: float, course: float) -> None:
+    """Add velocity east and north of speed (kn) and course (deg); a receiver that stands still leaves its course empty."""
+    if math.isnan(knots) or "VE" in row:
+        return
+    course = 0.0 if math.isnan(course) and knots == 0.0 else math.radians(course)
+    row["VE"], row["VN"] = knots * KNOT * math.sin(course), knots * KNOT * math.cos(course)

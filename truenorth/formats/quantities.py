@@ -1,0 +1,329 @@
+"""Columns of aiding logs: found by our names and their usual others, with the unit that a header gives.
+
+A header cell may hold its unit: ``speed [km/h]``, ``speed (km/h)`` or ``speed_kmh``. Names are compared without regard to
+case, blanks and hyphens.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import DataError, UsageError
+from truenorth.formats.table import check_finite
+from truenorth.units import DIMENSIONS, parse_quantity, parse_unit
+from truenorth.yaml_file import unknown_key
+
+Array = NDArray[np.float64]
+
+BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
+WRITTEN = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "m_s": "m/s", "mps2": "m/s^2", "knots": "kn", "sec": "s"}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A column that a reader understands.
+
+    Attributes
+    ----------
+    name : str
+        Ours.
+    dimension : str
+        A key of :data:`truenorth.units.DIMENSIONS`.
+    unit : str
+        Where neither the file nor the caller names one.
+    aliases : tuple of str
+        Other usual names.
+    opposite : tuple of str
+        Names of the same quantity counted the other way, such as ``VD`` of ``VU``.
+    group : str
+        By which `units` may name it along with others, such as ``velocity``.
+    """
+
+    name: str
+    dimension: str = "ratio"
+    unit: str = "1"
+    aliases: tuple[str, ...] = ()
+    opposite: tuple[str, ...] = ()
+    group: str = ""
+
+
+TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc"))
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A log as named columns, whatever its format.
+
+    Attributes
+    ----------
+    names : sequence of str
+    read : callable
+        Columns of some names side by side, (N, n); empty cells are NaN.
+    place : callable
+        Where a row stands in the file, in words.
+    """
+
+    path: Path
+    names: Sequence[str]
+    read: Callable[[Sequence[str]], Array]
+    place: Callable[[int], str] = lambda row: f"row {row + 1}"
+
+
+@dataclass(frozen=True)
+class Options:
+    """How an aiding log is to be read.
+
+    Attributes
+    ----------
+    columns : mapping
+        Our names to the log's; a minus before the latter turns the sign.
+    units : mapping
+        Of columns or their groups; they win over those in the header.
+    others : mapping
+        What only one kind of log has.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    others: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a log has of the columns that a reader understands.
+
+    Attributes
+    ----------
+    source : str
+    labels : mapping
+        Our names to the log's.
+    values : mapping
+        Our names to (N,) arrays in SI; NaN where a cell is empty.
+    place : callable
+        Where a row stands in the file, in words.
+    asked : set of str
+        Our names of those that the caller named.
+    """
+
+    source: str
+    labels: Mapping[str, str]
+    values: Mapping[str, Array]
+    place: Callable[[int], str]
+    asked: frozenset[str]
+
+    def has(self, *names: str) -> bool:
+        """Whether all of these columns are there."""
+        return all(name in self.values for name in names)
+
+    def stack(self, *names: str) -> Array | None:
+        """(N, len(names)) array, NaN where a column is not there; None where none of them is."""
+        if not any(name in self.values for name in names):
+            return None
+        absent = np.full(len(self.values["time"]), np.nan)
+        return np.column_stack([self.values.get(name, absent) for name in names])
+
+    def require(self, *names: str) -> None:
+        """Refuse an empty cell, NaN or inf in these columns.
+
+        Raises
+        ------
+        DataError
+            With the place and the column of the file.
+        """
+        for name in names:
+            check_finite(self.values[name][:, None], [self.labels[name]], self.source, self.place)
+
+    def missing(self, wanted: str) -> DataError:
+        """The error for a log without the columns that are `wanted`, in words."""
+        found = ", ".join(self.labels.values())
+        return DataError(
+            f"{self.source}: expected {wanted}; understood only {found}: name the columns with --columns or a YAML file beside "
+            "the log"
+        )
+
+
+def checked_options(
+    content: Mapping[Any, Any], quantities: Iterable[Quantity], others: Iterable[str]
+) -> dict[str, Any]:
+    """The options of a log: ``columns``, ``units`` and those of its kind.
+
+    Raises
+    ------
+    UsageError
+        A key that is not known, or names and units in another form.
+    """
+    known = {q.name for q in quantities}
+    groups = {q.group for q in quantities if q.group}
+    keys = ["columns", "units", *others]
+    for key in content:
+        if key not in keys:
+            raise UsageError(unknown_key("layout", key, keys))
+    result = dict(content)
+    for key, allowed in (("columns", known), ("units", known | groups)):
+        if key in result:
+            result[key] = _pairs(key, result[key], sorted(allowed))
+    return result
+
+
+def _pairs(key: str, value: Any, allowed: Sequence[str]) -> dict[str, str]:
+    if isinstance(value, str):
+        parts = [part.partition("=") for part in value.split(",")]
+        value = {name.strip(): text.strip() for name, _, text in parts}
+    if not isinstance(value, Mapping) or not all(value.values()):
+        raise UsageError(f"{key} are {value!r}; expected pairs such as {allowed[0]}=...")
+    for name in value:
+        if name not in allowed:
+            raise UsageError(unknown_key(key, name, allowed))
+    return {name: str(text) for name, text in value.items()}
+
+
+def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> Found:
+    """Read what a log has of the `quantities`, in SI.
+
+    Raises
+    ------
+    DataError
+        No time, a column that the caller names and is not there, two columns for one quantity, an empty log.
+    UsageError
+        A unit of another dimension.
+    """
+    source = columns.path.name
+    claims: dict[str, list[tuple[str, float]]] = {}
+    named = {ours: text if text in columns.names else text.removeprefix("-") for ours, text in options.columns.items()}
+    for name in columns.names:
+        if name in named.values():
+            continue
+        for quantity, sign, unit in _meanings(name, quantities):
+            if quantity.name not in options.columns:
+                claims.setdefault(quantity.name, []).append(
+                    (name, sign * _factor(quantity, unit, name, options, source))
+                )
+    for quantity in quantities:
+        if quantity.name in options.columns:
+            name = named[quantity.name]
+            if name not in columns.names:
+                near = get_close_matches(name, columns.names, n=1)
+                hint = f"; is it {near[0]!r}?" if near else ""
+                raise DataError(f"{source}: column {name!r} is missing; found {', '.join(columns.names)}{hint}")
+            unit = _split(name)[1]
+            sign = 1.0 if name == options.columns[quantity.name] else -1.0
+            claims[quantity.name] = [(name, sign * _factor(quantity, unit, name, options, source))]
+    for ours, claim in claims.items():
+        if len(claim) > 1:
+            both = " and ".join(repr(name) for name, _ in claim)
+            raise DataError(f"{source}: columns {both} are both {ours}; say which with --columns {ours}=...")
+    labels = {ours: claim[0][0] for ours, claim in claims.items()}
+    if "time" not in labels:
+        raise DataError(
+            f"{source}: no column of time among {', '.join(columns.names) or '(none)'}; expected time in seconds: name it with "
+            "--columns time=... or a YAML file beside the log"
+        )
+    table = columns.read(list(dict.fromkeys(labels.values())))
+    index = {name: i for i, name in enumerate(dict.fromkeys(labels.values()))}
+    values = {ours: table[:, index[labels[ours]]] * claims[ours][0][1] for ours in labels}
+    found = Found(source, labels, values, columns.place, frozenset(options.columns))
+    found.require("time")
+    return found
+
+
+def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[tuple[Quantity, float, str | None]]:
+    """What a header cell may mean: a quantity, its sign, and the unit it names."""
+    plain, unit = _split(name)
+    words = _key(plain)
+    ends = [(words, unit)]
+    if unit is None:
+        ends += [(words[: m.start()], _written(words[m.end() :])) for m in re.finditer("_", words)]
+    for base, stated in ends:
+        if base != words and stated is None:
+            continue
+        for quantity in quantities:
+            for sign, names in ((1.0, (quantity.name, *quantity.aliases)), (-1.0, quantity.opposite)):
+                if base in map(_key, names):
+                    yield quantity, sign, stated
+                    return
+
+
+def _split(name: str) -> tuple[str, str | None]:
+    match = BRACKETS.fullmatch(name.strip())
+    if match is None or match[2].isdigit():  # gnss[3] is a part of an array
+        return name, None
+    return match[1], match[2]
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[\s\-]+", "_", name.strip()).casefold()
+
+
+def _written(suffix: str) -> str | None:
+    """The unit that the end of a name stands for; None where it stands for none."""
+    text = WRITTEN.get(suffix, suffix)
+    try:
+        parse_unit(text)
+    except UsageError:
+        return None
+    return text
+
+
+def _factor(quantity: Quantity, stated: str | None, label: str, options: Options, source: str) -> float:
+    """What a column is multiplied with."""
+    text = options.units.get(quantity.name, options.units.get(quantity.group)) or stated or quantity.unit
+    try:
+        factor, found = parse_quantity(text) if text[:1] in "0123456789." and text != "1" else parse_unit(text)
+    except UsageError as error:
+        raise UsageError(f"{source}: column {label}: {error}") from None
+    wanted, example = DIMENSIONS[quantity.dimension]
+    if found != wanted:
+        raise UsageError(
+            f"{source}: column {label}: {quantity.name} cannot be in {text!r}; expected a unit of "
+            f"{quantity.dimension.replace('_', ' ')}, such as {example.partition(' ')[2]}"
+        )
+    return factor
+
+
+def columns_of(path: Path, format: str, example: str) -> Columns:
+    """A log of any format as columns; of two-dimensional arrays each column is ``name[i]``, counted from 0.
+
+    Raises
+    ------
+    DataError
+        A damaged file, or one without a header.
+    """
+    if format == "csv":
+        from truenorth.formats.csv import open_table
+
+        table = open_table(path, example)
+        return Columns(path, table.names, lambda names: table.read(names, gaps=True), table.place)
+    if format == "parquet":
+        from truenorth.formats.parquet import names_of, read_columns
+
+        return Columns(path, names_of(path), lambda names: read_columns(path, names))
+    from truenorth.formats import mat, npz
+
+    parts: dict[str, Array] = {}
+    for name, value in (npz if format == "npz" else mat).variables_of(path).items():
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" or array.ndim not in (1, 2):
+            continue
+        if array.ndim == 1:
+            parts[name] = array.astype(np.float64)
+        else:
+            parts |= {f"{name}[{i}]": array[:, i].astype(np.float64) for i in range(array.shape[1])}
+
+    def read(names: Sequence[str]) -> Array:
+        if len({len(parts[name]) for name in names}) > 1:
+            sizes = ", ".join(f"{name} {len(parts[name])}" for name in names)
+            raise DataError(
+                f"{path.name}: columns of different length ({sizes}); expected as many of each: name those of one sensor with "
+                "--columns"
+            )
+        return np.column_stack([parts[name] for name in names])
+
+    return Columns(path, list(parts), read)
