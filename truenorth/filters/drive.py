@@ -1,4 +1,4 @@
-"""From a system to a kernel and back to estimates: one driver for all linear filters."""
+"""From a system to a kernel and back to estimates: one driver for all filters."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any, Literal, TypeVar, get_args
 import numpy as np
 
 from truenorth.errors import DataError, UsageError
-from truenorth.filters.recursion import NO_FILTER, NO_INNOVATION_VARIANCE, Histories
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs, runs_of
+from truenorth.filters.recursion import NO_FILTER, NO_INNOVATION_VARIANCE, NOT_FINITE, Histories
+from truenorth.filters.stack import System
+from truenorth.filters.system import Estimates, FilterState, runs_of
 from truenorth.linalg import Array, Size, padded
 
 History = Literal["last", "sigma", "full"]
@@ -22,12 +23,13 @@ class NoFilterError(DataError):
     """No H-infinity filter keeps the bound."""
 
 
-Kernel = Callable[[Size, Runs, int, Histories], None]
+Kernel = Callable[[Size, Any, int, Histories], None]
+Flatten = Callable[[Any, tuple[int, ...]], Any]
 
 
 def drive(
     kernel: Kernel,
-    system: LinearSystem,
+    system: System,
     state: FilterState | None,
     *,
     history: History,
@@ -35,6 +37,7 @@ def drive(
     workers: int,
     memory: Array | None = None,
     adaptation: int = 0,
+    flatten: Flatten = runs_of,
 ) -> Estimates:
     """Run a kernel over all runs of a system and shape what it kept.
 
@@ -48,6 +51,8 @@ def drive(
         What an adaptive filter begins with, where no `state` says better.
     adaptation : int
         Figures that an adaptive filter reports of each epoch.
+    flatten : callable
+        ``flatten(system, shape)`` brings the system's arrays to what the kernel takes.
 
     Returns
     -------
@@ -56,9 +61,9 @@ def drive(
     if history not in get_args(History):
         raise UsageError(f'history is {history!r}, expected "last", "sigma" or "full"')
     if state is not None:
-        system = replace(system, x0=state.x, P0=state.P)
+        system = replace(system, x0=state.x, P0=state.P)  # type: ignore[type-var]
     shape, epochs = system.runs, system.epochs
-    runs = runs_of(system, shape)
+    runs = flatten(system, shape)
     keep_innovations = history != "last" if innovations is None else innovations
     out = _histories(shape, system, history, epochs if keep_innovations else 0, adaptation)
     if memory is not None:
@@ -96,13 +101,13 @@ def _remembered(state: FilterState, length: int, shape: tuple[int, ...]) -> Arra
 
 
 def _histories(
-    shape: tuple[int, ...], system: LinearSystem, history: History, innovations: int, adaptation: int
+    shape: tuple[int, ...], system: System, history: History, innovations: int, adaptation: int
 ) -> Histories:
     count, n, m, epochs = int(np.prod(shape, dtype=int)), system.states, system.rows, system.epochs
     of_x = 1 if history == "last" else epochs
     of_P = epochs if history == "full" else 1
     return Histories(
-        x=np.empty((count, of_x, n)),
+        x=np.empty((count, of_x, system.x0.shape[-1])),
         sigma=np.empty((count, of_x, n)),
         P=np.empty((count, of_P, n, n)),
         innovation=np.empty((count, innovations, m)),
@@ -147,6 +152,11 @@ def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
         raise DataError(
             f"the filter broke down at epoch {epoch}{run}: the variance of an innovation is not positive and finite; "
             "R is zero where the state is already known, S does not fit Q and R, or Phi has made P overflow"
+        )
+    if reason == NOT_FINITE:
+        raise DataError(
+            f"the filter broke down at epoch {epoch}{run}: transition, measurement or a Jacobian of the system gives a "
+            "number that is not finite there; see whether the state has left the range in which the model holds"
         )
     raise DataError(
         f"the filter broke down at epoch {epoch}{run}: the covariance P is lost in rounding; use Joseph's form "

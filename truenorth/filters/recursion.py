@@ -25,7 +25,7 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 ROUNDING = 1e-13  # of a variance
 PLAIN_RANGE = 1e13  # of an innovation's variance over its noise: beyond it the plain form leaves rounding in P
 
-SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE, NO_FILTER = range(4)
+SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE, NO_FILTER, NOT_FINITE = range(5)
 
 
 class Workspace(NamedTuple):

@@ -1,0 +1,209 @@
+"""What linear and nonlinear systems share: arrays over runs and epochs that belong together, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.errors import DataError, UsageError
+
+Array = NDArray[np.float64]
+S = TypeVar("S", bound="System")
+
+ASYMMETRY = 1e-9  # of a covariance, relative to the two variances; more is a mistake, less is rounding
+NEGATIVE = 1e-9  # of a covariance's smallest pivot, relative to its variance: rounding
+
+
+class System:
+    """Base of frozen dataclasses with fields that are arrays of numbers: leading axes are runs, then time, then rows.
+
+    A subclass says by `axes` which fields are arrays and what their axes behind the runs are, a letter each: K is time
+    (of length 1 for what does not change), any other letter is a length that all fields share.
+    """
+
+    x0: Array
+    P0: Array
+    z: Array
+
+    @property
+    def axes(self) -> Mapping[str, str]:
+        """Axes of each array behind the leading (run) axes."""
+        raise NotImplementedError
+
+    def __post_init__(self) -> None:
+        """Convert and check all arrays."""
+        for name, axes in self.axes.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = _floats(self._owner, name, value)
+            if array.ndim < len(axes):
+                shape = _shape_text(axes)
+                hint = " (a constant matrix needs a time axis of length 1)" if axes[0] == "K" else ""
+                raise UsageError(f"{self._owner}: {name} has shape {array.shape}, expected {shape}{hint}")
+            object.__setattr__(self, name, array)
+        self._check_shapes()
+        for name, a in self._arrays():
+            _check_finite(self._owner, name, self.axes[name], a)
+        for name in ("Q", "R", "P0"):
+            _check_covariance(self._owner, name, self.axes[name], getattr(self, name))
+
+    @property
+    def states(self) -> int:
+        """Number of states, n."""
+        return int(self.P0.shape[-1])
+
+    @property
+    def rows(self) -> int:
+        """Number of measurement rows, m."""
+        return int(self.z.shape[-1])
+
+    @property
+    def epochs(self) -> int:
+        """Number of epochs, K."""
+        return max(a.shape[-len(self.axes[name])] for name, a in self._arrays() if self.axes[name][0] == "K")
+
+    @property
+    def runs(self) -> tuple[int, ...]:
+        """Shape of the run axes; ``()`` for a single run."""
+        return np.broadcast_shapes(*(a.shape[: a.ndim - len(self.axes[name])] for name, a in self._arrays()))
+
+    def between(self: S, start: int, stop: int) -> S:
+        """Epochs ``start <= k < stop``; go on from the state that a filter left behind epoch ``start - 1``."""
+        cut = {}
+        for name, a in self._arrays():
+            time = -len(self.axes[name])
+            if self.axes[name][0] == "K" and a.shape[time] > 1:
+                cut[name] = a[(Ellipsis, slice(start, stop)) + (slice(None),) * (-time - 1)]
+        return replace(self, **cut)  # type: ignore[type-var]
+
+    def _arrays(self) -> list[tuple[str, Array]]:
+        return [(name, getattr(self, name)) for name in self.axes if getattr(self, name) is not None]
+
+    @property
+    def _owner(self) -> str:
+        return type(self).__name__
+
+    def _check_shapes(self) -> None:
+        sizes, owner = {"K": 1}, {"K": ""}
+        for name in ("x0", "P0", "z"):  # a length is as the first of these says that has it
+            array = getattr(self, name)
+            for axis, length in zip(self.axes[name], array.shape[array.ndim - len(self.axes[name]) :]):
+                if axis not in sizes:
+                    sizes[axis], owner[axis] = length, name
+        if self.x0.shape[-1] == 0:
+            raise UsageError(f"{self._owner}: x0 has no states")
+        for name, a in self._arrays():
+            for axis, length in zip(self.axes[name], a.shape[a.ndim - len(self.axes[name]) :]):
+                if axis == "K" and length == 0:
+                    raise UsageError(f"{self._owner}: {name} has no epochs, shape {a.shape}")
+                if axis not in sizes or (axis == "K" and sizes["K"] == 1):
+                    sizes[axis], owner[axis] = length, name
+                elif length != sizes[axis] and not (axis == "K" and length == 1):
+                    raise UsageError(
+                        f"{self._owner}: {name} has shape {a.shape}, expected {_shape_text(self.axes[name])} with "
+                        f"{axis} = {sizes[axis]} as in {owner[axis]}" + (" or 1" if axis == "K" else "")
+                    )
+        try:
+            _ = self.runs
+        except ValueError:
+            shapes = ", ".join(f"{name} {a.shape}" for name, a in self._arrays())
+            raise UsageError(f"{self._owner}: the run axes do not broadcast: {shapes}") from None
+
+
+def flatten_runs(a: Array, core: int, shape: tuple[int, ...]) -> Array:
+    """One run axis in front of the last `core` axes: of length 1 if all runs share `a`, else their number."""
+    lead, tail = a.shape[: a.ndim - core], a.shape[a.ndim - core :]
+    if any(length != 1 for length in lead):
+        a = np.broadcast_to(a, shape + tail)
+        lead = shape
+    flat = np.ascontiguousarray(a).reshape((int(np.prod(lead, dtype=int)), *tail)).view()
+    flat.flags.writeable = False
+    return flat
+
+
+def _floats(owner: str, name: str, value: ArrayLike) -> Array:
+    try:
+        return np.ascontiguousarray(value, dtype=np.float64) if np.ndim(value) else np.asarray(value, float)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{owner}: {name} is not an array of numbers ({error})") from None
+
+
+def _shape_text(axes: str) -> str:
+    return "(..., " + ", ".join(axes) + ")"
+
+
+def _where(axes: str, index: tuple[int, ...]) -> str:
+    """Index of an element in words: `epoch 12 of run (3,), row 0`."""
+    lead, core = index[: len(index) - len(axes)], index[len(index) - len(axes) :]
+    words = []
+    if axes[0] == "K":
+        words.append(f"epoch {core[0]}")
+        core = core[1:]
+    if lead:
+        words.append(f"run {', '.join(map(str, lead))}")
+    if core:
+        words.append(f"element [{', '.join(map(str, core))}]")
+    return ", ".join(words)
+
+
+def _check_finite(owner: str, name: str, axes: str, a: Array) -> None:
+    # A finite sum has finite terms: one pass, no temporary; only where it fails is the culprit looked for.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if name != "z" and np.isfinite(a.sum()):
+            return
+    bad = np.isinf(a) if name == "z" else ~np.isfinite(a)
+    if bad.any():
+        index = tuple(int(i) for i in np.argwhere(bad)[0])
+        allowed = " (NaN, for an absent row, is allowed)" if name == "z" else ""
+        raise DataError(f"{owner}: {name} is {a[index]} at {_where(axes, index)}, expected a finite number{allowed}")
+
+
+def _check_covariance(owner: str, name: str, axes: str, a: Array) -> None:
+    """Symmetric and positive semidefinite, each matrix of the stack; `Q` by its variances and 2x2 minors only."""
+    d = np.diagonal(a, axis1=-2, axis2=-1)
+    if (d < 0.0).any():
+        index = tuple(int(i) for i in np.argwhere(d < 0.0)[0])
+        raise DataError(
+            f"{owner}: {name} has the variance {d[index]} at {_where(axes, (*index, index[-1]))}, "
+            "expected a positive semidefinite matrix"
+        )
+    i, j = np.tril_indices(a.shape[-1], -1)
+    lower, upper = a[..., i, j], a[..., j, i]
+    if not (lower.any() or upper.any()):
+        return
+    scale = np.sqrt(d[..., i] * d[..., j])
+    for bad, text in (
+        (np.abs(lower - upper) > ASYMMETRY * scale, "is not symmetric"),
+        (np.abs(lower) > (1.0 + NEGATIVE) * scale, "is not positive semidefinite"),
+    ):
+        if bad.any():
+            at = tuple(int(k) for k in np.argwhere(bad)[0])
+            index = (*at[:-1], int(i[at[-1]]), int(j[at[-1]]))
+            mirrored = (*index[:-2], index[-1], index[-2])
+            raise DataError(
+                f"{owner}: {name} {text} at {_where(axes, index)}: {a[index]} there, {a[mirrored]} in its "
+                f"mirror image, variances {a[(*index[:-1], index[-2])]} and {a[(*index[:-2], index[-1], index[-1])]}"
+            )
+    if name != "Q":
+        _check_pivots(owner, name, axes, a, d)
+
+
+def _check_pivots(owner: str, name: str, axes: str, a: Array, d: Array) -> None:
+    """No negative pivot in ``L D L'`` of the correlation matrix, for the whole stack at once."""
+    sigma = np.sqrt(np.where(d > 0.0, d, 1.0))
+    A = a / (sigma[..., :, None] * sigma[..., None, :])
+    for j in range(a.shape[-1]):
+        pivot = A[..., j, j]
+        if (pivot < -NEGATIVE * (j + 1)).any():
+            index = tuple(int(k) for k in np.argwhere(pivot < -NEGATIVE * (j + 1))[0])
+            raise DataError(
+                f"{owner}: {name} is not positive semidefinite at {_where(axes, (*index, j, j))}: "
+                f"given the rows before it, a variance of {pivot[index]} of the given one is left"
+            )
+        column = A[..., j + 1 :, j] / np.where(pivot > NEGATIVE, pivot, np.inf)[..., None]
+        A[..., j + 1 :, j + 1 :] -= column[..., :, None] * A[..., None, j, j + 1 :]
