@@ -2,8 +2,8 @@
 
     z = w_hat - C' w_ie = eps + C' (w_ie x phi)
 
-The white noise of the gyros over the interval is both the row's noise and the process noise of phi; the two are
-treated as independent, which costs nothing where the base's own unrest is the larger part.
+The white noise of the gyros over the interval is both the row's noise and the process noise of phi. The two are treated
+as independent: the reported sigma of heading is then larger than its error, never smaller.
 """
 
 from __future__ import annotations

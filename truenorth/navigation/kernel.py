@@ -159,7 +159,7 @@ def predict_to_event(size: Any, s: Any, model: Model, sums: Sums, means: Sums, F
         for k in range(4):
             means.vectors[k, j] = sums.vectors[k, j] / T
             sums.vectors[k, j] = 0.0
-    sums.T[0] = 0.0
+    means.T[0], sums.T[0] = T, 0.0
     axis = earth_axis(s)
     error_dynamics(means.C, means.vectors[0], means.vectors[1], axis, s[11], False, model.fixed_altitude, F)
     couple_sensors(means.C, means.vectors[2], means.vectors[3], model.sensors, F)
@@ -364,6 +364,8 @@ def run(
             measure(s, sums, means, sources, source, model, events.measured[k], aux, mount, w)
             for a in range(3):
                 w.R[a, a] = events.variance[k, a]
+                if sources.kind[source] == ROTATION and means.T[0] > 0.0:  # a mean rate has the gyros' noise, too
+                    w.R[a, a] += model.noise[_PHI] / means.T[0]
                 if np.isnan(events.measured[k, a]) or np.isnan(w.z[a]):
                     w.z[a] = np.nan
                 kept.innovation[k, a] = w.z[a]

@@ -1,0 +1,171 @@
+"""From an alignment to the start of navigation: its attitude, biases and covariance, and how they hang together."""
+
+from __future__ import annotations
+
+import json
+import math
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.coarse.analytic import static_jacobian
+from truenorth.earth import normal_gravity
+from truenorth.errors import AlignmentError, DataError
+from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
+from truenorth.navigation.driver import Start
+from truenorth.position import Position
+from truenorth.specs import ImuSpec, imu_spec
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment
+
+Array = NDArray[np.float64]
+
+LEAST_VELOCITY_SIGMA = 1e-3  # m/s
+SUMMARY = "summary.json"
+
+
+def start_from_alignment(alignment: Alignment) -> Start:
+    """Where and how an alignment says the vehicle stands, at rest but for the base's own motion.
+
+    Tilt and accelerometer bias of an alignment at rest cancel each other, and so do heading and east gyro bias: without
+    their correlation navigation would seem far worse than it is. The biases' part of the misalignment's covariance (its
+    floor) is given by the static limits; where the alignment got below them (a turning IMU), the correlation is less.
+
+    Raises
+    ------
+    AlignmentError
+        The alignment has no heading that may be used.
+    """
+    if not alignment.heading_known:
+        raise AlignmentError(
+            f"{alignment.source}: the alignment is {alignment.status!r}, its heading may not be used; navigation needs one: "
+            "align longer, with a better IMU, or from motion"
+        )
+    return _start(
+        alignment.time,
+        alignment.C_nb,
+        alignment.phi_covariance,
+        alignment.phi_floor,
+        alignment.gyro_bias,
+        alignment.gyro_bias_sigma,
+        alignment.accel_bias,
+        alignment.accel_bias_sigma,
+        alignment.position,
+        alignment.imu,
+        alignment.disturbance,
+    )
+
+
+def _start(
+    time: float,
+    C_nb: Array,
+    phi_covariance: Array,
+    phi_floor: Array,
+    gyro_bias: Array,
+    gyro_bias_sigma: Array,
+    accel_bias: Array,
+    accel_bias_sigma: Array,
+    position: Position,
+    spec: ImuSpec,
+    disturbance: Array,
+) -> Start:
+    from truenorth.alignment.task import DEFLECTION
+
+    lat, alt = position.lat, position.alt
+    g = float(normal_gravity(lat, alt))
+    eps = np.diag(gyro_bias_sigma**2)
+    # What acts as an accelerometer bias as long as the vehicle stays level: also scale factor, misalignment, deflection.
+    f2 = (g * C_nb[2]) ** 2
+    nabla = np.diag(
+        accel_bias_sigma**2 + spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2)
+    )
+    nabla += C_nb.T @ np.diag([1.0, 1.0, 0.0]) @ C_nb * (DEFLECTION * g) ** 2
+    J = static_jacobian(lat, g)
+    X = np.hstack([J[:, 3:] @ C_nb @ eps, J[:, :3] @ C_nb @ nabla])
+    told = np.diag(J[:, 3:] @ C_nb @ eps @ C_nb.T @ J[:, 3:].T + J[:, :3] @ C_nb @ nabla @ C_nb.T @ J[:, :3].T)
+    X *= np.sqrt(np.minimum(1.0, np.diag(phi_floor) / np.maximum(told, 1e-30)))[:, None]
+
+    P = np.zeros((STATES, STATES))
+    P[PHI, PHI] = phi_covariance
+    P[BG, BG], P[BA, BA] = eps, nabla
+    P[PHI, BG.start : BA.stop] = X
+    P[BG.start : BA.stop, PHI] = X.T
+    motion = np.where(np.isfinite(disturbance), disturbance, 0.0)
+    P[DV, DV] = np.diag(motion**2 + LEAST_VELOCITY_SIGMA**2)
+    P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
+    return Start(time, C_nb, np.zeros(3), lat, position.lon, alt, gyro_bias, accel_bias, positive(P))
+
+
+def positive(P: Array) -> Array:
+    """The nearest correlation structure without negative eigenvalues; variances stay as they are or grow by rounding."""
+    sigma = np.sqrt(np.maximum(np.diag(P), 1e-300))
+    values, vectors = np.linalg.eigh(P / np.outer(sigma, sigma))
+    if values[0] >= 1e-9:
+        return P
+    raised = (vectors * np.maximum(values, 1e-9)) @ vectors.T
+    return np.asarray(raised * np.outer(sigma, sigma), dtype=np.float64)
+
+
+def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
+    """The start, the IMU's specification and the log's name that an alignment's folder holds.
+
+    Raises
+    ------
+    DataError
+        No summary.json in it, or one that lacks what navigation needs.
+    AlignmentError
+        The alignment has no heading that may be used.
+    """
+    path = Path(folder)
+    path = path / SUMMARY if path.is_dir() else path
+    try:
+        s: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise DataError(
+            f"{folder}: {path.name} cannot be read ({error.strerror}); expected the folder that `truenorth align -o` wrote"
+        ) from None
+    except ValueError as error:
+        raise DataError(f"{path}: not JSON ({error}); expected the summary that `truenorth align -o` wrote") from None
+    if s.get("heading_deg") is None:
+        raise AlignmentError(
+            f"{path}: the alignment is {s.get('status')!r}, it holds no heading that may be used; navigation needs one: align "
+            "longer, with a better IMU, or from motion"
+        )
+    try:
+        n = s["navigation"]
+        numbers = {key: np.array(n[key], dtype=np.float64) for key in ARRAYS}
+        position = Position.from_degrees(
+            s["lat_deg"], s["lon_deg"], s["alt_m"], horizontal_sigma=n["horizontal_sigma_m"], vertical_sigma=n["vertical_sigma_m"]
+        )
+        spec = imu_spec(n["imu"])
+        disturbance = np.array([math.nan if v is None else v for v in s["disturbance_m_s"]])
+        start = _start(float(s["time_s"]), **numbers, position=position, spec=spec, disturbance=disturbance)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(
+            f"{path}: {error!r} is missing or not as expected; write the alignment again with this version of Truenorth"
+        ) from None
+    return start, spec, str(s.get("source", ""))
+
+
+ARRAYS = (
+    "C_nb",
+    "phi_covariance",
+    "phi_floor",
+    "gyro_bias",
+    "gyro_bias_sigma",
+    "accel_bias",
+    "accel_bias_sigma",
+)
+
+
+def navigation_block(alignment: Alignment) -> dict[str, Any]:
+    """What navigation needs of an alignment beyond its summary, SI, ready for JSON."""
+    block: dict[str, Any] = {name: getattr(alignment, name).tolist() for name in ARRAYS}
+    block["horizontal_sigma_m"] = alignment.position.horizontal_sigma
+    block["vertical_sigma_m"] = alignment.position.vertical_sigma
+    block["imu"] = alignment.imu.to_mapping()
+    return block
