@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         write_imu,
         write_record,
     )
+    from truenorth.navigation import Mounting, Navigation, navigate
     from truenorth.position import Position
     from truenorth.quality import inspect
     from truenorth.records import (
@@ -51,6 +52,8 @@ _HOMES = {
     "ImuRecord": "records",
     "ImuSpec": "specs",
     "MasterRecord": "records",
+    "Mounting": "navigation",
+    "Navigation": "navigation",
     "OdometerRecord": "records",
     "Position": "position",
     "Trajectory": "records",
@@ -60,6 +63,7 @@ _HOMES = {
     "align": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
+    "navigate": "navigation",
     "read_gnss": "formats",
     "read_height": "formats",
     "read_imu": "formats",
@@ -84,6 +88,8 @@ __all__ = [
     "ImuRecord",
     "ImuSpec",
     "MasterRecord",
+    "Mounting",
+    "Navigation",
     "OdometerRecord",
     "Position",
     "Trajectory",
@@ -93,6 +99,7 @@ __all__ = [
     "align",
     "imu_spec",
     "inspect",
+    "navigate",
     "read_gnss",
     "read_height",
     "read_imu",

@@ -89,9 +89,9 @@ def test_near_the_vertical_the_combination_comes_first(tmp_path):
     ("value", "shown"), [(1000.0, "1000"), (30001.0, "30000"), (3.57e-5, "0.0000357"), (-12.19, "-12.2"), (0.0, "0")]
 )
 def test_figures_have_no_exponent(value, shown):
-    from truenorth.report.page import _short
+    from truenorth.report.page import short
 
-    assert _short(value) == shown
+    assert short(value) == shown
 
 
 def test_a_result_without_history_leaves_none_of_an_earlier_one(aligned, levelled, tmp_path):

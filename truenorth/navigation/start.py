@@ -139,7 +139,11 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         n = s["navigation"]
         numbers = {key: np.array(n[key], dtype=np.float64) for key in ARRAYS}
         position = Position.from_degrees(
-            s["lat_deg"], s["lon_deg"], s["alt_m"], horizontal_sigma=n["horizontal_sigma_m"], vertical_sigma=n["vertical_sigma_m"]
+            s["lat_deg"],
+            s["lon_deg"],
+            s["alt_m"],
+            horizontal_sigma=n["horizontal_sigma_m"],
+            vertical_sigma=n["vertical_sigma_m"],
         )
         spec = imu_spec(n["imu"])
         disturbance = np.array([math.nan if v is None else v for v in s["disturbance_m_s"]])

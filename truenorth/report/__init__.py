@@ -12,11 +12,12 @@ from truenorth.atomic import atomic_path, writable_folder
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
+    from truenorth.navigation import Navigation
 
 __all__ = ["save_alignment", "write_report"]
 
 
-def write_report(result: Alignment, path: str | PathLike[str]) -> Path:
+def write_report(result: Alignment | Navigation, path: str | PathLike[str]) -> Path:
     """Write the HTML page of a result: one file, everything inside, works offline.
 
     Raises
@@ -24,10 +25,17 @@ def write_report(result: Alignment, path: str | PathLike[str]) -> Path:
     UsageError
         The folder cannot be written to.
     """
-    from truenorth.report.page import alignment_page
+    from truenorth.alignment import Alignment
 
     target = Path(path)
-    page = alignment_page(result)
+    if isinstance(result, Alignment):
+        from truenorth.report.page import alignment_page
+
+        page = alignment_page(result)
+    else:
+        from truenorth.report.navigation import navigation_page
+
+        page = navigation_page(result)
     with atomic_path(target) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return target
@@ -49,12 +57,14 @@ def save_alignment(result: Alignment, folder: str | PathLike[str]) -> list[Path]
     UsageError
         The folder cannot be written to.
     """
+    from truenorth.navigation.start import navigation_block
     from truenorth.report.page import alignment_page
 
     target = writable_folder(folder)
     summary, history, report = (target / name for name in ("summary.json", "history.parquet", "report.html"))
     with ExitStack() as files:
-        text = json.dumps(result.summary(), indent=2, allow_nan=False) + "\n"
+        content = result.summary() | {"navigation": navigation_block(result)}  # what `truenorth navigate` goes on from
+        text = json.dumps(content, indent=2, allow_nan=False) + "\n"
         files.enter_context(atomic_path(summary)).write_text(text, encoding="utf-8")
         if result.history is not None:
             result.to_frame().to_parquet(files.enter_context(atomic_path(history)))

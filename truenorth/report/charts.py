@@ -63,7 +63,8 @@ def charts(result: Alignment) -> list[tuple[str, str, Any]]:
     ]
 
 
-def _figure(height: int, titles: list[str]) -> Any:
+def new_chart(height: int, titles: list[str]) -> Any:
+    """Rows of axes over one time axis, in the pages' look."""
     from plotly.subplots import make_subplots
 
     figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.05, x_title="time, s")
@@ -80,11 +81,12 @@ def _figure(height: int, titles: list[str]) -> Any:
     return figure
 
 
-def _band(figure: Any, row: int, t: Array, middle: Array, half: Array, colour: str) -> None:
+def band_trace(figure: Any, row: int, t: Array, middle: Array, half: Array, colour: str) -> None:
+    """A filled band of this half width."""
     import plotly.graph_objects as go
 
     rows = evenly(len(t), POINTS)
-    t, low, high = t[rows], _single(middle - half)[rows], _single(middle + half)[rows]
+    t, low, high = t[rows], single(middle - half)[rows], single(middle + half)[rows]
     rgba = f"rgba({int(colour[1:3], 16)},{int(colour[3:5], 16)},{int(colour[5:7], 16)},0.18)"
     figure.add_trace(
         go.Scatter(
@@ -101,19 +103,20 @@ def _band(figure: Any, row: int, t: Array, middle: Array, half: Array, colour: s
     )
 
 
-def _single(y: Array) -> NDArray[np.float32]:
+def single(y: Array) -> NDArray[np.float32]:
     """Seven digits, which no eye exhausts, at half the bytes; time keeps all of its own."""
     return y.astype(np.float32)
 
 
-def _line(figure: Any, row: int, t: Array, y: Array, colour: str, name: str, dash: str = "solid") -> None:
+def line(figure: Any, row: int, t: Array, y: Array, colour: str, name: str, dash: str = "solid") -> None:
+    """A line thinned to what the eye can tell."""
     import plotly.graph_objects as go
 
     rows = thin(t, y, POINTS)
     figure.add_trace(
         go.Scatter(
             x=t[rows],
-            y=_single(y)[rows],
+            y=single(y)[rows],
             mode="lines",
             line={"color": colour, "width": 1.4, "dash": dash},
             name=name,
@@ -124,30 +127,30 @@ def _line(figure: Any, row: int, t: Array, y: Array, colour: str, name: str, das
     )
 
 
-def _bound(figure: Any, row: int, t: Array, y: Array, dash: str) -> None:
+def bound(figure: Any, row: int, t: Array, y: Array, dash: str) -> None:
     """A limit: seen, but not in the way of the pointer."""
     rows = evenly(len(t), BOUND_POINTS)
-    _line(figure, row, t[rows], y[rows], REFERENCE, "", dash)
+    line(figure, row, t[rows], y[rows], REFERENCE, "", dash)
     figure.data[-1].update(hoverinfo="skip", hovertemplate=None, line={"width": 1.0})
 
 
 def _convergence(t: Array, angles: list[Course]) -> Any:
-    figure = _figure(220 * len(angles), [f"{course.name}, deg" for course in angles])
+    figure = new_chart(220 * len(angles), [f"{course.name}, deg" for course in angles])
     for row, course in enumerate(angles, start=1):
         value, sigma, floor = (np.degrees(x) for x in (course.value, course.sigma, course.floor))
         colour = COLOURS[row - 1]
-        _band(figure, row, t, value, sigma, colour)
-        _band(figure, row, t, value, floor, colour)
-        _line(figure, row, t, value, colour, course.name)
+        band_trace(figure, row, t, value, sigma, colour)
+        band_trace(figure, row, t, value, floor, colour)
+        line(figure, row, t, value, colour, course.name)
         figure.update_yaxes(range=settled_limits(value, sigma), row=row, col=1)
     return figure
 
 
 def _sigmas(t: Array, angles: list[Course]) -> Any:
-    figure = _figure(380, ["one sigma, arcmin"])
+    figure = new_chart(380, ["one sigma, arcmin"])
     for colour, course in zip(COLOURS, angles):
-        _line(figure, 1, t, 60 * np.degrees(course.sigma), colour, course.name)
-        _line(figure, 1, t, 60 * np.degrees(course.floor), colour, f"{course.name}, floor", "dot")
+        line(figure, 1, t, 60 * np.degrees(course.sigma), colour, course.name)
+        line(figure, 1, t, 60 * np.degrees(course.floor), colour, f"{course.name}, floor", "dot")
     lowest = 0.5 * 60 * np.degrees(min(course.floor[-1] for course in angles))
     highest = 2.0 * 60 * np.degrees(max(course.sigma.max() for course in angles))
     figure.update_yaxes(type="log", dtick=1, range=[np.log10(lowest), np.log10(highest)])
@@ -156,33 +159,33 @@ def _sigmas(t: Array, angles: list[Course]) -> Any:
 
 
 def _biases(t: Array, bias: Array, sigma: Array, unit: str) -> Any:
-    figure = _figure(560, [f"{axis}, {unit}" for axis in "xyz"])
+    figure = new_chart(560, [f"{axis}, {unit}" for axis in "xyz"])
     for i, axis in enumerate("xyz"):
-        _band(figure, i + 1, t, bias[:, i], sigma[:, i], COLOURS[i])
-        _line(figure, i + 1, t, bias[:, i], COLOURS[i], axis)
+        band_trace(figure, i + 1, t, bias[:, i], sigma[:, i], COLOURS[i])
+        line(figure, i + 1, t, bias[:, i], COLOURS[i], axis)
         figure.update_yaxes(range=settled_limits(bias[:, i], sigma[:, i]), row=i + 1, col=1)
     return figure
 
 
 def _innovations(h: History) -> Any:
-    figure = _figure(560, [f"{axis}, mm/s" for axis in ("east", "north", "up")])
+    figure = new_chart(560, [f"{axis}, mm/s" for axis in ("east", "north", "up")])
     for i, axis in enumerate(("east", "north", "up")):
         sigma = MILLI * h.innovation_sigma[:, i]
-        _line(figure, i + 1, h.time, MILLI * h.innovation[:, i], COLOURS[i], axis)
+        line(figure, i + 1, h.time, MILLI * h.innovation[:, i], COLOURS[i], axis)
         for factor, dash in ((2.0, "dot"), (3.0, "dash")):
             for sign in (1.0, -1.0):
-                _bound(figure, i + 1, h.time, sign * factor * sigma, dash)
+                bound(figure, i + 1, h.time, sign * factor * sigma, dash)
         figure.update_yaxes(range=settled_limits(np.zeros_like(sigma), 4.0 * sigma), row=i + 1, col=1)
     return figure
 
 
 def _nis(h: History) -> Any:
     t, mean, low, high = averaged_nis(h)
-    figure = _figure(320, ["NIS"])
-    _line(figure, 1, t, mean, COLOURS[0], "NIS")
+    figure = new_chart(320, ["NIS"])
+    line(figure, 1, t, mean, COLOURS[0], "NIS")
     ends = h.time[[0, -1]]
-    _band(figure, 1, ends, np.full(2, 0.5 * (low + high)), np.full(2, 0.5 * (high - low)), REFERENCE)
-    _bound(figure, 1, ends, np.full(2, 3.0), "dash")
+    band_trace(figure, 1, ends, np.full(2, 0.5 * (low + high)), np.full(2, 0.5 * (high - low)), REFERENCE)
+    bound(figure, 1, ends, np.full(2, 3.0), "dash")
     top = max(1.3 * high, float(np.quantile(mean, 0.98)) if mean.size else 0.0)
     figure.update_yaxes(range=[0.0, top])
     figure.update_xaxes(range=list(ends))

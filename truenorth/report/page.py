@@ -94,14 +94,14 @@ def _angle(x: float) -> str:
     return f"{degrees:.2f}°" if degrees >= 1.0 else f"{degrees:.4f}° ({degrees * 60:.2f}′)"
 
 
-def _short(x: float) -> str:
+def short(x: float) -> str:
     """Three significant digits, never with an exponent."""
     return str(np.format_float_positional(x, precision=3, fractional=False, trim="-"))
 
 
 def _quantity(value: float, unit: str) -> str:
     """An SI value in a datasheet unit, spelt for reading."""
-    return f"{_short(value / parse_unit(unit)[0])} {unit.replace('ug', 'µg').replace('sqrt(h)', '√h').replace('sqrt(Hz)', '√Hz')}"
+    return f"{short(value / parse_unit(unit)[0])} {unit.replace('ug', 'µg').replace('sqrt(h)', '√h').replace('sqrt(Hz)', '√Hz')}"
 
 
 def _facts(result: Alignment) -> list[tuple[str, str]]:
@@ -120,7 +120,7 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
     ]
     if np.all(np.isfinite(result.disturbance)):
         east, north, up = 1e3 * result.disturbance
-        facts.append(("Base's own motion", f"{_short(east)}, {_short(north)}, {_short(up)} mm/s RMS (east, north, up)"))
+        facts.append(("Base's own motion", f"{short(east)}, {short(north)}, {short(up)} mm/s RMS (east, north, up)"))
     if result.pays_until is not None and result.heading_known:
         verb = "stopped paying after" if result.pays_until <= result.duration else "pays until about"
         facts.append(("More time", f"{verb} {result.pays_until:.0f} s: then heading's random part is half its floor"))
@@ -151,8 +151,8 @@ def _biases(result: Alignment) -> list[dict[str, str]]:
             rows.append(
                 {
                     "name": f"{name} {axis}",
-                    "value": f"{_short(value)} {unit}" if told else "not estimated",
-                    "sigma": f"{_short(sigma)} {unit}",
+                    "value": f"{short(value)} {unit}" if told else "not estimated",
+                    "sigma": f"{short(sigma)} {unit}",
                 }
             )
     return rows
@@ -205,7 +205,7 @@ def _densities(noise: dict[str, Any]) -> list[dict[str, Any]]:
         ("Velocity random walk", "velocity_random_walk_ug_sqrt_hz", "µg/√Hz"),
         ("Accelerometer bias instability", "accel_bias_instability_ug", "µg"),
     ):
-        values = [_short(value) if value else "–" for value in noise[key]]
+        values = [short(value) if value else "–" for value in noise[key]]
         if any(noise[key]):
             rows.append({"name": words, "axes": values, "unit": unit})
     return rows

@@ -1,0 +1,146 @@
+"""The figure of a navigation: track, height, velocity, attitude, their sigmas, innovations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.figures.style import COLOURS, REFERENCE, band, evenly, new_figure, style, trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from truenorth.navigation.result import Navigation
+
+Array = NDArray[np.float64]
+
+ELLIPSES = 12  # along the track
+ROUND = 64  # points of an ellipse
+KILO = 5000.0  # m, from which the track is drawn in kilometres
+
+
+def plot_navigation(result: Navigation) -> Figure:
+    """Draw track with error ellipses, height, velocity and attitude with one-sigma bands, sigmas, innovations.
+
+    Parameters
+    ----------
+    result : Navigation
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Its `savefig` works without a display.
+    """
+    with style():
+        figure = new_figure(12.0, 10.5)
+        columns = figure.add_gridspec(1, 2)
+        left, right = columns[0].subgridspec(3, 1, height_ratios=[2.2, 1, 1]), columns[1].subgridspec(5, 1)
+        track, height, velocity = (figure.add_subplot(left[i]) for i in range(3))
+        heading, level, position, speeds, innovations = (figure.add_subplot(right[i]) for i in range(5))
+        _track(track, result)
+        t = result.time
+        band(height, t, result.position[:, 2], result.position_sigma[:, 2], color=COLOURS[2])
+        height.set_title(f"Height ({result.altitude}), ±1σ")
+        height.set_ylabel("m")
+        for i, name in enumerate(("east", "north", "up")):
+            band(velocity, t, result.v_n[:, i], result.v_sigma[:, i], color=COLOURS[i])
+            velocity.lines[-1].set_label(name)
+        velocity.set_title("Velocity, ±1σ")
+        velocity.set_ylabel("m/s")
+        velocity.legend(ncols=3, loc="upper right")
+        turned = np.degrees(np.unwrap(result.euler[:, 0]))
+        band(heading, t, turned, np.degrees(result.euler_sigma[:, 0]), color=COLOURS[0])
+        heading.set_title("Heading, ±1σ")
+        heading.set_ylabel("deg")
+        for i, name in ((1, "pitch"), (2, "roll")):
+            band(level, t, np.degrees(result.euler[:, i]), np.degrees(result.euler_sigma[:, i]), color=COLOURS[i])
+            level.lines[-1].set_label(name)
+        level.set_title("Pitch and roll, ±1σ")
+        level.set_ylabel("deg")
+        level.legend(ncols=2, loc="upper right")
+        _sigmas(position, t, result.position_sigma, "One sigma of position", "m")
+        _sigmas(speeds, t, result.v_sigma, "One sigma of velocity", "m/s")
+        _innovations(innovations, result)
+        for ax in figure.axes[1:]:
+            ax.set_xlim(t[0], t[-1])
+            ax.tick_params(labelbottom=ax in (velocity, innovations))
+        for ax in (velocity, innovations):
+            ax.set_xlabel("time, s")
+        smoothed = ", smoothed" if result.smoothed else ""
+        figure.suptitle(f"{result.source}: {result.status}{smoothed}", x=0.01, ha="left")
+    return figure
+
+
+def ellipse(P: Array) -> Array:
+    """(ROUND, 2) points of the one-sigma ellipse of a 2x2 covariance."""
+    values, vectors = np.linalg.eigh(P)
+    angle = np.linspace(0.0, 2.0 * np.pi, ROUND)
+    axes = vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes.T
+
+
+def ellipses(result: Navigation) -> list[Array]:
+    """One-sigma ellipses of position at a dozen epochs, metres from the start."""
+    from truenorth.models.ins import DP
+
+    horizontal = slice(DP.start, DP.start + 2)
+    rows = evenly(len(result.time), ELLIPSES)
+    return [result.displacement[k] + ellipse(result.track.P[k, horizontal, horizontal]) for k in rows]
+
+
+def track_unit(result: Navigation) -> tuple[float, str]:
+    """Metres in the unit of the track's axes, and its name."""
+    return (1000.0, "km") if np.abs(result.displacement).max() > KILO else (1.0, "m")
+
+
+def _track(ax: Axes, result: Navigation) -> None:
+    scale, unit = track_unit(result)
+    rows = evenly(len(result.time))
+    for points in ellipses(result):
+        ax.fill(*(points / scale).T, color=COLOURS[0], alpha=0.12, linewidth=0.0)
+    ax.plot(*(result.displacement[rows] / scale).T, color=COLOURS[0])
+    ax.plot(*(result.displacement[0] / scale), marker="o", color=COLOURS[2], linestyle="", label="start")
+    ax.plot(*(result.displacement[-1] / scale), marker="s", color=COLOURS[1], linestyle="", label="end")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.margins(0.08)
+    ax.set_title("Track, one-sigma ellipses")
+    ax.set_xlabel(f"east, {unit}")
+    ax.set_ylabel(f"north, {unit}")
+    ax.legend(loc="best")
+
+
+def _sigmas(ax: Axes, t: Array, sigma: Array, title: str, unit: str) -> None:
+    for i, name in enumerate(("east", "north", "up")):
+        if np.any(sigma[:, i] > 0.0):
+            trace(ax, t, sigma[:, i], color=COLOURS[i], label=name)
+    ax.set_yscale("log")
+    ax.set_title(title)
+    ax.set_ylabel(unit)
+    ax.legend(ncols=3, loc="upper right")
+
+
+def _innovations(ax: Axes, result: Navigation) -> None:
+    ax.set_title("Innovations over their σ (lines: 2σ, 3σ; crosses: rejected)")
+    ax.set_ylabel("sigmas")
+    for number, r in enumerate(result.residuals):
+        if len(r.time) == 0:
+            continue
+        ratio = r.innovation / r.sigma
+        rows = evenly(len(r.time), 1000)
+        colour = COLOURS[number % len(COLOURS)]
+        for i in range(3):
+            ax.plot(r.time[rows], ratio[rows, i], linestyle="", marker=".", markersize=2.5, color=colour)
+        ax.plot([], [], linestyle="", marker=".", color=colour, label=r.name)
+        out = r.time[~r.used]
+        ax.plot(out, np.full(len(out), 4.8), linestyle="", marker="x", markersize=4.0, color=colour)
+    for limit, dashes in ((2.0, ":"), (3.0, "--")):
+        for sign in (1.0, -1.0):
+            ax.axhline(sign * limit, color=REFERENCE, linestyle=dashes, linewidth=1.0)
+    ax.set_ylim(-5.0, 5.0)
+    if result.residuals:
+        ax.legend(ncols=3, loc="lower right")
+    else:
+        ax.text(0.5, 0.8, "no aiding: free inertial", transform=ax.transAxes, ha="center")

@@ -1,0 +1,374 @@
+"""`navigate`: from an alignment onward, free inertial or aided, with a verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import DataError, UsageError
+from truenorth.models.ins import InsModel
+from truenorth.navigation.aiding import Aiding
+from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
+from truenorth.navigation.result import Altitude, Navigation, mean_nis
+from truenorth.navigation.sensors import Mounting, from_gnss, from_height, from_odometer, from_velocity
+from truenorth.navigation.start import read_start, start_from_alignment
+from truenorth.navigation.stops import zero_updates
+from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, VelocityRecord
+from truenorth.specs import ImuSpec, imu_spec
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment
+    from truenorth.calibration import Calibration
+
+Array = NDArray[np.float64]
+R = TypeVar("R", bound=Record)
+
+LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
+FINE, COARSE = 0.2, 1.0
+LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
+MOST_REJECTED = 0.2  # of a sensor's measurements
+NIS_LIMIT = 3.0  # mean NIS over its rows, beyond which model and data contradict each other
+LAG_SIGMA = 0.3  # s, prior of the search for a clock offset
+CLEAR = 6.0  # sigmas from which an offset is told
+LEAST_LAG = 0.01  # s
+LEAST_ARM = 0.5  # m
+ARM_SIGMA = 3.0  # m
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Records of the aiding sensors and how they sit."""
+
+    gnss: GnssRecord | None = None
+    odometer: OdometerRecord | None = None
+    velocity: VelocityRecord | None = None
+    baro: HeightRecord | None = None
+
+
+def navigate(
+    record: ImuRecord,
+    start: Alignment | Start | str | PathLike[str],
+    *,
+    gnss: GnssRecord | None = None,
+    odometer: OdometerRecord | None = None,
+    velocity: VelocityRecord | None = None,
+    baro: HeightRecord | None = None,
+    altitude: Altitude | None = None,
+    zupt: str | Sequence[tuple[float, float]] | None = None,
+    smooth: bool = False,
+    imu: ImuSpec | str | None = None,
+    antenna: Mounting | None = None,
+    wheel: Mounting | None = None,
+    log: Mounting | None = None,
+    barometer: Mounting | None = None,
+    scale_factors: bool = False,
+    calibration: Calibration | None = None,
+    offset: float = 0.0,
+    check_clocks: bool = True,
+    interval: float | None = None,
+    output: float | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Navigation:
+    """Carry a log on from an alignment.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        Holds the alignment's epoch, or begins there.
+    start : Alignment, Start, or path
+        Of the alignment, or the folder it was saved in.
+    gnss, odometer, velocity, baro : records, optional
+        Aiding sensors.
+    altitude : {"fixed", "free", "baro", "gnss"}, optional
+        How height is kept; by default what the sensors allow, and fixed (at sea) where there is none.
+    zupt : "auto" or pairs of seconds, optional
+        Stops, with zero velocity (and zero rotation where nothing moves at all).
+    smooth : bool
+        Give each epoch what the whole log says of it.
+    imu : ImuSpec or str, optional
+        Specification; the alignment's own when left out.
+    antenna, wheel, log, barometer : Mounting, optional
+        How each sensor sits, and what of that is to be estimated.
+    scale_factors : bool
+        Estimate the IMU's scale factors.
+    calibration : Calibration, optional
+        Known errors, taken off first.
+    offset : float, s
+        Added to the times of all aiding logs, to bring them onto the IMU's clock.
+    check_clocks : bool
+        Look for a clock offset and a wrong lever arm in a second pass; told as a warning.
+    interval : float, s, optional
+        Of the filter; .2 s, and 1 s for logs beyond an hour.
+    output : float, s, optional
+        Of the track; 1 s, more for very long logs.
+    progress : callable, optional
+        Told what is being done.
+
+    Returns
+    -------
+    Navigation
+
+    Raises
+    ------
+    UsageError
+        Contradicting options, or numbers that cannot be.
+    DataError
+        The log does not hold the alignment's epoch; a gap too long to bridge; an aiding log that does not overlap, or in
+        other axes.
+    AlignmentError
+        The alignment has no usable heading.
+    """
+    tell = progress or (lambda stage: None)
+    begin, spec, imu_source = _start_of(start, imu)
+    if calibration is not None:
+        record = calibration.apply(record)
+    record = _from_start(record, begin)
+    record, gaps, disturbances = _bridge(record)
+    sources = Sources(
+        _shifted(gnss, offset), _shifted(odometer, offset), _shifted(velocity, offset), _shifted(baro, offset)
+    )
+    height, why = _altitude(altitude, sources)
+    mountings = {"gnss": antenna, "odometer": wheel, "velocity": log, "baro": barometer}
+    mounting = {name: m or Mounting() for name, m in mountings.items()}
+    aiding = _aiding(sources, mounting, height)
+    _check_overlap(record, aiding)
+    interval = (FINE if record.duration <= LONG else COARSE) if interval is None else interval
+    output = max(1.0, record.duration / 20_000.0) if output is None else output
+    if not (interval > 0.0 and output > 0.0):
+        raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
+    tell("looking for stops" if zupt is not None else "navigating")
+    stops = [] if zupt is None else zero_updates(record, zupt, interval)
+    every = max(1, round(output / interval))
+    plain = InsModel.from_spec(spec, scale_factors=scale_factors, fixed_altitude=height == "fixed")
+
+    def run(sensors: Sequence[Aiding], **options: Any) -> Track:
+        used = [*sensors, *stops, *disturbances]
+        return navigate_track(record, begin, with_states(plain, used), used, interval=interval, every=every, **options)
+
+    tell("navigating")
+    track = run(aiding, smooth=smooth)
+    status, reasons = _verdict(track)
+    if why:
+        reasons.append(why)
+    if check_clocks and aiding:
+        tell("checking clocks and lever arms")
+        reasons += _clock_warnings(run, sources, mounting, height)
+    return Navigation(
+        status="navigated" if status else "inconsistent",
+        reasons=tuple(reasons),
+        track=track,
+        altitude=height,
+        smoothed=smooth,
+        gaps=gaps,
+        stops=sum(len(r.time) for r in track.residuals if r.name == "zero velocity"),
+        imu_source=imu_source,
+        source=record.source,
+    )
+
+
+def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
+    from truenorth.alignment import Alignment
+
+    spec = None if imu is None else imu_spec(imu)
+    if isinstance(start, Start):
+        if spec is None:
+            raise UsageError(
+                "a start without a specification of the IMU; expected imu='navigation', a file or an ImuSpec"
+            )
+        return start, spec, spec.name
+    if isinstance(start, Alignment):
+        own, where = start.imu, start.imu_source
+        begin = start_from_alignment(start)
+    else:
+        begin, own, _ = read_start(start)
+        where = own.name
+    return begin, spec or own, where if spec is None else spec.name
+
+
+def _shifted(record: R | None, offset: float) -> R | None:
+    return None if record is None else record.shifted(offset)
+
+
+def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
+    """The rows after the start's epoch."""
+    begin = record.time[0] - record.interval
+    slack = 0.5 * record.interval
+    if not begin - slack <= start.time < record.time[-1] - record.interval:
+        raise DataError(
+            f"{record.source}: runs from {begin:.3f} s to {record.time[-1]:.3f} s, but the alignment holds at {start.time:.3f} "
+            "s; expected a log that holds the alignment's epoch and goes on from it, on the same clock"
+        )
+    first = int(np.searchsorted(record.time, start.time + slack))
+    return record[first:]
+
+
+def _bridge(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float], ...], list[Aiding]]:
+    """Gaps filled with the rate after them, and what they add to the uncertainty.
+
+    What the base did in a gap is as different from that as its rates differ over the log.
+    """
+    rows = record.gaps[record.gaps > 0]
+    if rows.size == 0:
+        return record, (), []
+    lengths = record.steps[rows]
+    missing = lengths - record.interval
+    if missing.max() > LONGEST_BRIDGE:
+        worst = int(np.argmax(missing))
+        raise DataError(
+            f"{record.source}: row {rows[worst] + 1}, column time: a gap of {lengths[worst]:.3f} s after "
+            f"{record.time[rows[worst] - 1]:.3f} s; expected gaps of {LONGEST_BRIDGE:g} s at most: what the vehicle did in it is "
+            "not known; navigate the parts, each from an alignment of its own"
+        )
+    scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
+    unrest = [np.std(values * scale, axis=0).max() for values in (record.gyro, record.accel)]
+    gaps = tuple((float(record.time[row - 1]), float(length)) for row, length in zip(rows, lengths))
+    if record.kind == "increments":
+        factor = np.ones(len(record))
+        factor[rows] = lengths / record.interval
+        record = replace(record, gyro=record.gyro * factor[:, None], accel=record.accel * factor[:, None])
+    turn, push = (np.tile(missing[:, None] * max(rate, 1e-9), 3) for rate in unrest)
+    # The kernel's form of a disturbance: variance of velocity as measured, of attitude as variance.
+    return record, gaps, [Aiding("gap", "disturbance", record.time[rows], push**2, turn)]
+
+
+def _altitude(wanted: str | None, sources: Sources) -> tuple[Altitude, str]:
+    heights = sources.gnss is not None and bool(np.isfinite(sources.gnss.alt).any())
+    if wanted is not None and wanted not in get_args(Altitude):
+        raise UsageError(f"altitude {wanted!r}; expected one of {', '.join(get_args(Altitude))}")
+    if wanted == "baro" and sources.baro is None:
+        raise UsageError("altitude 'baro' without a barometer's record; expected --baro FILE (baro=record)")
+    if wanted == "gnss" and not heights:
+        raise UsageError(
+            "altitude 'gnss' without heights of GNSS; expected --gnss FILE (gnss=record) with a column of heights"
+        )
+    if wanted is not None:
+        return wanted, ""  # type: ignore[return-value]  # one of the four
+    if heights:
+        return "gnss", ""
+    if sources.baro is not None:
+        return "baro", ""
+    if sources.odometer is not None or sources.velocity is not None:
+        return "free", "height is carried on by velocity alone: no sensor of height is given"
+    return (
+        "fixed",
+        "height is held fixed, as at sea: give a sensor of height, or altitude 'free', where the vehicle climbs",
+    )
+
+
+def _aiding(sources: Sources, mounting: dict[str, Mounting], altitude: str) -> list[Aiding]:
+    found: list[Aiding] = []
+    if sources.gnss is not None:
+        found += from_gnss(sources.gnss, mounting["gnss"], heights=altitude in ("gnss", "free"))
+    if sources.odometer is not None:
+        found += from_odometer(sources.odometer, mounting["odometer"])
+    if sources.velocity is not None:
+        found += from_velocity(sources.velocity, mounting["velocity"])
+    if sources.baro is not None and altitude == "baro":
+        found += from_height(sources.baro, mounting["baro"])
+    return found
+
+
+def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
+    for sensor in aiding:
+        inside = (sensor.time > record.time[0] - record.interval) & (sensor.time <= record.time[-1])
+        if not inside.any():
+            raise DataError(
+                f"{sensor.name}: runs from {sensor.time.min():.3f} s to {sensor.time.max():.3f} s, the navigated part of "
+                f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
+                "expected one clock: bring the aiding log onto the IMU's with --offset SECONDS"
+            )
+
+
+def _verdict(track: Track) -> tuple[bool, list[str]]:
+    """Whether the measurements agree with the model, and what there is to say."""
+    sound, reasons = True, []
+    for r in track.residuals:
+        if len(r.time) == 0:
+            continue
+        share, nis = r.rejected / len(r.time), mean_nis(r)
+        if share > MOST_REJECTED:
+            sound = False
+            reasons.append(
+                f"{r.name}: {r.rejected} of {len(r.time)} measurements rejected: they contradict the track (half of them "
+                f"by more than {_scatter(r)}); check axes, units, clock, lever arm and sigmas{_swapped(r, track)}"
+            )
+        elif r.rejected:
+            reasons.append(f"{r.name}: {r.rejected} of {len(r.time)} measurements rejected as outliers")
+        if nis is not None and nis > NIS_LIMIT:
+            sound = False
+            reasons.append(
+                f"{r.name}: innovations are {math.sqrt(nis):.1f} times as large as their sigma says: sigma is not to be trusted"
+            )
+        if r.outside:
+            reasons.append(f"{r.name}: {r.outside} measurements lie outside the IMU's log")
+    return sound, reasons
+
+
+def _scatter(r: Residuals) -> str:
+    """Median size of the innovations, with its unit."""
+    unit = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}.get(r.name, "m/s")
+    size = np.sqrt(np.nansum(r.innovation**2, axis=1))
+    return f"{float(np.median(size)):.3g} {unit}"
+
+
+def _swapped(r: Residuals, track: Track) -> str:
+    """A hint where velocities fit the track with east and north exchanged."""
+    if "velocity" not in r.name or not np.isfinite(r.innovation[:, :2]).all():
+        return ""
+    v = np.stack([np.interp(r.time, track.time, track.v_n[:, i]) for i in range(2)], axis=1)
+    measured = v - r.innovation[:, :2]
+    given = np.sqrt(np.mean((measured - v) ** 2))
+    exchanged = np.sqrt(np.mean((measured[:, ::-1] - v) ** 2))
+    return "; east and north exchanged, they fit: were north, east, down handed in?" if exchanged < 0.3 * given else ""
+
+
+def _clock_warnings(
+    run: Callable[..., Track], sources: Sources, mounting: dict[str, Mounting], altitude: str
+) -> list[str]:
+    """Navigate once more with latencies and the lever arm left open: what the data say of them."""
+    loose = {
+        name: replace(
+            m,
+            latency_sigma=LAG_SIGMA,
+            lever_arm_sigma=ARM_SIGMA if name == "gnss" else m.lever_arm_sigma,
+            gate=0.0,
+        )
+        for name, m in mounting.items()
+        if name != "baro"
+    } | {"baro": mounting["baro"]}
+    try:
+        track = run(_aiding(sources, loose, altitude))
+    except DataError:
+        return []
+    words = []
+    for name, key, option in (
+        ("GNSS", "gnss", "--gnss"),
+        ("odometer", "odometer", "--odometer"),
+        ("velocity log", "velocity", "--velocity"),
+    ):
+        for role, least, unit in (("lag", LEAST_LAG, "s"), ("lever arm", LEAST_ARM, "m")):
+            where = track.model.slice_of(f"{name} {role}")
+            if where is None or (role == "lever arm" and key != "gnss"):
+                continue
+            known = mounting[key].latency_sigma if role == "lag" else mounting[key].lever_arm_sigma
+            value, sigma = track.sensors[-1, where], track.sigma[-1, where]
+            clear = (np.abs(value) > CLEAR * sigma) & (np.abs(value) > least)
+            if known > 0.0 or not clear.any():
+                continue
+            if role == "lag":
+                words.append(
+                    f"warning: the clock of {option} seems {abs(value[0]):.3f} ± {sigma[0]:.3f} {unit} "
+                    f"{'late' if value[0] > 0 else 'early'}: try --offset {-value[0]:.3f}, or let it be estimated"
+                )
+            else:
+                told = ", ".join(
+                    f"{a} {v:+.2f} ± {s:.2f} m" for a, v, s in zip(("right", "forward", "up"), value, sigma)
+                )
+                words.append(f"warning: the lever arm of {option} seems off by {told}: check it, metres are expected")
+    return words

@@ -1,0 +1,274 @@
+"""The answer of navigation: the track with its uncertainty, what the aiding sensors said, and what was wrong with the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, euler_sigma
+from truenorth.attitude import euler_from_dcm, to_rotation
+from truenorth.earth import radii
+from truenorth.models.ins import BA, BG, DP, DV, PHI
+from truenorth.navigation.driver import Residuals, Track
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+    from scipy.spatial.transform import Rotation
+
+    from truenorth.records import Trajectory
+
+Array = NDArray[np.float64]
+Status = Literal["navigated", "inconsistent"]
+Altitude = Literal["fixed", "free", "baro", "gnss"]
+
+
+@dataclass(frozen=True)
+class Navigation:
+    """Where a vehicle was, how it was turned and how fast it went, with all that is needed to judge it.
+
+    Attributes
+    ----------
+    status : str
+        ``navigated``, or ``inconsistent``: the measurements contradict the model.
+    reasons : tuple of str
+        The verdict in words, with figures; warnings too.
+    track : Track
+        State, sensors and covariance at each output epoch, and the aiding sensors' residuals.
+    altitude : str
+        How height was kept: fixed, free, baro or gnss.
+    smoothed : bool
+        Each epoch given the whole log's measurements, not only the earlier ones.
+    gaps : tuple of (float, float)
+        Time and length (s) of the gaps in the IMU's log that were bridged.
+    stops : int
+        Seconds at rest that were used.
+    imu_source : str
+    source : str
+    """
+
+    status: Status
+    reasons: tuple[str, ...]
+    track: Track = field(repr=False)
+    altitude: Altitude
+    smoothed: bool
+    gaps: tuple[tuple[float, float], ...]
+    stops: int
+    imu_source: str
+    source: str
+
+    @property
+    def time(self) -> Array:
+        """(K,) s."""
+        return self.track.time
+
+    @property
+    def C_nb(self) -> Array:
+        """(K, 3, 3) ``v_n = C_nb @ v_b``."""
+        return self.track.C_nb
+
+    @property
+    def attitude(self) -> Rotation:
+        """The K attitudes as a stack of SciPy rotations from body to navigation axes."""
+        return to_rotation(self.track.C_nb)
+
+    @property
+    def v_n(self) -> Array:
+        """(K, 3) velocity east, north, up, m/s."""
+        return self.track.v_n
+
+    @property
+    def position(self) -> Array:
+        """(K, 3) latitude, longitude (rad), height (m)."""
+        return self.track.position
+
+    @cached_property
+    def euler(self) -> Array:
+        """(K, 3) heading, pitch, roll, rad."""
+        return np.stack(euler_from_dcm(self.C_nb), axis=-1)
+
+    @cached_property
+    def euler_sigma(self) -> Array:
+        """(K, 3) one-sigma of heading, pitch, roll, rad."""
+        return euler_sigma(self.C_nb, self.track.P[:, PHI, PHI])
+
+    @property
+    def v_sigma(self) -> Array:
+        """(K, 3) one-sigma of velocity, m/s."""
+        return self.track.sigma[:, DV]
+
+    @property
+    def position_sigma(self) -> Array:
+        """(K, 3) one-sigma of position east, north, up, m."""
+        return self.track.sigma[:, DP]
+
+    @property
+    def residuals(self) -> tuple[Residuals, ...]:
+        """What each aiding sensor's measurements said against the prediction."""
+        return self.track.residuals
+
+    @cached_property
+    def displacement(self) -> Array:
+        """(K, 2) metres east and north of the start, on the ellipsoid there."""
+        lat, lon, alt = self.position.T
+        R_M, R_N = radii(lat[0])
+        away = (lon - lon[0] + np.pi) % (2 * np.pi) - np.pi
+        return np.stack([away * (R_N + alt[0]) * np.cos(lat[0]), (lat - lat[0]) * (R_M + alt[0])], axis=1)
+
+    @cached_property
+    def distance(self) -> float:
+        """Metres travelled, from the velocity."""
+        speed = np.linalg.norm(self.v_n, axis=1)
+        return float(np.sum(0.5 * (speed[1:] + speed[:-1]) * np.diff(self.time)))
+
+    def to_frame(self) -> pd.DataFrame:
+        """The track as a pandas table, index ``time``, angles in deg, biases in datasheet units."""
+        import pandas as pd
+
+        t = self.track
+        columns: dict[str, Array] = {
+            "lat": np.degrees(self.position[:, 0]),
+            "lon": np.degrees(self.position[:, 1]),
+            "alt": self.position[:, 2],
+        }
+        for i, axis in enumerate("ENU"):
+            columns[f"V{axis}"] = self.v_n[:, i]
+        for i, angle in zip((2, 1, 0), ("roll", "pitch", "heading")):
+            columns[angle] = np.degrees(self.euler[:, i])
+        for i, axis in enumerate("ENU"):
+            columns[f"sigma_{axis}"] = self.position_sigma[:, i]
+        for i, axis in enumerate("ENU"):
+            columns[f"sigma_V{axis}"] = self.v_sigma[:, i]
+        for i, angle in zip((2, 1, 0), ("roll", "pitch", "heading")):
+            columns[f"{angle}_sigma"] = np.degrees(self.euler_sigma[:, i])
+        for i, axis in enumerate("xyz"):
+            columns[f"gyro_bias_{axis}_deg_h"] = t.gyro_bias[:, i] / DEG_PER_HOUR
+            columns[f"gyro_bias_{axis}_sigma_deg_h"] = t.sigma[:, BG][:, i] / DEG_PER_HOUR
+            columns[f"accel_bias_{axis}_ug"] = t.accel_bias[:, i] / MICRO_G
+            columns[f"accel_bias_{axis}_sigma_ug"] = t.sigma[:, BA][:, i] / MICRO_G
+        for extra in t.model.extras:
+            where = t.model.slice_of(extra.name)
+            assert where is not None  # it is one of the model's own
+            for i, column in enumerate(range(where.start, where.stop)):
+                name = extra.name.replace(" ", "_") + (f"_{i + 1}" if len(extra.sigma) > 1 else "")
+                columns[name] = t.sensors[:, column]
+                columns[f"{name}_sigma"] = t.sigma[:, column]
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+
+    def innovations(self) -> pd.DataFrame:
+        """Innovations of all aiding sensors as one table: time, sensor, components with sigmas, NIS, used."""
+        import pandas as pd
+
+        parts = []
+        for r in self.residuals:
+            part = pd.DataFrame({"time": r.time, "sensor": r.name})
+            for i in range(3):
+                part[f"innovation_{i + 1}"], part[f"sigma_{i + 1}"] = r.innovation[:, i], r.sigma[:, i]
+            part["nis"], part["used"] = r.nis, r.used
+            parts.append(part)
+        if not parts:
+            return pd.DataFrame(columns=["time", "sensor", "nis", "used"])
+        return pd.concat(parts, ignore_index=True)
+
+    def trajectory(self) -> Trajectory:
+        """The track as a record that formats can write."""
+        from truenorth.records import Trajectory
+
+        lat, lon, alt = self.position.T
+        return Trajectory(
+            time=self.time,
+            C_nb=self.C_nb,
+            v_n=self.v_n,
+            lat=lat,
+            lon=lon,
+            alt=alt,
+            source=f"navigation of {self.source}",
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """One flat dictionary in datasheet units, ready for JSON."""
+        deg = np.degrees
+        last, sigma = self.position[-1], self.position_sigma[-1]
+        return {
+            "status": self.status,
+            "reasons": list(self.reasons),
+            "start_s": float(self.time[0]),
+            "end_s": float(self.time[-1]),
+            "distance_m": self.distance,
+            "lat_deg": float(deg(last[0])),
+            "lon_deg": float(deg(last[1])),
+            "alt_m": float(last[2]),
+            "position_sigma_m": sigma.tolist(),
+            "v_n_m_s": self.v_n[-1].tolist(),
+            "v_n_sigma_m_s": self.v_sigma[-1].tolist(),
+            "heading_deg": float(deg(self.euler[-1, 0])),
+            "pitch_deg": float(deg(self.euler[-1, 1])),
+            "roll_deg": float(deg(self.euler[-1, 2])),
+            "heading_sigma_deg": float(deg(self.euler_sigma[-1, 0])),
+            "pitch_sigma_deg": float(deg(self.euler_sigma[-1, 1])),
+            "roll_sigma_deg": float(deg(self.euler_sigma[-1, 2])),
+            "altitude": self.altitude,
+            "smoothed": self.smoothed,
+            "gaps": [{"time_s": time, "length_s": length} for time, length in self.gaps],
+            "stops_s": self.stops,
+            "aiding": {
+                r.name: {
+                    "measurements": len(r.time),
+                    "rejected": r.rejected,
+                    "outside": r.outside,
+                    "nis_over_rows": mean_nis(r),
+                }
+                for r in self.residuals
+            },
+            "estimated": self.estimated(),
+            "imu_source": self.imu_source,
+            "source": self.source,
+        }
+
+    def estimated(self) -> dict[str, dict[str, list[float]]]:
+        """What was estimated of the aiding sensors at the end: value and one-sigma, SI."""
+        found = {}
+        for extra in self.track.model.extras:
+            where = self.track.model.slice_of(extra.name)
+            found[extra.name] = {
+                "value": self.track.sensors[-1, where].tolist(),
+                "sigma": self.track.sigma[-1, where].tolist(),
+            }
+        return found
+
+    def plot(self) -> Figure:
+        """Track, velocity, attitude with bands, innovations and NIS, as a matplotlib figure."""
+        from truenorth.figures.navigation import plot_navigation
+
+        return plot_navigation(self)
+
+    def save(self, folder: str | PathLike[str]) -> list[Path]:
+        """Write summary.json, track.parquet, innovations.parquet, track.geojson and report.html; return their paths."""
+        from truenorth.report.navigation import save_navigation
+
+        return save_navigation(self, folder)
+
+    def export(self, path: str | PathLike[str]) -> Path:
+        """Write the track as .geojson, .kml or .csv, by the suffix.
+
+        Raises
+        ------
+        UsageError
+            Another suffix, or a folder that cannot be written to.
+        """
+        from truenorth.navigation.export import export
+
+        return export(self, Path(path))
+
+
+def mean_nis(r: Residuals) -> float | None:
+    """Mean of NIS over its number of rows, rejected measurements left out: 1 where the model is right."""
+    if not r.used.any():
+        return None
+    return float(np.sum(r.nis[r.used]) / np.sum(r.rows[r.used]))
