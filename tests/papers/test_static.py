@@ -1,0 +1,176 @@
+"""System 4 against its closed form, its Jacobian and its bars; the table and the claims that every study writes."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from truenorth.cli import app
+from truenorth.errors import UsageError
+from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
+from truenorth.papers import reproduce
+from truenorth.papers.claims import Claim, markdown
+from truenorth.papers.static.study import ACCEL_BIAS, GYRO_BIAS, LAT
+from truenorth.papers.static.truth import ARCMIN
+from truenorth.papers.table import STATISTICS, UNITS, Figure, figure
+
+
+@pytest.fixture(scope="module")
+def study():
+    return reproduce("static", runs=60, seed=11)
+
+
+@pytest.fixture(scope="module")
+def value(study):
+    table = pd.DataFrame(study.figures)
+
+    def of(case, method, quantity, statistic, time=None):
+        rows = table[(table["case"] == case) & (table["method"] == method)]
+        rows = rows[(rows["quantity"] == quantity) & (rows["statistic"] == statistic)]
+        if time is not None:
+            rows = rows[rows["time_s"] == time]
+        assert len(rows) == 1
+        return float(rows["value"].iloc[0])
+
+    return of
+
+
+def test_the_closed_form_limit():
+    """Level nabla/g, heading eps/(w_ie cos L) and tan L times the level."""
+    level, heading = (x / ARCMIN for x in StationaryModel(LAT).limits(GYRO_BIAS, ACCEL_BIAS))
+    assert level == pytest.approx(20.6 / 60, abs=0.01)
+    assert heading == pytest.approx(math.hypot(3.23, 0.34), abs=0.02)
+
+
+def test_the_model_is_that_of_the_mechanisation():
+    """Columns of Phi against the strapdown with a perturbed start, over 20 s at rest."""
+    from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+    from truenorth.position import Position
+    from truenorth.simulation import rest, simulate
+    from truenorth.strapdown import NavigationState, mechanise
+
+    lat, seconds, heading = math.radians(50.0), 20.0, 0.7
+    record = simulate(rest(Position(lat), heading), rate=100.0, duration=seconds).record
+    C = rest(Position(lat), heading).states(np.array(0.0)).C_nb
+
+    def end(phi=(0, 0, 0), dv=(0, 0), gyro=(0, 0, 0), accel=(0, 0)):
+        from truenorth.records import ImuRecord
+
+        T = record.interval
+        moved = ImuRecord(
+            record.time, record.gyro + T * np.array(gyro), record.accel + T * np.array([*accel, 0.0]), "increments"
+        )
+        start = NavigationState.at(dcm_from_rotation_vector(-np.array(phi)) @ C, lat, v_n=np.array([*dv, 0.0]))
+        out = mechanise(moved, start, altitude="fixed")
+        return out.C_nb[-1], out.v_n[-1, :2]
+
+    C0, v0 = end()
+    Phi, _ = StationaryModel(lat).discrete(seconds, C, terms=12)
+    for name, rows, step in (("phi", PHI, 1e-5), ("gyro", BG, 1e-7), ("accel", BA, 1e-4), ("dv", DV, 1e-2)):
+        count = rows.stop - rows.start
+        for axis in range(count):
+            change = np.zeros(count)
+            change[axis] = step
+            C1, v1 = end(**{name: change})
+            phi = -rotation_vector_from_dcm(C1 @ C0.T) / step
+            column = Phi[:, rows.start + axis]
+            np.testing.assert_allclose(phi, column[PHI], atol=2e-4 * max(np.abs(column[PHI]).max(), 1e-6))
+            np.testing.assert_allclose((v1 - v0) / step, column[DV], atol=1e-3 * max(np.abs(column[DV]).max(), 1.0))
+
+
+def test_both_filters_agree_on_a_still_base(value):
+    for time in (60.0, 120.0, 300.0, 600.0):
+        eight, ten = (value("still", f"states{n}", "heading", "rms", time) for n in (8, 10))
+        assert eight == pytest.approx(ten, rel=0.03)
+
+
+def test_bars_of_the_still_base(value):
+    """60 runs: the bars leave room for the scatter of an RMS, 9 % at one sigma."""
+    assert value("still", "states10", "level", "rms", 600.0) <= 0.40
+    assert value("still", "states10", "heading", "rms", 120.0) <= 5.2
+    assert value("still", "states10", "heading", "rms", 600.0) <= 3.9 * 1.1
+
+
+@pytest.mark.parametrize("case", ["still", "two_position", "multi_position"])
+def test_sigma_is_honest(case, value):
+    """RMS over sigma within its 99.9 % band for 60 runs; NEES of 180 numbers likewise."""
+    spread = 3.3 / math.sqrt(2 * 60)
+    for method in ("states10", "states8"):
+        for quantity in ("phi_e", "phi_n", "heading"):
+            assert abs(value(case, method, quantity, "rms_over_sigma", 600.0) - 1) < spread
+        assert abs(value(case, method, "nees", "mean", 600.0) - 1) < 3.3 * math.sqrt(2 / 180)
+
+
+def test_two_positions_take_the_biases_out(value):
+    assert value("two_position", "states10", "level", "rms", 600.0) <= 0.012
+    assert value("two_position", "states10", "heading", "rms", 600.0) <= 1.1
+
+
+def test_sway_hurts_the_eight_states_more(value):
+    assert value("sway", "states8", "heading", "rms", 120.0) > 2 * value("sway", "states10", "heading", "rms", 120.0)
+
+
+def test_the_right_noise_helps_more_than_h_infinity(value):
+    right, robust = (value("sway", method, "heading", "rms", 120.0) for method in ("kf_retuned", "h_infinity"))
+    assert right < 0.5 * robust
+
+
+def test_the_study_repeats():
+    """To the bit, but for the time that a step takes."""
+    studies = [reproduce("static", runs=3, seed=11) for _ in range(2)]
+    one, two = (pd.DataFrame([f for f in s.figures if f.quantity != "runtime"]) for s in studies)
+    pd.testing.assert_frame_equal(one, two, check_exact=True)
+
+
+def test_runs_do_not_depend_on_their_number():
+    from truenorth.papers.static.study import BASES, _honest_truth
+
+    few, many = (_honest_truth(BASES["sway"], runs, 5) for runs in (2, 4))
+    np.testing.assert_array_equal(few.velocity, many.velocity[:2])
+
+
+def test_words_of_the_table():
+    assert Figure._fields == (
+        "case",
+        "method",
+        "noise",
+        "window_start_s",
+        "time_s",
+        "quantity",
+        "statistic",
+        "value",
+        "ci_low",
+        "ci_high",
+        "unit",
+        "paper",
+        "runs",
+    )
+    assert "rms_over_sigma" in STATISTICS
+    assert "arcmin" in UNITS
+    with pytest.raises(ValueError, match="no figure"):
+        figure("a", "b", "c", "average", 1.0, "arcmin")
+
+
+def test_claims_in_markdown():
+    text = markdown("T", [Claim("x is y.", "does not hold", "Because.", 50, 1e-9)], ["A remark."])
+    assert "**Does not hold.** Because." in text
+    assert "50 runs, the same data for both; two-sided sign test p < 0.0001" in text
+
+
+def test_the_command(tmp_path):
+    result = CliRunner().invoke(app, ["reproduce", "static", "--runs", "4", "-o", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"figures.csv", "claims.md", "figures_1_to_6.png", "convergence.png", "report.html"}
+    table = pd.read_csv(tmp_path / "figures.csv")
+    assert set(table["case"]) == {"literal", "still", "sway", "vibration", "two_position", "multi_position"}
+    assert set(table["unit"]) <= set(UNITS)
+
+
+def test_an_unknown_study_and_too_few_runs():
+    with pytest.raises(UsageError, match="choose one of static"):
+        reproduce("statics")
+    with pytest.raises(UsageError, match="two at least"):
+        reproduce("static", runs=1)

@@ -1,0 +1,81 @@
+"""Figures of the study: the paper's own, and convergence over many runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.papers.static.filtering import Errors
+from truenorth.papers.static.truth import ARCMIN, Truth
+
+Array = NDArray[np.float64]
+ANGLES = ("phi E (tilt)", "phi N (tilt)", "phi U (heading)")
+
+
+def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
+    """Estimates of the three angles in one run of the paper's scenario, ten states above, eight below."""
+    with style():
+        figure = new_figure(12.0, 6.5)
+        axes = figure.subplots(2, 3, sharex=True)
+        for row, (states, (truth, x, sigma)) in zip(axes, literal.items(), strict=True):
+            true = (truth.phi if states == 10 else truth.phi_platform)[0]
+            for axis, ax in enumerate(row):
+                ax.plot(truth.time, x[:, axis] / ARCMIN, color=COLOURS[0], linewidth=0.8, label="estimate")
+                ax.plot(truth.time, true[:, axis] / ARCMIN, "--", color=REFERENCE, label="truth")
+                if axis == 2:
+                    ax.set_yscale("symlog", linthresh=100.0)
+                else:
+                    ax.set_ylim(-30.0, 50.0)
+                own = f"its own sigma at the end: {np.degrees(sigma[-1, axis]):.0f} deg"
+                ax.text(
+                    0.98,
+                    0.04,
+                    own,
+                    transform=ax.transAxes,
+                    ha="right",
+                    fontsize=9,
+                    bbox={"facecolor": "white", "lw": 0},
+                )
+                ax.set_title(f"{ANGLES[axis]}, {states} states")
+            row[0].set_ylabel("arcmin")
+        for ax in axes[1]:
+            ax.set_xlabel("time, s")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        figure.suptitle(
+            "The paper's scenario: P0 = 1e5 I, Q = 0, R = .001, 1000 steps of .02 s", ha="left", x=0.01, fontsize=11
+        )
+    return figure
+
+
+def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Errors], runs: int) -> Figure:
+    """RMS of heading and level over time in every case, beside the claimed sigma."""
+    cases = list(dict.fromkeys(case for case, _ in found))
+    with style():
+        figure = new_figure(3.0 * len(cases) + 0.6, 6.5)
+        axes = figure.subplots(2, len(cases), sharex=True, sharey="row")
+        for column, case in enumerate(cases):
+            for states, colour in ((10, COLOURS[0]), (8, COLOURS[1])):
+                errors = found[case, states]
+                for row, part in ((0, slice(2, 3)), (1, slice(0, 2))):
+                    ax = axes[row, column]
+                    rms, sigma = (
+                        np.sqrt(np.mean(values[..., part] ** 2, axis=(1, 2))) / ARCMIN
+                        for values in (errors.error, errors.sigma)
+                    )
+                    ax.plot(times, rms, "o-", markersize=3, color=colour, label=f"{states} states, RMS")
+                    ax.plot(times, sigma, "--", linewidth=1.0, color=colour, label=f"{states} states, sigma")
+            axes[0, column].set(title=case.replace("_", " "), xscale="log", yscale="log")
+            axes[1, column].set(yscale="log", xlabel="time, s")
+            axes[1, column].set_xticks(times, [f"{t:g}" for t in times])
+            axes[1, column].minorticks_off()
+            for ax in axes[:, column]:
+                ax.margins(x=0.06)
+        axes[0, 0].set_ylabel("heading, arcmin")
+        axes[1, 0].set_ylabel("level, arcmin")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
+        figure.suptitle(f"Honest comparison, {runs} runs of each case", ha="left", x=0.01, fontsize=11)
+    return figure

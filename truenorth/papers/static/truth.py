@@ -1,0 +1,169 @@
+"""What the two filters measure: error dynamics of an INS on a base that is still, sways, vibrates or is turned.
+
+The truth is integrated at the paper's period of .02 s by the exact exponential; the filters get what an INS gives at their own
+rate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
+from truenorth.simulation.streams import stream
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.02  # s, the paper's
+EVERY = 5  # periods between two measurements of the honest cases: 10 Hz
+STUDY_STREAMS = {"initial": 300, "gyro": 301, "accel": 302, "base": 303}
+ARCMIN = math.radians(1.0) / 60.0
+
+
+@dataclass(frozen=True)
+class Base:
+    """How the base moves.
+
+    Attributes
+    ----------
+    name : str
+    sway : float, m/s
+        RMS velocity of a sway of 4 to 8 s period, along E and N.
+    vibration : float, m/s
+        RMS velocity of a vibration that is new at every sample.
+    headings : sequence of float, rad
+        Positions about the vertical that share the time equally; turned at once.
+    """
+
+    name: str
+    sway: float = 0.0
+    vibration: float = 0.0
+    headings: Sequence[float] = (0.0,)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Measurements of a block of runs, and what they are measurements of.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    velocity : (runs, K, 2) array, m/s
+        What the ten-state filter sees.
+    force : (runs, K, 2) array, m/s^2
+        Mean level acceleration over each interval, of a platform that is not fed by velocity: what the eight-state filter sees.
+    phi : (runs, K, 3) array, rad
+        Of the INS; `phi_platform` of the platform.
+    bias : (runs, 5) array
+        Gyro (x, y, z) and accelerometer (x, y) biases.
+    C_nb : (K, 3, 3) array
+        Attitude of the body during the interval that ends at each time.
+    """
+
+    time: Array
+    velocity: Array
+    force: Array
+    phi: Array
+    phi_platform: Array
+    bias: Array
+    C_nb: Array
+
+
+def simulate(
+    model: StationaryModel,
+    base: Base,
+    *,
+    duration: float,
+    runs: int,
+    seed: int,
+    phi_sigma: Array,
+    gyro_bias: float | Array,
+    accel_bias: float | Array,
+    every: int = EVERY,
+    given: bool = False,
+) -> Truth:
+    """Simulate runs; initial misalignment and biases are drawn from their sigmas, or are what is `given` for all runs.
+
+    Parameters
+    ----------
+    model : StationaryModel
+        Its random walks are the true ones.
+    base : Base
+    duration : float, s
+    runs, seed : int
+    phi_sigma : (3,) array, rad
+    gyro_bias, accel_bias : float or array of each axis, rad/s and m/s^2
+    every : int
+        Periods of .02 s between measurements.
+
+    Returns
+    -------
+    Truth
+    """
+    steps = round(duration / PERIOD)
+    count, T = steps // every, PERIOD * every
+    draw = {name: [stream(seed, 0, run, number) for run in range(runs)] for name, number in STUDY_STREAMS.items()}
+    initial = np.ones((runs, 8)) if given else np.stack([rng.standard_normal(8) for rng in draw["initial"]])
+    x = np.zeros((runs, 10))
+    x[:, PHI] = initial[:, :3] * phi_sigma
+    x[:, BG], x[:, BA] = initial[:, 3:6] * gyro_bias, initial[:, 6:] * accel_bias
+    bias = x[:, 3:8].copy()
+    platform = x.copy()
+
+    turns = [
+        np.array([[math.cos(h), math.sin(h), 0], [-math.sin(h), math.cos(h), 0], [0, 0, 1]]) for h in base.headings
+    ]
+    which = np.minimum(np.arange(steps) * len(turns) // steps, len(turns) - 1)
+    fed, free = zip(*(_exact(model, C) for C in turns), strict=True)
+    velocity, force = np.empty((runs, count, 2)), np.empty((runs, count, 2))
+    phi, phi_platform = np.empty((runs, count, 3)), np.empty((runs, count, 3))
+    walk = np.sqrt(PERIOD) * np.array([model.gyro_random_walk] * 3 + [model.accel_random_walk] * 2)
+    columns = [0, 1, 2, 8, 9]
+    before = platform[:, DV].copy()
+    for k in range(steps):
+        if k % 1000 == 0:  # noise in blocks: the same whatever the number of runs
+            block = min(1000, steps - k)
+            noise = np.concatenate(
+                [
+                    np.stack([rng.standard_normal((block, 3)) for rng in draw["gyro"]]),
+                    np.stack([rng.standard_normal((block, 2)) for rng in draw["accel"]]),
+                ],
+                axis=2,
+            )
+        w = walk * noise[:, k % 1000]
+        x = x @ fed[which[k]].T
+        platform = platform @ free[which[k]].T
+        x[:, columns] += w
+        platform[:, columns] += w
+        if (k + 1) % every == 0:
+            at = (k + 1) // every - 1
+            velocity[:, at], phi[:, at] = x[:, DV], x[:, PHI]
+            force[:, at], phi_platform[:, at] = (platform[:, DV] - before) / T, platform[:, PHI]
+            before = platform[:, DV].copy()
+    time: Array = T * np.arange(1.0, count + 1.0)
+    moved = np.stack([_base_velocity(base, np.concatenate([[0.0], time]), rng) for rng in draw["base"]])
+    velocity += moved[:, 1:]
+    force += np.diff(moved, axis=1) / T
+    C = np.stack(turns)[which[every - 1 :: every][:count]]
+    return Truth(time, velocity, force, phi, phi_platform, bias, C)
+
+
+def _exact(model: StationaryModel, C_nb: Array) -> tuple[Array, Array]:
+    """Transition of a period with the velocity error fed back through the transport rate, and without."""
+    from scipy.linalg import expm
+
+    fed = model.dynamics(C_nb)
+    free = fed.copy()
+    free[:, DV] = 0.0  # its "velocity" is the integral of the accelerometers, and turns nothing
+    return expm(fed * PERIOD), expm(free * PERIOD)
+
+
+def _base_velocity(base: Base, time: Array, rng: np.random.Generator) -> Array:
+    """(K, 2) velocity of the base along E and N, m/s."""
+    periods, phases = rng.uniform(4.0, 8.0, 2), rng.uniform(0, 2 * math.pi, 2)
+    sway = base.sway * math.sqrt(2) * np.cos(2 * math.pi * time[:, None] / periods + phases)
+    return sway + base.vibration * rng.standard_normal((time.size, 2))

@@ -1,0 +1,131 @@
+"""A reproduced study: its table, its figures and its settled claims, and the folder that they make."""
+
+from __future__ import annotations
+
+import html
+import io
+from base64 import b64encode
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from truenorth.atomic import atomic_path, writable_folder
+from truenorth.errors import UsageError
+from truenorth.papers.claims import Claim, markdown
+from truenorth.papers.table import Figure, to_frame, write_figures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Drawing
+
+# Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, progress) -> Study`.
+STUDIES = {"static": "truenorth.papers.static.study"}
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What the reproduction of a paper found.
+
+    Attributes
+    ----------
+    title : str
+    figures : sequence of Figure
+        Numbers, for figures.csv.
+    claims : sequence of Claim
+    drawings : mapping of name to matplotlib figure
+    captions : mapping of name to str
+        What a drawing shows, and what it does not.
+    remarks : sequence of str
+    """
+
+    title: str
+    figures: Sequence[Figure]
+    claims: Sequence[Claim]
+    drawings: Mapping[str, Drawing]
+    captions: Mapping[str, str] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
+
+    def save(self, folder: str | PathLike[str]) -> list[Path]:
+        """Write figures.csv, claims.md, each drawing as PNG, and report.html.
+
+        Raises
+        ------
+        UsageError
+            The folder cannot be written to.
+        """
+        target = writable_folder(folder)
+        paths: list[Path] = []
+        with ExitStack() as files:
+
+            def place(name: str) -> Path:
+                paths.append(target / name)
+                return files.enter_context(atomic_path(paths[-1]))
+
+            write_figures(self.figures, place("figures.csv"))
+            place("claims.md").write_text(markdown(self.title, self.claims, self.remarks), encoding="utf-8")
+            for name, drawing in self.drawings.items():
+                drawing.savefig(place(f"{name}.png"))
+            place("report.html").write_text(self._page(), encoding="utf-8")
+        return paths
+
+    def _page(self) -> str:
+        from jinja2 import Environment, PackageLoader
+
+        from truenorth import __version__
+
+        environment = Environment(
+            loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True
+        )
+        table = to_frame(self.figures).to_html(index=False, na_rep="", float_format="{:.4g}".format, border=0)
+        return environment.get_template("study.html").render(
+            study=self,
+            drawings=[
+                (name.replace("_", " "), self.captions.get(name, ""), _inline(d)) for name, d in self.drawings.items()
+            ],
+            table=table,
+            version=html.escape(__version__),
+        )
+
+
+def reproduce(
+    name: str, *, runs: int | None = None, seed: int = 0, full: bool = False, progress: Progress | None = None
+) -> Study:
+    """Reproduce a published system.
+
+    Parameters
+    ----------
+    name : str
+        A key of `STUDIES`.
+    runs : int, optional
+        Of each case; the study's own number when left out.
+    seed : int
+    full : bool
+        The paper's own length and number of runs, where the study shortens them.
+    progress : callable, optional
+        Called with a word about each part.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    UsageError
+        A system that is not known, or fewer than two runs.
+    """
+    if name not in STUDIES:
+        raise UsageError(f"study {name!r} is not known; choose one of {', '.join(STUDIES)}")
+    if runs is not None and runs < 2:
+        raise UsageError(f"{runs} run(s); a statistic needs two at least")
+    study: Study = import_module(STUDIES[name]).reproduce(runs, seed, full, progress or (lambda stage: None))
+    return study
+
+
+def _inline(drawing: Drawing) -> str:
+    buffer = io.BytesIO()
+    drawing.savefig(buffer, format="png")
+    return b64encode(buffer.getvalue()).decode()
