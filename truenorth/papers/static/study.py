@@ -262,9 +262,9 @@ def _claims(
             "With the paper's P0, Q and R the misalignment angles are estimated within 20 s.",
             "holds in part",
             f"With eight states the tilts end {off[0] / ARCMIN:.1f} and {off[1] / ARCMIN:.1f} arcmin off, although the filter's "
-            f"own sigma is {math.degrees(sigma8[-1, 0]):.0f} deg: P0 is alike for a tilt and for the bias that looks like it, and "
-            f"the tilt takes nearly all. Heading ends {math.degrees(off[2]):.0f} deg off, its sigma is still that of P0: the curve of "
-            "the paper's figure is the filter's noise.",
+            f"own sigma is {math.degrees(sigma8[-1, 0]):.0f} deg: P0 is alike for a tilt and for the bias that looks like it, "
+            f"and the tilt takes nearly all. Heading ends {math.degrees(off[2]):.0f} deg off, its sigma is still that of P0: "
+            "the curve of the paper's figure is the filter's noise.",
             1,
         ),
         Claim(
