@@ -1,4 +1,4 @@
-"""The command line: `truenorth align`, `inspect`, `simulate`, `campaign`, `tune`, `reproduce`.
+"""The command line: `truenorth align`, `inspect`, `navigate`, `simulate`, `campaign`, `tune`, `reproduce`.
 
 Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
@@ -15,6 +15,7 @@ from truenorth import __version__
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.inspect import inspect
+from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
@@ -33,6 +34,7 @@ app = typer.Typer(
 )
 app.command("align")(align)
 app.command("inspect")(inspect)
+app.command("navigate")(navigate)
 app.command("simulate")(simulate)
 app.command("campaign")(campaign)
 app.command("tune")(tune)

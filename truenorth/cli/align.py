@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import math
 import sys
-from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truenorth.cli.console import make_console
+from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ def align(
     position = Position.from_degrees(lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2 * position_sigma)
     if output is not None:
         writable_folder(output)  # before the work, not after it
-    with _progress(quiet=as_json) as tell:
+    with stages(quiet=as_json) as tell:
         tell(f"reading {log.name}")
         record = read_log(
             log,
@@ -146,22 +145,6 @@ def _refuse_implausible(record: ImuRecord, lat: float, any_attitude: bool, units
             raise DataError(f"{record.source}: rows 1 to {len(record)}: {finding.message}{extra}")
         if finding.severity == "warning":
             print(f"truenorth: warning: {finding.message}", file=sys.stderr)
-
-
-def _progress(quiet: bool) -> Any:
-    """A spinner with the stage's name on standard error, where a person looks at it."""
-    if quiet or not sys.stderr.isatty():
-        return nullcontext(lambda stage: None)
-    from contextlib import contextmanager
-
-    @contextmanager
-    def spinner() -> Any:
-        from rich.text import Text
-
-        with make_console(stderr=True).status("starting") as status:
-            yield lambda stage: status.update(Text(stage))
-
-    return spinner()
 
 
 def _print(result: Alignment, paths: list[Path]) -> None:

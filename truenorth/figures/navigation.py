@@ -141,6 +141,6 @@ def _innovations(ax: Axes, result: Navigation) -> None:
             ax.axhline(sign * limit, color=REFERENCE, linestyle=dashes, linewidth=1.0)
     ax.set_ylim(-5.0, 5.0)
     if result.residuals:
-        ax.legend(ncols=3, loc="lower right")
+        ax.legend(ncols=4, loc="lower left", frameon=True, fontsize=7.5)
     else:
         ax.text(0.5, 0.8, "no aiding: free inertial", transform=ax.transAxes, ha="center")

@@ -141,7 +141,7 @@ def error_dynamics(C: Any, f: Any, v: Any, axis: Any, alt: float, north: bool, f
 
 
 @compiled
-def couple_sensors(C: Any, w: Any, f_b: Any, at: Any, F: Any) -> None:
+def couple_sensors(C: Any, w: Any, f_b: Any, at: Any, fixed_altitude: bool, F: Any) -> None:
     """Fill in the columns by which slow biases and scale factors act as gyro and accelerometer errors.
 
     Parameters
@@ -152,16 +152,20 @@ def couple_sensors(C: Any, w: Any, f_b: Any, at: Any, F: Any) -> None:
         Measured rate and specific force, body axes.
     at : (4,) array of int
         First state of the slow gyro and accelerometer bias, of the gyro and accelerometer scale factor; -1: none.
+    fixed_altitude : bool
+        Vertical velocity is zero: nothing drives it.
     F : (N, N) array
     """
     for i in range(3):
         for j in range(3):
             if at[0] >= 0:
                 F[_PHI + i, at[0] + j] = -C[i, j]
-            if at[1] >= 0:
-                F[_DV + i, at[1] + j] = C[i, j]
             if at[2] >= 0:
                 F[_PHI + i, at[2] + j] = -C[i, j] * w[j]
+            if fixed_altitude and i == 2:
+                continue
+            if at[1] >= 0:
+                F[_DV + i, at[1] + j] = C[i, j]
             if at[3] >= 0:
                 F[_DV + i, at[3] + j] = C[i, j] * f_b[j]
 
@@ -406,7 +410,7 @@ def _stack(
     F, Phi, Phi_t = np.zeros((N, N)), np.zeros((N, N)), np.zeros((N, N))
     for k in range(len(T)):
         error_dynamics(C[k], f_n[k], v[k], axis[k], alt[k], True, fixed, F)
-        couple_sensors(C[k], w_b[k], f_b[k], at, F)
+        couple_sensors(C[k], w_b[k], f_b[k], at, fixed, F)
         transition(size, F, decay, T[k], Phi, Phi_t)
         for i in range(n):
             for j in range(n):

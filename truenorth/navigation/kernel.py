@@ -162,7 +162,7 @@ def predict_to_event(size: Any, s: Any, model: Model, sums: Sums, means: Sums, F
     means.T[0], sums.T[0] = T, 0.0
     axis = earth_axis(s)
     error_dynamics(means.C, means.vectors[0], means.vectors[1], axis, s[11], False, model.fixed_altitude, F)
-    couple_sensors(means.C, means.vectors[2], means.vectors[3], model.sensors, F)
+    couple_sensors(means.C, means.vectors[2], means.vectors[3], model.sensors, model.fixed_altitude, F)
     transition(size, F, model.decay, T, w.Phi, w.Phi_t)
     for i in range(len(model.noise)):
         w.Q[i, i] = 0.5 * T * model.noise[i]

@@ -1,0 +1,279 @@
+"""`navigate` from the user's side: starts, sensors, stops, gaps, wrong input, results on disk."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truenorth.alignment import align
+from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.navigation import Mounting, Start, navigate
+from truenorth.navigation.sensors import mounting_angles
+from truenorth.navigation.start import read_start, start_from_alignment
+from truenorth.position import Position
+from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, VelocityRecord
+from truenorth.simulation import rest, simulate
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import accelerate, straight, turn
+from truenorth.specs import imu_spec
+from truenorth.wander import C_en
+
+SPEC = imu_spec("tactical")
+PLACE = Position.from_degrees(48.0, 11.0, 500.0)
+SIGMA = np.repeat([5e-4, 0.01, 3.0, SPEC.gyro_bias, SPEC.accel_bias], 3)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """A car that stands 30 s, drives off and turns twice; its motion, log and start."""
+    legs = [
+        *straight(30.0),
+        *accelerate(15.0, 1.5, 0.0),
+        *straight(20.0),
+        *turn(np.radians(90.0), np.radians(10.0)),
+        *straight(30.0),
+        *turn(np.radians(-60.0), np.radians(6.0)),
+        *straight(60.0),
+    ]
+    motion = course(PLACE, legs, heading=0.7)
+    simulation = simulate(motion, rate=100.0, duration=180.0, imu=SPEC, seed=3)
+    s = motion.states(0.0)
+    rng = np.random.default_rng(1)
+    from truenorth.attitude import dcm_from_rotation_vector
+
+    C = dcm_from_rotation_vector(-SIGMA[:3] * rng.standard_normal(3)) @ s.C_nb
+    start = Start(0.0, C, np.zeros(3), PLACE.lat, PLACE.lon, PLACE.alt, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))
+    return motion, simulation.record, start
+
+
+def fixes(motion, time, sigma=1.0, seed=0, arm=(0.0, 0.0, 0.0), with_velocity=False):
+    s = motion.states(time)
+    rng = np.random.default_rng(seed)
+    offset = s.C_nb @ np.asarray(arm) + sigma * rng.standard_normal((len(time), 3))
+    lat, lon, alt = s.lat + offset[:, 1] / 6.37e6, s.lon + offset[:, 0] / (6.39e6 * np.cos(s.lat)), s.alt + offset[:, 2]
+    v = s.v_n + 0.05 * rng.standard_normal((len(time), 3)) if with_velocity else None
+    return GnssRecord(time, lat, lon, alt, v_n=v, position_sigma=np.full((len(time), 3), sigma), source="gnss.csv")
+
+
+def metres_off(result, motion, k=-1):
+    s = motion.states(result.time[k])
+    lat, lon, alt = result.position[k]
+    return np.array([(lon - s.lon) * 6.39e6 * np.cos(s.lat), (lat - s.lat) * 6.37e6, alt - s.alt])
+
+
+def test_odometer_bounds_what_free_inertial_does_not(drive):
+    """Errors of a 3 min drive stay within 4 sigma in all modes, and each sensor earns its keep."""
+    motion, record, start = drive
+    time = np.arange(0.55, 179.0, 0.1)
+    s = motion.states(time)
+    C_mb = mounting_angles(np.radians(3.0), np.radians(-2.0), 0.0)
+    v_b = np.einsum("kji,kj->ki", s.C_nb, s.v_n)  # here the body is the vehicle
+    speed = 1.02 * v_b[:, 1] + 0.02 * np.random.default_rng(2).standard_normal(len(time))
+    odometer = OdometerRecord(time, speed, "speed", source="odo.csv")
+    # The IMU sits turned in the car: its log, and its start, in its own axes.
+    turned = record.rotated(C_mb.T)
+    at = replace(start, C_nb=start.C_nb @ C_mb)
+    free = navigate(turned, at, imu=SPEC, altitude="fixed")
+    wheel = Mounting(scale_sigma=0.05, angle_sigma=np.radians(5.0))
+    aided = navigate(turned, at, imu=SPEC, odometer=odometer, wheel=wheel, zupt=[(1.0, 29.0)])
+    for result in (free, aided):
+        assert np.all(np.abs(metres_off(result, motion)[:2]) < 4 * result.position_sigma[-1, :2])
+    assert np.hypot(*aided.position_sigma[-1, :2]) < 0.2 * np.hypot(*free.position_sigma[-1, :2])
+    told = aided.estimated()
+    for name, true in (("odometer scale", [0.02]), ("odometer mounting", None)):
+        value, sigma = (np.array(told[name][key]) for key in ("value", "sigma"))
+        if true is not None:
+            assert np.all(np.abs(value - true) < 4 * sigma)
+        assert np.all(sigma < 0.01)
+    assert aided.status == "navigated"
+    assert aided.altitude == "free"
+    assert any("no sensor of height" in reason for reason in aided.reasons)
+
+
+def test_gnss_with_a_latency_and_a_clock_offset(drive):
+    """An offset of 300 ms is told with its sign; given, or as latency, it is gone."""
+    motion, record, start = drive
+    time = np.arange(1.0, 179.0)
+    late = fixes(motion, time, sigma=0.3).shifted(0.3)
+    found = navigate(record, start, imu=SPEC, gnss=late)
+    words = [reason for reason in found.reasons if reason.startswith("warning: the clock")]
+    assert len(words) == 1
+    assert "late" in words[0]
+    assert "--offset -0.3" in words[0] or "--offset -0.29" in words[0]
+    for options in ({"offset": -0.3}, {"antenna": Mounting(latency=0.3)}, {"antenna": Mounting(latency_sigma=0.5)}):
+        result = navigate(record, start, imu=SPEC, gnss=late, **options)
+        assert not any(reason.startswith("warning: the clock") for reason in result.reasons)
+        assert np.all(np.abs(metres_off(result, motion)) < 4 * result.position_sigma[-1])
+
+
+def test_a_wrong_lever_arm_is_told(drive):
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.1, arm=(1.5, 2.5, 1.0))
+    wrong = navigate(record, start, imu=SPEC, gnss=gnss)
+    assert any("lever arm" in reason for reason in wrong.reasons)
+    right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([1.5, 2.5, 1.0])))
+    assert not any("lever arm" in reason for reason in right.reasons)
+
+
+def test_height_from_a_barometer_and_from_nothing(drive):
+    """The barometer's slow error is in the sigma of height; the free channel's sigma grows, the fixed one's stays."""
+    motion, record, start = drive
+    time = np.arange(0.2, 179.0, 0.2)
+    baro = HeightRecord(time, motion.states(time).alt + 4.0 + 0.5 * np.random.default_rng(4).standard_normal(len(time)))
+    barometer = Mounting(bias_sigma=5.0, bias_time=3600.0)
+    held = navigate(record, start, imu=SPEC, baro=baro, barometer=barometer)
+    free = navigate(record, start, imu=SPEC, altitude="free")
+    fixed = navigate(record, start, imu=SPEC)
+    assert (held.altitude, free.altitude, fixed.altitude) == ("baro", "free", "fixed")
+    assert free.position_sigma[-1, 2] > 10 * held.position_sigma[-1, 2]
+    assert abs(metres_off(held, motion)[2]) < 4 * held.position_sigma[-1, 2]
+    assert np.ptp(fixed.position[:, 2]) == 0.0
+    assert fixed.position_sigma[-1, 2] == pytest.approx(3.0)
+
+
+def test_stops_are_found_where_the_car_stands_and_nowhere_else(drive):
+    _, record, start = drive
+    result = navigate(record, start, imu=SPEC, altitude="fixed", zupt="auto")
+    used = result.residuals[0]
+    assert used.name == "zero velocity"
+    assert 20 <= np.sum(used.used) <= 31
+    assert np.all(used.time[used.used] < 31.0)
+
+
+def test_a_gap_is_bridged_counted_and_believed(drive):
+    """Half a second lost while standing, and while turning: the sigma grows with it; a longer one is refused."""
+    _, record, start = drive
+    whole = navigate(record, start, imu=SPEC)
+    kept = np.ones(len(record), dtype=bool)
+    kept[9000:9050] = False
+
+    def without(kept):
+        return ImuRecord(record.time[kept], record.gyro[kept], record.accel[kept], record.kind, "log.csv")
+
+    result = navigate(without(kept), start, imu=SPEC)
+    assert len(result.gaps) == 1
+    assert result.gaps[0] == pytest.approx((90.0, 0.51))
+    assert result.position_sigma[-1, 0] > whole.position_sigma[-1, 0]
+    kept[9000:9200] = False
+    with pytest.raises(DataError, match=r"log.csv: row 9001, column time: a gap of 2.010 s"):
+        navigate(without(kept), start, imu=SPEC)
+
+
+def test_smoothing_is_at_least_as_good(drive):
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 179.0, 5.0), sigma=1.0)
+    one, two = (navigate(record, start, imu=SPEC, gnss=gnss, smooth=smooth) for smooth in (False, True))
+    assert two.smoothed
+    assert np.all(two.position_sigma <= one.position_sigma * (1 + 1e-9))
+    np.testing.assert_allclose(two.position[-1], one.position[-1], rtol=0, atol=1e-9)
+    errors = [np.mean([np.sum(metres_off(r, motion, k)[:2] ** 2) for k in range(10, 170)]) for r in (one, two)]
+    assert errors[1] < errors[0]
+
+
+def test_navigation_starts_from_an_alignment_and_from_its_folder(tmp_path):
+    """The folder holds what the object does; tilt and accelerometer bias stay balanced, so that little is lost at rest."""
+    spec = imu_spec("navigation")
+    record = simulate(rest(PLACE, 0.6, 0.02, -0.03), rate=100.0, duration=400.0, imu=spec, seed=1).record
+    alignment = align(record.between(None, 200.0), PLACE, spec)
+    alignment.save(tmp_path)
+    begin, own = start_from_alignment(alignment), read_start(tmp_path)
+    np.testing.assert_allclose(own[0].P, begin.P, rtol=1e-12, atol=0)
+    assert own[1] == spec
+    a, b = navigate(record, alignment), navigate(record, tmp_path)
+    np.testing.assert_allclose(a.position, b.position, rtol=1e-12, atol=0)
+    # Uncorrelated, the tilt alone (10 arcsec and more) would make .1 m/s in 200 s.
+    loose = replace(begin, P=np.diag(np.diag(begin.P)))
+    assert np.all(a.v_sigma[-1, :2] < 0.3 * navigate(record, loose, imu=spec).v_sigma[-1, :2])
+    assert np.all(np.abs(a.v_n[-1, :2]) < 4 * a.v_sigma[-1, :2])
+
+
+def test_a_start_without_heading_is_refused(tmp_path):
+    spec = imu_spec("consumer")
+    record = simulate(rest(PLACE), rate=50.0, duration=60.0, imu=spec, seed=1).record
+    alignment = align(record, PLACE, spec)
+    assert not alignment.heading_known
+    with pytest.raises(AlignmentError, match="heading may not be used"):
+        navigate(record, alignment)
+    alignment.save(tmp_path)
+    with pytest.raises(AlignmentError, match="no heading that may be used"):
+        navigate(record, tmp_path)
+
+
+def test_wrong_input_is_found_and_said(drive, tmp_path):
+    motion, record, start = drive
+    time = np.arange(1.0, 179.0)
+    good = fixes(motion, time, with_velocity=True)
+    with pytest.raises(DataError, match=r"no overlap.*--offset"):
+        navigate(record, start, imu=SPEC, gnss=good.shifted(1e6))
+    ned = replace(good, v_n=good.v_n[:, [1, 0, 2]] * [1, 1, -1])
+    with pytest.raises(DataError, match="north, east, down"):
+        navigate(record, start, imu=SPEC, gnss=ned)
+    with pytest.raises(UsageError, match="centimetres"):
+        Mounting(lever_arm=np.array([120.0, 50.0, 80.0]))
+    with pytest.raises(UsageError, match="expected one of fixed, free, baro, gnss"):
+        navigate(record, start, imu=SPEC, altitude="up")
+    with pytest.raises(UsageError, match="without a barometer"):
+        navigate(record, start, imu=SPEC, altitude="baro")
+    with pytest.raises(UsageError, match="without a specification"):
+        navigate(record, start)
+    with pytest.raises(DataError, match=r"but the alignment holds at 500\.000 s"):
+        navigate(record, replace(start, time=500.0), imu=SPEC)
+    with pytest.raises(DataError, match="cannot be read"):
+        navigate(record, tmp_path / "nothing")
+    (tmp_path / "summary.json").write_text(json.dumps({"heading_deg": 1.0}))
+    with pytest.raises(DataError, match="write the alignment again"):
+        navigate(record, tmp_path)
+
+
+def test_a_reference_in_wrong_axes_is_inconsistent(drive):
+    """North, east, down handed in as east, north, up, with no position to tell by."""
+    motion, record, start = drive
+    time = np.arange(0.5, 179.0, 0.5)
+    v = motion.states(time).v_n
+    swapped = VelocityRecord(time, v[:, [1, 0, 2]] * [1, 1, -1], "navigation", source="ref.csv")
+    result = navigate(record, start, imu=SPEC, velocity=swapped, altitude="fixed")
+    assert result.status == "inconsistent"
+    assert any("north, east, down" in reason for reason in result.reasons)
+    right = VelocityRecord(time, v, "navigation", source="ref.csv")
+    assert navigate(record, start, imu=SPEC, velocity=right, altitude="fixed").status == "navigated"
+
+
+def test_results_on_disk(drive, tmp_path):
+    import pandas as pd
+
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 179.0))
+    result = navigate(record, start, imu=SPEC, gnss=gnss)
+    paths = result.save(tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
+    track = pd.read_parquet(tmp_path / "track.parquet")
+    assert track.index.name == "time"
+    np.testing.assert_allclose(track["lat"], np.degrees(result.position[:, 0]))
+    assert len(pd.read_parquet(tmp_path / "innovations.parquet")) == 178
+    line = json.loads((tmp_path / "track.geojson").read_text())["features"][0]["geometry"]
+    np.testing.assert_allclose(line["coordinates"][-1][:2], np.degrees(result.position[-1, 1::-1]), atol=1e-8)
+    page = (tmp_path / "report.html").read_text()
+    assert "GNSS position" in page
+    assert "http://" not in page.split("<main>")[1].split("<script")[0]
+    for suffix in ("kml", "csv"):
+        assert result.export(tmp_path / f"track.{suffix}").stat().st_size > 1000
+    with pytest.raises(UsageError, match="suffix"):
+        result.export(tmp_path / "track.gpx")
+    assert result.plot().axes
+    at = result.trajectory()
+    assert len(at) == len(result.time)
+
+
+def test_a_track_over_the_date_line_is_two_lines():
+    from truenorth.navigation.export import _lines
+
+    class Crossing:
+        time = np.arange(5.0)
+        position = np.stack(
+            [np.full(5, 0.1), np.radians([179.99, 179.995, -180.0, -179.995, -179.99]), np.zeros(5)], axis=1
+        )
+
+    lines = _lines(Crossing())
+    assert [len(line) for line in lines] == [2, 3]
+    assert C_en(0.0, np.pi)[0, 2] == pytest.approx(-1.0)
