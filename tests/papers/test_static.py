@@ -70,7 +70,7 @@ def test_the_model_is_that_of_the_mechanisation():
 
     C0, v0 = end()
     Phi, _ = StationaryModel(lat).discrete(seconds, C, terms=12)
-    for name, rows, step in (("phi", PHI, 1e-5), ("gyro", BG, 1e-7), ("accel", BA, 1e-4), ("dv", DV, 1e-2)):
+    for name, rows, step in (("phi", PHI, 1e-5), ("gyro", BG, 1e-7), ("accel", BA, 1e-2), ("dv", DV, 1e-2)):
         count = rows.stop - rows.start
         for axis in range(count):
             change = np.zeros(count)
