@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 
 from truenorth.errors import DataError, UsageError
-from truenorth.specs import PRESETS, ImuSpec, imu_spec
+from truenorth.specs import KEYS, PRESETS, ImuSpec, imu_spec
 
 DEG = math.pi / 180
 G = 9.80665
@@ -41,7 +41,10 @@ def test_a_file_in_datasheet_units(tmp_path):
         "accel_range": 20 * G,
         "correlation_time": 3600.0,
     }
-    assert {item.name for item in fields(spec)} == {*expected, "name"}
+    perfect = ImuSpec()
+    for item in fields(spec):
+        if item.name not in {*expected, "name"}:
+            assert getattr(spec, item.name) == getattr(perfect, item.name)
     for name, value in expected.items():
         assert getattr(spec, name) == pytest.approx(value, rel=1e-14), name
 
@@ -63,7 +66,7 @@ def test_written_and_read_back(name, tmp_path):
     again = imu_spec(tmp_path / "imu.yaml")
     assert again.name == spec.name
     for item in fields(spec):
-        if item.name != "name":
+        if item.name not in ("name", "accel_positions"):
             assert getattr(again, item.name) == pytest.approx(getattr(spec, item.name), rel=2e-15)
 
 
@@ -88,7 +91,25 @@ def test_a_specification_passes_through_and_a_mapping_is_read():
         ("gyro: {bias: 1 deg/sqrt(h)}", ["gyro.bias", "angular rate", "0.01 deg/h"]),
         ("accel: {bias: 0.5}", ["accel.bias", "no unit", "50 ug"]),
         ("accel: {bias: -1 mg}", ["accel.bias", "negative"]),
-        ("accel: {range: 0 g}", ["accel_range", "positive"]),
+        ("accel: {range: 0 g}", ["accel.range", "positive"]),
+        ("gyro: {sample_noise: 1 deg}", ["gyro.sample_noise", "angular rate", "0.01 deg/h"]),
+        ("gyro: {rate_random_walk: 1 deg/h}", ["gyro.rate_random_walk", "deg/h/sqrt(h)"]),
+        ("gyro: {g_sensitivity: 1 deg/h}", ["gyro.g_sensitivity", "1 deg/h/g"]),
+        ("accel: {g_sensitivity: 1 deg/h/g}", ["accel.g_sensitivity", "not known"]),
+        ("accel: {bias_temperature: 1 ug}", ["accel.bias_temperature", "10 ug/degC"]),
+        ("gyro: {scale_factor_temperature: -1 ppm/K}", ["gyro.scale_factor_temperature", "negative"]),
+        ("gyro: {bandwidth: 0 Hz}", ["gyro.bandwidth", "positive"]),
+        ("gyro: {filter_order: 3}", ["gyro.filter_order", "3", "1 (one pole)"]),
+        ("gyro: {latency: -1 ms}", ["gyro.latency", "negative"]),
+        ("accel: {positions: 3 cm}", ["accel.positions", "three places"]),
+        ("accel: {positions: [[1 m, 0 m, 0 m], [0 m, 1 m], [0 m, 0 m, 0 m]]}", ["accel.positions[2]", "three places"]),
+        (
+            "accel: {positions: [[1 m, 0 m, 0 m], [0 m, 1 m, 2 s], [0 m, 0 m, 0 m]]}",
+            ["accel.positions[2][3]", "length"],
+        ),
+        ("temperature: {rate: 1 K}", ["temperature.rate", "1 degC/min"]),
+        ("temperature: {time_constant: 0 s}", ["temperature.time_constant", "positive"]),
+        ("temperature: {strat: 1 K}", ["temperature.strat", "did you mean 'temperature.start'"]),
         ("correlation_time: 0 s", ["correlation_time", "positive"]),
         ("correlation_time: 300", ["correlation_time", "no unit", "300 s"]),
         ("gyro: 1 deg/h", ["gyro", "expected keys"]),
@@ -117,3 +138,42 @@ def test_neither_preset_nor_file():
 def test_a_sigma_is_zero_or_more_and_finite(value):
     with pytest.raises(UsageError, match="gyro_bias"):
         ImuSpec(gyro_bias=value)
+
+
+def test_every_key_is_written_and_read_back(tmp_path):
+    content = {
+        "name": "full",
+        "gyro": {key: f"3 {entry.unit}" for key, entry in KEYS["gyro"].items()} | {"filter_order": 2},
+        "accel": {key: f"3 {entry.unit}" for key, entry in KEYS["accel"].items()}
+        | {"positions": [["3 cm", "0 m", "0 m"], ["0 m", "3 cm", "0 m"], ["0 m", "0 m", "-30 mm"]]},
+        "temperature": {"start": "-20 degC", "rate": "-1 K/min", "time_constant": "10 min"},
+        "correlation_time": "10 s",
+    }
+    spec = imu_spec(content)
+    for item in fields(spec):
+        assert getattr(spec, item.name) != getattr(ImuSpec(), item.name) or item.name == "accel_filter_order"
+    assert spec.accel_positions == ((0.03, 0, 0), (0, 0.03, 0), (0, 0, -0.03))
+    assert spec.gyro_rate_random_walk == pytest.approx(3 * DEG / 3600 / 60, rel=1e-14)
+    assert spec.accel_rate_random_walk == pytest.approx(3e-6 * G / 60, rel=1e-14)
+    assert spec.gyro_g_sensitivity == pytest.approx(3 * DEG / 3600 / G, rel=1e-14)
+    assert spec.temperature_rate == pytest.approx(-1 / 60, rel=1e-14)
+    spec.to_yaml(tmp_path / "imu.yaml")
+    again = imu_spec(tmp_path / "imu.yaml")
+    for item in fields(spec):
+        if item.name not in ("name", "accel_positions"):
+            assert getattr(again, item.name) == pytest.approx(getattr(spec, item.name), rel=2e-15)
+    assert again.accel_positions == spec.accel_positions
+
+
+def test_sample_noise_as_random_walks():
+    spec = ImuSpec(gyro_sample_noise=4e-6, gyro_random_walk=3e-7, accel_sample_noise=1e-4).with_random_walks(0.01)
+    assert spec.gyro_random_walk == pytest.approx(5e-7, rel=1e-14)
+    assert spec.accel_random_walk == pytest.approx(1e-5, rel=1e-14)
+    assert spec.gyro_sample_noise == spec.accel_sample_noise == 0.0
+
+
+def test_positions_are_three_places_of_three_lengths():
+    with pytest.raises(UsageError, match="three places"):
+        ImuSpec(accel_positions=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    with pytest.raises(UsageError, match="1 or 2"):
+        ImuSpec(gyro_filter_order=0)

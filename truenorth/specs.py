@@ -1,24 +1,31 @@
 """IMU specifications: what a datasheet promises, one-sigma, in SI inside and in datasheet units in files.
 
-A file holds two groups, each value with its unit:
+A file holds groups of keys, each value with its unit:
 
     name: my IMU
-    gyro: {bias: 0.01 deg/h, random_walk: 0.001 deg/sqrt(h), scale_factor: 5 ppm}
-    accel: {bias: 50 ug, random_walk: 10 ug/sqrt(Hz)}
+    gyro: {bias: 0.01 deg/h, random_walk: 0.001 deg/sqrt(h), scale_factor: 5 ppm, bandwidth: 100 Hz}
+    accel: {bias: 50 ug, random_walk: 10 ug/sqrt(Hz), positions: [[3 cm, 0 m, 0 m], [0 m, 3 cm, 0 m], [0 m, 0 m, 3 cm]]}
+    temperature: {start: -10 K, rate: 1 K/min, time_constant: 20 min}
+    correlation_time: 5 min
+
+What each term does to a measurement is written in :mod:`truenorth.simulation.imu_errors`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from truenorth.errors import DataError, UsageError
 from truenorth.units import format as format_quantity
 from truenorth.yaml_file import quantity, read_mapping, unknown_key
+
+Places = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True)
@@ -28,64 +35,134 @@ class ImuSpec:
     Attributes
     ----------
     gyro_bias : float, rad/s
-        What is left after calibration, from switch-on to switch-on.
+        Constant: what calibration has left.
+    gyro_turn_on_bias : float, rad/s
+        Another from each switch-on to the next.
     gyro_random_walk : float, rad/sqrt(s)
+    gyro_sample_noise : float, rad/s
+        White noise of each sample, whatever the rate: at an interval T like a random walk of ``gyro_sample_noise sqrt(T)``.
     gyro_bias_instability : float, rad/s
         Slow change of the bias in operation, a Gauss-Markov process.
+    gyro_rate_random_walk : float, rad/s/sqrt(s)
+        Slow change of the bias without bound, from zero at switch-on.
     gyro_scale_factor, gyro_misalignment : float, 1 and rad
+    gyro_scale_factor_asymmetry : float, 1
+        Half the difference of the scale factors for positive and negative rates.
+    gyro_g_sensitivity : float, rad/s/(m/s^2)
+        Of each gyro to the specific force along each axis.
+    gyro_bias_temperature, gyro_scale_factor_temperature : float, rad/s/K and 1/K
+    gyro_bandwidth : float, Hz
+        At which the response falls by 3 dB; infinite where not given.
+    gyro_filter_order : {1, 2}
+        Of the low pass: one pole, or Butterworth's two.
+    gyro_latency : float, s
+        By which the output is late.
     gyro_quantisation : float, rad
         Size of one step of the output increment.
     gyro_range : float, rad/s
         Beyond it the output saturates; infinite where not given.
-    accel_bias, accel_random_walk, accel_bias_instability : float, m/s^2, m/s/sqrt(s), m/s^2
-    accel_scale_factor, accel_misalignment : float, 1 and rad
-    accel_quantisation : float, m/s
-    accel_range : float, m/s^2
+    accel_...
+        The same of the accelerometers, m/s^2 for rad/s; they have no g-sensitivity.
+    accel_positions : three (3,) tuples or None, m
+        Where each accelerometer sits from the centre of the IMU (size effect).
+    temperature_start : float, K
+        At switch-on, above the temperature of calibration.
+    temperature_rate : float, K/s
+        To begin with.
+    temperature_time_constant : float, s
+        In which the rate dies away; infinite: it stays.
     correlation_time : float, s
         Of the bias instabilities.
     name : str
     """
 
     gyro_bias: float = 0.0
+    gyro_turn_on_bias: float = 0.0
     gyro_random_walk: float = 0.0
+    gyro_sample_noise: float = 0.0
     gyro_bias_instability: float = 0.0
+    gyro_rate_random_walk: float = 0.0
     gyro_scale_factor: float = 0.0
+    gyro_scale_factor_asymmetry: float = 0.0
     gyro_misalignment: float = 0.0
+    gyro_g_sensitivity: float = 0.0
+    gyro_bias_temperature: float = 0.0
+    gyro_scale_factor_temperature: float = 0.0
+    gyro_bandwidth: float = math.inf
+    gyro_filter_order: int = 1
+    gyro_latency: float = 0.0
     gyro_quantisation: float = 0.0
-    gyro_range: float = float("inf")
+    gyro_range: float = math.inf
     accel_bias: float = 0.0
+    accel_turn_on_bias: float = 0.0
     accel_random_walk: float = 0.0
+    accel_sample_noise: float = 0.0
     accel_bias_instability: float = 0.0
+    accel_rate_random_walk: float = 0.0
     accel_scale_factor: float = 0.0
+    accel_scale_factor_asymmetry: float = 0.0
     accel_misalignment: float = 0.0
+    accel_bias_temperature: float = 0.0
+    accel_scale_factor_temperature: float = 0.0
+    accel_bandwidth: float = math.inf
+    accel_filter_order: int = 1
+    accel_latency: float = 0.0
     accel_quantisation: float = 0.0
-    accel_range: float = float("inf")
+    accel_range: float = math.inf
+    accel_positions: Places | None = None
+    temperature_start: float = 0.0
+    temperature_rate: float = 0.0
+    temperature_time_constant: float = math.inf
     correlation_time: float = 300.0
     name: str = "custom"
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name == "name":
-                continue
-            positive = item.name in ("gyro_range", "accel_range", "correlation_time")
-            if not (value > 0.0 if positive else 0.0 <= value < float("inf")):
-                wanted = "a positive value" if positive else "zero or more, and finite"
-                raise UsageError(f"IMU specification {self.name!r}: {item.name} is {value}; expected {wanted}")
+        where = f"IMU specification {self.name!r}"
+        for (group, key), entry in ENTRIES.items():
+            name = _field(group, key)
+            value = getattr(self, name)
+            if not entry.allows(value):
+                raise UsageError(f"{where}: {name} is {value}; expected {WANTED[entry.least]}")
+        for name in ("gyro_filter_order", "accel_filter_order"):
+            if getattr(self, name) not in (1, 2):
+                raise UsageError(f"{where}: {name} is {getattr(self, name)}; expected 1 or 2")
+        if self.accel_positions is not None:
+            places = [tuple(place) for place in self.accel_positions]
+            if [len(place) for place in places] != [3, 3, 3] or not all(math.isfinite(x) for p in places for x in p):
+                raise UsageError(
+                    f"{where}: accel_positions is {self.accel_positions}; expected three places of three lengths"
+                )
+            object.__setattr__(self, "accel_positions", tuple(places))
+
+    def with_random_walks(self, interval: float) -> ImuSpec:
+        """What a filter sees of the noise of samples: random walks that hold it, at a sampling interval (s)."""
+        root = math.sqrt(interval)
+        return replace(
+            self,
+            gyro_random_walk=math.hypot(self.gyro_random_walk, self.gyro_sample_noise * root),
+            accel_random_walk=math.hypot(self.accel_random_walk, self.accel_sample_noise * root),
+            gyro_sample_noise=0.0,
+            accel_sample_noise=0.0,
+        )
 
     def to_mapping(self) -> dict[str, Any]:
-        """The specification as it stands in a file; only what differs from zero or infinity."""
+        """The specification as it stands in a file; only what differs from a perfect IMU."""
         result: dict[str, Any] = {"name": self.name}
+        for (group, key), entry in ENTRIES.items():
+            value = getattr(self, _field(group, key))
+            if value in (0.0, math.inf):
+                continue
+            text = format_quantity(value, entry.unit, digits=None)
+            if group:
+                result.setdefault(group, {})[key] = text
+            else:
+                result[key] = text
         for group in ("gyro", "accel"):
-            values = {
-                key: format_quantity(getattr(self, f"{group}_{key}"), unit, digits=None)
-                for key, (_, unit) in KEYS[group].items()
-                if getattr(self, f"{group}_{key}") not in (0.0, float("inf"))
-            }
-            if values:
-                result[group] = values
-        if self.correlation_time < float("inf"):
-            result["correlation_time"] = format_quantity(self.correlation_time, "s", digits=None)
+            if getattr(self, f"{group}_filter_order") != 1:
+                result.setdefault(group, {})["filter_order"] = getattr(self, f"{group}_filter_order")
+        if self.accel_positions is not None:
+            places = [[format_quantity(x, "m", digits=None) for x in place] for place in self.accel_positions]
+            result.setdefault("accel", {})["positions"] = places
         return result
 
     def to_yaml(self, path: str | PathLike[str]) -> None:
@@ -104,27 +181,75 @@ class ImuSpec:
             temporary.write_text(yaml.safe_dump(self.to_mapping(), sort_keys=False, allow_unicode=True), "utf-8")
 
 
-# Keys of a file with their dimension and the unit they are written in.
-KEYS: dict[str, dict[str, tuple[str, str]]] = {
+@dataclass(frozen=True)
+class Entry:
+    """A key of a file: its dimension, the unit it is written in, and the least it may be."""
+
+    dimension: str
+    unit: str
+    least: Literal["zero", "above zero", "finite"] = "zero"
+
+    def allows(self, value: float) -> bool:
+        """Whether a value in SI makes sense."""
+        if self.least == "above zero":
+            return value > 0.0
+        return math.isfinite(value) and (value >= 0.0 or self.least == "finite")
+
+
+WANTED = {"zero": "zero or more, and finite", "above zero": "a positive value", "finite": "a finite number"}
+
+# Keys of a file by group.
+KEYS: dict[str, dict[str, Entry]] = {
     "gyro": {
-        "bias": ("angular_rate", "deg/h"),
-        "random_walk": ("angle_random_walk", "deg/sqrt(h)"),
-        "bias_instability": ("angular_rate", "deg/h"),
-        "scale_factor": ("ratio", "ppm"),
-        "misalignment": ("angle", "arcsec"),
-        "quantisation": ("angle", "arcsec"),
-        "range": ("angular_rate", "deg/s"),
+        "bias": Entry("angular_rate", "deg/h"),
+        "turn_on_bias": Entry("angular_rate", "deg/h"),
+        "random_walk": Entry("angle_random_walk", "deg/sqrt(h)"),
+        "sample_noise": Entry("angular_rate", "deg/h"),
+        "bias_instability": Entry("angular_rate", "deg/h"),
+        "rate_random_walk": Entry("rate_random_walk", "deg/h/sqrt(h)"),
+        "scale_factor": Entry("ratio", "ppm"),
+        "scale_factor_asymmetry": Entry("ratio", "ppm"),
+        "misalignment": Entry("angle", "arcsec"),
+        "g_sensitivity": Entry("rate_per_acceleration", "deg/h/g"),
+        "bias_temperature": Entry("rate_per_temperature", "deg/h/K"),
+        "scale_factor_temperature": Entry("ratio_per_temperature", "ppm/K"),
+        "bandwidth": Entry("frequency", "Hz", "above zero"),
+        "latency": Entry("time", "ms"),
+        "quantisation": Entry("angle", "arcsec"),
+        "range": Entry("angular_rate", "deg/s", "above zero"),
     },
     "accel": {
-        "bias": ("acceleration", "ug"),
-        "random_walk": ("velocity_random_walk", "ug/sqrt(Hz)"),
-        "bias_instability": ("acceleration", "ug"),
-        "scale_factor": ("ratio", "ppm"),
-        "misalignment": ("angle", "arcsec"),
-        "quantisation": ("speed", "m/s"),
-        "range": ("acceleration", "g"),
+        "bias": Entry("acceleration", "ug"),
+        "turn_on_bias": Entry("acceleration", "ug"),
+        "random_walk": Entry("velocity_random_walk", "ug/sqrt(Hz)"),
+        "sample_noise": Entry("acceleration", "ug"),
+        "bias_instability": Entry("acceleration", "ug"),
+        "rate_random_walk": Entry("acceleration_random_walk", "ug/sqrt(h)"),
+        "scale_factor": Entry("ratio", "ppm"),
+        "scale_factor_asymmetry": Entry("ratio", "ppm"),
+        "misalignment": Entry("angle", "arcsec"),
+        "bias_temperature": Entry("acceleration_per_temperature", "ug/K"),
+        "scale_factor_temperature": Entry("ratio_per_temperature", "ppm/K"),
+        "bandwidth": Entry("frequency", "Hz", "above zero"),
+        "latency": Entry("time", "ms"),
+        "quantisation": Entry("speed", "m/s"),
+        "range": Entry("acceleration", "g", "above zero"),
+    },
+    "temperature": {
+        "start": Entry("temperature", "K", "finite"),
+        "rate": Entry("temperature_rate", "K/min", "finite"),
+        "time_constant": Entry("time", "min", "above zero"),
     },
 }
+PLAIN = {"gyro": ("filter_order",), "accel": ("filter_order", "positions"), "temperature": ()}  # keys of other kinds
+CORRELATION_TIME = Entry("time", "s", "above zero")
+ENTRIES = {(group, key): entry for group, keys in KEYS.items() for key, entry in keys.items()}
+ENTRIES["", "correlation_time"] = CORRELATION_TIME
+
+
+def _field(group: str, key: str) -> str:
+    return f"{group}_{key}" if group else key
+
 
 PRESETS: dict[str, dict[str, Any]] = {
     "navigation": {
@@ -229,24 +354,53 @@ def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
         if group == "name":
             continue
         if group == "correlation_time":
-            values[group] = _sigma(entries, "time", f"{where}: {group}")
+            values[group] = _value(entries, CORRELATION_TIME, f"{where}: {group}")
             continue
         if group not in KEYS:
             raise DataError(unknown_key(where, str(group), [*KEYS, "name", "correlation_time"]))
         if not isinstance(entries, Mapping):
-            raise DataError(f"{where}: {group}: expected keys such as bias and random_walk, found {entries!r}")
+            raise DataError(
+                f"{where}: {group}: expected keys such as {', '.join([*KEYS[group]][:3])}, found {entries!r}"
+            )
         for key, text in entries.items():
-            if key not in KEYS[group]:
-                raise DataError(unknown_key(where, f"{group}.{key}", [f"{group}.{k}" for k in KEYS[group]]))
-            values[f"{group}_{key}"] = _sigma(text, KEYS[group][key][0], f"{where}: {group}.{key}")
-    try:
-        return ImuSpec(**values)
-    except UsageError as error:
-        raise DataError(f"{where}: {error}") from None
+            path = f"{group}.{key}"
+            if key in KEYS[group]:
+                values[f"{group}_{key}"] = _value(text, KEYS[group][key], f"{where}: {path}")
+            elif key not in PLAIN[group]:
+                raise DataError(unknown_key(where, path, [f"{group}.{k}" for k in (*KEYS[group], *PLAIN[group])]))
+            elif key == "positions":
+                values["accel_positions"] = _places(text, f"{where}: {path}")
+            else:
+                values[f"{group}_{key}"] = _order(text, f"{where}: {path}")
+    return ImuSpec(**values)
 
 
-def _sigma(text: Any, dimension: str, where: str) -> float:
-    value = quantity(text, dimension, where)
-    if value < 0.0:
-        raise DataError(f"{where}: {text!r} is negative; expected a one-sigma value, zero or more")
+def _value(text: Any, entry: Entry, where: str) -> float:
+    value = quantity(text, entry.dimension, where)
+    if not entry.allows(value):
+        if entry.least == "zero":
+            raise DataError(f"{where}: {text!r} is negative; expected a one-sigma value, zero or more")
+        raise DataError(f"{where}: {text!r}; expected {WANTED[entry.least]}")
     return value
+
+
+def _order(value: Any, where: str) -> int:
+    if type(value) is not int or value not in (1, 2):
+        raise DataError(f"{where}: {value!r}; expected 1 (one pole) or 2 (Butterworth)")
+    return value
+
+
+def _places(rows: Any, where: str) -> Any:
+    """Three places of three lengths; the message names the row and column."""
+    wanted = (
+        "expected three places, of the x, y and z accelerometer, each [right, forward, up] such as [3 cm, 0 m, 0 m]"
+    )
+    if not isinstance(rows, list | tuple) or len(rows) != 3:
+        raise DataError(f"{where}: {rows!r}; {wanted}")
+    for i, row in enumerate(rows, 1):
+        if not isinstance(row, list | tuple) or len(row) != 3:
+            raise DataError(f"{where}[{i}]: {row!r}; {wanted}")
+    return tuple(
+        tuple(quantity(x, "length", f"{where}[{i}][{j}]") for j, x in enumerate(row, 1))
+        for i, row in enumerate(rows, 1)
+    )

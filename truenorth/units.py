@@ -125,6 +125,8 @@ DIMENSIONS: dict[str, tuple[Dimension, str]] = {
     "acceleration_density": (_dimension(0, 2, -3), "0.01 g^2/Hz"),
     "rate_per_acceleration": (_dimension(1, -1, 1), "1 deg/h/g"),
     "rate_per_temperature": (_dimension(1, time=-1, temperature=-1), "0.1 deg/h/degC"),
+    "ratio_per_temperature": (_dimension(temperature=-1), "5 ppm/degC"),
+    "temperature_rate": (_dimension(time=-1, temperature=1), "1 degC/min"),
     "acceleration_per_temperature": (_dimension(0, 1, -2, -1), "10 ug/degC"),
 }
 

@@ -118,23 +118,6 @@ def test_same_seed_same_bits_and_runs_do_not_know_each_other():
     assert not np.array_equal(alone.gyro, other.gyro)
 
 
-@pytest.mark.parametrize("term", ["bias", "random_walk", "bias_instability", "scale_factor", "misalignment"])
-def test_switching_a_term_off_leaves_the_others_draws(term):
-    """The difference with and without a term is that term alone, on a base of zeros and unit force."""
-    from dataclasses import replace
-
-    spec = imu_spec("tactical")
-    without = replace(spec, **{f"gyro_{term}": 0.0, f"accel_{term}": 0.0})
-    alone = ImuSpec(
-        **{f"{g}_{term}": getattr(spec, f"{g}_{term}") for g in ("gyro", "accel")},
-        correlation_time=spec.correlation_time,
-    )
-    ideal = np.full((50, 3), 0.01)
-    whole, rest_of_it, term_alone = (apply_errors(ideal, ideal, 0.01, s, seed=9)[:2] for s in (spec, without, alone))
-    for a, b, c in zip(whole, rest_of_it, term_alone, strict=True):
-        np.testing.assert_allclose(a - b, c - ideal, atol=1e-14)
-
-
 def test_quantisation_carries_its_residue():
     spec = ImuSpec(gyro_quantisation=1e-4, accel_quantisation=1e-3, name="counts")
     ideal = ideal_log(SHIP, rate=100.0, duration=50.0)

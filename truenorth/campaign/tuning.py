@@ -117,7 +117,7 @@ def read_search(source: str | PathLike[str] | Mapping[str, Any]) -> Search:
     """
     where, content = ("search", source) if isinstance(source, Mapping) else (str(source), read_mapping(source))
     search = validated(Search, dict(content), where)
-    known = {f"{group}.{key}": dimension for group, keys in KEYS.items() for key, (dimension, _) in keys.items()}
+    known = {f"{group}.{key}": entry.dimension for group, keys in KEYS.items() for key, entry in keys.items()}
     for term, limits in search.search.items():
         if term not in known:
             raise DataError(unknown_key(f"{where}: search", term, known))
@@ -201,7 +201,7 @@ class _Bench:
         case = self._plan("simulated", search.seed).cases[0]
         self.own = case.built.imu_spec
         self.limits = {
-            term: tuple(parse(text, KEYS[term.split(".")[0]][term.split(".")[1]][0]) for text in limits)
+            term: tuple(parse(text, KEYS[term.split(".")[0]][term.split(".")[1]].dimension) for text in limits)
             for term, limits in search.search.items()
         }
         self.usual = {term: float(getattr(self.own, term.replace(".", "_"))) for term in self.limits}
@@ -227,7 +227,7 @@ class _Bench:
         mapping = copy.deepcopy(self._base)
         for term, value in values.items():
             group, key = term.split(".")
-            mapping.setdefault(group, {})[key] = format_quantity(value, KEYS[group][key][1], digits=4)
+            mapping.setdefault(group, {})[key] = format_quantity(value, KEYS[group][key].unit, digits=4)
         return imu_spec(mapping | {"name": "tuned"})
 
     def judge(self, spec: ImuSpec, seed: int) -> dict[str, Any]:

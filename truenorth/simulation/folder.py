@@ -115,7 +115,7 @@ def _facts(scenario: Scenario, simulation: Simulation, seed: int, run: int) -> d
         "rate_hz": scenario.rate,
         "kind": simulation.record.kind,
         "imu": scenario.imu_spec.name,
-        "true_errors": {name: np.asarray(value).tolist() for name, value in vars(errors).items() if value is not None},
+        "true_errors": {name: value.tolist() for name, value in errors.constants().items()},
         "true_errors_unit": "SI: rad/s, m/s^2",
         "truenorth": __version__,
         "numpy": np.__version__,

@@ -1,42 +1,49 @@
 """Errors of an IMU on ideal increments, term by term from its specification.
 
-Each term draws from a stream of its own, ``SeedSequence(seed, spawn_key=(scenario, run, stream))``: switching one off
-leaves the others' draws as they were, and a run does not depend on how many there are.
+With x the true rate (specific force) as a mean over a sampling interval T, and dT the temperature above that of
+calibration, the terms act in this order:
+
+    s   = (I + S + M + c_S dT) x + A |x| + G f     scale factor, misalignment, asymmetry, g-sensitivity (gyros)
+    d   = low pass and delay of s                  bandwidth, latency
+    y   = d + b + b_on + c_b dT + b_GM + b_RRW     constant and turn-on bias, temperature, instability, rate random walk
+            + (N/sqrt(T) + n) e                    random walk and sample noise, e white with variance 1
+    out = quantised(saturated(y))                  range; whole steps, the residue carried on
+
+The size effect comes before: it is in what each accelerometer senses. Noise and biases are those of the output, as on a
+datasheet: the low pass does not touch them. The temperature is ``start + rate tau (1 - exp(-t/tau))`` from the beginning
+of the log, taken at the middle of each interval. The range limits the mean over an interval.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from truenorth.compiled import compiled
+from truenorth.simulation.drift import gauss_markov, random_walk
+from truenorth.simulation.response import respond
 from truenorth.simulation.streams import STREAMS, stream
+from truenorth.simulation.true_errors import SensorErrors, TrueErrors, drawn_errors
 from truenorth.specs import ImuSpec
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class TrueErrors:
-    """The errors that were really drawn.
-
-    Attributes
-    ----------
-    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
-        Constant part, measured minus true.
-    gyro_matrix, accel_matrix : (3, 3) arrays
-        Scale factors and misalignments, ``measured = (I + matrix) true``.
-    """
-
-    gyro_bias: Array
-    accel_bias: Array
-    gyro_matrix: Array
-    accel_matrix: Array
-
-
 def apply_errors(
-    dtheta: Array, dvel: Array, interval: float, spec: ImuSpec, *, seed: int, run: int = 0, scenario: int = 0
+    dtheta: Array,
+    dvel: Array,
+    interval: float,
+    spec: ImuSpec,
+    *,
+    seed: int,
+    run: int = 0,
+    scenario: int = 0,
+    given: Mapping[str, ArrayLike] | None = None,
 ) -> tuple[Array, Array, TrueErrors]:
     """Ideal increments as the IMU of a specification would give them.
 
@@ -47,64 +54,110 @@ def apply_errors(
     spec : ImuSpec
         Terms that are zero are left out.
     seed, run, scenario : int
+    given : mapping, optional
+        See :func:`truenorth.simulation.true_errors.drawn_errors`.
 
     Returns
     -------
     dtheta, dvel : (N, 3) arrays
     errors : TrueErrors
     """
-    measured, biases, matrices = [], [], []
+    errors = drawn_errors(spec, seed=seed, run=run, scenario=scenario, given=given)
+    dT = temperature(spec, interval, len(dtheta))
+    results = []
     for group, ideal in (("gyro", dtheta), ("accel", dvel)):
 
         def draw(term: str, group: str = group) -> np.random.Generator:
             return stream(seed, scenario, run, STREAMS[f"{group}_{term}"])
 
-        def sigma(term: str, group: str = group) -> float:
+        def value(term: str, group: str = group) -> float:
             return float(getattr(spec, f"{group}_{term}"))
 
-        matrix = np.zeros((3, 3))
-        if sigma("scale_factor") > 0:
-            matrix += np.diag(sigma("scale_factor") * draw("scale_factor").standard_normal(3))
-        if sigma("misalignment") > 0:
-            off = sigma("misalignment") * draw("misalignment").standard_normal((3, 3))
-            matrix += off - np.diag(np.diag(off))
-        bias = sigma("bias") * draw("bias").standard_normal(3)
-        out = ideal + ideal @ matrix.T if matrix.any() else ideal.copy()
-        out += bias * interval
-        if sigma("random_walk") > 0:
-            out += sigma("random_walk") * np.sqrt(interval) * draw("random_walk").standard_normal(out.shape)
-        if sigma("bias_instability") > 0:
-            drift = _gauss_markov(
-                sigma("bias_instability"), spec.correlation_time, interval, len(out), draw("bias_instability")
-            )
-            out += drift * interval
-        full_scale = sigma("range") * interval
-        if np.isfinite(full_scale):
-            np.clip(out, -full_scale, full_scale, out=out)
-        if sigma("quantisation") > 0:
-            out = _quantised(out, sigma("quantisation"))
-        measured.append(out)
-        biases.append(bias)
-        matrices.append(matrix)
-    return measured[0], measured[1], TrueErrors(biases[0], biases[1], matrices[0], matrices[1])
+        own: SensorErrors = getattr(errors, group)
+        out = np.empty_like(ideal)
+        _sense(
+            *(np.ascontiguousarray(x) for x in (ideal, dvel, dT, own.matrix, own.g_sensitivity)),
+            own.scale_factor_temperature,
+            own.scale_factor_asymmetry,
+            out,
+        )
+        order = int(value("filter_order"))
+        out = respond(out, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
+        out += own.constant_bias * interval
+        drift = _drift(own, dT, interval, value, draw, spec.correlation_time)
+        if drift is not None:
+            out += drift
+            drift /= interval
+        for term, size in (("random_walk", math.sqrt(interval)), ("sample_noise", interval)):
+            if value(term) > 0.0:
+                noise = draw(term).standard_normal(out.shape)
+                noise *= value(term) * size
+                out += noise
+        full_scale, step = value("range") * interval, value("quantisation")
+        if step > 0.0 or math.isfinite(full_scale):
+            _put_out(out, full_scale, step)
+        results.append((out, replace(own, drift=drift)))
+    (gyro, gyro_errors), (accel, accel_errors) = results
+    return gyro, accel, TrueErrors(gyro_errors, accel_errors)
+
+
+def temperature(spec: ImuSpec, interval: float, count: int) -> Array:
+    """(N,) temperature above that of calibration in the middle of each interval, K."""
+    t = interval * (np.arange(count) + 0.5)
+    tau = spec.temperature_time_constant
+    since = t if math.isinf(tau) else -tau * np.expm1(-t / tau)
+    return np.asarray(spec.temperature_start + spec.temperature_rate * since)
+
+
+def size_effect(leverage: Array, spec: ImuSpec) -> Array:
+    """What accelerometers sense beside one in the centre, each by its own place, (N, 3) of the leverage (N, 3, 3)."""
+    return np.einsum("kij,ij->ki", leverage, np.asarray(spec.accel_positions))
 
 
 def without_bias(spec: ImuSpec) -> ImuSpec:
     """The same IMU calibrated perfectly: noise alone."""
-    return replace(spec, gyro_bias=0.0, accel_bias=0.0, name=f"{spec.name}, no bias")
+    none = {f"{group}_{term}": 0.0 for group in ("gyro", "accel") for term in ("bias", "turn_on_bias")}
+    return replace(spec, name=f"{spec.name}, no bias", **none)  # type: ignore[arg-type]
 
 
-def _gauss_markov(sigma: float, tau: float, interval: float, count: int, rng: np.random.Generator) -> Array:
-    """First-order Gauss-Markov process of three axes, stationary from the first sample, (N, 3)."""
-    from scipy.signal import lfilter
+def _drift(own: SensorErrors, dT: Array, interval: float, value: Any, draw: Any, tau: float) -> Array | None:
+    """Integrals over each interval of what wanders, (N, 3)."""
+    parts = []
+    if own.bias_temperature.any() and dT.any():
+        parts.append(np.multiply.outer(dT * interval, own.bias_temperature))
+    if value("bias_instability") > 0.0:
+        parts.append(gauss_markov(value("bias_instability"), tau, interval, len(dT), draw("bias_instability")))
+    if value("rate_random_walk") > 0.0:
+        parts.append(random_walk(value("rate_random_walk"), interval, len(dT), draw("rate_random_walk")))
+    if not parts:
+        return None
+    total = parts[0]
+    for part in parts[1:]:
+        total += part
+    return total
 
-    decay = np.exp(-interval / tau)
-    noise = sigma * np.sqrt(1 - decay**2) * rng.standard_normal((count, 3))
-    noise[0] = sigma * rng.standard_normal(3)
-    return lfilter([1.0], [1.0, -decay], noise, axis=0)
+
+@compiled
+def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, asymmetry: Any, out: Any) -> None:
+    """``(I + matrix + c dT) x + A |x| + G f``; everything as increments."""
+    for k in range(len(x)):
+        for i in range(3):
+            total = (1.0 + by_temperature[i] * dT[k]) * x[k, i] + asymmetry[i] * abs(x[k, i])
+            for j in range(3):
+                total += matrix[i, j] * x[k, j] + G[i, j] * f[k, j]
+            out[k, i] = total
 
 
-def _quantised(increments: Array, quantum: float) -> Array:
-    """Whole quanta of the running sum: what a counter gives, the residue carried on to the next sample."""
-    counts = np.floor(np.cumsum(increments, axis=0) / quantum)
-    return np.diff(counts, axis=0, prepend=np.zeros((1, 3))) * quantum
+@compiled
+def _put_out(out: Any, full_scale: float, step: float) -> None:
+    """Limited to the full scale; then whole steps of the running sum: what a counter gives."""
+    for i in range(3):
+        total, counted = 0.0, 0.0
+        for k in range(len(out)):
+            y = min(max(out[k, i], -full_scale), full_scale)
+            if step > 0.0:
+                total += y
+                count = np.floor(total / step)
+                y = (count - counted) * step
+                counted = count
+            out[k, i] = y

@@ -1,15 +1,23 @@
-"""One simulated log beside its truth."""
+"""Simulated logs beside their truth: one, or many that share a motion."""
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
+from numpy.typing import ArrayLike
+
+from truenorth.errors import UsageError
 from truenorth.records import ImuRecord
 from truenorth.simulation.ideal import IdealLog, ideal_log
-from truenorth.simulation.imu_errors import TrueErrors, apply_errors
+from truenorth.simulation.imu_errors import apply_errors, size_effect
 from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.sensing import Moving
+from truenorth.simulation.true_errors import TrueErrors
 from truenorth.specs import ImuSpec
 
 
@@ -46,6 +54,7 @@ def simulate(
     run: int = 0,
     scenario: int = 0,
     kind: Literal["increments", "rates"] = "increments",
+    errors: Mapping[str, ArrayLike] | None = None,
 ) -> Simulation:
     """Simulate the log of an IMU.
 
@@ -62,17 +71,89 @@ def simulate(
         The same three give the same bits.
     kind : {"increments", "rates"}
         Rates are instantaneous, the errors those of the increments divided by the interval.
+    errors : mapping, optional
+        Constant errors in SI that are given, not drawn, by name: ``{"gyro_bias": (1e-7, -1e-7, 2e-7)}``; from datasheet
+        units by :func:`truenorth.simulation.given_errors`.
 
     Returns
     -------
     Simulation
+
+    Raises
+    ------
+    UsageError
+        A rate, a duration or a given error that makes no sense.
     """
     ideal = motion if isinstance(motion, IdealLog) else ideal_log(motion, rate=rate, duration=duration, start=start)
-    interval, times = ideal.interval, ideal.edges[1:]
-    dtheta, dvel = ideal.dtheta, ideal.dvel
+    spec = imu or ImuSpec()
+    interval = ideal.interval
+    dtheta, dvel = (x * interval for x in ideal.rates) if kind == "rates" else (ideal.dtheta, ideal.dvel)
+    if spec.accel_positions is not None:
+        leverage = ideal.leverage_rates * interval if kind == "rates" else ideal.leverage
+        dvel = dvel + size_effect(leverage, spec)
+    dtheta, dvel, drawn = apply_errors(
+        dtheta, dvel, interval, spec, seed=seed, run=run, scenario=scenario, given=errors
+    )
     if kind == "rates":
-        dtheta, dvel = (x * interval for x in ideal.rates)
-    dtheta, dvel, errors = apply_errors(dtheta, dvel, interval, imu or ImuSpec(), seed=seed, run=run, scenario=scenario)
-    scale = interval if kind == "rates" else 1.0
-    record = ImuRecord(times, dtheta / scale, dvel / scale, kind, "simulation")
-    return Simulation(record, ideal.motion, errors)
+        dtheta, dvel = dtheta / interval, dvel / interval
+    record = ImuRecord(ideal.edges[1:], dtheta, dvel, kind, "simulation")
+    return Simulation(record, ideal.motion, drawn)
+
+
+def simulate_runs(
+    ideal: IdealLog,
+    imu: ImuSpec,
+    runs: int | Iterable[int],
+    *,
+    workers: int = 1,
+    seed: int = 0,
+    scenario: int = 0,
+    kind: Literal["increments", "rates"] = "increments",
+    errors: Mapping[str, ArrayLike] | None = None,
+) -> Iterator[Simulation]:
+    """Simulate many runs of one motion, in order, as they are asked for.
+
+    At most ``workers + 1`` logs wait to be taken. The bits do not depend on the workers.
+
+    Parameters
+    ----------
+    ideal : IdealLog
+    imu : ImuSpec
+    runs : int or iterable of int
+        How many, or which.
+    workers : int
+        Threads.
+    seed, scenario, kind, errors
+        As in :func:`simulate`.
+
+    Yields
+    ------
+    Simulation
+
+    Raises
+    ------
+    UsageError
+        Fewer than one worker.
+    """
+    if workers < 1:
+        raise UsageError(f"workers={workers}; expected 1 or more")
+    one = partial(simulate, ideal, imu=imu, seed=seed, scenario=scenario, kind=kind, errors=errors)
+    numbers = range(runs) if isinstance(runs, int) else runs
+    if workers == 1:
+        for run in numbers:
+            yield one(run=run)
+        return
+    if imu.accel_positions is not None:
+        _ = ideal.leverage_rates if kind == "rates" else ideal.leverage  # made once, before the threads ask for it
+    waiting: deque[Future[Simulation]] = deque()
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for run in numbers:
+                waiting.append(pool.submit(one, run=run))
+                if len(waiting) > workers:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
