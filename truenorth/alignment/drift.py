@@ -76,7 +76,7 @@ def detect_drift(fine: FineAlignment) -> Drift:
                 columns.append(z)
     signature = np.stack(columns, axis=-1)  # (K, 3, 12)
 
-    gain, step = fine.gains
+    gain, _, step = fine.gains
     H_Phi = fine.system.H @ fine.system.Phi
     expected = np.empty_like(signature)
     x = np.zeros((step.shape[1], signature.shape[2]))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truenorth.attitude import dcm_from_rotation_vector
 from truenorth.filters import Estimates, LinearSystem, kalman
+from truenorth.filters.gains import Gains, filter_gains, initial_part
 from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
 from truenorth.position import Position
@@ -48,8 +49,8 @@ class FineAlignment:
     system : LinearSystem
     estimates : Estimates
         With the whole history of x and P.
-    gains : tuple of (K, 12, 3) and (K, 12, 12) arrays
-        Of :func:`filter_gains`.
+    gains : Gains
+        That the filter used.
     floor : (K, 12, 12) array
         The part of the covariance that the biases alone make, ``P = floor + random``: what waiting does not improve.
     disturbance : (3,) array, m/s
@@ -64,7 +65,7 @@ class FineAlignment:
     nominal_bias: Array
     system: LinearSystem
     estimates: Estimates
-    gains: tuple[Array, Array]
+    gains: Gains
     floor: Array
     disturbance: Array
     passes: int
@@ -184,6 +185,8 @@ def fine_align(
         integrals = integrate(record, interval, bias[:3], bias[3:], rows)
 
     gains = filter_gains(system, estimates)
+    P0_bias = np.zeros((STATES, STATES))
+    P0_bias[6:, 6:] = P_bias
     return FineAlignment(
         integrals=integrals,
         C_n0_i=C_n0_i,
@@ -191,34 +194,11 @@ def fine_align(
         system=system,
         estimates=estimates,
         gains=gains,
-        floor=bias_part(gains[1], P_bias),
+        floor=initial_part(gains.step, P0_bias),
         disturbance=np.sqrt(R),
         passes=passes,
         settled=moved < ROUGHLY,
     )
-
-
-def filter_gains(system: LinearSystem, estimates: Estimates) -> tuple[Array, Array]:
-    """Gains ``K_k`` (K, 12, 3) of a filter run, and how its errors go on, ``(I - K_k H_k) Phi_k`` (K, 12, 12)."""
-    Phi, H, P = system.Phi, system.H, estimates.P
-    before = np.concatenate([system.P0[None], P[:-1]])
-    P_predicted = Phi @ before @ np.swapaxes(Phi, 1, 2) + system.Q
-    cross = P_predicted @ np.swapaxes(H, 1, 2) + system.S
-    gain = cross @ np.linalg.inv(estimates.innovation_covariance)
-    return gain, Phi - gain @ (H @ Phi)
-
-
-def bias_part(step: Array, P_bias: Array) -> Array:
-    """The biases' share of each covariance, (K, 12, 12): the initial bias errors carried through the filter's gains.
-
-    Errors obey ``e_k = (I - K_k H_k) Phi_k e_{k-1}`` + noise; what is not the biases' is noise and the forgotten start.
-    """
-    response = np.empty((len(step), STATES, 6))
-    e = np.eye(STATES)[:, 6:]
-    for k, step_k in enumerate(step):
-        e = step_k @ e
-        response[k] = e
-    return response @ P_bias @ np.swapaxes(response, 1, 2)
 
 
 def _with_base_variance(system: LinearSystem, R: Array) -> tuple[LinearSystem, Estimates, Array]:
