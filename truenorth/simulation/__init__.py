@@ -2,26 +2,45 @@
 
 from __future__ import annotations
 
+from truenorth.simulation.aiding import Aided
+from truenorth.simulation.flexure import Flexed, FlexureSpec
+from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
 from truenorth.simulation.ideal import IdealLog, ideal_log
+from truenorth.simulation.master import MasterSpec, simulate_master
 from truenorth.simulation.motion import Motion, MotionStates
+from truenorth.simulation.odometer import OdometerSpec, simulate_odometer
 from truenorth.simulation.runs import Simulation, simulate, simulate_runs
 from truenorth.simulation.sway import Disturbed, Sway, rest
 from truenorth.simulation.tones import Tone
 from truenorth.simulation.true_errors import SensorErrors, TrueErrors, given_errors
+from truenorth.simulation.velocity_log import VelocityLogSpec, simulate_velocity
 
 __all__ = [
+    "Aided",
     "Disturbed",
+    "Flexed",
+    "FlexureSpec",
+    "GnssSpec",
+    "HeightSpec",
     "IdealLog",
+    "MasterSpec",
     "Motion",
     "MotionStates",
+    "OdometerSpec",
     "SensorErrors",
     "Simulation",
     "Sway",
     "Tone",
     "TrueErrors",
+    "VelocityLogSpec",
     "given_errors",
     "ideal_log",
     "rest",
     "simulate",
+    "simulate_gnss",
+    "simulate_height",
+    "simulate_master",
+    "simulate_odometer",
     "simulate_runs",
+    "simulate_velocity",
 ]

@@ -11,14 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from truenorth import __version__, write_imu
+from truenorth import __version__, write_imu, write_record
 from truenorth.atomic import atomic_path, writable_folder
-from truenorth.attitude import euler_from_dcm
-from truenorth.simulation.motion import MotionStates
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from truenorth.simulation.runs import Simulation
     from truenorth.simulation.scenario import Scenario
 
@@ -66,7 +62,7 @@ def save_run(
     with ExitStack() as files:
         imu, truth, resolved, summary = (files.enter_context(atomic_path(path)) for path in paths)
         write_imu(simulation.record, imu)
-        _write_table(truth_frame(simulation.truth), truth)
+        write_record(simulation.truth.trajectory(), truth)
         text = yaml.safe_dump(scenario.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
         resolved.write_text(text, encoding="utf-8")
         facts = json.dumps(_facts(scenario, simulation, seed, run), indent=2, allow_nan=False)
@@ -78,30 +74,6 @@ def save_run(
             title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
             plot_simulation(simulation, title).savefig(files.enter_context(atomic_path(paths[-1])))
     return paths
-
-
-def truth_frame(states: MotionStates) -> pd.DataFrame:
-    """True motion as a table with the documented columns, angles in degrees, index ``time``."""
-    import pandas as pd
-
-    heading, pitch, roll = (np.degrees(x) for x in euler_from_dcm(states.C_nb))
-    columns = {
-        "lat": np.degrees(states.lat),
-        "lon": np.degrees(states.lon),
-        "alt": states.alt,
-        **{f"V{axis}": states.v_n[:, i] for i, axis in enumerate("ENU")},
-        "roll": roll,
-        "pitch": pitch,
-        "heading": np.mod(heading, 360.0),
-    }
-    return pd.DataFrame(columns, index=pd.Index(states.time, name="time"))
-
-
-def _write_table(table: pd.DataFrame, path: Path) -> None:
-    if path.suffix == ".parquet":
-        table.to_parquet(path)
-    else:
-        table.to_csv(path, float_format="%.17g")
 
 
 def _facts(scenario: Scenario, simulation: Simulation, seed: int, run: int) -> dict[str, Any]:

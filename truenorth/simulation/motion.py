@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.attitude import dcm_from_euler
 from truenorth.earth import earth_rate_n, gravity_n, radii, transport_rate_n
+from truenorth.records import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -43,6 +44,10 @@ class MotionStates:
     w_ib_b: Array
     f_b: Array
     dw_ib_b: Array
+
+    def trajectory(self) -> Trajectory:
+        """Attitude, velocity and position as a record; times (N,)."""
+        return Trajectory(self.time, self.C_nb, self.v_n, self.lat, self.lon, self.alt, "truth")
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,7 @@ class Motion(ABC):
         t = np.asarray(t, dtype=np.float64)
         k = self.kinematics(t)
         C_nb = dcm_from_euler(*k.angles)
-        w_nb, dw_nb = _body_rates(k.angles, k.rates, k.accelerations)
+        w_nb, dw_nb = body_rates(k.angles, k.rates, k.accelerations)
         arm, d_arm, dd_arm = self.arm(t)
         turning = np.cross(w_nb, arm) + d_arm
         centripetal = np.cross(dw_nb, arm) + np.cross(w_nb, turning + d_arm) + dd_arm
@@ -165,7 +170,7 @@ def displaced(path: Path, away: tuple[Array, Array, Array]) -> Path:
     )
 
 
-def _body_rates(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
+def body_rates(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
     """``w_nb_b`` and its derivative, (..., 3): ``C_nb = Rz(-h) Rx(p) Ry(r)`` differentiated once and twice."""
     _, p, r = angles
     dh, dp, dr = rates

@@ -38,7 +38,7 @@ class Moving(Protocol):
 
 def increments(moving: Moving, edges: Array) -> tuple[Array, Array]:
     """Integrals of rate and specific force between successive `edges` (N+1,), as (N, 3) rad and m/s."""
-    both = _integrals(moving, edges, lambda at: np.concatenate([at.w_ib_b, at.f_b], axis=-1), 6)
+    both = integrals(moving, edges, lambda at: np.concatenate([at.w_ib_b, at.f_b], axis=-1), 6)
     return np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:])
 
 
@@ -47,7 +47,7 @@ def leverage(moving: Moving, edges: Array) -> Array:
 
     Times a place r from the centre of the IMU it is what an accelerometer there senses beside one in the centre.
     """
-    return _integrals(moving, edges, lambda at: acceleration_gain(at).reshape(*at.time.shape, 9), 9).reshape(-1, 3, 3)
+    return integrals(moving, edges, lambda at: acceleration_gain(at).reshape(*at.time.shape, 9), 9).reshape(-1, 3, 3)
 
 
 def acceleration_gain(at: MotionStates) -> Array:
@@ -57,8 +57,8 @@ def acceleration_gain(at: MotionStates) -> Array:
     return skew(at.dw_ib_b) + w[..., :, None] * w[..., None, :] - square
 
 
-def _integrals(moving: Moving, edges: Array, rates: Callable[[MotionStates], Array], columns: int) -> Array:
-    """Of the (..., columns) values that `rates` takes from the states, between the edges."""
+def integrals(moving: Moving, edges: Array, rates: Callable[[MotionStates], Array], columns: int) -> Array:
+    """Integrals between successive `edges` (N+1,) of the (..., columns) values that `rates` takes from the states, (N, columns)."""
     corners = moving.breaks
     inside = corners[(corners > edges[0]) & (corners < edges[-1])]
     parts = math.ceil(8 * float(np.max(np.diff(edges))) / moving.shortest_period)

@@ -1,0 +1,531 @@
+"""Simulated aiding sensors: without errors the truth itself; each error is what was asked for, and can be taken off again."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.earth import ecef_axes, ecef_from_geodetic
+from truenorth.errors import DataError, UsageError
+from truenorth.position import Position
+from truenorth.simulation import (
+    Flexed,
+    FlexureSpec,
+    GnssSpec,
+    HeightSpec,
+    MasterSpec,
+    OdometerSpec,
+    Sway,
+    Tone,
+    VelocityLogSpec,
+    simulate,
+    simulate_gnss,
+    simulate_height,
+    simulate_master,
+    simulate_odometer,
+    simulate_velocity,
+)
+from truenorth.simulation.aiding import STREAMS, velocity_b
+from truenorth.simulation.course import Leg, course, with_lever_arm
+from truenorth.simulation.streams import STREAMS as IMU_STREAMS
+from truenorth.strapdown import NavigationState, mechanise
+
+PLACE = Position.from_degrees(48.0, 11.0, 500.0)
+ARM = (0.4, -1.3, -0.6)
+DRIVE = course(
+    PLACE,
+    [
+        Leg(10.0),
+        Leg(8.0, speed=12.0, slope=np.radians(2.0)),
+        Leg(12.0, turn=np.radians(100.0)),
+        Leg(15.0, slope=np.radians(-3.0)),
+        Leg(10.0, turn=np.radians(-60.0), bank=0.05),
+        Leg(8.0, speed=0.0),
+    ],
+    heading=0.7,
+)
+FERRY = Sway(  # to and fro
+    PLACE,
+    heading=0.3,
+    heading_tones=(Tone(0.1, 11.0, 0.2),),
+    pitch_tones=(Tone(0.05, 7.0, 0.0),),
+    roll_tones=(Tone(0.1, 6.0, 1.0),),
+    east_tones=(Tone(6.0, 40.0, 0.1),),
+    north_tones=(Tone(20.0, 40.0, 0.1),),
+    up_tones=(Tone(0.8, 8.0, 2.0),),
+)
+SENSORS = {
+    "odometer": (simulate_odometer, OdometerSpec),
+    "velocity": (simulate_velocity, VelocityLogSpec),
+    "gnss": (simulate_gnss, GnssSpec),
+    "height": (simulate_height, HeightSpec),
+    "master": (simulate_master, MasterSpec),
+}
+
+
+@pytest.mark.parametrize("motion", [DRIVE, FERRY], ids=["drive", "ferry"])
+def test_without_errors_it_is_the_truth(motion):
+    odometer = simulate_odometer(motion, OdometerSpec(output="speed"), duration=60.0)
+    true = velocity_b(motion.states(odometer.record.time), ARM)
+    at = motion.states(simulate_gnss(motion, duration=60.0).record.time)
+    np.testing.assert_array_equal(odometer.record.values, velocity_b(motion.states(odometer.sampled), 0)[:, 1])
+    assert np.abs(true[:, 1] - odometer.record.values).max() > 0.01
+
+    gnss = simulate_gnss(motion, duration=60.0).record
+    height = simulate_height(motion, duration=60.0).record
+    master = simulate_master(motion, MasterSpec(rate=1.0, with_sensors=True), duration=60.0).record
+    level = simulate_velocity(motion, VelocityLogSpec(frame="navigation"), duration=60.0).record
+    body = simulate_velocity(motion, duration=60.0).record
+    assert gnss.time.tolist() == height.time.tolist() == master.time.tolist() == level.time.tolist() == list(range(61))
+    for found, wanted in (
+        (gnss.lat, at.lat),
+        (gnss.lon, at.lon),
+        (gnss.alt, at.alt),
+        (gnss.v_n, at.v_n),
+        (height.alt, at.alt),
+        (level.velocity, at.v_n),
+        (master.C_nb, at.C_nb),
+        (master.v_n, at.v_n),
+        (master.lat, at.lat),
+        (master.w_ib_b, at.w_ib_b),
+        (master.f_b, at.f_b),
+    ):
+        np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_allclose(np.einsum("kij,kj->ki", at.C_nb, body.velocity), at.v_n, atol=1e-14)
+    assert gnss.position_sigma is None
+    assert level.sigma is None
+
+
+def test_distance_is_exact():
+    """A car that goes where it points has driven what its course says, and an odometer of any rate counts just that."""
+    for rate in (0.2, 1.0, 10.0):
+        record = simulate_odometer(DRIVE, OdometerSpec(rate=rate), duration=60.0).record
+        np.testing.assert_allclose(np.cumsum(record.distance), DRIVE.distance(record.time), atol=1e-9)
+
+
+@pytest.mark.parametrize("motion", [DRIVE, with_lever_arm(DRIVE, (0.0, 1.0, 0.5))], ids=["centre", "arm"])
+def test_points_of_the_body(motion):
+    """A sensor at an arm sees what the motion of an IMU at that arm is."""
+    there = with_lever_arm(motion, tuple(np.add(motion.lever_arm, ARM)))
+    gnss = simulate_gnss(motion, GnssSpec(lever_arm=ARM), duration=60.0).record
+    at = there.states(gnss.time)
+    place = ecef_from_geodetic(gnss.lat, gnss.lon, gnss.alt) - ecef_from_geodetic(at.lat, at.lon, at.alt)
+    assert np.abs(place).max() < 1e-6
+    np.testing.assert_allclose(gnss.v_n, at.v_n, atol=1e-6)
+
+    h = 1e-3
+    t = np.arange(1.37, 59.0)  # away from corners, where differences see the next piece
+    ahead, behind = (there.states(t + s) for s in (h, -h))
+    v_e = (
+        ecef_from_geodetic(ahead.lat, ahead.lon, ahead.alt) - ecef_from_geodetic(behind.lat, behind.lon, behind.alt)
+    ) / (2 * h)
+    now = motion.states(t)
+    v_b = np.einsum("kji,klj,kl->ki", now.C_nb, ecef_axes(now.lat, now.lon), v_e)
+    # The course's table of places follows its velocity within 4e-5 m/s (3 um) where a turn sets in; a wrong arm is off by cm/s.
+    np.testing.assert_allclose(velocity_b(now, ARM), v_b, atol=1e-4)
+    log = simulate_velocity(motion, VelocityLogSpec(lever_arm=ARM), start=1.37, duration=57.0).record
+    np.testing.assert_allclose(log.velocity, v_b, atol=1e-4)
+
+    arm = simulate_master(
+        motion, MasterSpec(rate=1.0, lever_arm=tuple(np.negative(ARM)), with_sensors=True), duration=60.0
+    )
+    np.testing.assert_allclose(arm.record.v_n, gnss.v_n, atol=1e-14)
+    np.testing.assert_allclose(arm.record.f_b, at.f_b, atol=2e-6)
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_latency_is_exact(sensor):
+    run, kind = SENSORS[sensor]
+    for latency in (0.03, -0.02, 2.0):
+        late = run(DRIVE, kind(rate=4.0, latency=latency), duration=50.0)
+        now = run(DRIVE, kind(rate=4.0), duration=50.0)
+        rows = len(late.record)
+        assert late.record.time[-1] <= 50.0
+        np.testing.assert_array_equal(late.record.time, late.sampled + latency)
+        for name, values in late.record.columns().items():
+            np.testing.assert_array_equal(values, now.record.columns()[name][:rows])
+
+
+def test_odometer_errors():
+    spec = OdometerSpec(scale=0.02, mounting=(0.03, -0.01), lever_arm=ARM)
+    record = simulate_odometer(DRIVE, replace(spec, output="speed"), duration=60.0).record
+    forward = dcm_from_euler(0.03, -0.01, 0.0) @ [0, 1, 0]
+    np.testing.assert_allclose(forward, [np.sin(0.03) * np.cos(0.01), np.cos(0.03) * np.cos(0.01), -np.sin(0.01)])
+    speed = velocity_b(DRIVE.states(record.time), ARM) @ forward
+    np.testing.assert_allclose(record.values, 1.02 * speed, atol=1e-13)
+
+    drawn = simulate_odometer(DRIVE, OdometerSpec(scale_sigma=0.01, mounting_sigma=0.02, noise=0.1), duration=60.0)
+    again = OdometerSpec(scale=drawn.errors["scale"], mounting=tuple(drawn.errors["mounting"]))
+    clean = simulate_odometer(DRIVE, again, duration=60.0).record
+    np.testing.assert_allclose(drawn.record.values - clean.values, 0.1 * drawn.errors["noise"], atol=1e-14)
+
+
+def test_pulses_carry_their_residue_forwards_and_backwards():
+    spec = OdometerSpec(output="pulses", pulse_size=0.07)
+    run = simulate_odometer(FERRY, spec, duration=60.0)
+    distance = np.cumsum(simulate_odometer(FERRY, OdometerSpec(), duration=60.0).record.values)
+    counted = np.cumsum(run.record.values)
+    assert counted.min() < -100
+    assert counted[-1] > counted.min() + 100
+    np.testing.assert_array_equal(counted, np.floor(distance / 0.07 + run.errors["phase"]))
+    assert np.abs(np.cumsum(run.record.distance) - distance).max() < 0.07
+
+    unsigned = simulate_odometer(FERRY, replace(spec, signed=False), duration=60.0).record
+    assert not unsigned.signed
+    assert np.cumsum(unsigned.distance)[-1] == pytest.approx(np.abs(np.diff(distance, prepend=0.0)).sum(), abs=0.07)
+
+
+def test_slip_counts_in_its_window_alone():
+    clean = simulate_odometer(DRIVE, OdometerSpec(), duration=60.0).record
+    run = simulate_odometer(DRIVE, OdometerSpec(slips=((20.03, 21.57, 0.3), (40.0, 41.0, -1.0))), duration=60.0)
+    extra = run.record.values - clean.values
+    slipped = DRIVE.distance(np.array([20.03, 21.57, 40.0, 41.0]))
+    outside = (clean.time <= 20.0) | ((clean.time > 21.6) & (clean.time < 40.05)) | (clean.time > 41.05)
+    assert np.abs(extra[outside]).max() < 1e-12
+    assert extra[clean.time < 30].sum() == pytest.approx(0.3 * (slipped[1] - slipped[0]), abs=1e-9)
+    assert extra[clean.time > 30].sum() == pytest.approx(-(slipped[3] - slipped[2]), abs=1e-9)
+    locked = (clean.time > 40.05) & (clean.time < 41.05)
+    np.testing.assert_allclose(run.record.values[locked], 0.0, atol=1e-14)
+
+
+def test_random_slips_and_lost_pulses():
+    """Numbers of events over 200 runs; false alarms below 1 in 1e5 (4.5 sigma) each."""
+    spec = OdometerSpec(rate=1.0, slip_rate=0.1, slip_duration=1.5, slip_size=0.3)
+    counts = [len(simulate_odometer(DRIVE, spec, duration=60.0, run=run).errors["slips"]) for run in range(200)]
+    assert abs(np.mean(counts) - 6.0) < 4.5 * np.sqrt(6.0 / 200)
+    for start, stop, size in simulate_odometer(DRIVE, spec, duration=60.0).errors["slips"]:
+        assert (stop - start, size) == pytest.approx((1.5, 0.3))
+
+    spec = OdometerSpec(output="pulses", lost=0.05)
+    lossy, whole = (simulate_odometer(DRIVE, s, duration=60.0) for s in (spec, replace(spec, lost=0.0)))
+    np.testing.assert_array_equal(lossy.record.values + lossy.errors["lost"], whole.record.values)
+    n = whole.record.values.sum()
+    assert abs(lossy.errors["lost"].sum() - 0.05 * n) < 4.5 * np.sqrt(n * 0.05 * 0.95)
+
+
+@pytest.mark.parametrize("frame", ["body", "navigation"])
+def test_velocity_errors_are_as_their_model_says(frame):
+    spec = VelocityLogSpec(
+        frame=frame,
+        rate=2.0,
+        bias=(0.1, -0.3, 0.02),
+        bias_sigma=0.05,
+        drift=0.2,
+        noise=0.05,
+        scale=0.01,
+        scale_sigma=0.01,
+        misalignment=(0.01, 0.02, -0.03),
+        misalignment_sigma=0.01,
+        outlier_rate=0.1,
+    )
+    run = simulate_velocity(DRIVE, spec, duration=60.0, seed=5)
+    at, e = DRIVE.states(run.sampled), run.errors
+    true = velocity_b(at, 0) if frame == "body" else at.v_n
+    C = dcm_from_rotation(e["misalignment"])
+    model = (1 + e["scale"]) * true @ C + e["bias"] + e["drift"] + e["noise"] + e["outliers"]
+    np.testing.assert_allclose(run.record.velocity, model, atol=1e-13)
+    np.testing.assert_allclose(run.record.sigma, np.hypot(0.2, 0.05))
+    forward = simulate_velocity(DRIVE, VelocityLogSpec(axes="forward", noise=0.1), duration=60.0).record
+    assert forward.measured.tolist() == [False, True, False]
+    np.testing.assert_array_equal(np.isfinite(forward.sigma), np.isfinite(forward.velocity))
+
+
+def dcm_from_rotation(v):
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(v).as_matrix()
+
+
+def test_gnss_errors_have_the_covariance_that_the_record_states():
+    """One row of each of 400 runs, so that drift is independent: chi-square of 400 x 3, within 4.5 sigma (1 in 1e5)."""
+    spec = GnssSpec(position_noise=1.0, position_drift=2.0, velocity_noise=0.03, velocity_drift=0.04, vertical=2.0)
+    nees = np.zeros((2, 3))
+    for run in range(400):
+        record = simulate_gnss(DRIVE, spec, duration=2.0, start=30.0, seed=9, run=run).record
+        at = DRIVE.states(record.time)
+        place = ecef_from_geodetic(record.lat, record.lon, record.alt) - ecef_from_geodetic(at.lat, at.lon, at.alt)
+        error = np.einsum("kji,kj->ki", ecef_axes(at.lat, at.lon), place)
+        nees += [
+            (error[-1] / record.position_sigma[-1]) ** 2,
+            ((record.v_n - at.v_n)[-1] / record.velocity_sigma[-1]) ** 2,
+        ]
+    assert np.all(np.abs(nees / 400 - 1.0) < 4.5 * np.sqrt(2 / 400))
+    assert record.position_sigma[0].tolist() == pytest.approx([np.sqrt(5), np.sqrt(5), 2 * np.sqrt(5)])
+
+
+@pytest.mark.parametrize("sensor", ["velocity", "gnss", "height", "master"])
+def test_outages(sensor):
+    run, kind = SENSORS[sensor]
+    record = run(DRIVE, kind(rate=2.0, outages=((10.0, 20.0), (59.0, 99.0))), duration=60.0).record
+    assert not np.any((record.time >= 10.0) & (record.time < 20.0))
+    assert (record.time[-1], len(record)) == (58.5, 98)
+    gaps = kind(rate=1.0, outage_rate=0.02, outage_duration=5.0)
+    holes = [len(run(DRIVE, gaps, duration=60.0, run=k).record) for k in range(100)]
+    mean = np.mean(holes)  # of 61 rows each of about 1.2 outages takes 5; the overlaps and those at the end take fewer
+    assert 61 - 6.0 - 0.1 < mean < 61 - 3.5
+    with pytest.raises(UsageError, match="outages leave less than two rows"):
+        run(DRIVE, kind(outages=((0.0, 99.0),)), duration=60.0)
+
+
+def test_outliers():
+    """Their number is binomial: within 4.5 sigma (1 in 1e5), and each is of its size."""
+    run = simulate_gnss(DRIVE, GnssSpec(rate=20.0, outlier_rate=0.1), duration=60.0)
+    hit = np.any(run.errors["outliers"] != 0, axis=1)
+    n = len(hit)
+    assert abs(hit.sum() - 0.1 * n) < 4.5 * np.sqrt(n * 0.09)
+    east = run.errors["outliers"][hit, 0]
+    assert abs((east**2).mean() / 900 - 1) < 4.5 * np.sqrt(2 / hit.sum())
+
+
+def test_a_barometer_lags_as_a_first_order_filter_does():
+    """Heave ``A sin(w t + p)`` from rest at t = 0: the closed solution of ``lag y' + y = x``."""
+    A, w, p, lag = 0.8, 2 * np.pi / 8.0, 2.0, 1.7
+    for rate in (0.3, 5.0):
+        run = simulate_height(FERRY, HeightSpec(rate=rate, lag=lag), duration=60.0)
+        t = run.record.time
+        gain, shift = 1 / np.hypot(1, w * lag), np.arctan(w * lag)
+        settled = lambda t: gain * np.sin(w * t + p - shift)  # noqa: B023, E731
+        y = A * (settled(t) + (np.sin(p) - settled(0.0)) * np.exp(-t / lag))
+        np.testing.assert_allclose(run.record.alt - PLACE.alt, y, atol=1e-10)
+
+
+def test_height_errors():
+    spec = HeightSpec(bias=3.0, bias_sigma=1.0, drift=2.0, noise=0.5, outlier_rate=0.05)
+    run = simulate_height(DRIVE, spec, duration=60.0, seed=4)
+    e = run.errors
+    model = DRIVE.states(run.sampled).alt + e["bias"] + e["drift"] + e["noise"] + e["outliers"]
+    np.testing.assert_allclose(run.record.alt, model, atol=1e-12)
+    assert e["bias"] != 3.0
+    assert run.record.sigma[0] == pytest.approx(np.hypot(2.0, 0.5))
+
+
+NOISY_MASTER = MasterSpec(
+    level=1e-4,
+    heading=1e-3,
+    attitude_drift=2e-4,
+    attitude_noise=1e-4,
+    velocity=0.1,
+    velocity_drift=0.05,
+    velocity_noise=0.02,
+    position=5.0,
+    schuler=0.01,
+    jumps=((30.0, 0.5, -0.2),),
+    jump_rate=0.05,
+)
+
+
+def test_master_errors_are_computed_minus_true():
+    run = simulate_master(DRIVE, NOISY_MASTER, duration=60.0, seed=2)
+    at, e = DRIVE.states(run.sampled), run.errors
+    phi = -rotation_vector_from_dcm(run.record.C_nb @ np.swapaxes(at.C_nb, 1, 2))
+    np.testing.assert_allclose(phi, e["attitude"], atol=1e-14)
+    np.testing.assert_allclose(run.record.v_n - at.v_n, e["velocity"], atol=1e-14)
+    place = ecef_from_geodetic(run.record.lat, run.record.lon, run.record.alt) - ecef_from_geodetic(
+        at.lat, at.lon, at.alt
+    )
+    error = np.einsum("kji,kj->ki", ecef_axes(at.lat, at.lon), place)
+    np.testing.assert_allclose(error, e["position"], atol=1e-4)  # some 10 m in a tangent plane
+    calm = simulate_master(DRIVE, replace(NOISY_MASTER, jumps=(), jump_rate=0.0), duration=60.0, seed=2)
+    steps = np.array([[t, 0, 0] for t in run.sampled]) * 0
+    for moment, east, north in e["jumps"]:
+        steps[run.sampled >= moment] += (east, north, 0)
+    np.testing.assert_allclose(e["velocity"] - calm.errors["velocity"], steps, atol=1e-14)
+    assert len(e["jumps"]) > 1
+
+
+def test_the_oscillation_of_a_master_obeys_the_error_equations():
+    from truenorth.earth import normal_gravity, radii
+
+    spec = MasterSpec(rate=0.5, schuler=0.5)
+    ferry = Sway(PLACE)
+    run = simulate_master(ferry, spec, duration=3 * 84.4 * 60, seed=1)
+    phi, dv, dp = (run.errors[name] for name in ("attitude", "velocity", "position"))
+    g, R = normal_gravity(PLACE.lat, PLACE.alt), np.mean(radii(PLACE.lat)) + PLACE.alt
+    slope = lambda x: (x[2:] - x[:-2]) / 4.0  # noqa: E731  # of rows 2 s apart
+    near = {"rtol": 1e-4, "atol": 1e-9}
+    np.testing.assert_allclose(slope(dv)[:, 0], -g * phi[1:-1, 1], **near)
+    np.testing.assert_allclose(slope(dv)[:, 1], g * phi[1:-1, 0], **near)
+    np.testing.assert_allclose(slope(phi)[:, 0], -dv[1:-1, 1] / R, **near)
+    np.testing.assert_allclose(slope(phi)[:, 1], dv[1:-1, 0] / R, **near)
+    np.testing.assert_allclose(slope(phi)[:, 2], dv[1:-1, 0] * np.tan(PLACE.lat) / R, **near)
+    np.testing.assert_allclose(slope(dp), dv[1:-1], rtol=1e-4, atol=1e-5)
+    crossings = run.sampled[1:][np.diff(np.sign(dv[:, 0])) > 0]
+    assert np.diff(crossings) == pytest.approx(84.4 * 60, abs=6.0)
+
+
+def test_a_master_in_other_axes_and_on_its_own_clock():
+    spec = MasterSpec(
+        mounting=(0.02, -0.01, 0.03), clock_offset=100.0, clock_drift=1e-3, latency=0.2, with_sensors=True
+    )
+    run = simulate_master(DRIVE, spec, duration=60.0, start=5.0)
+    np.testing.assert_allclose(run.record.time, run.sampled + 100.2 + 1e-3 * (run.sampled - 5.0), rtol=1e-15)
+    at = DRIVE.states(run.sampled)
+    C_ms = dcm_from_euler(0.02, -0.01, 0.03)
+    np.testing.assert_allclose(run.record.C_nb @ C_ms, at.C_nb, atol=1e-14)
+    f_n = np.einsum("kij,kj->ki", run.record.C_nb, run.record.f_b)
+    np.testing.assert_allclose(f_n, np.einsum("kij,kj->ki", at.C_nb, at.f_b), atol=1e-13)
+    few = simulate_master(DRIVE, MasterSpec(with_attitude=False, with_position=False), duration=60.0).record
+    assert few.C_nb is None
+    assert few.lat is None
+
+
+FLEXIBLE = FlexureSpec(sigma=(2e-3, 3e-3, 1e-2), correlation_time=3.0)
+
+
+def test_a_flexed_slave_is_a_motion_like_any_other():
+    """An ideal IMU on it comes back through the strapdown; rates are the derivatives of attitude and of each other."""
+    flexed = Flexed(DRIVE, FLEXIBLE, duration=70.0, seed=3)
+    record = simulate(flexed, rate=100.0, duration=60.0).record
+    start = flexed.states(0.0)
+    state = NavigationState.at(start.C_nb, float(start.lat), float(start.lon), float(start.alt), tuple(start.v_n), 0.01)
+    computed = mechanise(record, state, every=100)
+    true = flexed.states(computed.time)
+    error = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))
+    assert np.degrees(np.abs(error).max()) * 3600 < 0.05
+    assert np.abs(computed.v_n - true.v_n).max() < 1e-4
+
+    t, h = np.array([7.123, 33.3]), 1e-4
+    ahead, at, behind = (flexed.states(t + s) for s in (h, 0.0, -h))
+    np.testing.assert_allclose((ahead.w_ib_b - behind.w_ib_b) / (2 * h), at.dw_ib_b, atol=1e-6)
+    body = DRIVE.states(t)
+    np.testing.assert_allclose(at.C_nb, body.C_nb @ dcm_from_euler(*flexed.angles(t).T), atol=1e-15)
+    np.testing.assert_array_equal(at.v_n, body.v_n)
+    with pytest.raises(UsageError, match="longer duration"):
+        flexed.states(80.0)
+
+
+def test_flexure_has_its_covariance_between_its_knots_as_at_them():
+    """500 runs, three angles: 4.5 sigma (1 in 1e5) for each of six figures."""
+    times = np.array([1.037, 2.5, 4.037])  # the first and the last are a correlation time apart
+    x = np.array([Flexed(DRIVE, FLEXIBLE, duration=5.0, run=run).angles(times) for run in range(500)]) / FLEXIBLE.sigma
+    for product, wanted in ((x[:, 1] ** 2, 1.0), (x[:, 0] * x[:, 2], np.exp(-1.0))):
+        assert np.all(np.abs(product.mean(axis=0) - wanted) < 4.5 * product.std(axis=0) / np.sqrt(500))
+
+
+LOADED = {
+    "odometer": OdometerSpec(
+        scale_sigma=0.01, mounting_sigma=0.01, noise=0.1, slip_rate=0.1, output="pulses", lost=0.01
+    ),
+    "velocity": VelocityLogSpec(
+        bias_sigma=0.1,
+        drift=0.1,
+        noise=0.1,
+        scale_sigma=0.1,
+        misalignment_sigma=0.1,
+        outlier_rate=0.1,
+        outage_rate=0.02,
+    ),
+    "gnss": GnssSpec(
+        position_noise=1, position_drift=1, velocity_noise=1, velocity_drift=1, outlier_rate=0.1, outage_rate=0.02
+    ),
+    "height": HeightSpec(bias_sigma=1.0, drift=1.0, noise=1.0, outlier_rate=0.1, outage_rate=0.02),
+    "master": replace(NOISY_MASTER, outage_rate=0.02),
+}
+NO_ERROR = ("output", "outlier_size", "slip_size")
+TERMS = [(sensor, item) for sensor, spec in LOADED.items() for item in spec.to_mapping() if item not in NO_ERROR]
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_the_same_seed_gives_the_same_bytes(sensor):
+    run = SENSORS[sensor][0]
+
+    def bits(**key):
+        return b"".join(
+            column.tobytes() for column in run(DRIVE, LOADED[sensor], duration=60.0, **key).record.columns().values()
+        )
+
+    assert bits() == bits()
+    assert len({bits(seed=s, run=r, scenario=c) for s, r, c in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))}) == 4
+
+
+@pytest.mark.parametrize(("sensor", "term"), TERMS)
+def test_switching_one_term_off_leaves_the_others(sensor, term):
+    run, kind = SENSORS[sensor]
+    full = run(DRIVE, LOADED[sensor], duration=60.0)
+    off = run(DRIVE, replace(LOADED[sensor], **{term: getattr(kind(), term)}), duration=60.0)
+    assert full.record.columns().keys() == off.record.columns().keys()
+    common, rows, others = np.intersect1d(full.sampled, off.sampled, return_indices=True)
+    assert len(common) == min(len(full.sampled), len(off.sampled))
+    changed = 0
+    for name, error in full.errors.items():
+        if isinstance(error, np.ndarray) and len(error) == len(full.sampled):
+            same = np.array_equal(error[rows], off.errors[name][others])
+        else:
+            same = np.array_equal(error, off.errors[name])
+        changed += not same
+    touched = {"jumps": 2, "jump_rate": 2, "schuler": 3}.get(term, 1)  # jumps also stand in a list of their own
+    assert changed <= (2 if sensor == "odometer" else touched)  # of other pulses others are lost
+    assert changed or term == "outage_rate"
+
+
+def test_streams_are_those_of_nobody_else():
+    numbers = list(STREAMS.values())
+    assert len(set(numbers)) == len(numbers)
+    assert min(numbers) >= 100 > max(IMU_STREAMS.values())
+    assert max(numbers) < 200  # where those of motions begin
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_specifications_go_into_files_and_come_back(sensor):
+    kind = SENSORS[sensor][1]
+    assert kind.from_mapping(LOADED[sensor].to_mapping()) == LOADED[sensor]
+    assert kind().to_mapping() == {}
+
+
+def test_a_specification_with_its_units():
+    text = {"rate": "4 Hz", "output": "pulses", "pulse_size": "2 cm", "scale_sigma": "0.3 %", "signed": False}
+    text |= {"mounting": ["2 deg", "0.5 deg"], "slips": [["10 s", "11.5 s", "30 %"]]}
+    spec = OdometerSpec.from_mapping(text)
+    assert (spec.pulse_size, spec.scale_sigma, spec.slips) == (0.02, 0.003, ((10.0, 11.5, 0.3),))
+    assert spec.mounting == pytest.approx(np.radians([2.0, 0.5]))
+    assert OdometerSpec.from_mapping(spec.to_mapping()) == spec
+
+
+@pytest.mark.parametrize(
+    ("kind", "content", "words"),
+    [
+        (OdometerSpec, {"scal": "1 %"}, ["odo: key 'scal'", "'scale'"]),
+        (OdometerSpec, {"scale": "1 m"}, ["odo: scale", "ratio"]),
+        (OdometerSpec, {"rate": "-1 Hz"}, ["rate is -1.0", "positive"]),
+        (OdometerSpec, {"noise": "-1 m/s"}, ["noise is -1.0", "zero or more"]),
+        (OdometerSpec, {"mounting": "1 deg"}, ["odo: mounting", "2 quantities"]),
+        (OdometerSpec, {"slips": [["1 s", "2 s"]]}, ["odo: slips[1]", "3 quantities"]),
+        (OdometerSpec, {"slips": [["2 s", "1 s", "1 %"]]}, ["slips, number 1", "an end after its start"]),
+        (OdometerSpec, {"lost": "1 %"}, ["lost pulses", "distance"]),
+        (OdometerSpec, {"output": "miles"}, ["output 'miles'"]),
+        (OdometerSpec, {"signed": "no"}, ["odo: signed: 'no'", "true or false"]),
+        (VelocityLogSpec, {"frame": "navigation", "axes": "forward"}, ["body axes"]),
+        (GnssSpec, {"outlier_rate": "120 %"}, ["outlier_rate is 1.2"]),
+        (MasterSpec, {"with_attitude": False, "with_velocity": False}, ["without attitude and velocity"]),
+        (FlexureSpec, {"correlation_time": "0 s"}, ["correlation_time", "positive"]),
+        (HeightSpec, ["lag"], ["odo: expected keys"]),
+    ],
+)
+def test_a_wrong_specification_is_named(kind, content, words):
+    with pytest.raises(DataError) as caught:
+        kind.from_mapping(content, "odo")
+    for word in words:
+        assert word in str(caught.value), caught.value
+
+
+def test_too_short_a_log():
+    with pytest.raises(UsageError, match="two rows at least"):
+        simulate_gnss(DRIVE, GnssSpec(latency=59.5), duration=60.0)
+    with pytest.raises(UsageError, match=r"GnssSpec: rate is nan"):
+        GnssSpec(rate=np.nan)
+
+
+def test_truth_as_a_record_and_as_a_file(tmp_path):
+    """What a run's folder holds reads back; between its samples it is the motion, to the order of interpolation."""
+    from truenorth import read_trajectory, write_record
+
+    truth = DRIVE.states(np.arange(0.0, 60.0, 0.1)).trajectory()
+    write_record(truth, tmp_path / "truth.parquet")
+    read = read_trajectory(tmp_path / "truth.parquet")
+    np.testing.assert_allclose(read.lat, truth.lat, rtol=4e-16)
+    times = np.arange(0.05, 59.0, 1.0)
+    at, true = read.at(times), DRIVE.states(times)
+    place = ecef_from_geodetic(at.lat, at.lon, at.alt) - ecef_from_geodetic(true.lat, true.lon, true.alt)
+    assert np.abs(place).max() < 1e-5
+    assert np.abs(rotation_vector_from_dcm(at.C_nb @ np.swapaxes(true.C_nb, 1, 2))).max() < 5e-4
