@@ -1,6 +1,7 @@
 """Records: measurements in SI units and our axes, checked when they are made."""
 
 from truenorth.records.base import GAP_FACTOR, Record
+from truenorth.records.encoder import EncoderRecord
 from truenorth.records.gnss import GnssRecord, HeightRecord
 from truenorth.records.imu import COLUMNS, ImuRecord
 from truenorth.records.odometer import OdometerRecord
@@ -10,6 +11,7 @@ from truenorth.records.velocity import VelocityRecord
 __all__ = [
     "COLUMNS",
     "GAP_FACTOR",
+    "EncoderRecord",
     "GnssRecord",
     "HeightRecord",
     "ImuRecord",

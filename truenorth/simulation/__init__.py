@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from truenorth.simulation.aiding import Aided
+from truenorth.simulation.axis_angles import Spin, Steps, Swing, scheme, steps
+from truenorth.simulation.encoder import Encoder, EncoderErrors, encoder_record
 from truenorth.simulation.flexure import Flexed, FlexureSpec
 from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
 from truenorth.simulation.ideal import IdealLog, ideal_log
+from truenorth.simulation.indexer import Axis, C_bs_from_angles, Indexed, Indexer
 from truenorth.simulation.master import MasterSpec, simulate_master
 from truenorth.simulation.motion import Motion, MotionStates
 from truenorth.simulation.odometer import OdometerSpec, simulate_odometer
@@ -17,25 +20,36 @@ from truenorth.simulation.velocity_log import VelocityLogSpec, simulate_velocity
 
 __all__ = [
     "Aided",
+    "Axis",
+    "C_bs_from_angles",
     "Disturbed",
+    "Encoder",
+    "EncoderErrors",
     "Flexed",
     "FlexureSpec",
     "GnssSpec",
     "HeightSpec",
     "IdealLog",
+    "Indexed",
+    "Indexer",
     "MasterSpec",
     "Motion",
     "MotionStates",
     "OdometerSpec",
     "SensorErrors",
     "Simulation",
+    "Spin",
+    "Steps",
     "Sway",
+    "Swing",
     "Tone",
     "TrueErrors",
     "VelocityLogSpec",
+    "encoder_record",
     "given_errors",
     "ideal_log",
     "rest",
+    "scheme",
     "simulate",
     "simulate_gnss",
     "simulate_height",
@@ -43,4 +57,5 @@ __all__ = [
     "simulate_odometer",
     "simulate_runs",
     "simulate_velocity",
+    "steps",
 ]

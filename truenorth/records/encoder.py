@@ -1,0 +1,41 @@
+"""The encoder's record: how far the axes of an indexer have turned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.records.base import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EncoderRecord(Record):
+    """Angles of the axes of an indexer (rotation mechanism), the outermost first.
+
+    Parameters
+    ----------
+    time : (N,) array, s
+        Strictly increasing.
+    angles : (N, A) array, rad
+        Of A axes, (N,) of a single one; turns are counted, so that an angle can be interpolated.
+    source : str
+
+    Raises
+    ------
+    DataError
+        As for every record.
+    """
+
+    time: Array
+    angles: Array
+    source: str = field(default="encoder record", compare=False)
+
+    def groups(self) -> Mapping[str, Sequence[str]]:
+        """One angle an axis."""
+        axes = np.shape(self.angles)[1] if np.ndim(self.angles) == 2 else 1
+        return {"angles": [f"angle_{i}" for i in range(1, axes + 1)]}
