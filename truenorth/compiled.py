@@ -48,6 +48,36 @@ def compiled(function: F | None = None, **options: Any) -> Any:
         return numba.jit(cache=False, **(OPTIONS | options))(function)
 
 
+def compiled_callback(signature: str) -> Callable[[F], Any]:
+    """Compile a function that kernels take as an *argument*, with a declared signature.
+
+    A dispatcher or closure as an argument would make each kernel be compiled anew for each such function, and miss the
+    disk cache; one with a declared signature is a pointer, and all functions of that signature share one kernel.
+
+    Parameters
+    ----------
+    signature : str
+        Of Numba's, such as ``"void(float64[::1], float64[::1], float64[::1])"``.
+
+    Returns
+    -------
+    decorator
+        Of functions; compiles at once.
+    """
+
+    def decorate(function: F) -> Any:
+        options: dict[str, Any] = {"nopython": True, "error_model": "numpy"}
+        try:
+            with _cache_folder(_folder()):
+                return numba.cfunc(signature, cache=True, **options)(function)
+        except RuntimeError as error:  # "cannot cache function ...: no locator available"
+            if "cache" not in str(error):
+                raise
+            return numba.cfunc(signature, cache=False, **options)(function)
+
+    return decorate
+
+
 @cache
 def _folder() -> str:
     """The cache folder of this very source: beside the package where that is writable, else in the user's cache."""

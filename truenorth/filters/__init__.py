@@ -1,5 +1,6 @@
-"""Filters and smoothers for linear systems; they know nothing of navigation."""
+"""Filters and smoothers for linear and nonlinear systems; they know nothing of navigation."""
 
+from truenorth.filters.extended import extended, iterated
 from truenorth.filters.fading import fading
 from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.information import (
@@ -10,28 +11,41 @@ from truenorth.filters.information import (
     no_information,
     two_filter_smoother,
 )
+from truenorth.filters.jacobians import JacobianCheck, check_jacobians
 from truenorth.filters.kalman import kalman
-from truenorth.filters.robust import gated, robust
+from truenorth.filters.nonlinear_system import NonlinearSystem, matrix_function, vector_function
+from truenorth.filters.robust import Gate, gated, robust
 from truenorth.filters.sage_husa import sage_husa
+from truenorth.filters.sigma_points import cubature, gauss_hermite, unscented
 from truenorth.filters.smoother import Smoothed, smoother
 from truenorth.filters.square_root import square_root
-from truenorth.filters.strong_tracking import strong_tracking
+from truenorth.filters.strong_tracking import StrongTracking, strong_tracking
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
 from truenorth.filters.variational import variational
 
 __all__ = [
     "Estimates",
     "FilterState",
+    "Gate",
     "InformationEstimates",
     "InformationState",
+    "JacobianCheck",
     "LinearSystem",
+    "NonlinearSystem",
     "Smoothed",
+    "StrongTracking",
+    "check_jacobians",
+    "cubature",
+    "extended",
     "fading",
     "gated",
+    "gauss_hermite",
     "h_infinity",
     "information",
     "information_behind",
+    "iterated",
     "kalman",
+    "matrix_function",
     "no_information",
     "robust",
     "sage_husa",
@@ -40,5 +54,7 @@ __all__ = [
     "square_root",
     "strong_tracking",
     "two_filter_smoother",
+    "unscented",
     "variational",
+    "vector_function",
 ]

@@ -210,12 +210,7 @@ def faded(
     workers: int,
 ) -> Estimates:
     """Run the fading kernel, its options checked."""
-    if not rho >= 0.0 or not np.isfinite(rho):
-        raise UsageError(f"rho is {rho}, expected a number of at least 0")
-    if not cap >= 1.0:
-        raise UsageError(f"cap is {cap}, expected at least 1")
-    if not softening >= 1.0 or not np.isfinite(softening):
-        raise UsageError(f"softening is {softening}, expected a number of at least 1")
+    check_factor_options(rho, softening, cap)
 
     def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
         fading_runs(size, runs, epochs, kind, float(rho), float(softening), float(cap), out)
@@ -230,6 +225,16 @@ def faded(
         memory=np.full(system.rows, np.nan),
         adaptation=system.rows if kind in (MULTIPLE, IMPROVED) else 1,
     )
+
+
+def check_factor_options(rho: float, softening: float, cap: float) -> None:
+    """Refuse a memory, a softening or a cap out of range."""
+    if not rho >= 0.0 or not np.isfinite(rho):
+        raise UsageError(f"rho is {rho}, expected a number of at least 0")
+    if not cap >= 1.0:
+        raise UsageError(f"cap is {cap}, expected at least 1")
+    if not softening >= 1.0 or not np.isfinite(softening):
+        raise UsageError(f"softening is {softening}, expected a number of at least 1")
 
 
 def _check_rows(H: Array) -> None:

@@ -19,6 +19,7 @@ T. Xu, Robust estimator for correlated observations based on bifactor equivalent
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -50,6 +51,48 @@ from truenorth.linalg import Array, Size
 
 Weighting = Literal["huber", "igg3"]
 GATE_ROWS, GATE_EPOCHS, HUBER, IGG3 = range(4)
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A chi-square gate.
+
+    Parameters
+    ----------
+    probability : float
+        With which a good row (or epoch) passes.
+    by : "row" or "epoch"
+        Judge each row, given those before it, or all rows of an epoch together.
+    patience : int, optional
+        After so many rejections in a row the next one is believed: a filter that is wrong itself finds back.
+
+    Raises
+    ------
+    UsageError
+        An option out of range.
+    """
+
+    probability: float = 0.999
+    by: Literal["row", "epoch"] = "row"
+    patience: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        if not 0.0 < self.probability < 1.0:
+            raise UsageError(f"probability is {self.probability}, expected a number between 0 and 1")
+        if self.by not in ("row", "epoch"):
+            raise UsageError(f'by is {self.by!r}, expected "row" or "epoch"')
+        if self.patience is not None and self.patience < 1:
+            raise UsageError(f"patience is {self.patience}, expected at least 1")
+
+    def limits(self, rows: int) -> tuple[int, float, int, Array]:
+        """As the kernels take it: rule, largest row in sigma, patience, largest NIS by number of rows present."""
+        from scipy.special import chdtri
+
+        quantiles = np.append(0.0, chdtri(np.arange(1.0, rows + 1.0), 1.0 - self.probability))
+        k0 = float(np.sqrt(chdtri(1.0, 1.0 - self.probability)))
+        rule = GATE_ROWS if self.by == "row" else GATE_EPOCHS
+        return rule, k0, np.iinfo(np.int64).max if self.patience is None else self.patience, quantiles
 
 
 @compiled(forceinline=True)
@@ -209,18 +252,8 @@ def gated(
     DataError
         As :func:`truenorth.filters.kalman`.
     """
-    if not 0.0 < probability < 1.0:
-        raise UsageError(f"probability is {probability}, expected a number between 0 and 1")
-    if by not in ("row", "epoch"):
-        raise UsageError(f'by is {by!r}, expected "row" or "epoch"')
-    if patience is not None and patience < 1:
-        raise UsageError(f"patience is {patience}, expected at least 1")
-    from scipy.special import chdtri
-
-    quantiles = np.append(0.0, chdtri(np.arange(1.0, system.rows + 1.0), 1.0 - probability))
-    k0 = float(np.sqrt(chdtri(1.0, 1.0 - probability)))
-    rule = GATE_ROWS if by == "row" else GATE_EPOCHS
-    believed = np.iinfo(np.int64).max if patience is None else patience
+    gate = Gate(probability, by, patience)
+    rule, k0, believed, quantiles = gate.limits(system.rows)
     return _robust(system, state, rule, k0, k0, believed, quantiles, history, innovations, workers)
 
 

@@ -7,11 +7,37 @@ noise, Int. J. Control 65, 1996: ``lam = max(1, tr(V - beta R - H Q H') / tr(H P
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from truenorth.filters.drive import History
-from truenorth.filters.fading import SINGLE, faded
+from truenorth.filters.fading import SINGLE, check_factor_options, faded
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
+
+
+@dataclass(frozen=True)
+class StrongTracking:
+    """Strong tracking as an option of nonlinear filters: a factor on the predicted covariance, without Q.
+
+    Parameters
+    ----------
+    softening, rho, cap : float
+        As in :func:`strong_tracking`.
+
+    Raises
+    ------
+    UsageError
+        An option out of range.
+    """
+
+    softening: float = 1.0
+    rho: float = 0.95
+    cap: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        check_factor_options(self.rho, self.softening, self.cap)
 
 
 def strong_tracking(

@@ -1,0 +1,137 @@
+"""Extended Kalman filters: the model's tangent at the estimate, once or iterated; also for states on a manifold.
+
+Sources: A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.3; B. M. Bell, F. W. Cathey, The
+iterated Kalman filter update as a Gauss-Newton method, IEEE Trans. Autom. Control 38, 1993; A. Barrau, S. Bonnabel, The
+invariant extended Kalman filter as a stable observer, IEEE Trans. Autom. Control 62, 2017.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truenorth.errors import UsageError
+from truenorth.filters.drive import History
+from truenorth.filters.linearisation import NO_RULE
+from truenorth.filters.nonlinear import run_nonlinear
+from truenorth.filters.nonlinear_system import NonlinearSystem, require_jacobians, require_vector_space
+from truenorth.filters.robust import Gate
+from truenorth.filters.strong_tracking import StrongTracking
+from truenorth.filters.system import Estimates, FilterState
+
+
+def extended(
+    system: NonlinearSystem,
+    state: FilterState | None = None,
+    *,
+    tracking: StrongTracking | None = None,
+    gate: Gate | None = None,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """Extended Kalman filter.
+
+    With the retraction of the system it is the error-state filter on a manifold; with errors in which the motion's
+    Jacobians do not depend on the estimate it is the *invariant* extended Kalman filter.
+
+    Parameters
+    ----------
+    system : NonlinearSystem
+        With both Jacobians.
+    state : FilterState, optional
+        From an earlier call with the same options, to go on from.
+    tracking : StrongTracking, optional
+        Fade the predicted covariance where innovations are larger than expected.
+    gate : Gate, optional
+        Leave out measurements whose innovation is not to be believed.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        `adaptation` holds the factor of strong tracking, then each row's weight (1 taken, 0 rejected, NaN absent), as
+        far as asked for. With a gate, `nis` is of all rows present and `log_likelihood` of those taken.
+
+    Raises
+    ------
+    UsageError
+        A Jacobian is missing.
+    DataError
+        The filter broke down, naming run and epoch.
+    """
+    require_jacobians(system, "the extended Kalman filter")
+    return run_nonlinear(
+        system,
+        state,
+        NO_RULE,
+        np.zeros(0, np.int64),
+        tracking=tracking,
+        gate=gate,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+    )
+
+
+def iterated(
+    system: NonlinearSystem,
+    state: FilterState | None = None,
+    *,
+    iterations: int = 10,
+    tolerance: float = 1e-6,
+    gate: Gate | None = None,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """Iterated extended Kalman filter: each measurement is linearised again where the update has led.
+
+    The updates are Gauss and Newton's steps towards the largest posterior density.
+
+    Parameters
+    ----------
+    system : NonlinearSystem
+        With both Jacobians; without retraction.
+    state : FilterState, optional
+        From an earlier call with the same options, to go on from.
+    iterations : int
+        At most, of each epoch; 1 is the extended Kalman filter.
+    tolerance : float
+        Stop where no state moves by more than this part of its sigma.
+    gate : Gate, optional
+        Leave out measurements whose innovation is not to be believed; they are judged before the iteration.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        Innovations, NIS and log-likelihood are those of the first linearisation.
+
+    Raises
+    ------
+    UsageError
+        A Jacobian is missing, the system has a retraction, or an option is out of range.
+    DataError
+        The filter broke down, naming run and epoch.
+    """
+    require_jacobians(system, "the iterated extended Kalman filter")
+    require_vector_space(system, "the iterated extended Kalman filter")
+    if iterations < 1:
+        raise UsageError(f"iterations is {iterations}, expected at least 1")
+    if not tolerance >= 0.0:
+        raise UsageError(f"tolerance is {tolerance}, expected a number of at least 0")
+    return run_nonlinear(
+        system,
+        state,
+        NO_RULE,
+        np.zeros(0, np.int64),
+        tracking=None,
+        gate=gate,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+        iterations=iterations,
+        tolerance=tolerance,
+    )

@@ -1,0 +1,367 @@
+"""The one recursion of all nonlinear filters that carry a single normal distribution.
+
+Predict, linearise the measurement (by tangents or by nodes, see :mod:`truenorth.filters.linearisation`), and update as
+the Kalman filter does, row after row in Joseph's form. The update is that of the error: zero before it, and carried to
+the estimate by the system's retraction after it. On the way the predicted covariance may be faded (strong tracking),
+rows may be gated, and the linearisation may be repeated at the new estimate.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.compiled import compiled
+from truenorth.filters.drive import History, drive
+from truenorth.filters.fading import SINGLE, fade, remember
+from truenorth.filters.linearisation import (
+    Points,
+    decompose,
+    measure_nodes,
+    measure_tangent,
+    points,
+    predict_nodes,
+    predict_tangent,
+)
+from truenorth.filters.nonlinear_system import (
+    Functions,
+    NonlinearRuns,
+    NonlinearSystem,
+    functions_of,
+    nonlinear_runs_of,
+)
+from truenorth.filters.quadrature import QuadratureRule
+from truenorth.filters.recursion import (
+    NOT_FINITE,
+    NOT_POSITIVE,
+    SOUND,
+    Histories,
+    Workspace,
+    conclude,
+    innovate,
+    update,
+    workspace,
+)
+from truenorth.filters.robust import GATE_EPOCHS, Gate, judge_and_update, squared
+from truenorth.filters.strong_tracking import StrongTracking
+from truenorth.filters.system import Estimates, FilterState
+from truenorth.linalg import Array, Size, load
+
+NO_GATE = -1
+
+
+class Options(NamedTuple):
+    """What a filter does beside the plain recursion."""
+
+    tracking: bool
+    softening: float
+    rho: float
+    cap: float
+    gate: int
+    k0: float
+    patience: int
+    largest_nis: Array
+    iterations: int
+    tolerance: float
+
+
+@compiled
+def begin_point(size: Size, system: NonlinearRuns, run: int, w: Workspace, s: Points) -> None:
+    """Load the state before epoch 0."""
+    b = run if system.x0.shape[0] > 1 else 0
+    for i in range(system.x0.shape[1]):
+        s.X[i] = system.x0[b, i]
+    load(size, system.P0[run if system.P0.shape[0] > 1 else 0], w.P)
+    for i in range(len(size)):
+        w.largest[i] = w.P[i, i]
+
+
+@compiled
+def load_epoch(size: Size, system: NonlinearRuns, run: int, epoch: int, w: Workspace, s: Points) -> None:
+    """Load parameters and process noise of an epoch."""
+    b = run if system.p.shape[0] > 1 else 0
+    k = epoch if system.p.shape[1] > 1 else 0
+    for i in range(system.p.shape[2]):
+        s.p[i] = system.p[b, k, i]
+    if epoch == 0 or system.Q.shape[1] > 1:
+        load(size, system.Q[run if system.Q.shape[0] > 1 else 0, epoch], w.Q)
+
+
+@compiled
+def load_rows(size: Size, system: NonlinearRuns, run: int, epoch: int, w: Workspace) -> int:
+    """Load ``z, R`` of an epoch, anew for each linearisation; the error is zero. Rows that are there."""
+    rows = system.z.shape[2]
+    b, c = run if system.z.shape[0] > 1 else 0, run if system.R.shape[0] > 1 else 0
+    k, e = epoch if system.z.shape[1] > 1 else 0, epoch if system.R.shape[1] > 1 else 0
+    present = 0
+    for i in range(rows):
+        w.z[i] = system.z[b, k, i]
+        present += not np.isnan(w.z[i])
+        w.v[i] = 0.0
+        for j in range(rows):
+            w.R[i, j] = system.R[c, e, i, j]
+        for j in range(len(size)):
+            w.S_t[i, j] = 0.0
+    for j in range(len(size)):
+        w.x[j] = 0.0
+    return present
+
+
+@compiled
+def predict_point(
+    size: Size, functions: Functions, rule: QuadratureRule, order: NDArray[np.int64], w: Workspace, s: Points
+) -> int:
+    """``X = E f(x)``, ``P = cov f(x)``, without Q; the failure, if any."""
+    if len(rule.mean) == 0:
+        return SOUND if predict_tangent(size, functions, w, s) else NOT_FINITE
+    if not decompose(size, w.P, order, s):
+        return NOT_POSITIVE
+    return SOUND if predict_nodes(size, functions, rule, order, w, s) else NOT_FINITE
+
+
+@compiled
+def measure_point(
+    size: Size, functions: Functions, rule: QuadratureRule, order: NDArray[np.int64], w: Workspace, s: Points
+) -> int:
+    """``w.z, w.H, w.R`` of the linear measurement ``z = H dx + v``; the failure, if any."""
+    if len(rule.mean) == 0:
+        return SOUND if measure_tangent(size, functions, w, s) else NOT_FINITE
+    if not decompose(size, w.P, order, s):
+        return NOT_POSITIVE
+    return SOUND if measure_nodes(size, functions, rule, order, w, s) else NOT_FINITE
+
+
+@compiled(forceinline=True)
+def add_noise(size: Size, w: Workspace) -> None:
+    """``P = P + Q``."""
+    for i in range(len(size)):
+        for j in range(len(size)):
+            w.P[i, j] += w.Q[i, j]
+
+
+@compiled(forceinline=True)
+def copy(size: Size, source: Array, M: Array) -> None:
+    """``M = source``."""
+    for i in range(len(size)):
+        for j in range(len(size)):
+            M[i, j] = source[i, j]
+
+
+@compiled(forceinline=True)
+def are_correlated(R: Array) -> bool:
+    """Whether the noise of a row is correlated with that of another."""
+    for i in range(len(R)):
+        for j in range(i):
+            if R[i, j] != 0.0:
+                return True
+    return False
+
+
+@compiled(forceinline=True)
+def move(functions: Functions, w: Workspace, s: Points, dx: Array) -> None:
+    """``X = retract(X, dx)``."""
+    for i in range(len(dx)):
+        dx[i] = w.x[i]
+    functions.retract(s.X, dx, s.y)
+    for i in range(len(s.X)):
+        s.X[i] = s.y[i]
+
+
+@compiled(forceinline=True)
+def keep_point(out: Histories, run: int, epoch: int, last: int, X: Array, P: Array) -> None:
+    """Keep state, sigma and covariance of an epoch in those histories that have room; the last epoch in all."""
+    n = out.P.shape[2]
+    if out.x.shape[1] > epoch or epoch == last:
+        k = epoch if out.x.shape[1] > 1 else 0
+        for i in range(len(X)):
+            out.x[run, k, i] = X[i]
+        for i in range(n):
+            out.sigma[run, k, i] = np.sqrt(P[i, i])
+    if out.P.shape[1] > epoch or epoch == last:
+        k = epoch if out.P.shape[1] > 1 else 0
+        for i in range(n):
+            for j in range(n):
+                out.P[run, k, i, j] = P[i, j]
+
+
+@compiled
+def correct(
+    size: Size,
+    w: Workspace,
+    nu: Array,
+    W: Array,
+    present: int,
+    options: Options,
+    rejected: Array,
+    weights: Array,
+) -> tuple[int, float, float]:
+    """Update by all rows, or by those that the gate lets pass; the failure if any, NIS and log-likelihood."""
+    correlated = are_correlated(w.R)
+    if options.gate == NO_GATE:
+        return update(size, w, correlated, True)
+    nis, _ = squared(nu, W)
+    for i in range(len(weights)):
+        weights[i] = np.nan
+    if options.gate == GATE_EPOCHS:
+        taken = nis <= options.largest_nis[present] or rejected[0] >= options.patience
+        rejected[0] = 0.0 if taken else rejected[0] + 1.0
+        for i in range(len(weights)):
+            weights[i] = 1.0 if taken else 0.0
+    failure, log_likelihood = judge_and_update(
+        size, w, correlated, options.gate, options.k0, options.k0, options.patience, rejected, weights
+    )
+    return failure, nis, log_likelihood
+
+
+@compiled
+def correct_again(size: Size, w: Workspace) -> int:
+    """Update by all rows that are left; the failure, if any."""
+    return update(size, w, are_correlated(w.R), True)[0]
+
+
+@compiled
+def nonlinear_runs(
+    size: Size,
+    functions: Functions,
+    system: NonlinearRuns,
+    epochs: int,
+    rule: QuadratureRule,
+    order: NDArray[np.int64],
+    options: Options,
+    out: Histories,
+) -> None:
+    """Nonlinear filter of each run."""
+    N, rows, n = len(size), system.z.shape[2], system.P0.shape[1]
+    w, s = workspace(size, rows), points(size, system, rule)
+    P, X, dx = np.zeros((N, N)), np.zeros(system.x0.shape[1]), np.zeros(n)
+    nu, W, weights = np.zeros(rows), np.zeros((rows, rows)), np.ones(rows)
+    lam, Lam, before = np.ones(max(rows, 1)), np.ones(N), np.zeros(N)
+    first = 1 if options.tracking else 0
+    for run in range(out.x.shape[0]):
+        begin_point(size, system, run, w, s)
+        V = out.memory[run, : rows * first]
+        rejected = out.memory[run, rows * first :]
+        for epoch in range(epochs):
+            load_epoch(size, system, run, epoch, w, s)
+            failure = predict_point(size, functions, rule, order, w, s)
+            if failure != SOUND:
+                conclude(out, run, epoch, failure, 0.0, 0.0)
+                break
+            if options.tracking:
+                copy(size, w.P, P)
+            add_noise(size, w)
+            present = load_rows(size, system, run, epoch, w)
+            if present > 0 or out.innovation.shape[1] > 0:
+                failure = measure_point(size, functions, rule, order, w, s)
+                if options.tracking and failure == SOUND:
+                    remember(size, w, options.rho, V)
+                    copy(size, P, w.P)
+                    fade(size, w, SINGLE, options.softening, options.cap, V, lam, Lam)
+                    if lam[0] > 1.0 and len(rule.mean) > 0:  # the nodes lie further out
+                        load_rows(size, system, run, epoch, w)
+                        failure = measure_point(size, functions, rule, order, w, s)
+                if failure != SOUND:
+                    conclude(out, run, epoch, failure, 0.0, 0.0)
+                    break
+                innovate(size, w, nu, W)
+            if out.innovation.shape[1] > 0:
+                for i in range(rows):
+                    out.innovation[run, epoch, i] = nu[i]
+                    for j in range(rows):
+                        out.innovation_covariance[run, epoch, i, j] = W[i, j]
+            if present > 0:
+                if options.iterations > 1:
+                    copy(size, w.P, P)
+                    for i in range(len(X)):
+                        X[i] = s.X[i]
+                failure, nis, log_likelihood = correct(size, w, nu, W, present, options, rejected, weights)
+                if not conclude(out, run, epoch, failure, nis, log_likelihood):
+                    break
+                move(functions, w, s, dx)
+                for _ in range(1, options.iterations):
+                    # Linearise at the last estimate, update from the prediction: z - h(X_i) + H (X_i - X).
+                    load_rows(size, system, run, epoch, w)
+                    failure = measure_point(size, functions, rule, order, w, s)
+                    for i in range(n):
+                        before[i] = dx[i]
+                    for i in range(rows):
+                        for j in range(n):
+                            w.z[i] += w.H[i, j] * dx[j]
+                        if weights[i] == 0.0:
+                            w.z[i] = np.nan
+                    copy(size, P, w.P)
+                    for i in range(len(X)):
+                        s.X[i] = X[i]
+                    if failure == SOUND:
+                        failure = correct_again(size, w)
+                    if failure != SOUND:
+                        break
+                    move(functions, w, s, dx)
+                    change = 0.0
+                    for i in range(n):
+                        change = max(change, abs(dx[i] - before[i]) - options.tolerance * np.sqrt(w.P[i, i]))
+                    if change <= 0.0:
+                        break
+                if failure != SOUND:
+                    conclude(out, run, epoch, failure, 0.0, 0.0)
+                    break
+            if out.innovation.shape[1] > 0:
+                if options.tracking:
+                    out.adaptation[run, epoch, 0] = lam[0]
+                if options.gate != NO_GATE:
+                    for i in range(rows):
+                        here = np.isfinite(out.innovation[run, epoch, i])
+                        out.adaptation[run, epoch, first + i] = weights[i] if here else np.nan
+            keep_point(out, run, epoch, epochs - 1, s.X, w.P)
+
+
+def run_nonlinear(
+    system: NonlinearSystem,
+    state: FilterState | None,
+    rule: QuadratureRule,
+    order: NDArray[np.int64],
+    *,
+    tracking: StrongTracking | None,
+    gate: Gate | None,
+    history: History,
+    innovations: bool | None,
+    workers: int,
+    iterations: int = 1,
+    tolerance: float = 0.0,
+) -> Estimates:
+    """Run the kernel with its options; memory and adaptation are those of tracking, then of the gate."""
+    functions, rows = functions_of(system), system.rows
+    fading = tracking or StrongTracking()
+    number, k0, patience, largest = gate.limits(rows) if gate else (NO_GATE, 0.0, 0, np.zeros(1))
+    options = Options(
+        tracking is not None,
+        float(fading.softening),
+        float(fading.rho),
+        float(fading.cap),
+        number,
+        k0,
+        patience,
+        largest,
+        iterations,
+        float(tolerance),
+    )
+
+    def kernel(size: Size, runs: NonlinearRuns, epochs: int, out: Histories) -> None:
+        nonlinear_runs(size, functions, runs, epochs, rule, order, options, out)
+
+    remembered = [np.full(rows, np.nan)] if tracking else []
+    if gate:
+        remembered.append(np.zeros(max(rows, 1)))
+    return drive(
+        kernel,
+        system,
+        state,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+        memory=np.concatenate(remembered) if remembered else None,
+        adaptation=(1 if tracking else 0) + (rows if gate else 0),
+        flatten=nonlinear_runs_of,
+    )
