@@ -265,6 +265,8 @@ def navigate_track(
     P0 = _solve(J, model.prior(start.P))
     P = P0.copy()
     dtheta, dvel = increments(record)
+    # The sample before the first is not there: its coning would be missing, a tilt of nanoradians and millimetres an hour on.
+    s[wander.LAST_ANGLE], s[wander.LAST_VELOCITY] = 2.0 * dtheta[0] - dtheta[1], 2.0 * dvel[0] - dvel[1]
     code, event = kernel.run(
         padded(n),
         kernel.Samples(*(read_only(a) for a in (steps, record.time, dtheta, dvel))),
