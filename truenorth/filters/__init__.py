@@ -2,6 +2,16 @@
 
 from truenorth.filters.extended import extended, iterated
 from truenorth.filters.fading import fading
+from truenorth.filters.fusion import (
+    Federated,
+    Fused,
+    covariance_intersection,
+    cross_covariance,
+    diagonal_weighted,
+    federated,
+    fuse,
+)
+from truenorth.filters.gains import Gains, filter_gains
 from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.information import (
     InformationEstimates,
@@ -19,13 +29,17 @@ from truenorth.filters.sage_husa import sage_husa
 from truenorth.filters.sigma_points import cubature, gauss_hermite, unscented
 from truenorth.filters.smoother import Smoothed, smoother
 from truenorth.filters.square_root import square_root
+from truenorth.filters.steady_state import SteadyState, steady_state
 from truenorth.filters.strong_tracking import StrongTracking, strong_tracking
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
 from truenorth.filters.variational import variational
 
 __all__ = [
     "Estimates",
+    "Federated",
     "FilterState",
+    "Fused",
+    "Gains",
     "Gate",
     "InformationEstimates",
     "InformationState",
@@ -33,11 +47,18 @@ __all__ = [
     "LinearSystem",
     "NonlinearSystem",
     "Smoothed",
+    "SteadyState",
     "StrongTracking",
     "check_jacobians",
+    "covariance_intersection",
+    "cross_covariance",
     "cubature",
+    "diagonal_weighted",
     "extended",
     "fading",
+    "federated",
+    "filter_gains",
+    "fuse",
     "gated",
     "gauss_hermite",
     "h_infinity",
@@ -52,6 +73,7 @@ __all__ = [
     "smallest_bound",
     "smoother",
     "square_root",
+    "steady_state",
     "strong_tracking",
     "two_filter_smoother",
     "unscented",
