@@ -1,0 +1,129 @@
+"""The posterior Cramer-Rao bound: a covariance that no estimator's errors fall below, on average over the scenario.
+
+The information about the state runs as ``J_k = D22 - D21 (J_{k-1} + D11)^-1 D12`` with, for additive Gaussian noise,
+``D11 = E F' Q^-1 F``, ``D12 = -E F' Q^-1``, ``D22 = Q^-1 + E H' R^-1 H``: expectations over true trajectories of Jacobians taken
+*at the truth*. A nonlinear system so enters as its linearisation about trajectories that were drawn, one run each.
+
+Source: P. Tichavsky, C. H. Muravchik, A. Nehorai, Posterior Cramer-Rao bounds for discrete-time nonlinear filtering, IEEE
+Trans. Signal Processing 46, 1998, eqs. 21 and 34-36.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors import DataError, UsageError
+from truenorth.filters import LinearSystem
+
+Array = NDArray[np.float64]
+
+SAME = 1e-12  # of an element of Phi: runs that differ by less have one Phi
+
+
+@dataclass(frozen=True)
+class CramerRao:
+    """Bound after each epoch.
+
+    Attributes
+    ----------
+    P : (K, n, n) array
+        Covariance of the error, at least.
+    sigma : (K, n) array
+    """
+
+    P: Array
+    sigma: Array
+
+
+def cramer_rao(system: LinearSystem) -> CramerRao:
+    """Posterior Cramer-Rao bound of a scenario.
+
+    For a linear system of one run it is the covariance of the Kalman filter. An expectation over few trajectories is itself
+    uncertain: about as much as the mean over runs of what varies in ``H' R^-1 H`` and Phi.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        Jacobians at the truth, the run axes being drawn trajectories; `x0` and `u` do not matter, of `z` only which rows are
+        present. Without S.
+
+    Returns
+    -------
+    CramerRao
+
+    Raises
+    ------
+    UsageError
+        S, or a P0 or Q that differs from run to run.
+    DataError
+        P0 is singular; R is singular; or Phi differs from run to run while Q is singular (then the bound degenerates:
+        give every state some noise, or take the trajectories one by one).
+    """
+    _check(system)
+    n, epochs = system.states, system.epochs
+    P = _common("P0", system.P0, 2)
+    Q = _common("Q", system.Q, 3)
+    J = _inverse(P, "P0 is singular; leave out states known exactly")
+    out = np.empty((epochs, n, n))
+    for k in range(epochs):
+        Phi, Q_k = _epoch(system.Phi, k, 2), Q[k if len(Q) > 1 else 0]
+        told = np.mean(_told(system, k), axis=0)
+        mean = Phi.mean(axis=0)
+        if np.all(np.abs(Phi - mean) <= SAME * np.abs(mean).max()):
+            J = _inverse(mean @ _inverse(J, _LOST) @ mean.T + Q_k, f"Phi P Phi' + Q is singular at epoch {k}") + told
+        else:
+            noise = _inverse(
+                Q_k, f"Q is singular at epoch {k} while Phi differs from run to run: the bound degenerates"
+            )
+            D11 = np.mean(np.swapaxes(Phi, -1, -2) @ noise @ Phi, axis=0)
+            D12 = -mean.T @ noise
+            J = noise - D12.T @ np.linalg.solve(J + D11, D12) + told
+        J = 0.5 * (J + J.T)
+        out[k] = _inverse(J, _LOST)
+    return CramerRao(out, np.sqrt(np.diagonal(out, axis1=-2, axis2=-1)))
+
+
+_LOST = "the information is lost in rounding; bring the states to like sizes, or P0 nearer to what is known"
+
+
+def _check(system: LinearSystem) -> None:
+    if system.S is not None and system.S.any():
+        raise UsageError("cramer_rao: S is given; the bound is for noise that is independent of the process noise")
+
+
+def _common(name: str, a: Array, core: int) -> Array:
+    """What all runs must share, without their axes."""
+    flat = a.reshape(-1, *a.shape[a.ndim - core :])
+    if np.any(flat != flat[0]):
+        raise UsageError(f"cramer_rao: {name} differs from run to run, expected one for all trajectories")
+    return flat[0]
+
+
+def _epoch(a: Array, k: int, core: int) -> Array:
+    """(runs or 1, ...) of an epoch."""
+    flat = a.reshape(-1, *a.shape[a.ndim - core - 1 :])
+    return flat[:, k if flat.shape[1] > 1 else 0]
+
+
+def _told(system: LinearSystem, k: int) -> Array:
+    """(runs or 1, n, n) ``H' R^-1 H`` of the rows present."""
+    absent = np.isnan(_epoch(system.z, k, 1))
+    R = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), _epoch(system.R, k, 2))
+    H = np.where(absent[..., :, None], 0.0, _epoch(system.H, k, 2))
+    return np.asarray(np.swapaxes(H, -1, -2) @ _inverse(R, f"R is singular at epoch {k}") @ H)
+
+
+def _inverse(A: Array, trouble: str) -> Array:
+    """Of positive definite matrices in whatever units."""
+    size = np.sqrt(np.maximum(np.diagonal(A, axis1=-2, axis2=-1), 0.0))
+    scale = size[..., :, None] * size[..., None, :]
+    try:
+        if not np.all(size > 0.0):
+            raise np.linalg.LinAlgError
+        L = np.linalg.inv(np.linalg.cholesky(A / scale))
+    except np.linalg.LinAlgError:
+        raise DataError(f"cramer_rao: {trouble}") from None
+    return np.asarray(np.swapaxes(L, -1, -2) @ L / scale)
