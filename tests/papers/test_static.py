@@ -45,7 +45,10 @@ def test_the_closed_form_limit():
 
 
 def test_the_model_is_that_of_the_mechanisation():
-    """Columns of Phi against the strapdown with a perturbed start, over 5 s at rest: later the latitude error, no state here, counts."""
+    """Columns of Phi against the strapdown with a perturbed start.
+
+    Over 5 s at rest: later the latitude error, which is no state here, begins to count.
+    """
     from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
     from truenorth.position import Position
     from truenorth.simulation import rest, simulate

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,23 +13,34 @@ from numpy.typing import NDArray
 from truenorth.attitude import euler_from_dcm
 from truenorth.earth import radii
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
+from truenorth.records import GnssRecord, HeightRecord, MasterRecord, OdometerRecord, Record, VelocityRecord
 from truenorth.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
+    from truenorth.simulation.aiding import Aided
     from truenorth.simulation.motion import MotionStates
     from truenorth.simulation.runs import Simulation
 
 Array = NDArray[np.float64]
+AIDING_COLOURS = {
+    "gnss": COLOURS[1],
+    "odometer": COLOURS[1],
+    "velocity_log": COLOURS[1],
+    "height": COLOURS[3],
+    "master": COLOURS[1],
+}
 SAMPLES = 20_000  # of the truth, evenly; enough for a page
 
 
-def plot_simulation(simulation: Simulation, title: str = "") -> Figure:
+def plot_simulation(simulation: Simulation, title: str = "", aiding: Mapping[str, Aided[Any]] | None = None) -> Figure:
     """Draw the track, speed and height, attitude, rates and specific forces of one run.
 
     Parameters
     ----------
     simulation : Simulation
     title : str
+    aiding : mapping of name to Aided, optional
+        Logs of aiding sensors; what they say of track, speed and height is drawn as dots.
 
     Returns
     -------
@@ -43,13 +55,19 @@ def plot_simulation(simulation: Simulation, title: str = "") -> Figure:
         figure = new_figure(12.0, 8.5)
         columns = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
         left, right = columns[0].subgridspec(3, 1, height_ratios=[2.0, 1.0, 1.0]), columns[1].subgridspec(4, 1)
-        _track(figure.add_subplot(left[0]), truth)
+        track = figure.add_subplot(left[0])
+        _track(track, truth)
         speed = figure.add_subplot(left[1])
         height = figure.add_subplot(left[2], sharex=speed)
         trace(speed, times / unit, np.linalg.norm(truth.v_n, axis=1), color=COLOURS[0])
         trace(height, times / unit, truth.alt, color=COLOURS[2])
         speed.set(title="Speed", ylabel="m/s")
         height.set(title="Height above the ellipsoid", ylabel="m", xlabel=f"time, {name}")
+        for sensor, log in (aiding or {}).items():
+            _aiding_dots(sensor, log.record, track, speed, height, truth, unit)
+        for ax in (speed, height):
+            if ax.get_legend_handles_labels()[0]:
+                _legend(ax, 3)
         rows = [figure.add_subplot(right[0])]
         rows += [figure.add_subplot(right[k], sharex=rows[0]) for k in range(1, 4)]
         _attitude(rows[0], rows[1], times / unit, truth)
@@ -65,9 +83,7 @@ def plot_simulation(simulation: Simulation, title: str = "") -> Figure:
 
 def _track(ax: Axes, truth: MotionStates) -> None:
     """East and north of the first position, in metres or kilometres, to one scale."""
-    R_M, R_N = radii(truth.lat[0])
-    east = (truth.lon - truth.lon[0]) * (R_N + truth.alt[0]) * np.cos(truth.lat)
-    north = (truth.lat - truth.lat[0]) * (R_M + truth.alt[0])
+    east, north = _plane(truth.lat, truth.lon, truth)
     extent = float(max(np.ptp(east), np.ptp(north)))
     factor, unit = (1e-3, "km") if extent > 3e3 else (1.0, "m")
     if extent < 1e-6:
@@ -83,6 +99,35 @@ def _track(ax: Axes, truth: MotionStates) -> None:
     place = f"{abs(np.degrees(truth.lat[0])):.4f} {'N' if truth.lat[0] >= 0 else 'S'}, "
     place += f"{abs(np.degrees(truth.lon[0])):.4f} {'E' if truth.lon[0] >= 0 else 'W'}"
     ax.set(title=f"Track of the IMU, from {place}", xlabel=f"east, {unit}", ylabel=f"north, {unit}")
+
+
+def _plane(lat: Array, lon: Array, truth: MotionStates) -> tuple[Array, Array]:
+    """East and north of the first true position, m."""
+    R_M, R_N = radii(truth.lat[0])
+    return (lon - truth.lon[0]) * (R_N + truth.alt[0]) * np.cos(lat), (lat - truth.lat[0]) * (R_M + truth.alt[0])
+
+
+def _aiding_dots(
+    name: str, record: Record, track: Axes, speed: Axes, height: Axes, truth: MotionStates, unit: float
+) -> None:
+    """What an aiding sensor says of track, speed and height, faint."""
+    dots: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 2.5, "alpha": 0.5, "zorder": 1}
+    dots |= {"color": AIDING_COLOURS.get(name, REFERENCE), "label": name.replace("_", " ")}
+    time = record.time / unit
+    if isinstance(record, GnssRecord):
+        east, north = _plane(record.lat, record.lon, truth)
+        factor = 1e-3 if "km" in track.get_xlabel() else 1.0
+        track.plot(east * factor, north * factor, **dots)
+        track.legend()
+        height.plot(time, record.alt, **dots)
+    elif isinstance(record, HeightRecord):
+        height.plot(time, record.alt, **dots)
+    elif isinstance(record, OdometerRecord):
+        speed.plot(time, np.abs(record.speed), **dots)
+    elif isinstance(record, VelocityRecord):
+        speed.plot(time, np.sqrt(np.nansum(record.velocity**2, axis=1)), **dots)
+    elif isinstance(record, MasterRecord) and record.v_n is not None:
+        speed.plot(time, np.linalg.norm(record.v_n, axis=1), **dots)
 
 
 def _attitude(heading_axes: Axes, tilt_axes: Axes, time: Array, truth: MotionStates) -> None:

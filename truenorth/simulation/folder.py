@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+from collections.abc import Mapping
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
@@ -15,6 +16,7 @@ from truenorth import __version__, write_imu, write_record
 from truenorth.atomic import atomic_path, writable_folder
 
 if TYPE_CHECKING:
+    from truenorth.simulation.aiding import Aided
     from truenorth.simulation.runs import Simulation
     from truenorth.simulation.scenario import Scenario
 
@@ -57,26 +59,36 @@ def save_run(
     import yaml
 
     target = writable_folder(folder)
+    aiding = scenario.simulate_aiding(seed=seed, run=run)
+    records = {key: log.record for key, log in aiding.items()}
+    if scenario.indexer is not None:  # truth is the IMU's; beside it that of the body in which it turns
+        body = scenario.build_motion(seed, run)
+        records["truth_body"] = body.states(simulation.record.time).trajectory()
     names = [f"imu.{suffix}", f"truth.{suffix}", "scenario.yaml", "summary.json"]
+    names += [f"{key}.{suffix}" for key in records]
     paths = [target / name for name in names]
     with ExitStack() as files:
-        imu, truth, resolved, summary = (files.enter_context(atomic_path(path)) for path in paths)
+        imu, truth, resolved, summary, *others = [files.enter_context(atomic_path(path)) for path in paths]
         write_imu(simulation.record, imu)
+        for record, path in zip(records.values(), others, strict=True):
+            write_record(record, path)
         write_record(simulation.truth.trajectory(), truth)
         text = yaml.safe_dump(scenario.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
         resolved.write_text(text, encoding="utf-8")
-        facts = json.dumps(_facts(scenario, simulation, seed, run), indent=2, allow_nan=False)
+        facts = json.dumps(_facts(scenario, simulation, aiding, seed, run), indent=2, allow_nan=False)
         summary.write_text(f"{facts}\n", encoding="utf-8")
         if plot:
             from truenorth.figures.simulation import plot_simulation
 
             paths.append(target / "figure.png")
             title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
-            plot_simulation(simulation, title).savefig(files.enter_context(atomic_path(paths[-1])))
+            plot_simulation(simulation, title, aiding).savefig(files.enter_context(atomic_path(paths[-1])))
     return paths
 
 
-def _facts(scenario: Scenario, simulation: Simulation, seed: int, run: int) -> dict[str, Any]:
+def _facts(
+    scenario: Scenario, simulation: Simulation, aiding: Mapping[str, Aided[Any]], seed: int, run: int
+) -> dict[str, Any]:
     errors = simulation.errors
     return {
         "scenario": scenario.name,
@@ -88,9 +100,17 @@ def _facts(scenario: Scenario, simulation: Simulation, seed: int, run: int) -> d
         "kind": simulation.record.kind,
         "imu": scenario.imu_spec.name,
         "true_errors": {name: value.tolist() for name, value in errors.constants().items()},
-        "true_errors_unit": "SI: rad/s, m/s^2",
+        "true_errors_of_aiding": {key: _constants(log) for key, log in aiding.items()},
+        "true_errors_unit": "SI",
         "truenorth": __version__,
         "numpy": np.__version__,
         "python": platform.python_version(),
         "machine": platform.machine(),
     }
+
+
+def _constants(log: Aided[Any]) -> dict[str, Any]:
+    """What does not change from row to row."""
+    rows = len(log.sampled)
+    arrays = {name: np.asarray(value, dtype=np.float64) for name, value in log.errors.items()}
+    return {name: array.tolist() for name, array in arrays.items() if array.ndim == 0 or len(array) < rows}

@@ -25,10 +25,17 @@ from pydantic import Field, PrivateAttr, field_validator
 from truenorth.errors import DataError, TruenorthError, UsageError
 from truenorth.position import Position
 from truenorth.schema import Angle, Frequency, Length, Strict, Time, validated
-from truenorth.simulation import IdealLog, Simulation, ideal_log, simulate
+from truenorth.simulation import IdealLog, Simulation, given_errors, ideal_log, simulate
+from truenorth.simulation.aiding import Aided
+from truenorth.simulation.encoder import encoder_record
+from truenorth.simulation.flexure import Flexed, FlexureSpec
+from truenorth.simulation.indexer import Indexed
 from truenorth.simulation.motion import Motion
 from truenorth.simulation.scenario_motion import Disturbance, MotionModel, RouteMotion, disturbed
+from truenorth.simulation.scenario_sensors import AIDING, IndexerModel
+from truenorth.simulation.sensing import Moving
 from truenorth.simulation.streams import stream
+from truenorth.simulation.unit_spec import UnitSpec
 from truenorth.specs import ImuSpec, imu_spec
 from truenorth.yaml_file import read_mapping
 
@@ -63,6 +70,14 @@ class Scenario(Strict):
     imu : preset, file or mapping
         See :func:`truenorth.imu_spec`; an ideal IMU when left out.
     output : {"increments", "rates"}
+    errors : mapping
+        Errors of the IMU that are given, not drawn; see :func:`truenorth.simulation.given_errors`.
+    indexer : IndexerModel
+        The IMU turns in the body.
+    flexure : mapping
+        The IMU's seat bends; see :class:`truenorth.simulation.FlexureSpec`.
+    odometer, velocity_log, gnss, height, master : mapping
+        Aiding sensors, on the rigid body; see the specifications of :mod:`truenorth.simulation`. An empty one is ideal.
     """
 
     name: str = Field(min_length=1)
@@ -77,6 +92,14 @@ class Scenario(Strict):
     lever_arm: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
     imu: str | dict[str, Any] | None = None
     output: Literal["increments", "rates"] = "increments"
+    errors: dict[str, Any] | None = None
+    indexer: IndexerModel | None = None
+    flexure: dict[str, Any] | None = None
+    odometer: dict[str, Any] | None = None
+    velocity_log: dict[str, Any] | None = None
+    gnss: dict[str, Any] | None = None
+    height: dict[str, Any] | None = None
+    master: dict[str, Any] | None = None
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: str = PrivateAttr(default="scenario")
 
@@ -130,15 +153,35 @@ class Scenario(Strict):
         except UsageError as error:
             raise DataError(f"{self._source}: {where}: {error}") from None
 
+    def imu_motion(self, body: Motion, seed: int | None = None, run: int = 0, number: int = 0) -> Moving:
+        """The motion of the IMU on a body: where its seat bends and it turns, as it does.
+
+        Raises
+        ------
+        DataError
+            An indexer or a flexure that cannot be; the message names the key.
+        """
+        moving: Moving = body
+        span = {"duration": self.duration, "start": self.start}
+        if self.flexure is not None:
+            spec = FlexureSpec.from_mapping(self.flexure, f"{self._source}: flexure")
+            moving = Flexed(moving, spec, seed=self.seed if seed is None else seed, run=run, scenario=number, **span)
+        if self.indexer is not None:
+            try:
+                moving = Indexed(moving, self.indexer.build(self.start + self.duration))
+            except UsageError as error:
+                raise DataError(f"{self._source}: indexer: {error}") from None
+        return moving
+
     def ideal(self, seed: int | None = None, run: int = 0, number: int = 0) -> IdealLog:
         """What an ideal IMU measures on a run's motion."""
-        motion = self.build_motion(seed, run, number)
+        motion = self.imu_motion(self.build_motion(seed, run, number), seed, run, number)
         return ideal_log(motion, rate=self.rate, duration=self.duration, start=self.start)
 
     def simulate(
         self, *, seed: int | None = None, run: int = 0, number: int = 0, ideal: IdealLog | None = None
     ) -> Simulation:
-        """Simulate one run.
+        """Simulate one run of the IMU.
 
         Parameters
         ----------
@@ -161,7 +204,43 @@ class Scenario(Strict):
             run=run,
             scenario=number,
             kind=self.output,
+            errors=None if self.errors is None else given_errors(self.errors, f"{self._source}: errors"),
         )
+
+    def simulate_aiding(self, *, seed: int | None = None, run: int = 0, number: int = 0) -> dict[str, Aided[Any]]:
+        """Simulate the aiding sensors of a run, by their key; with an indexer also its `encoder`.
+
+        Raises
+        ------
+        DataError
+            A specification with a mistake, or a sensor that has nothing to say in the time; the message names the key.
+        """
+        seed = self.seed if seed is None else seed
+        draw: dict[str, Any] = {"seed": seed, "run": run, "scenario": number}
+        body = self.build_motion(seed, run, number)
+        logs: dict[str, Aided[Any]] = {}
+        for key, (_, make) in AIDING.items():
+            if key in self.aiding_specs:
+                try:
+                    logs[key] = make(body, self.aiding_specs[key], duration=self.duration, start=self.start, **draw)
+                except UsageError as error:
+                    raise DataError(f"{self._source}: {key}: {error}") from None
+        if self.indexer is not None:
+            times = self.start + np.arange(round(self.duration * self.rate) + 1) / self.rate
+            indexer = self.indexer.build(self.start + self.duration)
+            record, errors = encoder_record(indexer, times, self.indexer.errors(), **draw)
+            logs["encoder"] = Aided(record, times, vars(errors))
+        return logs
+
+    @cached_property
+    def aiding_specs(self) -> dict[str, UnitSpec]:
+        """Specifications of the aiding sensors that the scenario has."""
+        given = {key: getattr(self, key) for key in AIDING}
+        return {
+            key: AIDING[key][0].from_mapping(content, f"{self._source}: {key}")
+            for key, content in given.items()
+            if content is not None
+        }
 
     def to_mapping(self) -> dict[str, Any]:
         """The scenario with all its defaults, as a file that needs no other file and reads back to the same bits."""
@@ -208,8 +287,14 @@ def shipped() -> dict[str, str]:
 def _checked(content: Mapping[str, Any], source: str, folder: Path) -> Scenario:
     scenario = validated(Scenario, dict(content), source)
     scenario._folder, scenario._source = folder, source
+    # Read now, so that mistakes are told before the work.
     try:
-        scenario.imu_spec  # noqa: B018  # read now, so that its mistakes are told before the work
+        scenario.imu_spec  # noqa: B018
     except TruenorthError as error:
         raise DataError(f"{source}: imu: {error}") from None
+    scenario.aiding_specs  # noqa: B018
+    if scenario.errors is not None:
+        given_errors(scenario.errors, f"{source}: errors")
+    if scenario.flexure is not None:
+        FlexureSpec.from_mapping(scenario.flexure, f"{source}: flexure")
     return scenario

@@ -1,0 +1,108 @@
+"""Sensors of a scenario beside the IMU: aiding sensors, an indexer with its encoder, flexure; as a file describes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from truenorth.errors import UsageError
+from truenorth.schema import Angle, AngularRate, Strict, Time
+from truenorth.simulation.axis_angles import SCHEMES, Spin, Swing, Turning, scheme
+from truenorth.simulation.encoder import Encoder
+from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
+from truenorth.simulation.indexer import Axis, Indexer
+from truenorth.simulation.master import MasterSpec, simulate_master
+from truenorth.simulation.odometer import OdometerSpec, simulate_odometer
+from truenorth.simulation.tones import Tone
+from truenorth.simulation.unit_spec import UnitSpec
+from truenorth.simulation.velocity_log import VelocityLogSpec, simulate_velocity
+
+# Key in a scenario: the specification that its mapping is, and what makes the log.
+AIDING: dict[str, tuple[type[UnitSpec], Callable[..., Any]]] = {
+    "odometer": (OdometerSpec, simulate_odometer),
+    "velocity_log": (VelocityLogSpec, simulate_velocity),
+    "gnss": (GnssSpec, simulate_gnss),
+    "height": (HeightSpec, simulate_height),
+    "master": (MasterSpec, simulate_master),
+}
+Direction = Literal["x", "y", "z"]
+
+
+class SpinAxis(Strict):
+    """An axis that turns at a constant rate, counter-clockwise about its direction."""
+
+    kind: Literal["spin"]
+    direction: Direction
+    rate: AngularRate
+    start: Angle = 0.0
+    tilt: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+
+    def axis(self) -> Axis:
+        """The axis."""
+        return Axis(self.direction, Spin(self.rate, self.start), self.tilt)
+
+
+class SwingAxis(Strict):
+    """An axis that swings to and fro, ``mean + amplitude cos(2 pi t/period + phase)``."""
+
+    kind: Literal["swing"]
+    direction: Direction
+    amplitude: Angle
+    period: Time
+    phase: Angle = 0.0
+    mean: Angle = 0.0
+    tilt: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+
+    def axis(self) -> Axis:
+        """The axis."""
+        return Axis(self.direction, Swing(Tone(self.amplitude, self.period, self.phase), self.mean), self.tilt)
+
+
+class EncoderModel(Strict):
+    """Errors of the encoder, one sigma; see :class:`truenorth.simulation.encoder.Encoder`."""
+
+    resolution: Angle = 0.0
+    noise: Angle = 0.0
+    offset: Angle = 0.0
+    eccentricity: Angle = 0.0
+    latency: Time = 0.0
+
+
+class IndexerModel(Strict):
+    """A rotation mechanism: axes that turn for ever, the outermost first, or a scheme of positions."""
+
+    axes: tuple[Annotated[SpinAxis | SwingAxis, Field(discriminator="kind")], ...] = ()
+    scheme: str | None = None
+    directions: tuple[Direction, ...] = ("z", "x")
+    dwell: Time = 60.0
+    rate: AngularRate = 0.17453292519943295
+    encoder: EncoderModel = EncoderModel()
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if bool(self.axes) == (self.scheme is not None):
+            raise ValueError(f"expected axes, or a scheme ({', '.join(SCHEMES)}) with its directions and dwell")
+        return self
+
+    def build(self, duration: float) -> Indexer:
+        """The mechanism, its scheme going on for a time (s).
+
+        Raises
+        ------
+        UsageError
+            A scheme that is not known, or one of more axes than there are directions.
+        """
+        if self.scheme is None:
+            return Indexer(tuple(item.axis() for item in self.axes))
+        angles: tuple[Turning, ...] = scheme(self.scheme, dwell=self.dwell, duration=duration, rate=self.rate)
+        if len(angles) > len(self.directions):
+            raise UsageError(
+                f"scheme {self.scheme!r} turns {len(angles)} axes; directions names {len(self.directions)}"
+            )
+        return Indexer(tuple(Axis(name, angle) for name, angle in zip(self.directions, angles, strict=False)))
+
+    def errors(self) -> Encoder:
+        """Of the encoder."""
+        return Encoder(**self.encoder.__dict__)
