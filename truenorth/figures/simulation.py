@@ -138,15 +138,15 @@ def _attitude(heading_axes: Axes, tilt_axes: Axes, time: Array, truth: MotionSta
     heading_axes.plot(np.insert(time, jumps + 1, time[jumps]), shown, color=COLOURS[0])
     if np.ptp(heading) > 180.0:
         heading_axes.set(ylim=(0, 360), yticks=(0, 90, 180, 270, 360))
-    heading_axes.set(title="Heading, true", ylabel="deg")
+    heading_axes.set(title="Heading of the IMU, true", ylabel="deg")
     trace(tilt_axes, time, pitch, color=COLOURS[0], label="pitch")
     trace(tilt_axes, time, roll, color=COLOURS[1], label="roll")
-    tilt_axes.set(title="Pitch and roll, true", ylabel="deg")
+    tilt_axes.set(title="Pitch and roll of the IMU, true", ylabel="deg")
     _legend(tilt_axes, 2)
 
 
 def _signals(ax: Axes, time: Array, values: Array, title: str, unit: str) -> None:
-    upright = unit == "g" and abs(float(np.median(values[:, 2])) - 1.0) < 0.2
+    upright = unit == "g" and float(np.percentile(values[:, 2], 2.0)) > 0.5
     for axis in range(3):
         less_gravity = axis == 2 and upright  # or the vertical axis would flatten the others
         label = f"{AXES_NAMES[axis]} − 1 g" if less_gravity else AXES_NAMES[axis]
