@@ -11,17 +11,17 @@ from truenorth.errors import UsageError
 from truenorth.simulation import (
     Axis,
     C_bs_from_angles,
-    Encoder,
+    EncoderSpec,
     Indexed,
     Indexer,
     Spin,
     Sway,
     Swing,
     Tone,
-    encoder_record,
     ideal_log,
     scheme,
     simulate,
+    simulate_encoder,
     simulate_runs,
     steps,
 )
@@ -178,8 +178,8 @@ def test_steps_go_where_they_are_told():
         (lambda: steps([(0, 1.0), (0, 0.0)], dwell=1.0, duration=10.0), "turn 2"),
         (lambda: Axis("w", Spin(1.0)), "x, y and z"),
         (lambda: Indexer(()), "without axes"),
-        (lambda: Encoder(noise=-1.0), "noise is -1"),
-        (lambda: encoder_record(DUAL, [0.0, 1.0], given={"offset": [1.0]}), "offset"),
+        (lambda: EncoderSpec(noise=-1.0), "noise is -1"),
+        (lambda: encoder(errors={"offset": [1.0]}), "offset"),
     ],
 )
 def test_mechanisms_that_make_no_sense(call, said):
@@ -187,44 +187,49 @@ def test_mechanisms_that_make_no_sense(call, said):
         call()
 
 
+def encoder(spec=None, indexer=DUAL, **options):
+    return simulate_encoder(indexer, spec, duration=50.0, **options)
+
+
 def test_a_perfect_encoder_tells_the_angles():
-    t = np.arange(1, 1001) / 100
-    record, errors = encoder_record(DUAL, t)
-    np.testing.assert_array_equal(record.angles, np.outer(t, [deg(18), deg(3)]))
-    assert not errors.offset.any()
-    assert list(record.to_frame().columns) == ["angle_1", "angle_2"]
-    single, _ = encoder_record(Indexer((Axis("y", Spin(1.0)),)), t)
-    np.testing.assert_allclose(single.angles, t)
+    log = encoder()
+    record = log.record
+    np.testing.assert_allclose(record.angles, np.outer(record.time, [deg(18), deg(3)]), atol=1e-12)
+    assert not log.errors["offset"].any()
+    table = record.to_frame()
+    assert list(table.columns) == ["angle_1", "angle_2"]
+    np.testing.assert_allclose(table["angle_2"], 3 * record.time, atol=1e-10)
+    single = encoder(indexer=Indexer((Axis("y", Spin(1.0)),))).record
+    np.testing.assert_allclose(single.angles, single.time)
 
 
 def test_each_error_of_the_encoder():
-    t = np.arange(1, 5001) / 100
-    true = DUAL.angles(t)
-    late, _ = encoder_record(DUAL, t, Encoder(latency=0.004))
-    np.testing.assert_allclose(late.angles, true - 0.004 * deg([18, 3]), atol=1e-12)
-    coarse, _ = encoder_record(DUAL, t, Encoder(resolution=20 * ARCSEC))
-    assert np.max(np.abs(coarse.angles - true)) < 10.0001 * ARCSEC
-    np.testing.assert_allclose(coarse.angles / (20 * ARCSEC), np.round(coarse.angles / (20 * ARCSEC)), atol=1e-6)
+    late = encoder(EncoderSpec(latency=0.004)).record
+    np.testing.assert_allclose(late.angles, DUAL.angles(late.time - 0.004), atol=1e-12)
+    coarse = encoder(EncoderSpec(resolution=17 * ARCSEC)).record
+    true = DUAL.angles(coarse.time)
+    assert 7 * ARCSEC < np.max(np.abs(coarse.angles - true)) < 8.5001 * ARCSEC
+    np.testing.assert_allclose(coarse.angles / (17 * ARCSEC), np.round(coarse.angles / (17 * ARCSEC)), atol=1e-6)
     given = {"offset": [1e-4, -2e-4], "eccentricity": [[1e-5, 2e-5], [3e-5, -1e-5]]}
-    wrong, errors = encoder_record(DUAL, t, given=given)
+    wrong = encoder(errors=given)
     for i in range(2):
-        c, s = errors.eccentricity[i]
-        expected = errors.offset[i] + c * np.cos(true[:, i]) + s * np.sin(true[:, i])
-        np.testing.assert_allclose(wrong.angles[:, i] - true[:, i], expected, atol=1e-13)
-    noisy, _ = encoder_record(DUAL, t, Encoder(noise=ARCSEC))
-    # 10,000 draws: one sigma of their RMS is .7 %; beyond 4.5 of them 1 in 150,000.
+        c, s = wrong.errors["eccentricity"][i]
+        expected = given["offset"][i] + c * np.cos(true[:, i]) + s * np.sin(true[:, i])
+        np.testing.assert_allclose(wrong.record.angles[:, i] - true[:, i], expected, atol=1e-13)
+    noisy = encoder(EncoderSpec(noise=ARCSEC)).record
+    # 10,002 draws: one sigma of their RMS is .7 %; beyond 4.5 of them 1 in 150,000.
     assert np.std(noisy.angles - true) == pytest.approx(ARCSEC, rel=4.5 / np.sqrt(2e4))
 
 
 def test_encoder_draws_are_its_own():
-    t = np.arange(1, 101) / 100
-    whole = Encoder(noise=ARCSEC, offset=ARCSEC, eccentricity=ARCSEC)
-    a, b = (encoder_record(DUAL, t, whole, seed=3, run=1)[0].angles for _ in range(2))
-    assert a.tobytes() == b.tobytes()
-    assert a.tobytes() != encoder_record(DUAL, t, whole, seed=3, run=2)[0].angles.tobytes()
-    without, _ = encoder_record(DUAL, t, Encoder(noise=ARCSEC, eccentricity=ARCSEC), seed=3, run=1)
-    offset = encoder_record(DUAL, t, whole, seed=3, run=1)[1].offset
-    np.testing.assert_allclose(a - without.angles, np.tile(offset, (100, 1)), atol=1e-14)
+    whole = EncoderSpec(noise=ARCSEC, offset=ARCSEC, eccentricity=ARCSEC)
+    a, b = (encoder(whole, seed=3, run=1) for _ in range(2))
+    assert a.record.angles.tobytes() == b.record.angles.tobytes()
+    assert a.record.angles.tobytes() != encoder(whole, seed=3, run=2).record.angles.tobytes()
+    without = encoder(EncoderSpec(noise=ARCSEC, eccentricity=ARCSEC), seed=3, run=1)
+    shift = np.broadcast_to(a.errors["offset"], a.record.angles.shape)
+    np.testing.assert_allclose(a.record.angles - without.record.angles, shift, atol=1e-14)
+    assert np.all(shift != 0)
 
 
 def test_runs_share_an_indexed_motion():

@@ -39,3 +39,7 @@ class EncoderRecord(Record):
         """One angle an axis."""
         axes = np.shape(self.angles)[1] if np.ndim(self.angles) == 2 else 1
         return {"angles": [f"angle_{i}" for i in range(1, axes + 1)]}
+
+    def columns(self) -> dict[str, Array]:
+        """The angles in degrees."""
+        return {name: np.degrees(x) for name, x in super().columns().items()}

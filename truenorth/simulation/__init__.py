@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from truenorth.simulation.aiding import Aided
 from truenorth.simulation.axis_angles import Spin, Steps, Swing, scheme, steps
-from truenorth.simulation.encoder import Encoder, EncoderErrors, encoder_record
+from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
 from truenorth.simulation.flexure import Flexed, FlexureSpec
 from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
 from truenorth.simulation.ideal import IdealLog, ideal_log
@@ -23,8 +23,7 @@ __all__ = [
     "Axis",
     "C_bs_from_angles",
     "Disturbed",
-    "Encoder",
-    "EncoderErrors",
+    "EncoderSpec",
     "Flexed",
     "FlexureSpec",
     "GnssSpec",
@@ -45,12 +44,12 @@ __all__ = [
     "Tone",
     "TrueErrors",
     "VelocityLogSpec",
-    "encoder_record",
     "given_errors",
     "ideal_log",
     "rest",
     "scheme",
     "simulate",
+    "simulate_encoder",
     "simulate_gnss",
     "simulate_height",
     "simulate_master",

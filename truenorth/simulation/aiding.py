@@ -63,6 +63,9 @@ STREAMS = {
     "master_jumps": 158,
     "master_outages": 159,
     "flexure": 170,
+    "encoder_offset": 180,
+    "encoder_eccentricity": 181,
+    "encoder_noise": 182,
 }
 
 

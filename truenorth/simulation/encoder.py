@@ -3,119 +3,98 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.errors import UsageError
 from truenorth.records.encoder import EncoderRecord
+from truenorth.simulation.aiding import Aided, AidingSpec, Draws, sample_times
 from truenorth.simulation.indexer import Indexer
-from truenorth.simulation.streams import STREAMS, stream
+from truenorth.simulation.unit_spec import value
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Encoder:
-    """Errors of an encoder, one-sigma for each axis.
+@dataclass(frozen=True, kw_only=True)
+class EncoderSpec(AidingSpec):
+    """An encoder and its errors, one-sigma for each axis.
 
-    ``measured = steps of (angle(t - latency) + offset + c cos(angle) + s sin(angle) + noise)``
+    Measured is ``angle + offset + c cos(angle) + s sin(angle) + noise``, in whole steps.
 
     Attributes
     ----------
     resolution : float, rad
-        Size of one step; what is measured is rounded to whole ones. Zero: none.
+        Size of a step, to which what is measured is rounded. Zero: none.
     noise : float, rad
         White, of each reading.
     offset : float, rad
+        Of the zero of each axis.
     eccentricity : float, rad
         Of c and of s each: the disc turns about a point that is not its centre.
-    latency : float, s
     """
 
-    resolution: float = 0.0
-    noise: float = 0.0
-    offset: float = 0.0
-    eccentricity: float = 0.0
-    latency: float = 0.0
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not 0.0 <= value < float("inf"):
-                raise UsageError(f"encoder: {item.name} is {value}; expected zero or more, and finite")
+    rate: float = value("frequency", "Hz", 100.0, sign="positive")
+    resolution: float = value("angle", "arcsec")
+    noise: float = value("angle", "arcsec")
+    offset: float = value("angle", "arcsec")
+    eccentricity: float = value("angle", "arcsec")
 
 
-@dataclass(frozen=True, eq=False)
-class EncoderErrors:
-    """The constant errors of one run.
-
-    Attributes
-    ----------
-    offset : (A,) array, rad
-    eccentricity : (A, 2) array, rad
-        Coefficients of cosine and sine of the angle.
-    """
-
-    offset: Array
-    eccentricity: Array
-
-
-def encoder_record(
+def simulate_encoder(
     indexer: Indexer,
-    times: ArrayLike,
-    encoder: Encoder | None = None,
+    spec: EncoderSpec | None = None,
     *,
+    duration: float,
+    start: float = 0.0,
     seed: int = 0,
     run: int = 0,
     scenario: int = 0,
-    given: Mapping[str, ArrayLike] | None = None,
-) -> tuple[EncoderRecord, EncoderErrors]:
-    """What the encoder says.
+    errors: Mapping[str, ArrayLike] | None = None,
+) -> Aided[EncoderRecord]:
+    """Simulate the encoder of an indexer.
 
     Parameters
     ----------
     indexer : Indexer
-    times : (N,) array, s
-    encoder : Encoder, optional
-        A perfect one when left out.
+    spec : EncoderSpec, optional
+        A perfect one of 100 Hz when left out.
+    duration, start : float, s
     seed, run, scenario : int
         The same three give the same bits.
-    given : mapping, optional
-        ``offset`` (A,) and ``eccentricity`` (A, 2) in place of their draws.
+    errors : mapping, optional
+        ``offset`` (A,) and ``eccentricity`` (A, 2; of cosine and sine), rad, given in place of their draws.
 
     Returns
     -------
-    EncoderRecord
-        Angles (N, A), or (N,) of a single axis.
-    EncoderErrors
+    Aided
+        Angles of the record (N, A), or (N,) of a single axis; errors ``offset, eccentricity``.
 
     Raises
     ------
     UsageError
         A given error that is not known, or of another shape.
     """
-    encoder = encoder or Encoder()
+    spec = EncoderSpec() if spec is None else spec
+    draws = Draws("encoder", seed, run, scenario)
     count = len(indexer.axes)
     shapes: dict[str, tuple[int, ...]] = {"offset": (count,), "eccentricity": (count, 2)}
-    fixed = {name: np.asarray(value, dtype=np.float64) for name, value in (given or {}).items()}
-    for name, value in fixed.items():
-        if shapes.get(name) != value.shape:
-            raise UsageError(f"encoder errors: {name} of shape {value.shape}; expected {shapes}")
-
-    def draw(name: str, shape: tuple[int, ...]) -> Array:
-        if name in fixed:
-            return fixed[name]
-        sigma = getattr(encoder, name)
-        rng = stream(seed, scenario, run, STREAMS[f"encoder_{name}"])
-        return sigma * rng.standard_normal(shape) if sigma > 0.0 else np.zeros(shape)
-
-    errors = EncoderErrors(**{name: draw(name, shape) for name, shape in shapes.items()})
-    times = np.asarray(times, dtype=np.float64)
-    true = indexer.angles(times - encoder.latency)
-    c, s = errors.eccentricity.T
-    angles = true + errors.offset + c * np.cos(true) + s * np.sin(true) + draw("noise", true.shape)
-    if encoder.resolution > 0.0:
-        angles = np.round(angles / encoder.resolution) * encoder.resolution
-    return EncoderRecord(times, angles[:, 0] if count == 1 else angles, "simulation"), errors
+    given = {name: np.asarray(x, dtype=np.float64) for name, x in (errors or {}).items()}
+    for name, x in given.items():
+        if shapes.get(name) != x.shape:
+            known = ", ".join(f"{key} of shape {shape}" for key, shape in shapes.items())
+            raise UsageError(f"errors of the encoder: {name} of shape {x.shape}; expected {known}")
+    drawn = {
+        name: given.get(name, getattr(spec, name) * draws(name).standard_normal(shape))
+        for name, shape in shapes.items()
+    }
+    times = sample_times(spec, start, duration)
+    true = indexer.angles(times)
+    c, s = drawn["eccentricity"].T
+    angles = true + drawn["offset"] + c * np.cos(true) + s * np.sin(true)
+    angles += spec.noise * draws("noise").standard_normal(true.shape)
+    if spec.resolution > 0.0:
+        angles = np.round(angles / spec.resolution) * spec.resolution
+    record = EncoderRecord(times + spec.latency, angles[:, 0] if count == 1 else angles, "simulation")
+    return Aided(record, times, drawn)

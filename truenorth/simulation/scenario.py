@@ -27,7 +27,7 @@ from truenorth.position import Position
 from truenorth.schema import Angle, Frequency, Length, Strict, Time, validated
 from truenorth.simulation import IdealLog, Simulation, given_errors, ideal_log, simulate
 from truenorth.simulation.aiding import Aided
-from truenorth.simulation.encoder import encoder_record
+from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
 from truenorth.simulation.flexure import Flexed, FlexureSpec
 from truenorth.simulation.indexer import Indexed
 from truenorth.simulation.motion import Motion
@@ -226,11 +226,14 @@ class Scenario(Strict):
                 except UsageError as error:
                     raise DataError(f"{self._source}: {key}: {error}") from None
         if self.indexer is not None:
-            times = self.start + np.arange(round(self.duration * self.rate) + 1) / self.rate
             indexer = self.indexer.build(self.start + self.duration)
-            record, errors = encoder_record(indexer, times, self.indexer.errors(), **draw)
-            logs["encoder"] = Aided(record, times, vars(errors))
+            logs["encoder"] = simulate_encoder(
+                indexer, self._encoder(self.indexer), duration=self.duration, start=self.start, **draw
+            )
         return logs
+
+    def _encoder(self, indexer: IndexerModel) -> EncoderSpec:
+        return indexer.encoder_spec(self.rate, f"{self._source}: indexer.encoder")
 
     @cached_property
     def aiding_specs(self) -> dict[str, UnitSpec]:
@@ -295,6 +298,8 @@ def _checked(content: Mapping[str, Any], source: str, folder: Path) -> Scenario:
     scenario.aiding_specs  # noqa: B018
     if scenario.errors is not None:
         given_errors(scenario.errors, f"{source}: errors")
+    if scenario.indexer is not None:
+        scenario._encoder(scenario.indexer)
     if scenario.flexure is not None:
         FlexureSpec.from_mapping(scenario.flexure, f"{source}: flexure")
     return scenario

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from truenorth.errors import UsageError
 from truenorth.schema import Angle, AngularRate, Strict, Time
 from truenorth.simulation.axis_angles import SCHEMES, Spin, Swing, Turning, scheme
-from truenorth.simulation.encoder import Encoder
+from truenorth.simulation.encoder import EncoderSpec
 from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
 from truenorth.simulation.indexer import Axis, Indexer
 from truenorth.simulation.master import MasterSpec, simulate_master
@@ -60,25 +60,18 @@ class SwingAxis(Strict):
         return Axis(self.direction, Swing(Tone(self.amplitude, self.period, self.phase), self.mean), self.tilt)
 
 
-class EncoderModel(Strict):
-    """Errors of the encoder, one sigma; see :class:`truenorth.simulation.encoder.Encoder`."""
-
-    resolution: Angle = 0.0
-    noise: Angle = 0.0
-    offset: Angle = 0.0
-    eccentricity: Angle = 0.0
-    latency: Time = 0.0
-
-
 class IndexerModel(Strict):
-    """A rotation mechanism: axes that turn for ever, the outermost first, or a scheme of positions."""
+    """A rotation mechanism: axes that turn for ever, the outermost first, or a scheme of positions.
+
+    Its encoder is a mapping of :class:`truenorth.simulation.EncoderSpec`; an ideal one at the IMU's rate when left out.
+    """
 
     axes: tuple[Annotated[SpinAxis | SwingAxis, Field(discriminator="kind")], ...] = ()
     scheme: str | None = None
     directions: tuple[Direction, ...] = ("z", "x")
     dwell: Time = 60.0
     rate: AngularRate = 0.17453292519943295
-    encoder: EncoderModel = EncoderModel()
+    encoder: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
@@ -103,6 +96,6 @@ class IndexerModel(Strict):
             )
         return Indexer(tuple(Axis(name, angle) for name, angle in zip(self.directions, angles, strict=False)))
 
-    def errors(self) -> Encoder:
-        """Of the encoder."""
-        return Encoder(**self.encoder.__dict__)
+    def encoder_spec(self, rate: float, where: str) -> EncoderSpec:
+        """The encoder, at a rate (Hz) where it names none; `where` leads the messages of the DataError."""
+        return EncoderSpec.from_mapping({"rate": f"{rate!r} Hz", **self.encoder}, where)

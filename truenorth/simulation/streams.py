@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-# Streams by term; never renumbered, so that a seed keeps its data.
+# Streams of the IMU by term; those of aiding sensors begin at 100, of motions at 200. Never renumbered, so that a seed keeps
+# its data.
 STREAMS = {
     "gyro_bias": 0,
     "accel_bias": 1,
@@ -33,9 +34,6 @@ STREAMS = {
     "accel_bias_temperature": 21,
     "gyro_scale_factor_temperature": 22,
     "accel_scale_factor_temperature": 23,
-    "encoder_offset": 30,
-    "encoder_eccentricity": 31,
-    "encoder_noise": 32,
 }
 
 
