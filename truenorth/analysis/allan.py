@@ -180,7 +180,9 @@ def _fit(data: Array, record: ImuRecord) -> NoiseCoefficients:
     allan = overlapping_adev(data, record.interval, kind=record.kind)
     values, sigmas = np.zeros((4, 3)), np.full((4, 3), np.nan)
     for axis in range(3):
-        values[:, axis], sigmas[:, axis] = _nonnegative_fit(allan.tau, allan.deviation[:, axis], allan.sigma[:, axis])
+        values[:, axis], sigmas[:, axis], _ = fit_shapes(
+            _shapes(allan.tau), allan.deviation[:, axis], allan.sigma[:, axis]
+        )
     return NoiseCoefficients(*values, *sigmas, allan)  # type: ignore[call-arg]
 
 
@@ -189,10 +191,13 @@ def _shapes(tau: Array) -> Array:
     return np.stack([3.0 / tau**2, 1.0 / tau, np.full_like(tau, 2.0 * np.log(2.0) / np.pi), tau / 3.0], axis=-1)
 
 
-def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array, Array]:
-    """Coefficients (4,) and sigmas (4,) of the set of processes that explains the variance best.
+def fit_shapes(shapes: Array, deviation: Array, sigma: Array) -> tuple[Array, Array, float]:
+    """Coefficients (S,) and sigmas (S,) of the set of processes that explains an Allan deviation (M,) best, and the misfit.
 
-    Fifteen small least-squares problems, one for each set of processes, replace an iterative solver; a set
+    `shapes` (M, S) are the Allan variances of the processes for coefficients of one. The misfit is the sum of squared
+    logarithmic residuals, each in units of its sigma.
+
+    Small least-squares problems, one for each set of processes, replace an iterative solver; a set
     with a square below zero is out, and a process must lower chi-square by `WORTH` to be taken. The weights
     are the fitted variance's; the measured one, whose weights favour small values, only starts the iteration.
 
@@ -200,11 +205,11 @@ def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array,
     relative error of the model joins the weights until it no longer does, so that no part of the curve rules;
     residuals are then meant on the logarithmic scale of the plot.
     """
-    coefficients, sigmas = np.zeros(4), np.full(4, np.nan)
+    coefficients, sigmas = np.zeros(shapes.shape[1]), np.full(shapes.shape[1], np.nan)
     usable = deviation > 0.0
     if np.count_nonzero(usable) < 2:
-        return coefficients, sigmas
-    shapes, variance = _shapes(tau[usable]), deviation[usable] ** 2
+        return coefficients, sigmas, 0.0
+    shapes, variance = shapes[usable], deviation[usable] ** 2
     relative = 2.0 * sigma[usable] / deviation[usable]
     lag = np.abs(np.subtract.outer(np.arange(variance.size), np.arange(variance.size)))
     correlation = OCTAVE_CORRELATION**lag
@@ -224,7 +229,8 @@ def _nonnegative_fit(tau: Array, deviation: Array, sigma: Array) -> tuple[Array,
     covariance = solver @ correlation @ solver.T  # of the squares; the weighted rows have unit variance
     coefficients[list(chosen)] = np.sqrt(squares)
     sigmas[list(chosen)] = np.sqrt(max(1.0, spread) * np.diag(covariance)) / (2.0 * np.sqrt(squares))
-    return coefficients, sigmas
+    misfit = float(np.sum((np.log(shapes[:, chosen] @ squares / variance) / relative) ** 2))
+    return coefficients, sigmas, misfit
 
 
 def _logarithmic_size(model: Array, variance: Array) -> Array:
@@ -241,8 +247,8 @@ Fit = tuple[float, tuple[int, ...], Array, Array]
 def _best_processes(shapes: Array, variance: Array, weights: Array) -> Fit:
     fits = [
         fit
-        for size in range(1, min(4, variance.size) + 1)
-        for chosen in combinations(range(4), size)
+        for size in range(1, min(shapes.shape[1], variance.size) + 1)
+        for chosen in combinations(range(shapes.shape[1]), size)
         if (fit := _fit_processes(shapes, variance, weights, chosen)) is not None
     ]
     return min(fits, key=lambda fit: fit[0] + WORTH * len(fit[1]))
@@ -251,7 +257,7 @@ def _best_processes(shapes: Array, variance: Array, weights: Array) -> Fit:
 def _fit_processes(shapes: Array, variance: Array, weights: Array, chosen: tuple[int, ...]) -> Fit | None:
     """Chi-square, processes, squared coefficients and solver; None where a square is not positive."""
     rows = shapes[:, chosen] * weights[:, None]
-    scale = np.linalg.norm(rows, axis=0)  # the four shapes differ by many powers of ten
+    scale = np.linalg.norm(rows, axis=0)  # the shapes differ by many powers of ten
     solver = np.linalg.pinv(rows / scale) / scale[:, None]
     squares = solver @ (variance * weights)
     if np.any(squares <= 0.0):
