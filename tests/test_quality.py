@@ -444,3 +444,16 @@ def test_the_summary_is_cheap():
         motion_summary(record)
         times.append(clock.process_time() - start)
     assert min(times) < 0.12
+
+
+def test_waves_do_not_carry_a_moored_ship_away():
+    """A swell that shakes the mast by .1 m/s^2 and turns the hull by a fifth of a degree; a start of a van, beside it."""
+    from truenorth.quality.regimes import motion_summary
+    from truenorth.simulation.scenario import read_scenario
+
+    for run in range(3):
+        ship = motion_summary(read_scenario("quay").simulate(run=run).record)
+        assert ship.fraction("moving") == 0.0
+        assert ship.overall == "disturbed"
+    van = motion_summary(read_scenario("van").simulate().record)
+    assert van.fraction("moving") > 0.2

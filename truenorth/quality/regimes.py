@@ -46,6 +46,7 @@ TURN_RATE = np.radians(0.5)  # rad/s
 TURN_ANGLE = np.radians(3.0)  # net angle from which a turn is called rotating
 TURN_SHARE = 0.4  # of the RMS rate that is net rotation; a sway of 15 s period has at most 0.33
 MOVING_ACCELERATION = 0.08  # m/s^2 over one second; tilt error, bias and people in the car stay below 0.05
+LEAST_GAIN = 0.04  # m/s^2 over WINDOW: waves that come and go within it leave less, a start of .4 m/s more
 SWAY_ACCELERATION = 0.2  # m/s^2 over WINDOW: a rocking base with less gains no speed
 MOVING_PAUSE = 60  # s between two accelerations, without rest, that counts as moving too (cruising)
 TURNED_BIAS = 0.5  # m/s^2 for a radian: level error and bias of a cheap sensor that a turn shows as acceleration
@@ -211,6 +212,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
         active=_in_every_window(active, seconds),
         sways=around * np.sqrt(2.0) > SWAY_ANGLE,
         accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * np.linalg.norm(force_noise)) + TURNED_BIAS * turned,
+        gains=gain > LEAST_GAIN,
         gains_speed=gain > SWAY_ACCELERATION,
         rate_noise=float(np.linalg.norm(angle_noise)),
     )
@@ -230,6 +232,7 @@ def _classify(
     active: NDArray[np.bool_],
     sways: NDArray[np.bool_],
     accelerates: NDArray[np.bool_],
+    gains: NDArray[np.bool_],
     gains_speed: NDArray[np.bool_],
     rate_noise: float,
 ) -> NDArray[np.int8]:
@@ -238,7 +241,7 @@ def _classify(
     sways = _closed(sways & ~turns & active, WINDOW)
     sways = _without_short(sways, min(WINDOW, rate.shape[1] // 2))
     rocks = _without_short(sways, min(SHORTEST_SWAY, rate.shape[1] // 2))  # its lever arms accelerate, too
-    moves = accelerates & ~(rocks & ~gains_speed)
+    moves = accelerates & gains & ~(rocks & ~gains_speed)
     moves = _without_short(_closed(moves, MOVING_PAUSE, unless=~active & ~turns), 2)
     kind = np.full(rate.shape[1], STILL, dtype=np.int8)
     kind[active | accelerates] = DISTURBED
