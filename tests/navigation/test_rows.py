@@ -20,7 +20,7 @@ W_B = np.array([0.3, -0.2, 0.5])
 def _aiding(kind):
     states = {}
     roles = {
-        "position": ("lever arm", "lag"),
+        "position": ("lever arm", "lag", "bias"),
         "velocity": ("lever arm", "lag"),
         "body velocity": ("lever arm", "scale", "mounting", "bias", "lag"),
         "height": ("bias",),
@@ -59,7 +59,7 @@ def _predicted(kind, dx):
     kernel.set_matrix(s, sums.C_now)
     means.vectors[2] = W_B + dx[BG] + dx[model.slice_of("slow gyro bias")]
     w = workspace(padded(n), 3)
-    compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False)
+    compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False, 0.0, 0.0)
     kernel.measure(
         s, sums, means, _sources([source], model), 0, compiled_model, source.measured[0], aux, np.zeros((3, 3)), w
     )
@@ -89,4 +89,4 @@ def test_row_is_the_derivative_of_the_prediction(kind):
 
 
 def _extra_states(kind):
-    return {"position": 4, "velocity": 4, "body velocity": 10, "height": 1, "rotation": 0}[kind]
+    return {"position": 7, "velocity": 4, "body velocity": 10, "height": 1, "rotation": 0}[kind]

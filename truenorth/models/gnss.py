@@ -4,7 +4,7 @@ A row is *predicted less measured*, so that ``z = H x + noise`` with the states 
 computed minus true; what is left of a parameter, true minus assumed). With the lever arm l (body axes) and the clock lag
 tau (the measurement shows the antenna as it was tau before its time stamp):
 
-    position   z = dp - tau dv + (C l) x phi - C dl + v dtau
+    position   z = dp - tau dv + (C l) x phi - C dl + v dtau - dbias
     velocity   z = dv + u x phi + C (eps x l) - C (w x dl) + a dtau,   u = C (w x l)
 
 Rows are in ENU. A velocity is told in the axes at the true place; those at the computed place are turned against them
@@ -50,7 +50,19 @@ def into_north(s: Any, H: Any, z: Any) -> None:
 
 
 @compiled
-def position_row(s: Any, C: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any) -> None:
+def position_row(
+    s: Any,
+    C: Any,
+    arm: Any,
+    lag: float,
+    bias: Any,
+    at_arm: int,
+    at_lag: int,
+    at_bias: int,
+    measured: Any,
+    H: Any,
+    z: Any,
+) -> None:
     """Position of an antenna.
 
     Parameters
@@ -62,8 +74,10 @@ def position_row(s: Any, C: Any, arm: Any, lag: float, at_arm: int, at_lag: int,
     arm : tuple of 3, m
         IMU to antenna, body axes.
     lag : float, s
-    at_arm, at_lag : int
-        The first state of lever arm and lag; -1: none.
+    bias : tuple of 3, m
+        East, north, up: what the receiver is off by for minutes.
+    at_arm, at_lag, at_bias : int
+        The first state of lever arm, lag and bias; -1: none.
     measured : (3,) array
         Latitude, longitude (rad), height (m).
     H : (3, N) array
@@ -98,6 +112,10 @@ def position_row(s: Any, C: Any, arm: Any, lag: float, at_arm: int, at_lag: int,
         if at_lag >= 0:
             H[j, at_lag] = s[4 + j]
     into_north(s, H, z)
+    for j in range(3):
+        z[j] += bias[j]
+        if at_bias >= 0:
+            H[j, at_bias + j] = -1.0
 
 
 @compiled

@@ -58,6 +58,7 @@ STATES = 15
 
 # The same for kernels, which take numbers.
 _PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
+TURN_TIME = 10.0  # s, for which a turn goes on about one axis: so long its scale and misalignment errors are alike
 DYNAMIC = 9  # states whose errors drive each other; those behind them are sensors' and run by themselves
 _W = earth.EARTH_RATE
 _normal_gravity_at = compiled(earth.normal_gravity_at)
@@ -244,6 +245,8 @@ class InsModel:
     accel_random_walk : float, m/s/sqrt(s)
     gyro_rate_walk, accel_rate_walk : float
         Random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s).
+    turn_noise : (2,) tuple, s
+        What scale factors and misalignments of the gyros do in turns, as noise: their variances times `TURN_TIME`.
     extras : tuple of Extra
         Further states, in order.
     fixed_altitude : bool
@@ -254,6 +257,7 @@ class InsModel:
     accel_random_walk: float
     gyro_rate_walk: float = 0.0
     accel_rate_walk: float = 0.0
+    turn_noise: tuple[float, float] = (0.0, 0.0)
     extras: tuple[Extra, ...] = ()
     fixed_altitude: bool = False
 
@@ -272,7 +276,7 @@ class InsModel:
         ----------
         spec : ImuSpec
         scale_factors : bool
-            States for the scale factors; else their effect is left out.
+            States for the scale factors; else they count as noise in turns, as the gyros' misalignments do.
         extras : tuple of Extra
             Of aiding sensors.
         fixed_altitude : bool
@@ -286,9 +290,11 @@ class InsModel:
         ):
             if sigma > 0.0:
                 own.append(Extra(name, np.full(3, sigma), time))
+        scale = 0.0 if scale_factors else spec.gyro_scale_factor
         return cls(
             gyro_random_walk=spec.gyro_random_walk,
             accel_random_walk=spec.accel_random_walk,
+            turn_noise=(scale**2 * TURN_TIME, spec.gyro_misalignment**2 * TURN_TIME),
             extras=(*own, *extras),
             fixed_altitude=fixed_altitude,
         )
@@ -370,7 +376,7 @@ class InsModel:
         v_n : (K, 3) array, m/s
         lat, alt : (K,) arrays, rad and m
         w_ib_b : (K, 3) array, rad/s
-            Needed where gyro scale factors are among the states.
+            Needed for scale factors and misalignments of the gyros.
 
         Returns
         -------
@@ -385,9 +391,12 @@ class InsModel:
         Phi = np.empty((len(T), n, n))
         fixed, at = self.fixed_altitude, self.sensor_states
         _stack(padded(n), T, C, f, f_b, w_b, v, axis, alt, fixed, at, self.decay, Phi)
-        q = self.noise
-        half = 0.5 * T[:, None, None]
-        return Phi, half * ((Phi * q) @ np.swapaxes(Phi, 1, 2) + np.diag(q))
+        q = np.zeros((len(T), n, n))
+        q[:] = np.diag(self.noise)
+        square = w_b**2
+        turning = self.turn_noise[0] * square + self.turn_noise[1] * (square.sum(axis=1, keepdims=True) - square)
+        q[:, PHI, PHI] += (C * turning[:, None, :]) @ np.swapaxes(C, 1, 2)
+        return Phi, 0.5 * T[:, None, None] * (Phi @ q @ np.swapaxes(Phi, 1, 2) + q)
 
 
 @compiled

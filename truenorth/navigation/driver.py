@@ -272,7 +272,7 @@ def navigate_track(
         kernel.Samples(*(read_only(a) for a in (steps, record.time, dtheta, dvel))),
         kernel.Events(plan.time, plan.source, plan.output, plan.measured, plan.variance),
         _sources(aiding, model),
-        kernel.Model(model.decay, model.noise, model.sensor_states, model.fixed_altitude),
+        kernel.Model(model.decay, model.noise, model.sensor_states, model.fixed_altitude, *model.turn_noise),
         s,
         aux,
         P,

@@ -72,6 +72,8 @@ class Model(NamedTuple):
     noise: Array
     sensors: Integers
     fixed_altitude: bool
+    turn_scale: float
+    turn_cross: float
 
 
 class Kept(NamedTuple):
@@ -166,9 +168,21 @@ def predict_to_event(size: Any, s: Any, model: Model, sums: Sums, means: Sums, F
     transition(size, F, model.decay, T, w.Phi, w.Phi_t)
     for i in range(len(model.noise)):
         w.Q[i, i] = 0.5 * T * model.noise[i]
-        w.P[i, i] += w.Q[i, i]
         if i >= 9:
             aux[i] *= w.Phi[i, i]
+    # Scale factors act along the axis that turns, misalignments across it.
+    x, y, z = means.vectors[2, 0] ** 2, means.vectors[2, 1] ** 2, means.vectors[2, 2] ** 2
+    k, m = 0.5 * T * model.turn_scale, 0.5 * T * model.turn_cross
+    turning = (k * x + m * (y + z), k * y + m * (z + x), k * z + m * (x + y))
+    for i in range(3):
+        for j in range(3):
+            total = model.noise[_PHI] * 0.5 * T * (i == j)
+            for n in range(3):
+                total += means.C[i, n] * turning[n] * means.C[j, n]
+            w.Q[_PHI + i, _PHI + j] = total
+            w.P[_PHI + i, _PHI + j] += total
+    for i in range(3, len(model.noise)):
+        w.P[i, i] += w.Q[i, i]
     propagate_covariance(size, w.Phi, w.Phi_t, w.Q, w.P, w.temporary)
 
 
@@ -197,6 +211,12 @@ def measure(
     arm = (figures[0], figures[1], figures[2])
     if at_arm >= 0:
         arm = (arm[0] + aux[at_arm], arm[1] + aux[at_arm + 1], arm[2] + aux[at_arm + 2])
+    at_bias = states[AT_BIAS]
+    bias = (0.0, 0.0, 0.0)
+    if at_bias >= 0 and kind == HEIGHT:
+        bias = (aux[at_bias], 0.0, 0.0)
+    elif at_bias >= 0:
+        bias = (aux[at_bias], aux[at_bias + 1], aux[at_bias + 2])
     lag = 0.0
     if at_lag >= 0:
         lag = aux[at_lag]
@@ -209,17 +229,14 @@ def measure(
         w_ib[2] - (C[0, 2] * w_ie[0] + C[1, 2] * w_ie[1] + C[2, 2] * w_ie[2]),
     )
     if kind == POSITION:
-        position_row(s, C, arm, lag, at_arm, at_lag, measured, w.H, w.z)
+        position_row(s, C, arm, lag, bias, at_arm, at_lag, at_bias, measured, w.H, w.z)
     elif kind == VELOCITY:
         velocity_row(s, C, w_eb, arm, lag, at_arm, at_lag, measured, w.H, w.z)
     elif kind == BODY_VELOCITY:
-        at_scale, at_mount, at_bias = states[AT_SCALE], states[AT_MOUNT], states[AT_BIAS]
+        at_scale, at_mount = states[AT_SCALE], states[AT_MOUNT]
         scale = 0.0
         if at_scale >= 0:
             scale = aux[at_scale]
-        bias = (0.0, 0.0, 0.0)
-        if at_bias >= 0:
-            bias = (aux[at_bias], aux[at_bias + 1], aux[at_bias + 2])
         angles = (0.0, 0.0, 0.0)
         if at_mount >= 0:
             angles = (-aux[at_mount], 0.0, -aux[at_mount + 1])
@@ -230,10 +247,7 @@ def measure(
             s, C, w_eb, mount, arm, scale, bias, lag, at_arm, at_scale, at_mount, at_bias, at_lag, measured, w.H, w.z
         )
     elif kind == HEIGHT:
-        offset = 0.0
-        if states[AT_BIAS] >= 0:
-            offset = aux[states[AT_BIAS]]
-        height_row(s, C, arm, offset, states[AT_BIAS], measured, w.H, w.z)
+        height_row(s, C, arm, bias[0], at_bias, measured, w.H, w.z)
     elif kind == ROTATION:
         rotation_row(C, w_ib, w_ie, w.H, w.z)
     if model.sensors[0] >= 0:  # the slow bias is a gyro bias like the other
@@ -351,7 +365,7 @@ def run(
                 for a in range(N):
                     for b in range(N):
                         Phi[a, b] = w.temporary[a, b]
-                    Q[a, a] += w.Q[a, a]
+                        Q[a, b] += w.Q[a, b]
                 propagate_covariance(size, w.Phi, w.Phi_t, w.Q, Q, w.temporary)
         source = events.source[k]
         if source >= 0 and sources.kind[source] == DISTURBANCE:

@@ -44,7 +44,7 @@ class Mounting:
     scale_sigma : float
         Of an odometer's or a log's scale factor; 0: known.
     bias_sigma : float, m/s or m
-        Of a slow error of a velocity log or a barometer; 0: none.
+        Of a slow error of a velocity log, a barometer or a receiver's positions; 0: none.
     bias_time : float, s
         Its correlation time.
     latency : float, s
@@ -131,6 +131,8 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         if not heights:
             measured[:, 2] = np.nan
         states = mounting.states("GNSS", "lever arm", "lag")
+        if mounting.bias_sigma > 0.0:
+            states |= state("GNSS", "bias", np.full(3, mounting.bias_sigma), mounting.bias_time)
         found.append(
             Aiding(
                 "GNSS position",
