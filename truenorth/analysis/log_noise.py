@@ -114,7 +114,7 @@ def noise_from_log(
 
     quantisation, random_walk, instability = values * np.array([np.sqrt(12.0), 1.0, 1.0])[:, None, None]
     worst = {"random_walk": random_walk, "quantisation": quantisation, "bias_instability": instability}
-    terms = {
+    terms: dict[str, Any] = {
         f"{group}_{key}": float(a[i].max()) for key, a in worst.items() for i, group in enumerate(("gyro", "accel"))
     }
     base = ImuSpec() if like is None else imu_spec(like)

@@ -2,6 +2,7 @@
 
 from truenorth.filters.extended import extended, iterated
 from truenorth.filters.fading import fading
+from truenorth.filters.feedback import feedback
 from truenorth.filters.fusion import (
     Federated,
     Fused,
@@ -21,6 +22,7 @@ from truenorth.filters.information import (
     no_information,
     two_filter_smoother,
 )
+from truenorth.filters.innovation_adaptive import innovation_adaptive
 from truenorth.filters.jacobians import JacobianCheck, check_jacobians
 from truenorth.filters.kalman import kalman
 from truenorth.filters.nonlinear_system import NonlinearSystem, matrix_function, vector_function
@@ -57,6 +59,7 @@ __all__ = [
     "extended",
     "fading",
     "federated",
+    "feedback",
     "filter_gains",
     "fuse",
     "gated",
@@ -64,6 +67,7 @@ __all__ = [
     "h_infinity",
     "information",
     "information_behind",
+    "innovation_adaptive",
     "iterated",
     "kalman",
     "matrix_function",

@@ -1,0 +1,163 @@
+"""The measurement noise from a window of innovations or of residuals.
+
+Of the last N measurements of a row, with the predicted covariance P- and the filtered P+::
+
+    innovation:  r = mean(nu^2 - h P- h'),   nu = z - h x-
+    residual:    r = mean(e^2 + h P+ h'),    e  = z - h x+
+
+The first tells the truth also where the given R is far off, but as a difference it may be negative and is held within
+limits. The second is never negative; since P+ and e follow from the R in use, it comes nearer with each window only.
+Where the window reaches back before the first measurement, the given R stands in.
+
+Sources: R. K. Mehra, On the identification of variances and adaptive Kalman filtering, IEEE Trans. Autom. Control 15,
+1970; A. H. Mohamed, K. P. Schwarz, Adaptive Kalman filtering for INS/GPS, J. of Geodesy 73, 1999, eqs. 8 and 13.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from truenorth.compiled import compiled
+from truenorth.errors import UsageError
+from truenorth.filters.drive import History, drive
+from truenorth.filters.recursion import (
+    Histories,
+    Workspace,
+    begin,
+    conclude,
+    innovate,
+    keep,
+    load_measurement,
+    load_process,
+    predict,
+    update,
+    workspace,
+)
+from truenorth.filters.sage_husa import check_independent_rows
+from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.linalg import Array, Size, dot, transposed_times
+
+AdaptiveKind = Literal["innovation", "residual"]
+
+
+@compiled(forceinline=True)
+def observe(size: Size, w: Workspace, window: Array, seen: Array, sign: float) -> None:
+    """Put ``(z - h x)^2 + sign h P h'`` of each row present into its window, in the place of the oldest."""
+    for row in range(w.z.shape[0]):
+        if np.isnan(w.z[row]):
+            continue
+        nu = w.z[row] - dot(size, w.H[row], w.x)
+        transposed_times(size, w.P, w.H[row], w.a)
+        window[row, int(seen[row]) % window.shape[1]] = nu * nu + sign * dot(size, w.a, w.H[row])
+        seen[row] += 1.0
+
+
+@compiled(forceinline=True)
+def take_noise(w: Workspace, window: Array, seen: Array, smallest: float, largest: float) -> None:
+    """R of each row from its window; the given one in the places not yet filled."""
+    length = window.shape[1]
+    for row in range(w.z.shape[0]):
+        given = w.R[row, row]
+        count = int(min(seen[row], length))
+        total = (length - count) * given
+        for i in range(count):
+            total += window[row, i]
+        w.R[row, row] = min(max(total / length, smallest * given), largest * given)
+
+
+@compiled
+def innovation_adaptive_runs(
+    size: Size, system: Runs, epochs: int, length: int, before: bool, smallest: float, largest: float, out: Histories
+) -> None:
+    """Filter of each run; `before`: by innovations, else by residuals."""
+    rows = system.z.shape[2]
+    w = workspace(size, rows)
+    for run in range(out.x.shape[0]):
+        begin(size, system, run, w)
+        seen = out.memory[run, :rows]
+        window = out.memory[run, rows:].reshape(rows, length)
+        for epoch in range(epochs):
+            load_process(size, system, run, epoch, w)
+            predict(size, w)
+            present, correlated = load_measurement(size, system, run, epoch, w)
+            if before:
+                observe(size, w, window, seen, -1.0)
+            take_noise(w, window, seen, smallest, largest)
+            if out.innovation.shape[1] > 0:
+                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
+                for row in range(rows):
+                    out.adaptation[run, epoch, row] = w.R[row, row]
+            if present > 0:
+                failure, nis, log_likelihood = update(size, w, correlated, True)
+                if not conclude(out, run, epoch, failure, nis, log_likelihood):
+                    break
+                if not before:
+                    observe(size, w, window, seen, 1.0)
+            keep(out, run, epoch, epochs - 1, w)
+
+
+def innovation_adaptive(
+    system: LinearSystem,
+    state: FilterState | None = None,
+    *,
+    kind: AdaptiveKind = "innovation",
+    window: int = 50,
+    smallest: float = 1e-2,
+    largest: float = 1e4,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """Kalman filter that takes the measurement noise from a window of innovations or residuals.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        With a diagonal R, which is what each row begins with, and without S.
+    state : FilterState, optional
+        From an earlier call, to go on from.
+    kind : "innovation" or "residual"
+    window : int
+        Measurements of a row that count; the variance scatters by ``sqrt(2 / window)`` and more.
+    smallest, largest : float
+        Limits of the estimated variance, in units of the given one.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        `adaptation` holds each row's variance.
+
+    Raises
+    ------
+    UsageError
+        An option out of range, R not diagonal, or S given.
+    DataError
+        As :func:`truenorth.filters.kalman`.
+    """
+    if kind not in get_args(AdaptiveKind):
+        raise UsageError(f'kind is {kind!r}, expected "innovation" or "residual"')
+    if window < 1:
+        raise UsageError(f"window is {window}, expected at least 1 measurement")
+    if not 0.0 < smallest <= 1.0 <= largest:
+        raise UsageError(f"smallest is {smallest} and largest {largest}, expected 0 < smallest <= 1 <= largest")
+    check_independent_rows(system)
+
+    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
+        innovation_adaptive_runs(
+            size, runs, epochs, int(window), kind == "innovation", float(smallest), float(largest), out
+        )
+
+    return drive(
+        kernel,
+        system,
+        state,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+        memory=np.zeros(system.rows * (1 + window)),
+        adaptation=system.rows,
+    )
