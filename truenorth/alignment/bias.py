@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 def spec_variance(spec: ImuSpec) -> Array:
     """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2."""
-    gyro = spec.gyro_bias**2 + spec.gyro_bias_instability**2
-    accel = spec.accel_bias**2 + spec.accel_bias_instability**2
+    gyro = spec.gyro_bias**2 + spec.gyro_turn_on_bias**2 + spec.gyro_bias_instability**2
+    accel = spec.accel_bias**2 + spec.accel_turn_on_bias**2 + spec.accel_bias_instability**2
     return np.repeat([gyro, accel], 3)
 
 

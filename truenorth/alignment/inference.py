@@ -101,8 +101,8 @@ def noise_of(spec: ImuSpec) -> StaticModel:
     return StaticModel(
         spec.gyro_random_walk,
         spec.accel_random_walk,
-        spec.gyro_bias_instability * spread,
-        spec.accel_bias_instability * spread,
+        math.hypot(spec.gyro_bias_instability * spread, spec.gyro_rate_random_walk),
+        math.hypot(spec.accel_bias_instability * spread, spec.accel_rate_random_walk),
     )
 
 

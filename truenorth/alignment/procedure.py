@@ -91,7 +91,7 @@ def align(
         raise UsageError(f"method {method!r} is not known; choose one of {', '.join(get_args(Method))}")
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
-    spec = None if imu is None else imu_spec(imu)
+    spec = None if imu is None else imu_spec(imu).with_random_walks(record.interval)
     if calibration is not None:
         record = calibration.apply(record)
     record = bridged(record)

@@ -295,6 +295,8 @@ class InsModel:
             gyro_random_walk=spec.gyro_random_walk,
             accel_random_walk=spec.accel_random_walk,
             turn_noise=(scale**2 * TURN_TIME, spec.gyro_misalignment**2 * TURN_TIME),
+            gyro_rate_walk=spec.gyro_rate_random_walk,
+            accel_rate_walk=spec.accel_rate_random_walk,
             extras=(*own, *extras),
             fixed_altitude=fixed_altitude,
         )

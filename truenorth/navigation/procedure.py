@@ -145,7 +145,8 @@ def navigate(
     tell("looking for stops" if zupt is not None else "navigating")
     stops = [] if zupt is None else zero_updates(record, zupt, interval)
     every = max(1, round(output / interval))
-    plain = InsModel.from_spec(spec, scale_factors=scale_factors, fixed_altitude=height == "fixed")
+    noise = spec.with_random_walks(record.interval)
+    plain = InsModel.from_spec(noise, scale_factors=scale_factors, fixed_altitude=height == "fixed")
 
     def run(sensors: Sequence[Aiding], **options: Any) -> Track:
         used = [*sensors, *stops, *disturbances]
