@@ -232,6 +232,7 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     assert page.count("data:image/png;base64") == len(figures)
     assert "http" not in page.split("<pre")[0]
     again = read_campaign(tmp_path / "out")
+    assert set(again.convergence["converged"]) <= {0.0, 0.25, 0.5, 0.75, 1.0}
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
 
 

@@ -96,6 +96,8 @@ class Plan(Strict):
     times : list of s
         Also align the log up to each of these; the whole of it always.
     heading_limit : float, rad
+    converged : float, rad
+        A heading error that stays below it has converged.
     """
 
     name: str = Field(min_length=1)
@@ -108,6 +110,7 @@ class Plan(Strict):
     methods: tuple[MethodPlan, ...] = Field(min_length=1)
     times: tuple[Time, ...] = ()
     heading_limit: Angle = math.radians(5.0)
+    converged: Angle = math.radians(0.1)
     _folder: Path = PrivateAttr(default_factory=Path)
     _source: str = PrivateAttr(default="plan")
 

@@ -58,6 +58,27 @@ class Campaign:
 
         return compare(self.table, names=self.case_names, methods=[method.name for method in self.plan.methods])
 
+    @cached_property
+    def convergence(self) -> pd.DataFrame:
+        """How long the log must be for the heading error to come, and stay, within the plan's limit: one row a method.
+
+        Among the planned times only; ``converged`` is the share of runs that do, ``median_s`` and ``p95_s`` are infinite where
+        too few do.
+        """
+        from truenorth.campaign.aligning import ARCMIN
+        from truenorth.campaign.summary import time_to_converge
+
+        times = time_to_converge(self.table, "phi_u", self.plan.converged / ARCMIN)
+        groups = times.groupby(["case", "method"], observed=True, sort=False)["time_s"]
+        result = groups.agg(
+            runs="size",
+            converged=lambda t: float((t < float("inf")).mean()),
+            median_s=lambda t: float(t.quantile(0.5, interpolation="higher")),
+            p95_s=lambda t: float(t.quantile(0.95, interpolation="higher")),
+        ).reset_index()
+        result.insert(1, "name", result["case"].map(self.case_names))
+        return result
+
     @property
     def case_names(self) -> dict[int, str]:
         """Names of the cases by their number."""

@@ -33,6 +33,7 @@ def reproduce(
         int | None, typer.Option(min=2, help="Of each case; the study's own without it.", show_default=False)
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all random numbers.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="That share the runs.")] = 1,
     full: Annotated[
         bool, typer.Option("--full", help="The paper's own lengths, where the study shortens them.")
     ] = False,
@@ -43,7 +44,7 @@ def reproduce(
 
     writable_folder(output)  # before the work, not after it
     with _stages() as progress:
-        study = reproduced(name, runs=runs, seed=seed, full=full, progress=progress)
+        study = reproduced(name, runs=runs, seed=seed, full=full, workers=workers, progress=progress)
     console = make_console()
     for claim in study.claims:
         console.print(f"{claim.verdict}: {claim.text}", soft_wrap=True)

@@ -21,7 +21,7 @@ from truenorth.papers.table import Figure, to_frame, write_figures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
-# Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, progress) -> Study`.
+# Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, full, workers, progress) -> Study`.
 STUDIES = {"static": "truenorth.papers.static.study"}
 Progress = Callable[[str], None]
 
@@ -92,7 +92,13 @@ class Study:
 
 
 def reproduce(
-    name: str, *, runs: int | None = None, seed: int = 0, full: bool = False, progress: Progress | None = None
+    name: str,
+    *,
+    runs: int | None = None,
+    seed: int = 0,
+    full: bool = False,
+    workers: int = 1,
+    progress: Progress | None = None,
 ) -> Study:
     """Reproduce a published system.
 
@@ -105,6 +111,8 @@ def reproduce(
     seed : int
     full : bool
         The paper's own length and number of runs, where the study shortens them.
+    workers : int
+        That share the runs; the numbers do not depend on it.
     progress : callable, optional
         Called with a word about each part.
 
@@ -121,7 +129,9 @@ def reproduce(
         raise UsageError(f"study {name!r} is not known; choose one of {', '.join(STUDIES)}")
     if runs is not None and runs < 2:
         raise UsageError(f"{runs} run(s); a statistic needs two at least")
-    study: Study = import_module(STUDIES[name]).reproduce(runs, seed, full, progress or (lambda stage: None))
+    if workers < 1:
+        raise UsageError(f"workers {workers}; expected 1 or more")
+    study: Study = import_module(STUDIES[name]).reproduce(runs, seed, full, workers, progress or (lambda stage: None))
     return study
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,7 +42,7 @@ COLUMNS = {
 
 
 def save_campaign(campaign: Campaign) -> list[Path]:
-    """Write summary.csv, comparison.csv, outcomes.csv, the figures as PNG and report.html into the campaign's folder.
+    """Write the tables (summary, comparison, outcomes, convergence), the figures as PNG and report.html into the folder.
 
     Returns
     -------
@@ -58,6 +59,7 @@ def save_campaign(campaign: Campaign) -> list[Path]:
         "summary.csv": campaign.summary,
         "comparison.csv": campaign.comparison,
         "outcomes.csv": outcomes(campaign.table, campaign.case_names),
+        "convergence.csv": campaign.convergence,
     }
     figures = campaign.plot()
     paths: list[Path] = []
@@ -99,6 +101,8 @@ def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame], figures: 
         level=_accuracy(tables["summary.csv"], "level"),
         comparison=[_compared(row) for row in comparison.to_dict("records")],
         outcomes=outcomes.to_dict("records"),
+        convergence=tables["convergence.csv"].to_dict("records") if plan.times else [],
+        limit=f"{math.degrees(plan.converged):g} deg",
         figures=[
             (name.replace("_", " ").capitalize(), CAPTIONS.get(name, ""), _inline(f)) for name, f in figures.items()
         ],

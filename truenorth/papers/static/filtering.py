@@ -64,9 +64,11 @@ def system_of(truth: Truth, model: StationaryModel, states: int, P0: Array, R: f
     return LinearSystem(Phi=Phi, Q=Q, H=H, R=noise * np.eye(2)[None], z=z, x0=np.zeros(states), P0=P0[:states, :states])
 
 
-def errors_at(system: LinearSystem, truth: Truth, times: Sequence[float], run: Filter | None = None) -> Errors:
+def errors_at(
+    system: LinearSystem, truth: Truth, times: Sequence[float], run: Filter | None = None, workers: int = 1
+) -> Errors:
     """Filter in stretches between the times, and hold each estimate against the truth."""
-    estimate = run or (lambda part, state: kalman(part, state, innovations=False))
+    estimate = run or (lambda part, state: kalman(part, state, innovations=False, workers=workers))
     true_phi = truth.phi if system.states == 10 else truth.phi_platform
     state: FilterState | None = None
     error, sigma, nees, first = [], [], [], 0

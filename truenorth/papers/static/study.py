@@ -49,7 +49,7 @@ BASES = {
 }
 
 
-def reproduce(runs: int | None, seed: int, full: bool, progress: Callable[[str], None]) -> Study:
+def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
     """Run the study; see :func:`truenorth.papers.reproduce`."""
     count = runs or RUNS
     figures: list[Figure] = []
@@ -61,7 +61,7 @@ def reproduce(runs: int | None, seed: int, full: bool, progress: Callable[[str],
         progress(f"{name}: {count} runs")
         truth = _honest_truth(base, count, seed)
         for states in (10, 8):
-            errors = errors_at(_honest_system(truth, base, states), truth, TIMES)
+            errors = errors_at(_honest_system(truth, base, states), truth, TIMES, workers=workers)
             found[name, states] = errors
             figures += _error_figures(name, f"states{states}", errors)
         if name == "two_position":
