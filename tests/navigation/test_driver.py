@@ -8,12 +8,13 @@ import pytest
 from truenorth.analysis.consistency import nees
 from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.earth import earth_rate_n, normal_gravity, radii
+from truenorth.errors import UsageError
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Start, navigate_track
 from truenorth.position import Position
 from truenorth.records import ImuRecord
-from truenorth.simulation import ideal_log, simulate
+from truenorth.simulation import ideal_log, rest, simulate
 from truenorth.simulation.course import Leg, course
 from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.specs import ImuSpec
@@ -286,3 +287,53 @@ def test_misalignment_in_a_turn_is_in_the_sigma():
         phi.append(errors_of(track, motion, simulation.errors)[-1, :3])
     ratio = np.sqrt(np.mean(np.square(phi), axis=0)) / track.sigma[-1, :3]
     assert np.all((ratio > 0.65) & (ratio < 1.1))
+
+
+def test_third_order_loop_damps_as_its_poles_say():
+    """A level IMU at rest, 5 m too high and with an accelerometer bias, under a perfect barometer.
+
+    Three poles at -1/tau: the height error is a polynomial of second order times ``exp(-t/tau)``, and the bias is found.
+    """
+    lat, tau, T, bias = np.radians(45.0), 60.0, 0.1, 0.01
+    count = 12000
+    dtheta = np.tile(T * earth_rate_n(lat), (count, 1))
+    dvel = np.tile([0.0, 0.0, T * (normal_gravity(lat, 0.0) + bias)], (count, 1))
+    record = ImuRecord(T * np.arange(1, count + 1), dtheta, dvel, "increments")
+    start = Start(0.0, np.eye(3), np.zeros(3), lat, 0.0, 5.0, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))
+    time = record.time[::2]
+    baro = Aiding(
+        "barometer", "height", time, np.zeros((len(time), 3)) + [0, np.nan, np.nan], np.ones((len(time), 3)), loop=tau
+    )
+    track = navigate_track(record, start, InsModel(0.0, 0.0), [baro], interval=T, every=10)
+    t = track.time / tau
+    # e_h(0) = 5, e_v(0) = 0, b(0) = bias: e_h' = -3/tau 5, e_h'' = 9/tau^2 5 - 3/tau^2 5 + bias (c2 - 2g/R = 3/tau^2).
+    first, second = -3.0 * 5.0, 6.0 * 5.0 + bias * tau**2
+    a, b = first + 5.0, 0.5 * (second + 2.0 * first + 5.0)
+    expected = (5.0 + a * t + b * t**2) * np.exp(-t)
+    np.testing.assert_allclose(track.position[:, 2], expected, rtol=0, atol=0.02 * np.abs(expected).max())
+    assert track.accel_bias[-1, 2] == pytest.approx(bias, rel=1e-3)
+    with pytest.raises(UsageError, match="cannot be smoothed"):
+        navigate_track(record, start, InsModel(0.0, 0.0), [baro], smooth=True)
+
+
+def test_covariance_of_the_loop_is_that_of_many_runs():
+    """A hundred runs of noise and bias under the loop: variance of height and vertical velocity in their 99.98 % band."""
+    from scipy.stats import chi2
+
+    runs, seconds = 100, 300.0
+    motion = rest(Position.from_degrees(45.0))
+    log = ideal_log(motion, rate=20.0, duration=seconds)
+    model, rng = InsModel.from_spec(SPEC), np.random.default_rng(8)
+    time = np.arange(0.5, seconds, 0.5)
+    last = []
+    for run in range(runs):
+        simulation = simulate(log, imu=SPEC, seed=11, run=run)
+        measured = np.full((len(time), 3), np.nan)
+        measured[:, 0] = rng.standard_normal(len(time))
+        baro = Aiding("barometer", "height", time, measured, np.ones((len(time), 3)), gate=0.0, loop=40.0)
+        start = start_at(motion, SIGMA * rng.standard_normal(STATES))
+        track = navigate_track(simulation.record, start, model, [baro], interval=0.5, every=100)
+        last.append(errors_of(track, motion, simulation.errors)[-1])
+    ratio = np.mean(np.square(last), axis=0) / np.diag(track.P[-1])[:STATES]
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], runs) / runs
+    assert np.all((low < ratio) & (ratio < high))

@@ -48,6 +48,9 @@ def navigate(
         str | None,
         typer.Option(help="fixed, free, baro or gnss; by default what the logs allow, else fixed.", show_default=False),
     ] = None,
+    baro_loop: Annotated[
+        float, typer.Option(help="Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
+    ] = 0.0,
     zupt: Annotated[
         str | None,
         typer.Option(
@@ -141,6 +144,7 @@ def navigate(
             wheel=replace(wheel, noise=odometer_noise),
             log=replace(wheel, lever_arm_sigma=0.0),
             barometer=_barometer(),
+            baro_loop=baro_loop,
             scale_factors="scale_factors" in parts,
             calibration=None if calibration is None else Calibration.from_file(calibration),
             offset=offset,

@@ -64,6 +64,8 @@ class Aiding:
         height), "lag" (1).
     gate : float
         Probability of rejecting a sound measurement by its normalised innovation squared; 0: no gate.
+    loop : float, s
+        Of heights: time constant of a third-order loop that takes the place of the Kalman gain; 0: none.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Aiding:
     C_mb: Array = field(default_factory=lambda: np.eye(3))
     states: Mapping[Role, Extra] = field(default_factory=dict)
     gate: float = FALSE_REJECTION
+    loop: float = 0.0
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

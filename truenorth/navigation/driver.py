@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth import wander
 from truenorth.earth import radii
-from truenorth.errors import DataError
+from truenorth.errors import DataError, UsageError
 from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
 from truenorth.increments import increments, interval_lengths, read_only
 from truenorth.linalg import padded
@@ -232,9 +232,13 @@ def navigate_track(
 
     Raises
     ------
+    UsageError
+        Smoothing with a vertical loop.
     DataError
         The filter broke down (see :func:`truenorth.filters.kalman`).
     """
+    if smooth and any(source.loop > 0.0 for source in aiding):
+        raise UsageError("a vertical loop has fixed gains and cannot be smoothed; expected a Kalman gain (no loop)")
     n = model.states
     steps = interval_lengths(record)
     begin = float(record.time[0] - steps[0])
@@ -333,6 +337,7 @@ def _sources(aiding: Sequence[Aiding], model: InsModel) -> kernel.Sources:
         figures[number, kernel.ARM] = source.lever_arm
         figures[number, kernel.MOUNT] = source.C_mb.ravel()
         figures[number, kernel.GATES] = source.gates()
+        figures[number, kernel.LOOP] = source.loop
         for role, extra in source.states.items():
             states[number, COLUMNS[role]] = model.first_of(extra.name)
     return kernel.Sources(np.array([KINDS[source.kind] for source in aiding], dtype=np.int64), figures, states)

@@ -29,12 +29,14 @@ Integers = NDArray[np.int64]
 NOTHING, POSITION, VELOCITY, BODY_VELOCITY, HEIGHT, ROTATION, DISTURBANCE = range(7)
 ABSENT, USED, REJECTED = range(3)
 
+LONGEST_STEP = 0.3  # of the loop's time constant: longer steps would make it swing
 SAME_TIME = 1e-6  # s: an event this near the end of a sample is at its end
-_PHI, _DV, _BG = 0, 3, 9
+_PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
+GRAVITY_GRADIENT = 2.0 * earth.GRAVITY_EQUATOR / earth.SEMI_MAJOR  # 1/s^2: of the free vertical channel
 
 # Columns of Sources.figures and Sources.states.
 ARM, MOUNT, GATES = slice(0, 3), slice(3, 12), slice(12, 15)
-FIRST_GATE, FIGURES = 12, 15
+FIRST_GATE, LOOP, FIGURES = 12, 15, 16
 AT_ARM, AT_SCALE, AT_MOUNT, AT_BIAS, AT_LAG, PLACES = range(6)
 
 
@@ -58,7 +60,7 @@ class Events(NamedTuple):
 
 
 class Sources(NamedTuple):
-    """Of each source: its kind (S,), figures (S, 15) and states (S, 5)."""
+    """Of each source: its kind (S,), figures (S, 16) and states (S, 5)."""
 
     kind: Integers
     figures: Array
@@ -290,6 +292,28 @@ def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
 
 
 @compiled
+def damp_height(size: Any, C: Any, T: float, time_constant: float, w: Any) -> None:
+    """Third-order loop in place of a Kalman gain: height, velocity and accelerometer bias, all poles at -1/time_constant.
+
+    ``e_h' = e_v - c1 e_h``, ``e_v' = (2 g/R - c2) e_h + b``, ``b' = -c3 e_h``: ``c1 = 3/tau``, ``c2 = 3/tau^2 + 2 g/R``,
+    ``c3 = 1/tau^3``. The covariance is that of these gains: ``P = (I - k h) P (I - k h)' + k r k'``.
+    """
+    nu, variance, _ = row_variance(size, w, 0, False)
+    rate = 1.0 / time_constant
+    last = T * rate * rate * rate
+    for i in range(len(size)):
+        w.k[i] = 0.0
+    w.k[_DP + 2] = 3.0 * T * rate
+    w.k[_DV + 2] = T * (3.0 * rate * rate + GRAVITY_GRADIENT)
+    for j in range(3):
+        w.k[_BA + j] = C[2, j] * last
+    for i in range(len(size)):
+        w.x[i] += w.k[i] * nu
+        for j in range(len(size)):
+            w.P[i, j] += variance * w.k[i] * w.k[j] - (w.k[i] * w.a[j] + w.a[i] * w.k[j])
+
+
+@compiled
 def feed_back(s: Any, aux: Any, n: int, x: Any) -> None:
     """Take the estimated errors off the state and the sensors; the estimate is zero again."""
     q = quaternion_from_rotation_vector((x[0], x[1], x[2]))
@@ -346,6 +370,7 @@ def run(
     set_matrix(s, sums.C_now)
     smoothing = kept.Phi.shape[0] > 0
     i, done, j, link = 0, 0.0, 0, 0
+    heard = events.time[0]  # of height, by the loop
     for k in range(len(events.time)):
         while i < len(samples.step):
             T = samples.step[i]
@@ -393,9 +418,14 @@ def run(
                         for a in range(3):
                             for b in range(n):
                                 kept.H[link, a, b] = w.H[a, b]
-                    failure, _, _ = update(size, w, False, True)
-                    if failure != SOUND:
-                        return failure, k
+                    loop = sources.figures[source, LOOP]
+                    if loop > 0.0:
+                        damp_height(size, sums.C_now, min(events.time[k] - heard, LONGEST_STEP * loop), loop, w)
+                        heard = events.time[k]
+                    else:
+                        failure, _, _ = update(size, w, False, True)
+                        if failure != SOUND:
+                            return failure, k
                     if smoothing:
                         for b in range(n):
                             kept.dx[link, b] = w.x[b]

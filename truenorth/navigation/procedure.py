@@ -67,6 +67,7 @@ def navigate(
     wheel: Mounting | None = None,
     log: Mounting | None = None,
     barometer: Mounting | None = None,
+    baro_loop: float = 0.0,
     scale_factors: bool = False,
     calibration: Calibration | None = None,
     offset: float = 0.0,
@@ -95,6 +96,8 @@ def navigate(
         Specification; the alignment's own when left out.
     antenna, wheel, log, barometer : Mounting, optional
         How each sensor sits, and what of that is to be estimated.
+    baro_loop : float, s
+        Time constant of a third-order loop on the barometer instead of a Kalman gain; 0: none.
     scale_factors : bool
         Estimate the IMU's scale factors.
     calibration : Calibration, optional
@@ -136,7 +139,7 @@ def navigate(
     height, why = _altitude(altitude, sources)
     mountings = {"gnss": antenna, "odometer": wheel, "velocity": log, "baro": barometer}
     mounting = {name: m or Mounting() for name, m in mountings.items()}
-    aiding = _aiding(sources, mounting, height)
+    aiding = _aiding(sources, mounting, height, baro_loop)
     _check_overlap(record, aiding)
     interval = (FINE if record.duration <= LONG else COARSE) if interval is None else interval
     output = max(1.0, record.duration / 20_000.0) if output is None else output
@@ -159,7 +162,7 @@ def navigate(
         reasons.append(why)
     if check_clocks and aiding:
         tell("checking clocks and lever arms")
-        reasons += _clock_warnings(run, sources, mounting, height)
+        reasons += _clock_warnings(run, sources, mounting, height, baro_loop)
     return Navigation(
         status="navigated" if status else "inconsistent",
         reasons=tuple(reasons),
@@ -262,7 +265,7 @@ def _altitude(wanted: str | None, sources: Sources) -> tuple[Altitude, str]:
     )
 
 
-def _aiding(sources: Sources, mounting: dict[str, Mounting], altitude: str) -> list[Aiding]:
+def _aiding(sources: Sources, mounting: dict[str, Mounting], altitude: str, loop: float) -> list[Aiding]:
     found: list[Aiding] = []
     if sources.gnss is not None:
         found += from_gnss(sources.gnss, mounting["gnss"], heights=altitude in ("gnss", "free"))
@@ -271,7 +274,7 @@ def _aiding(sources: Sources, mounting: dict[str, Mounting], altitude: str) -> l
     if sources.velocity is not None:
         found += from_velocity(sources.velocity, mounting["velocity"])
     if sources.baro is not None and altitude == "baro":
-        found += from_height(sources.baro, mounting["baro"])
+        found += from_height(sources.baro, mounting["baro"], loop)
     return found
 
 
@@ -330,7 +333,7 @@ def _swapped(r: Residuals, track: Track) -> str:
 
 
 def _clock_warnings(
-    run: Callable[..., Track], sources: Sources, mounting: dict[str, Mounting], altitude: str
+    run: Callable[..., Track], sources: Sources, mounting: dict[str, Mounting], altitude: str, loop: float
 ) -> list[str]:
     """Navigate once more with latencies and the lever arm left open: what the data say of them."""
     loose = {
@@ -344,7 +347,7 @@ def _clock_warnings(
         if name != "baro"
     } | {"baro": mounting["baro"]}
     try:
-        track = run(_aiding(sources, loose, altitude))
+        track = run(_aiding(sources, loose, altitude, loop))
     except DataError:
         return []
     words = []

@@ -279,8 +279,23 @@ def from_velocity(record: VelocityRecord, mounting: Mounting) -> list[Aiding]:
     ]
 
 
-def from_height(record: HeightRecord, mounting: Mounting) -> list[Aiding]:
-    """A barometer: its height is off by the weather, slowly."""
+def from_height(record: HeightRecord, mounting: Mounting, loop: float = 0.0) -> list[Aiding]:
+    """A barometer: its height is off by the weather, slowly.
+
+    Parameters
+    ----------
+    record : HeightRecord
+    mounting : Mounting
+    loop : float, s
+        Time constant of the third-order vertical loop; 0: a Kalman gain.
+
+    Raises
+    ------
+    UsageError
+        A time constant that is negative or not finite.
+    """
+    if not 0.0 <= loop < math.inf:
+        raise UsageError(f"vertical loop of {loop} s; expected a time constant above zero, such as 60 s, or 0 for none")
     measured = np.full((len(record), 3), np.nan)
     measured[:, 0] = record.alt
     sigma = np.full((len(record), 3), np.nan)
@@ -299,6 +314,7 @@ def from_height(record: HeightRecord, mounting: Mounting) -> list[Aiding]:
             mounting.lever_arm,
             states=states,
             gate=mounting.gate,
+            loop=loop,
         )
     ]
 
