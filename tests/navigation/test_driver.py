@@ -302,7 +302,7 @@ def test_third_order_loop_damps_as_its_poles_say():
     start = Start(0.0, np.eye(3), np.zeros(3), lat, 0.0, 5.0, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))
     time = record.time[::2]
     baro = Aiding(
-        "barometer", "height", time, np.zeros((len(time), 3)) + [0, np.nan, np.nan], np.ones((len(time), 3)), loop=tau
+        "barometer", "height", time, np.tile([0.0, np.nan, np.nan], (len(time), 1)), np.ones((len(time), 3)), loop=tau
     )
     track = navigate_track(record, start, InsModel(0.0, 0.0), [baro], interval=T, every=10)
     t = track.time / tau
