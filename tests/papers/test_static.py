@@ -122,6 +122,15 @@ def test_the_right_noise_helps_more_than_h_infinity(value):
     assert right < 0.5 * robust
 
 
+def test_ranks_and_what_cannot_be_told_apart(study, value):
+    assert value("still", "states10", "rank", "value") == 7
+    assert value("still", "states8", "rank", "value") == 5
+    assert value("two_position", "states10", "rank", "value") == 10
+    claim = next(c for c in study.claims if "Seven of ten" in c.text)
+    assert claim.verdict == "holds"
+    assert "nabla_x" in claim.evidence
+
+
 def test_the_study_repeats():
     """To the bit, but for the time that a step takes."""
     studies = [reproduce("static", runs=3, seed=11) for _ in range(2)]

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 PHI, BG, BA, DV = slice(0, 3), slice(3, 6), slice(6, 8), slice(8, 10)
 NAMES = ("phi_E", "phi_N", "phi_U", "eps_x", "eps_y", "eps_z", "nabla_x", "nabla_y", "dv_E", "dv_N")
+STATE_UNITS = ("rad",) * 3 + ("rad/s",) * 3 + ("m/s^2",) * 2 + ("m/s",) * 2
 SERIES = 8  # terms of the exponential; the paper takes 6 to 10
 
 

@@ -9,13 +9,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.observability import PiecewiseObservability, Segment, piecewise_observability
 from truenorth.campaign.comparison import paired
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
-from truenorth.models.stationary import StationaryModel
+from truenorth.models.stationary import DV, NAMES, STATE_UNITS, StationaryModel
 from truenorth.papers.claims import Claim
 from truenorth.papers.static.drawings import draw_convergence, draw_literal
 from truenorth.papers.static.filtering import Errors, errors_at, system_of
-from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, simulate
+from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
 from truenorth.papers.table import Figure, figure, of_errors
 from truenorth.units import parse
@@ -71,9 +72,16 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
             wrong = _wrong_noise(truth, base)
             for method, errors in wrong.items():
                 figures += _error_figures(name, method, errors)
+    progress("observability")
+    seen = {
+        (name, states): _observability(BASES[name], states) for name in ("still", "two_position") for states in (10, 8)
+    }
+    for (name, states), result in seen.items():
+        paper = {10: 7.0, 8: 5.0}[states] if name == "still" else math.nan
+        figures.append(figure(name, f"states{states}", "rank", "value", result.rank[-1], "1", paper=paper))
     progress("cost of a step")
     figures += (cost := _cost(count, seed))
-    claims = _claims(literal, found, wrong, cost, count)
+    claims = [*_claims(literal, found, wrong, cost, count), _rank_claim(seen)]
     drawings = {"figures_1_to_6": draw_literal(literal), "convergence": draw_convergence(TIMES, found, count)}
     captions = {
         "figures_1_to_6": "The paper's figures 1 to 6: one run of 20 s with its P0, Q and R. Estimated misalignment and "
@@ -197,6 +205,30 @@ def _wrong_noise(truth: Truth, base: Base) -> dict[str, Errors]:
             wrong, truth, TIMES, lambda part, state: h_infinity(part, state, bound=bound, L=L, innovations=False)
         ),
     }
+
+
+def _observability(base: Base, states: int) -> PiecewiseObservability:
+    """Of the positions of a base, one after the other."""
+    model = StationaryModel(LAT)
+    segments = []
+    for C in attitudes(base):
+        H = np.eye(10)[DV] if states == 10 else model.accelerometer_rows(C)
+        duration = TIMES[-1] / len(base.headings)
+        segments.append(Segment(model.dynamics(C)[:states, :states], H, duration))
+    scale = np.array([*PHI_SIGMA, *[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 2, *[VELOCITY_PRIOR] * 2])
+    return piecewise_observability(segments, scale[:states], NAMES[:states], STATE_UNITS[:states])
+
+
+def _rank_claim(seen: dict[tuple[str, int], PiecewiseObservability]) -> Claim:
+    ten, eight, two = seen["still", 10], seen["still", 8], seen["two_position", 10]
+    words = "; ".join(map(str, ten.entangled))
+    return Claim(
+        "Seven of ten states are observable on a stationary base, and five of eight.",
+        "holds" if (ten.rank[-1], eight.rank[-1]) == (7, 5) else "does not hold",
+        f"Rank {ten.rank[-1]} of 10 and {eight.rank[-1]} of 8. With ten states (SI): {words}. Turned by 180 deg at half time: rank "
+        f"{two.rank[-1]} of 10.",
+        1,
+    )
 
 
 def _cost(runs: int, seed: int) -> list[Figure]:

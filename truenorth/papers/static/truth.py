@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.attitude import dcm_from_euler
 from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
 from truenorth.simulation.streams import stream
 
@@ -114,9 +115,7 @@ def simulate(
     bias = x[:, 3:8].copy()
     platform = x.copy()
 
-    turns = [
-        np.array([[math.cos(h), math.sin(h), 0], [-math.sin(h), math.cos(h), 0], [0, 0, 1]]) for h in base.headings
-    ]
+    turns = attitudes(base)
     which = np.minimum(np.arange(steps) * len(turns) // steps, len(turns) - 1)
     fed, free = zip(*(_exact(model, C) for C in turns), strict=True)
     velocity, force = np.empty((runs, count, 2)), np.empty((runs, count, 2))
@@ -150,6 +149,11 @@ def simulate(
     force += np.diff(moved, axis=1) / T
     C = np.stack(turns)[which[every - 1 :: every][:count]]
     return Truth(time, velocity, force, phi, phi_platform, bias, C)
+
+
+def attitudes(base: Base) -> list[Array]:
+    """``C_nb`` of each position of a base."""
+    return [dcm_from_euler(heading, 0.0, 0.0) for heading in base.headings]
 
 
 def _exact(model: StationaryModel, C_nb: Array) -> tuple[Array, Array]:
