@@ -160,5 +160,5 @@ def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
         )
     raise DataError(
         f"the filter broke down at epoch {epoch}{run}: the covariance P is lost in rounding; use Joseph's form "
-        "(joseph=True) or the UD filter, a smaller P0, or more process noise"
+        "(joseph=True) or the filter square_root, a smaller P0, or more process noise"
     )

@@ -68,8 +68,8 @@ def kalman(
         Keep innovations, their covariances and NIS of every epoch; as a rule where a history is kept.
     joseph : bool
         Update the covariance in Joseph's form, which survives precise measurements of what was unknown; the plain
-        form takes two thirds of the time of an update. What a prior 1e14 times R and worse hides from both,
-        :func:`truenorth.filters.square_root` sees.
+        form takes two thirds of the time of an update. Where P cannot hold what a row tells in either form (rows that mix
+        states with a prior some 1e16 times R), the filter stops and says so; :func:`truenorth.filters.square_root` goes on.
     workers : int
         Threads that share the runs; the bits do not depend on it.
 
@@ -80,8 +80,8 @@ def kalman(
     Raises
     ------
     DataError
-        The variance of an innovation or of a state is not positive, or the plain form would leave nothing but rounding
-        in P, naming run and epoch.
+        The variance of an innovation or of a state is not positive, or there is nothing but rounding left in P, naming run
+        and epoch.
     """
 
     def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:

@@ -24,6 +24,7 @@ from truenorth.linalg import (
 LOG_2PI = float(np.log(2.0 * np.pi))
 ROUNDING = 1e-13  # of a variance
 PLAIN_RANGE = 1e13  # of an innovation's variance over its noise: beyond it the plain form leaves rounding in P
+JOSEPH_RANGE = 1e12  # of the same: beyond it Joseph's form is checked, as P may not hold what the row told
 
 SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE, NO_FILTER, NOT_FINITE = range(5)
 
@@ -239,6 +240,18 @@ def settle(size: Size, w: Workspace) -> None:
 
 
 @compiled(forceinline=True)
+def holds(size: Size, w: Workspace, row: int, variance: float, noise: float) -> bool:
+    """Whether P holds what a row told: ``h P h'`` after it is ``noise (1 - noise / variance)``, to a half.
+
+    A row that reads off one state of a huge variance leaves a small number in P; one that reads the sum of two such
+    states leaves huge ones, whose rounding may be larger than the noise.
+    """
+    transposed_times(size, w.P, w.H[row], w.t)
+    expected = noise * (1.0 - noise / variance)
+    return abs(dot(size, w.H[row], w.t) - expected) < 0.5 * expected
+
+
+@compiled(forceinline=True)
 def still_positive(size: Size, w: Workspace) -> bool:
     """Whether no variance is below zero by more than rounding of the largest it ever was; rounding becomes zero."""
     for i in range(len(size)):
@@ -272,6 +285,8 @@ def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[in
         update_by_row(size, w, row, nu, variance, h_s, correlated, joseph)
         if noise == 0.0:
             settle(size, w)
+        elif not correlated and variance > JOSEPH_RANGE * noise and not holds(size, w, row, variance, noise):
+            return NOT_POSITIVE, nis, log_likelihood
     if not still_positive(size, w):
         return NOT_POSITIVE, nis, log_likelihood
     return SOUND, nis, log_likelihood
