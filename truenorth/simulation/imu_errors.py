@@ -114,12 +114,6 @@ def size_effect(leverage: Array, spec: ImuSpec) -> Array:
     return np.einsum("kij,ij->ki", leverage, np.asarray(spec.accel_positions))
 
 
-def without_bias(spec: ImuSpec) -> ImuSpec:
-    """The same IMU calibrated perfectly: noise alone."""
-    none = {f"{group}_{term}": 0.0 for group in ("gyro", "accel") for term in ("bias", "turn_on_bias")}
-    return replace(spec, name=f"{spec.name}, no bias", **none)  # type: ignore[arg-type]
-
-
 def _drift(own: SensorErrors, dT: Array, interval: float, value: Any, draw: Any, tau: float) -> Array | None:
     """Integrals over each interval of what wanders, (N, 3)."""
     parts = []
