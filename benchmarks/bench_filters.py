@@ -5,16 +5,16 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 
 import numpy as np
 
-from truenorth.filters import LinearSystem, fading, kalman, smoother, square_root
+from truenorth.filters import LinearSystem, fading, feedback, innovation_adaptive, kalman, smoother, square_root
 
 STATES, ROWS, EVERY = 15, 3, 10
-RUNS, REPEATS = 200, 5
+RUNS, REPEATS = 200, 15
+LIMIT_ONE, LIMIT_MANY, CORES = 1.2, 0.7, 2  # us: of the plain form, one run and 200 runs on two cores
 
 
 def system(epochs: int, runs: tuple[int, ...] = (), every: int = EVERY, seed: int = 0) -> LinearSystem:
@@ -73,32 +73,49 @@ def by_simdkalman(s: LinearSystem) -> np.ndarray:
 def main() -> None:
     one, few = system(20_000), system(1_000)
     many, few_many = system(2_000, (RUNS,)), system(200, (RUNS,))
-    cores = os.cpu_count() or 1
 
     x = kalman(few).x[-1]
     np.testing.assert_allclose(by_filterpy(few), x, rtol=1e-8, atol=1e-10)
     x = kalman(few_many).x[:, -1]
     np.testing.assert_allclose(by_simdkalman(few_many), x, rtol=1e-8, atol=1e-10)
 
-    print(f"{STATES} states, {ROWS} rows every {EVERY}th step; us a step (a run and step where there are many runs)")
-    ours = best(lambda: kalman(one), one.epochs)
-    print(f"  one run,  truenorth, Joseph            {ours:8.3f}")
-    print(f"  one run,  truenorth, plain             {best(lambda: kalman(one, joseph=False), one.epochs):8.3f}")
-    print(f"  one run,  truenorth, full history      {best(lambda: kalman(one, history='full'), one.epochs):8.3f}")
-    print(f"  one run,  truenorth, smoother          {best(lambda: smoother(one), one.epochs):8.3f}")
-    print(f"  one run,  truenorth, fading            {best(lambda: fading(one, kind='single'), one.epochs):8.3f}")
-    print(f"  one run,  truenorth, square root       {best(lambda: square_root(one), one.epochs):8.3f}")
-    theirs = best(lambda: by_filterpy(few), few.epochs)
-    print(f"  one run,  filterpy (Joseph)            {theirs:8.3f}   {theirs / ours:.0f} times ours")
+    print(f"  {STATES} states, {ROWS} rows every {EVERY}th step; us a step (a run and step where there are many runs)")
+    ours = {
+        "plain": best(lambda: kalman(one, joseph=False), one.epochs),
+        "Joseph": best(lambda: kalman(one), one.epochs),
+        "full history": best(lambda: kalman(one, history="full"), one.epochs),
+        "feedback": best(lambda: feedback(one), one.epochs),
+        "fading": best(lambda: fading(one, kind="single"), one.epochs),
+        "R from a window": best(lambda: innovation_adaptive(one), one.epochs),
+        "square root": best(lambda: square_root(one), one.epochs),
+        "smoother": best(lambda: smoother(one), one.epochs, 5),
+    }
+    show("one run, truenorth", ours, LIMIT_ONE)
     every = system(20_000, every=1)
-    print(f"  one run,  truenorth, update each step  {best(lambda: kalman(every), every.epochs):8.3f}")
+    update = {
+        "plain": best(lambda: kalman(every, joseph=False), every.epochs),
+        "Joseph": best(lambda: kalman(every), every.epochs),
+    }
+    show("one run, update at each step", update)
+    theirs = best(lambda: by_filterpy(few), few.epochs, 5)
+    print(f"  {'one run, filterpy, Joseph':44s}{theirs:8.3f}  {theirs / ours['Joseph']:.0f} times ours")
+
     steps = RUNS * many.epochs
-    alone = best(lambda: kalman(many), steps)
-    print(f"  {RUNS} runs, truenorth, 1 thread          {alone:8.3f}")
-    ours = best(lambda: kalman(many, workers=cores), steps)
-    print(f"  {RUNS} runs, truenorth, {cores} threads         {ours:8.3f}")
+    show(f"{RUNS} runs, 1 thread", {"plain": best(lambda: kalman(many, joseph=False), steps, 5)})
+    shared = {
+        "plain": best(lambda: kalman(many, joseph=False, workers=CORES), steps),
+        "Joseph": best(lambda: kalman(many, workers=CORES), steps),
+    }
+    show(f"{RUNS} runs, {CORES} threads", shared, LIMIT_MANY)
     theirs = best(lambda: by_simdkalman(few_many), RUNS * few_many.epochs, 2)
-    print(f"  {RUNS} runs, simdkalman                   {theirs:8.3f}   {theirs / ours:.0f} times ours")
+    print(f"  {f'{RUNS} runs, simdkalman':44s}{theirs:8.3f}  {theirs / shared['plain']:.0f} times ours")
+
+
+def show(title: str, figures: dict[str, float], limit: float | None = None) -> None:
+    """A line for each figure; the limit is that of the first."""
+    for i, (name, figure) in enumerate(figures.items()):
+        verdict = f"(limit {limit:g})" if limit is not None and i == 0 else ""
+        print(f"  {f'{title}, {name}':44s}{figure:8.3f}  {verdict}".rstrip())
 
 
 if __name__ == "__main__":
