@@ -49,6 +49,7 @@ class Factors(NamedTuple):
     joint: Array  # of [[Q, S], [S', R]], lower triangle
     array: Array
     e: Array
+    t: Array
 
 
 @compiled
@@ -69,8 +70,8 @@ def factorise(A: Array) -> None:
 
 
 @compiled
-def triangularise(A: Array, columns: int) -> None:
-    """Upper triangle of the QR decomposition by reflections, in place; no negative diagonal."""
+def triangularise(A: Array, columns: int, t: Array) -> None:
+    """Upper triangle of the QR decomposition by reflections, in place; no negative diagonal. `t` is room for a row."""
     rows = len(A)
     for c in range(columns):
         norm = 0.0
@@ -81,16 +82,21 @@ def triangularise(A: Array, columns: int) -> None:
             continue
         # Reflect column c onto -sign(A[c, c]) * norm, then turn the row's sign round if need be.
         target = -norm if A[c, c] > 0.0 else norm
-        head = A[c, c] - target
         scale = 1.0 / (norm * (norm + abs(A[c, c])))
+        A[c, c] -= target
+        # Rows are contiguous, so each reflection goes along them: t = v' A, then A -= v t.
         for j in range(c + 1, columns):
-            total = head * A[c, j]
-            for r in range(c + 1, rows):
-                total += A[r, c] * A[r, j]
-            total *= scale
-            A[c, j] -= total * head
-            for r in range(c + 1, rows):
-                A[r, j] -= total * A[r, c]
+            t[j] = 0.0
+        for r in range(c, rows):
+            v = A[r, c]
+            if v != 0.0:
+                for j in range(c + 1, columns):
+                    t[j] += v * A[r, j]
+        for r in range(c, rows):
+            v = scale * A[r, c]
+            if v != 0.0:
+                for j in range(c + 1, columns):
+                    A[r, j] -= v * t[j]
         A[c, c] = target
         for r in range(c + 1, rows):
             A[r, c] = 0.0
@@ -147,7 +153,7 @@ def fill(size: Size, w: Workspace, f: Factors, n: int) -> int:
 @compiled(forceinline=True)
 def square_root_update(w: Workspace, f: Factors, n: int, present: int) -> tuple[int, float, float]:
     """Predict and condition on the rows present, in one; the failure if any, NIS and log-likelihood."""
-    triangularise(f.array, present + n)
+    triangularise(f.array, present + n, f.t)
     nis, log_likelihood = 0.0, 0.0
     for j in range(present):
         for i in range(j):
@@ -183,7 +189,11 @@ def square_root_runs(size: Size, system: Runs, epochs: int, out: Histories) -> N
     N, n, rows = len(size), out.x.shape[2], system.z.shape[2]
     w = workspace(size, rows)
     f = Factors(
-        np.zeros((N, N)), np.zeros((n + rows, n + rows)), np.zeros((2 * N + rows, rows + n)), np.zeros(max(rows, 1))
+        np.zeros((N, N)),
+        np.zeros((n + rows, n + rows)),
+        np.zeros((2 * N + rows, rows + n)),
+        np.zeros(max(rows, 1)),
+        np.zeros(rows + n),
     )
     varying = system.Q.shape[1] > 1 or system.R.shape[1] > 1 or system.S.shape[1] > 1
     every = out.x.shape[1] > 1 or out.innovation.shape[1] > 0
