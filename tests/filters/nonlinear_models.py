@@ -92,13 +92,16 @@ def range_and_bearing_jacobian(x, p, out):
     out[1, 0], out[1, 1] = x[1] / r**2, -x[0] / r**2
 
 
-def tracking(runs, epochs, rng, missing=0.0):
-    """Targets some 1000 m off, seen to 5 m and 5 mrad; the system and the true states (runs, epochs, 4)."""
-    dt, q = 1.0, 0.05
+def tracking(runs, epochs, rng, missing=0.0, q=0.05, coarse=1.0):
+    """Targets some 1000 m off, seen to 5 m and 5 mrad; the system and the true states (runs, epochs, 4).
+
+    They accelerate with the density q, m^2/s^3; a `coarse` sensor has so many times the sigma.
+    """
+    dt = 1.0
     F = np.eye(4)
     F[0, 2] = F[1, 3] = dt
     Q = q * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
-    R = np.diag([5.0, 5e-3]) ** 2
+    R = np.diag([5.0 * coarse, 5e-3 * coarse]) ** 2
     x0, P0 = np.array([600.0, 800.0, 5.0, -3.0]), np.diag([30.0, 30.0, 3.0, 3.0]) ** 2
     truth = np.empty((runs, epochs, 4))
     x = x0 + rng.standard_normal((runs, 4)) @ np.linalg.cholesky(P0).T
@@ -163,20 +166,42 @@ TURNING = 2  # the nonlinear state
 
 
 def conditionally_linear(epochs, rng, runs=(), missing=0.2):
-    """The turning system with random measurements, its prior correlated in all states, half a radian in the angle."""
+    """The turning system, measured as it is; its prior correlated in all states, half a radian in the angle."""
     root = rng.standard_normal((4, 4))
     P0 = 0.05 * root @ root.T + np.diag([0.1, 0.1, 0.25, 0.1])
-    z = rng.standard_normal((*runs, epochs, 2))
+    Q, R = np.diag([0.02, 0.01, 0.02, 0.01]), np.array([[0.3, 0.1], [0.1, 0.5]])
+    x0, p = np.array([1.0, -0.5, 0.7, 0.2]), rng.standard_normal((epochs, 1))
+    z = np.empty((*runs, epochs, 2))
+    for run in np.ndindex(*runs):
+        x, y, h = rng.multivariate_normal(x0, P0), np.empty(4), np.empty(2)
+        for k in range(epochs):
+            turning(x, p[k], y)
+            x = rng.multivariate_normal(y, Q)
+            turned(x, p[k], h)
+            z[(*run, k)] = rng.multivariate_normal(h, R)
     z[rng.random(z.shape) < missing] = np.nan
     return NonlinearSystem(
         transition=turning,
         measurement=turned,
-        Q=np.diag([0.02, 0.01, 0.02, 0.01])[None],
-        R=np.array([[[0.3, 0.1], [0.1, 0.5]]]),
+        Q=Q[None],
+        R=R[None],
         z=z,
-        x0=np.array([1.0, -0.5, 0.7, 0.2]),
+        x0=x0,
         P0=P0,
-        p=rng.standard_normal((epochs, 1)),
+        p=p,
         transition_jacobian=turning_jacobian,
         measurement_jacobian=turned_jacobian,
     )
+
+
+# The growth model that particle filters are tried on: two valleys wherever x is, since only its square is seen.
+
+
+@vector_function
+def growth(x, p, out):
+    out[0] = 0.5 * x[0] + 25.0 * x[0] / (1.0 + x[0] ** 2) + p[0]
+
+
+@vector_function
+def squared(x, p, out):
+    out[0] = x[0] ** 2 / 20.0

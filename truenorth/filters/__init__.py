@@ -26,6 +26,7 @@ from truenorth.filters.innovation_adaptive import innovation_adaptive
 from truenorth.filters.jacobians import JacobianCheck, check_jacobians
 from truenorth.filters.kalman import kalman
 from truenorth.filters.nonlinear_system import NonlinearSystem, matrix_function, vector_function
+from truenorth.filters.particle import particle
 from truenorth.filters.robust import Gate, gated, robust
 from truenorth.filters.sage_husa import sage_husa
 from truenorth.filters.sigma_points import cubature, gauss_hermite, unscented
@@ -72,6 +73,7 @@ __all__ = [
     "kalman",
     "matrix_function",
     "no_information",
+    "particle",
     "robust",
     "sage_husa",
     "smallest_bound",

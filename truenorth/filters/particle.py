@@ -1,0 +1,466 @@
+"""The particle filter, Rao-Blackwellised in the states in which the model is linear.
+
+Each particle holds values of the nonlinear states and, for the others given these, a normal distribution that a Kalman
+filter carries on: one epoch predicts all states at once, draws the nonlinear ones from their part, and conditions the
+others on what was drawn. The weight is multiplied by the likelihood of the measurement, all linear states integrated
+out. With all states nonlinear it is the bootstrap filter; nothing is linear then and no Jacobian is needed.
+
+Sources: N. J. Gordon, D. J. Salmond, A. F. M. Smith, Novel approach to nonlinear/non-Gaussian Bayesian state estimation,
+IEE Proc. F 140, 1993; T. Schoen, F. Gustafsson, P.-J. Nordlund, Marginalized particle filters for mixed linear/nonlinear
+state-space models, IEEE Trans. Signal Process. 53, 2005; G. Kitagawa, J. Comput. Graph. Stat. 5, 1996 (systematic resampling).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.compiled import compiled
+from truenorth.errors import UsageError
+from truenorth.filters.drive import History, drive
+from truenorth.filters.linearisation import (
+    Points,
+    decompose,
+    finite,
+    measure_tangent,
+    points,
+    predict_tangent,
+)
+from truenorth.filters.nonlinear import add_noise, are_correlated, copy, keep_point, load_epoch, load_rows
+from truenorth.filters.nonlinear_system import (
+    Functions,
+    NonlinearRuns,
+    NonlinearSystem,
+    functions_of,
+    nonlinear_runs_of,
+    require_jacobians,
+    require_vector_space,
+)
+from truenorth.filters.quadrature import QuadratureRule
+from truenorth.filters.recursion import (
+    LOG_2PI,
+    NO_INNOVATION_VARIANCE,
+    NOT_FINITE,
+    NOT_POSITIVE,
+    SOUND,
+    Histories,
+    Workspace,
+    conclude,
+    innovate,
+    update,
+    workspace,
+)
+from truenorth.filters.robust import squared
+from truenorth.filters.sigma_points import cholesky_order
+from truenorth.filters.system import Estimates, FilterState
+from truenorth.linalg import Array, Size, load
+
+
+class Cloud(NamedTuple):
+    """L particles of one run."""
+
+    log_weight: Array  # (L,) of normalised weights
+    weight: Array  # (L,)
+    X: Array  # (L, n)
+    P: Array  # (L or 0, N, N) of the linear states; 0 where there are none
+    X_next: Array
+    P_next: Array
+    h: Array  # (L, m) predicted measurements
+
+
+class NumberedRuns(NamedTuple):
+    """The arrays of a system, and the number of each run."""
+
+    Q: Array
+    R: Array
+    z: Array
+    x0: Array
+    P0: Array
+    p: Array
+    number: NDArray[np.int64]
+
+
+@compiled
+def cloud_of(size: Size, system: NonlinearRuns, particles: int, linear: bool) -> Cloud:
+    """Zeros throughout."""
+    N, n, m = len(size), system.P0.shape[1], system.z.shape[2]
+    L = particles if linear else 0
+    return Cloud(
+        np.zeros(particles),
+        np.zeros(particles),
+        np.zeros((particles, n)),
+        np.zeros((L, N, N)),
+        np.zeros((particles, n)),
+        np.zeros((L, N, N)),
+        np.zeros((particles, m)),
+    )
+
+
+@compiled(forceinline=True)
+def draw(s: Points, generator: np.random.Generator) -> None:
+    """``X += S xi``: the nonlinear states from their distribution, the others with what that says of them."""
+    for k in range(len(s.S)):
+        xi = generator.standard_normal()
+        for j in range(len(s.X)):
+            s.X[j] += s.S[k, j] * xi
+
+
+@compiled
+def start_cloud(
+    size: Size,
+    system: NonlinearRuns,
+    run: int,
+    order: NDArray[np.int64],
+    generator: np.random.Generator,
+    w: Workspace,
+    s: Points,
+    cloud: Cloud,
+    memory: Array,
+) -> bool:
+    """Take the particles from the memory, or draw them from the prior where there is none."""
+    L, n = cloud.X.shape
+    if not np.isnan(memory[0]):
+        at = L
+        for i in range(L):
+            cloud.log_weight[i] = memory[i]
+            for j in range(n):
+                cloud.X[i, j] = memory[at]
+                at += 1
+        for i in range(len(cloud.P)):
+            for j in range(n):
+                for k in range(n):
+                    cloud.P[i, j, k] = memory[at]
+                    at += 1
+        return True
+    b = run if system.x0.shape[0] > 1 else 0
+    load(size, system.P0[run if system.P0.shape[0] > 1 else 0], w.P)
+    if not decompose(size, w.P, order, s):
+        return False
+    for i in range(L):
+        for j in range(n):
+            s.X[j] = system.x0[b, j]
+        draw(s, generator)
+        for j in range(n):
+            cloud.X[i, j] = s.X[j]
+        cloud.log_weight[i] = -np.log(L)
+        if len(cloud.P) > 0:
+            copy(size, s.rest, cloud.P[i])
+    return True
+
+
+@compiled
+def remember_cloud(cloud: Cloud, memory: Array) -> None:
+    """All particles, to go on from."""
+    L, n = cloud.X.shape
+    at = L
+    for i in range(L):
+        memory[i] = cloud.log_weight[i]
+        for j in range(n):
+            memory[at] = cloud.X[i, j]
+            at += 1
+    for i in range(len(cloud.P)):
+        for j in range(n):
+            for k in range(n):
+                memory[at] = cloud.P[i, j, k]
+                at += 1
+
+
+@compiled
+def predict_particle(
+    size: Size,
+    functions: Functions,
+    order: NDArray[np.int64],
+    generator: np.random.Generator,
+    i: int,
+    w: Workspace,
+    s: Points,
+    cloud: Cloud,
+) -> int:
+    """Carry particle i to the epoch: all states, then the draw; the failure, if any."""
+    for j in range(len(s.X)):
+        s.X[j] = cloud.X[i, j]
+    if len(cloud.P) > 0:
+        copy(size, cloud.P[i], w.P)
+        if not predict_tangent(size, functions, w, s):
+            return NOT_FINITE
+        add_noise(size, w)
+        if not decompose(size, w.P, order, s):
+            return NOT_POSITIVE
+        copy(size, s.rest, w.P)
+    else:  # the noise was decomposed once for all
+        functions.transition(s.X, s.p, s.x)
+        for j in range(len(s.X)):
+            s.X[j] = s.x[j]
+        if not finite(s.X):
+            return NOT_FINITE
+    draw(s, generator)
+    return SOUND
+
+
+@compiled
+def weigh_particle(
+    size: Size, functions: Functions, w: Workspace, s: Points, linear: bool, nu: Array, W: Array
+) -> tuple[int, float]:
+    """Condition the linear states on the measurement; the failure, if any, and the log-likelihood."""
+    if linear:
+        if not measure_tangent(size, functions, w, s):
+            return NOT_FINITE, 0.0
+        innovate(size, w, nu, W)
+        failure, _, log_likelihood = update(size, w, are_correlated(w.R), True)
+        for j in range(len(s.X)):
+            s.X[j] += w.x[j]
+        return failure, log_likelihood
+    functions.measurement(s.X, s.p, s.h)
+    if not finite(s.h):
+        return NOT_FINITE, 0.0
+    for r in range(len(nu)):
+        w.z[r] -= s.h[r]
+        nu[r] = w.z[r]
+        for q in range(len(nu)):
+            W[r, q] = w.R[r, q]
+    nis, present = squared(w.z, w.R)  # leaves the pivots on the diagonal
+    log_likelihood = -0.5 * (nis + present * LOG_2PI)
+    for r in range(len(nu)):
+        if not np.isnan(nu[r]):
+            if not w.R[r, r] > 0.0:
+                return NO_INNOVATION_VARIANCE, 0.0
+            log_likelihood -= 0.5 * np.log(w.R[r, r])
+    return SOUND, log_likelihood
+
+
+@compiled
+def normalise(cloud: Cloud) -> float:
+    """Make weights sum to 1; the logarithm of what they summed to."""
+    largest = -np.inf
+    for i in range(len(cloud.log_weight)):
+        largest = max(largest, cloud.log_weight[i])
+    total = 0.0
+    for i in range(len(cloud.log_weight)):
+        total += np.exp(cloud.log_weight[i] - largest)
+    log_total = largest + np.log(total)
+    for i in range(len(cloud.log_weight)):
+        cloud.log_weight[i] -= log_total
+        cloud.weight[i] = np.exp(cloud.log_weight[i])
+    return log_total
+
+
+@compiled
+def moments(size: Size, weight: Array, X: Array, P: Array, mean: Array, covariance: Array) -> None:
+    """Mean and covariance of a mixture: within its members and among them."""
+    L, n = X.shape
+    for j in range(n):
+        total = 0.0
+        for i in range(L):
+            total += weight[i] * X[i, j]
+        mean[j] = total
+    for j in range(n):
+        for k in range(j + 1):
+            total = 0.0
+            for i in range(L):
+                total += weight[i] * (X[i, j] - mean[j]) * (X[i, k] - mean[k])
+            for i in range(len(P)):
+                total += weight[i] * P[i, j, k]
+            covariance[j, k] = total
+            covariance[k, j] = total
+
+
+@compiled
+def resample(size: Size, generator: np.random.Generator, cloud: Cloud) -> None:
+    """Systematic resampling: one random number, equal steps along the summed weights."""
+    L, n = cloud.X.shape
+    step = 1.0 / L
+    wanted = step * generator.random()
+    source, reached = 0, cloud.weight[0]
+    for i in range(L):
+        while reached < wanted and source < L - 1:
+            source += 1
+            reached += cloud.weight[source]
+        for j in range(n):
+            cloud.X_next[i, j] = cloud.X[source, j]
+        if len(cloud.P) > 0:
+            copy(size, cloud.P[source], cloud.P_next[i])
+        wanted += step
+    for i in range(L):
+        for j in range(n):
+            cloud.X[i, j] = cloud.X_next[i, j]
+        if len(cloud.P) > 0:
+            copy(size, cloud.P_next[i], cloud.P[i])
+        cloud.log_weight[i] = -np.log(L)
+        cloud.weight[i] = np.exp(cloud.log_weight[i])
+
+
+@compiled
+def particle_run(
+    size: Size,
+    functions: Functions,
+    system: NonlinearRuns,
+    run: int,
+    epochs: int,
+    order: NDArray[np.int64],
+    particles: int,
+    threshold: float,
+    generator: np.random.Generator,
+    out: Histories,
+) -> None:
+    """Particle filter of one run."""
+    n, rows, d = system.P0.shape[1], system.z.shape[2], len(order)
+    linear = d < n
+    w, s = (
+        workspace(size, rows),
+        points(size, system, QuadratureRule(np.zeros((0, d)), np.zeros(0), np.zeros(0))),
+    )
+    cloud = cloud_of(size, system, particles, linear)
+    mean, covariance = np.zeros(n), np.zeros((n, n))
+    nu, W, nu_bar, W_bar = np.zeros(rows), np.zeros((rows, rows)), np.zeros(rows), np.zeros((rows, rows))
+    if not start_cloud(size, system, run, order, generator, w, s, cloud, out.memory[run]):
+        conclude(out, run, 0, NOT_POSITIVE, 0.0, 0.0)
+        return
+    for i in range(particles):
+        cloud.weight[i] = np.exp(cloud.log_weight[i])
+    keep_rows = out.innovation.shape[1] > 0
+    for epoch in range(epochs):
+        load_epoch(size, system, run, epoch, w, s)
+        present = load_rows(size, system, run, epoch, w)
+        failure, log_likelihood = SOUND, 0.0
+        if not linear and not decompose(size, w.Q, order, s):
+            failure = NOT_POSITIVE
+        for r in range(rows):
+            nu_bar[r] = w.z[r]
+            for q in range(rows):
+                W_bar[r, q] = 0.0
+        for i in range(particles):
+            if failure == SOUND:
+                failure = predict_particle(size, functions, order, generator, i, w, s, cloud)
+            if failure == SOUND and (present > 0 or keep_rows):
+                load_rows(size, system, run, epoch, w)
+                failure, log_likelihood = weigh_particle(size, functions, w, s, linear, nu, W)
+                cloud.log_weight[i] += log_likelihood
+                for r in range(rows):
+                    cloud.h[i, r] = s.h[r]
+                    nu_bar[r] -= cloud.weight[i] * s.h[r]
+                    for q in range(rows):
+                        W_bar[r, q] += cloud.weight[i] * W[r, q]
+            for j in range(n):
+                cloud.X[i, j] = s.X[j]
+            if linear:
+                copy(size, w.P, cloud.P[i])
+        nis = 0.0
+        if keep_rows:
+            for r in range(rows):
+                s.h[r] = 0.0
+                for i in range(particles):
+                    s.h[r] += cloud.weight[i] * cloud.h[i, r]
+            for i in range(particles):
+                for r in range(rows):
+                    for q in range(rows):
+                        W_bar[r, q] += cloud.weight[i] * (cloud.h[i, r] - s.h[r]) * (cloud.h[i, q] - s.h[q])
+            for r in range(rows):
+                out.innovation[run, epoch, r] = nu_bar[r]
+                for q in range(rows):
+                    out.innovation_covariance[run, epoch, r, q] = W_bar[r, q]
+            nis, _ = squared(nu_bar, W_bar)
+        log_total = normalise(cloud)
+        if failure == SOUND and not np.isfinite(log_total):
+            failure = NO_INNOVATION_VARIANCE
+        if not conclude(out, run, epoch, failure, nis, log_total):
+            return
+        squares = 0.0
+        for i in range(particles):
+            squares += cloud.weight[i] * cloud.weight[i]
+        if keep_rows:
+            out.adaptation[run, epoch, 0] = 1.0 / squares
+        if out.x.shape[1] > 1 or epoch == epochs - 1:
+            moments(size, cloud.weight, cloud.X, cloud.P, mean, covariance)
+            keep_point(out, run, epoch, epochs - 1, mean, covariance)
+        if 1.0 / squares < threshold * particles:
+            resample(size, generator, cloud)
+    remember_cloud(cloud, out.memory[run])
+
+
+def particle(
+    system: NonlinearSystem,
+    state: FilterState | None = None,
+    *,
+    generators: np.random.Generator | Sequence[np.random.Generator],
+    particles: int = 1000,
+    nonlinear: Sequence[int] | None = None,
+    threshold: float = 0.5,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
+) -> Estimates:
+    """Particle filter.
+
+    Resampled particles differ again by the process noise only: for states that hardly move, a prior much wider than
+    the posterior asks for many particles, and one that is too narrow is not found out. See `adaptation`.
+
+    Parameters
+    ----------
+    system : NonlinearSystem
+        Without retraction; with both Jacobians where `nonlinear` leaves states out.
+    state : FilterState, optional
+        From an earlier call with the same options, to go on from; its `memory` is the particles. Chunks give the bits
+        of one batch if they are given the same generators, which remember where they stand.
+    generators : numpy.random.Generator or sequence of them
+        One for each run, in the order of the run axes; a run does not depend on how many there are beside it.
+    particles : int
+    nonlinear : sequence of int, optional
+        The states to be drawn; all of them, if not given. The model must be linear in the others once these are given.
+    threshold : float
+        Resample where the effective sample size falls below this part of the particles.
+    history, innovations, workers
+        As in :func:`truenorth.filters.kalman`.
+
+    Returns
+    -------
+    Estimates
+        Mean and covariance of the particles; a mean may stand where no particle does. `adaptation` holds the
+        effective sample size before resampling. ``exp(log_likelihood)`` is unbiased.
+
+    Raises
+    ------
+    UsageError
+        An option out of range, a missing Jacobian or generator.
+    DataError
+        The filter broke down, or no particle explains a measurement at all, naming run and epoch.
+    """
+    require_vector_space(system, "the particle filter")
+    order = cholesky_order(system, nonlinear)
+    n, linear = system.states, len(order) < system.states
+    if linear:
+        require_jacobians(system, "a particle filter with linear states")
+    if particles < 2:
+        raise UsageError(f"particles is {particles}, expected at least 2")
+    if not 0.0 <= threshold <= 1.0:
+        raise UsageError(f"threshold is {threshold}, expected a part of the particles between 0 and 1")
+    shape = system.runs if state is None else np.broadcast_shapes(system.runs, state.x.shape[:-1])
+    count = int(np.prod(shape, dtype=int))
+    several = [generators] if isinstance(generators, np.random.Generator) else list(generators)
+    if len(several) != count or not all(isinstance(g, np.random.Generator) for g in several):
+        raise UsageError(f"generators are {len(several)}, expected one numpy.random.Generator for each of {count} runs")
+    if len({id(g.bit_generator) for g in several}) < count:
+        raise UsageError("generators: two runs share one, expected a different one for each run")
+    functions = functions_of(system)
+
+    def flatten(system: NonlinearSystem, shape: tuple[int, ...]) -> NumberedRuns:
+        return NumberedRuns(*nonlinear_runs_of(system, shape), np.arange(count))
+
+    def kernel(size: Size, runs: NumberedRuns, epochs: int, out: Histories) -> None:
+        arrays = NonlinearRuns(*runs[:-1])
+        for run, number in enumerate(runs.number):
+            particle_run(size, functions, arrays, run, epochs, order, particles, threshold, several[number], out)
+
+    return drive(
+        kernel,
+        system,
+        state,
+        history=history,
+        innovations=innovations,
+        workers=workers,
+        memory=np.full(particles * (1 + n + (n * n if linear else 0)), np.nan),
+        adaptation=1,
+        flatten=flatten,
+    )
