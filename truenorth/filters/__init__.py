@@ -13,6 +13,7 @@ from truenorth.filters.fusion import (
     fuse,
 )
 from truenorth.filters.gains import Gains, filter_gains
+from truenorth.filters.gaussian_sum import GaussianSum, Hypotheses, around_circle, gaussian_sum, split
 from truenorth.filters.h_infinity import h_infinity, smallest_bound
 from truenorth.filters.information import (
     InformationEstimates,
@@ -44,6 +45,8 @@ __all__ = [
     "Fused",
     "Gains",
     "Gate",
+    "GaussianSum",
+    "Hypotheses",
     "InformationEstimates",
     "InformationState",
     "JacobianCheck",
@@ -52,6 +55,7 @@ __all__ = [
     "Smoothed",
     "SteadyState",
     "StrongTracking",
+    "around_circle",
     "check_jacobians",
     "covariance_intersection",
     "cross_covariance",
@@ -65,6 +69,7 @@ __all__ = [
     "fuse",
     "gated",
     "gauss_hermite",
+    "gaussian_sum",
     "h_infinity",
     "information",
     "information_behind",
@@ -78,6 +83,7 @@ __all__ = [
     "sage_husa",
     "smallest_bound",
     "smoother",
+    "split",
     "square_root",
     "steady_state",
     "strong_tracking",
