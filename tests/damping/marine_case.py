@@ -1,0 +1,57 @@
+"""The marine scenario, coarsely sampled, navigated with given errors: shared by the tests of damping."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.damping.course import Course
+from truenorth.simulation import simulate
+from truenorth.simulation.scenario import SHIPPED, read_scenario
+from truenorth.strapdown import NavigationState, mechanise
+from truenorth.yaml_file import read_mapping
+
+HOUR = 3600.0
+DEG_PER_HOUR = np.radians(1.0) / HOUR
+MICRO_G = 9.80665e-6
+
+
+@cache
+def ideal_and_truth(lat=45.78, heading=51.3401917, interval=10.0, hours=48.0):
+    """Ideal log and true course of the paper's ship, from a latitude (deg) on a heading (deg)."""
+    kept = ("name", "duration", "motion")
+    scenario = {key: read_mapping(SHIPPED / "marine_damping.yaml")[key] for key in kept}
+    scenario |= {"rate": f"{1.0 / interval} Hz", "duration": f"{hours} h"}
+    scenario["position"] = {"lat": f"{lat} deg", "lon": "126.67 deg"}
+    scenario["motion"] = scenario["motion"] | {"heading": f"{heading} deg"}
+    ideal = read_scenario(scenario).ideal()
+    at = ideal.motion.states(ideal.edges)
+    return ideal, Course(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+
+
+def navigate(ideal, truth, x0, gyro_bias, accel_bias):
+    """The course of a free INS that begins with errors `x0` (7,) and has these biases."""
+    sim = simulate(ideal, errors={"gyro_bias": gyro_bias, "accel_bias": accel_bias})
+    lat, lon, alt = truth.position[0]
+    from truenorth.earth import radii
+
+    R_M, R_N = radii(lat)
+    start = NavigationState.at(
+        dcm_from_rotation_vector(-x0[4:7]) @ truth.C_nb[0],
+        lat + x0[3] / (R_M + alt),
+        lon + x0[2] / ((R_N + alt) * np.cos(lat)),
+        alt,
+        truth.v_n[0] + np.append(x0[:2], 0.0),
+    )
+    out = mechanise(sim.record, start, altitude="fixed")
+
+    def joined(first, rest):
+        return np.concatenate([np.asarray(first)[None], rest])
+
+    return replace(
+        truth,
+        C_nb=joined(start.C_nb, out.C_nb),
+        v_n=joined(start.v_n, out.v_n),
+        position=joined([start.lat, start.lon, start.alt], out.position),
+    )

@@ -1,0 +1,201 @@
+"""Error model of a marine INS with its height held: 13 states, and two more where the reference velocity has an error of its own.
+
+States, errors computed minus true:
+
+| slice | state | unit |
+| --- | --- | --- |
+| DV | velocity error east, north | m/s |
+| DP | position error east, north | m |
+| PHI | misalignment E, N, U, ``C_nb_hat = (I - [phi x]) C_nb`` | rad |
+| BA | accelerometer bias left, measured minus true, body axes | m/s^2 |
+| BG | gyro bias left, measured minus true, body axes | rad/s |
+| REF | constant error of the reference velocity east, north (15 states) | m/s |
+
+It is the INS model of :mod:`truenorth.models.ins` in ENU with altitude fixed, its rows of the vertical channel left out and
+its biases first-order Gauss-Markov processes. Against the paper's states, ``dp_N = (R_M + h) dL`` and
+``dp_E = (R_N + h) cos L dlon``: a metre has one meaning at every latitude (:func:`position_in_angles`).
+
+Source: L. Zhao, J. Li, J. Cheng, "Double-filters external damping strapdown inertial navigation algorithm", J. Harbin
+Inst. Technol. 50 (3), 2018, eq. 1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth import earth
+from truenorth.compiled import compiled
+from truenorth.errors import UsageError
+from truenorth.linalg import padded
+from truenorth.models import ins
+from truenorth.models.ins import error_dynamics, transition
+from truenorth.specs import ImuSpec
+from truenorth.units import parse
+
+Array = NDArray[np.float64]
+
+DV = slice(0, 2)
+DP = slice(2, 4)
+PHI = slice(4, 7)
+BA = slice(7, 10)
+BG = slice(10, 13)
+REF = slice(13, 15)
+MOTION = slice(0, 7)  # what drives each other; the biases run by themselves
+STATES = 13
+NAMES = ("v_e", "v_n", "p_e", "p_n", "phi_e", "phi_n", "phi_u")
+
+# The same states in the order of models.ins; its vertical channel, which does not move, has no place here.
+OF_INS = np.array([3, 4, 6, 7, 0, 1, 2, 12, 13, 14, 9, 10, 11])
+
+
+@dataclass(frozen=True)
+class MarineModel:
+    """Noise and memory of the error model; one-sigma, SI.
+
+    Attributes
+    ----------
+    accel_random_walk : float, m/s/sqrt(s)
+    gyro_random_walk : float, rad/sqrt(s)
+    accel_rate_walk, gyro_rate_walk : float, m/s^2/sqrt(s) and rad/s/sqrt(s)
+        White noise that drives the biases.
+    accel_time, gyro_time : float, s
+        Correlation times of the biases; infinite: constants, or random walks.
+    reference_walk : float, m/s/sqrt(s)
+        White noise that drives the reference's error.
+    reference_time : float, s
+        Its correlation time.
+    with_reference : bool
+        Fifteen states rather than thirteen.
+    """
+
+    accel_random_walk: float
+    gyro_random_walk: float
+    accel_rate_walk: float = 0.0
+    gyro_rate_walk: float = 0.0
+    accel_time: float = math.inf
+    gyro_time: float = math.inf
+    reference_walk: float = 0.0
+    reference_time: float = math.inf
+    with_reference: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("accel_random_walk", "gyro_random_walk", "accel_rate_walk", "gyro_rate_walk", "reference_walk"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise UsageError(f"{name} is {getattr(self, name)}; expected zero or more")
+        for name in ("accel_time", "gyro_time", "reference_time"):
+            if not getattr(self, name) > 0.0:
+                raise UsageError(f"{name} is {getattr(self, name)} s; expected more than zero")
+
+    @classmethod
+    def of_paper(cls, *, with_reference: bool = False) -> MarineModel:
+        """The paper's ``Q``, taken per second, and the correlation time of 300 s that matches its figures."""
+        g = parse("1 g", "acceleration")
+        rate = parse("1 deg/h", "angular_rate")
+        root = math.sqrt(2.0)
+        return cls(
+            accel_random_walk=root * 1e-4 * g,
+            gyro_random_walk=root * 0.01 * rate,
+            accel_rate_walk=root * 1e-5 * g,
+            gyro_rate_walk=root * 0.001 * rate,
+            accel_time=300.0,
+            gyro_time=300.0,
+            with_reference=with_reference,
+        )
+
+    @classmethod
+    def from_spec(cls, spec: ImuSpec, *, reference_walk: float = 0.0, with_reference: bool = True) -> MarineModel:
+        """The model of a specification: constant biases that may walk.
+
+        A bias instability, forgotten in minutes, does over hours what a random walk of density ``sigma sqrt(2 tau)`` does.
+        """
+        slow = math.sqrt(2.0 * spec.correlation_time)
+        return cls(
+            accel_random_walk=math.hypot(spec.accel_random_walk, slow * spec.accel_bias_instability),
+            gyro_random_walk=math.hypot(spec.gyro_random_walk, slow * spec.gyro_bias_instability),
+            accel_rate_walk=spec.accel_rate_random_walk,
+            gyro_rate_walk=spec.gyro_rate_random_walk,
+            reference_walk=reference_walk,
+            with_reference=with_reference,
+        )
+
+    @property
+    def states(self) -> int:
+        """Thirteen or fifteen."""
+        return REF.stop if self.with_reference else STATES
+
+    @property
+    def decay(self) -> Array:
+        """(n,) inverse correlation time of each state, 1/s."""
+        rate = np.zeros(self.states)
+        rate[BA], rate[BG] = 1.0 / self.accel_time, 1.0 / self.gyro_time
+        rate[REF] = 1.0 / self.reference_time
+        return rate
+
+    @property
+    def noise(self) -> Array:
+        """(n,) spectral density of the white noise that drives each state, its unit^2/s."""
+        q = np.zeros(self.states)
+        q[DV], q[PHI] = self.accel_random_walk**2, self.gyro_random_walk**2
+        q[BA], q[BG] = self.accel_rate_walk**2, self.gyro_rate_walk**2
+        q[REF] = self.reference_walk**2
+        return q
+
+    def linearise(
+        self, T: ArrayLike, C_nb: ArrayLike, f_n: ArrayLike, v_n: ArrayLike, lat: ArrayLike, alt: ArrayLike
+    ) -> tuple[Array, Array]:
+        """Stack the model over K intervals of a trajectory.
+
+        Parameters
+        ----------
+        T : (K,) array, s
+        C_nb : (K, 3, 3) array
+            Mean over each interval, as all that follow.
+        f_n : (K, 3) array, m/s^2
+        v_n : (K, 3) array, m/s
+        lat, alt : (K,) arrays, rad and m
+
+        Returns
+        -------
+        F, Phi : (K, n, n) arrays
+            Of ``x' = F x + w``, and the transition over each interval.
+        """
+        T, C, f, v, lat, alt = (np.ascontiguousarray(a, dtype=np.float64) for a in (T, C_nb, f_n, v_n, lat, alt))
+        axis = np.stack([np.zeros_like(lat), np.cos(lat), np.sin(lat)], axis=-1)
+        decay = np.zeros(ins.STATES)
+        decay[ins.BG], decay[ins.BA] = 1.0 / self.gyro_time, 1.0 / self.accel_time
+        n = self.states
+        F, Phi = np.zeros((len(T), n, n)), np.zeros((len(T), n, n))
+        _stack(padded(ins.STATES), T, C, f, v, axis, alt, decay, OF_INS, F, Phi)
+        if self.with_reference:
+            for i in range(REF.start, REF.stop):
+                F[:, i, i] = -1.0 / self.reference_time
+                Phi[:, i, i] = np.exp(-T / self.reference_time)
+        return F, Phi
+
+
+def position_in_angles(p: Array, lat: ArrayLike, alt: ArrayLike) -> Array:
+    """Errors of latitude and longitude (..., 2) rad, of a position error east, north (..., 2) m."""
+    lat = np.asarray(lat, dtype=np.float64)
+    R_M, R_N = earth.radii(lat)
+    return np.stack([p[..., 1] / (R_M + alt), p[..., 0] / ((R_N + alt) * np.cos(lat))], axis=-1)
+
+
+@compiled
+def _stack(
+    size: Any, T: Any, C: Any, f_n: Any, v: Any, axis: Any, alt: Any, decay: Any, order: Any, F_out: Any, Phi_out: Any
+) -> None:
+    N = len(size)
+    F, Phi, Phi_t = np.zeros((N, N)), np.zeros((N, N)), np.zeros((N, N))
+    for k in range(len(T)):
+        error_dynamics(C[k], f_n[k], v[k], axis[k], alt[k], True, True, F)
+        transition(size, F, decay, T[k], Phi, Phi_t)
+        for i in range(len(order)):
+            for j in range(len(order)):
+                F_out[k, i, j] = F[order[i], order[j]]
+                Phi_out[k, i, j] = Phi[order[i], order[j]]
+            F_out[k, i, i] -= decay[order[i]]
