@@ -66,7 +66,7 @@ def check_means(m: Means, lat: float, g: float) -> LogCheck:
 
 
 def check_filter(
-    task: Task, C_n0_i: Array, usual: StaticModel, known: StaticModel | None = None
+    task: Task, integrals: InertialIntegrals, C_n0_i: Array, usual: StaticModel, known: StaticModel | None = None
 ) -> tuple[LogCheck, StaticModel]:
     """What the inertial frame tells of the biases and random walks: a filter that believes in no specified bias.
 
@@ -78,7 +78,7 @@ def check_filter(
     P[:3, :3] = C_n_b @ np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2]) @ C_n_b.T
     P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
     noise = usual if known is None else known
-    fine = fine_align(task.record, C_n0_i, task.position, noise, P, task.interval)
+    fine = fine_align(task.record, C_n0_i, task.position, noise, P, task.interval, integrals=integrals)
     if known is None:
         noise = fit_task_noise(task, fine.integrals, fine.C_n0_i, fine.system.P0, usual)
         fine = fine_align(task.record, fine.C_n0_i, task.position, noise, P, task.interval)

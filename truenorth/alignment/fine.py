@@ -137,6 +137,7 @@ def fine_align(
     P_bias: Array,
     interval: float,
     rows_at: Array | None = None,
+    integrals: InertialIntegrals | None = None,
 ) -> FineAlignment:
     """Estimate attitude and biases from a whole log.
 
@@ -153,6 +154,8 @@ def fine_align(
         Filter interval.
     rows_at : (M,) int array, optional
         Rows after which the integrated attitude is wanted.
+    integrals : InertialIntegrals, optional
+        Of the log as it is, with `interval` and `rows_at`, where they are known already.
 
     Returns
     -------
@@ -166,13 +169,14 @@ def fine_align(
     P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
     P0[6:, 6:] = P_bias
 
-    integrals = integrate(record, interval, bias[:3], bias[3:], rows)
+    if integrals is None:
+        integrals = integrate(record, interval, rows_at=rows)
     R = white_variance(mean_velocity(integrals, C_n0_i, lat, alt))
 
     for passes in range(1, MAX_PASSES + 1):
         x0 = np.zeros(STATES)
         x0[6:] = -bias
-        system = replace(model.linearise(integrals, C_n0_i, lat, alt, P0, R), x0=x0)
+        system = model.linearise(integrals, C_n0_i, lat, alt, P0, R, x0)
         system, estimates, R = _with_base_variance(system, R)
         x, P = estimates.x[-1], estimates.P[-1]
         moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))

@@ -184,7 +184,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
     coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt)
-    filtered, noise = check_filter(task, coarse.C_n0_i, usual_noise(), None if spec is None else noise_of(spec))
+    filtered, noise = check_filter(
+        task, integrals, coarse.C_n0_i, usual_noise(), None if spec is None else noise_of(spec)
+    )
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     used, where = _specification(spec, check, noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
@@ -195,7 +197,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
-    fine = fine_align(task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows)
+    fine = fine_align(task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows, integrals)
     C_ib = task.epoch.attitude(fine.integrals.C_ib_at[0])
     answer = at_epoch(task, used, where, *fine.misalignment_at(C_ib, task.epoch.elapsed))
     history = make_history(task, fine, used)

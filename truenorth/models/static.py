@@ -59,7 +59,14 @@ class StaticModel:
     accel_rate_walk: float = 0.0
 
     def linearise(
-        self, integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float, P0: Array, R: Array
+        self,
+        integrals: InertialIntegrals,
+        C_n0_i: Array,
+        lat: float,
+        alt: float,
+        P0: Array,
+        R: Array,
+        x0: Array | None = None,
     ) -> LinearSystem:
         """Stack the model over the K intervals of a log.
 
@@ -73,6 +80,8 @@ class StaticModel:
             Covariance before the first interval.
         R : (3,) array, (m/s)^2
             Variance of the base's mean velocity over an interval (E, N, U).
+        x0 : (12,) array, optional
+            States before the first interval; zero without it.
 
         Returns
         -------
@@ -132,7 +141,7 @@ class StaticModel:
             R=C_n_n0 @ R_inside @ C_n0_n + np.diag(R),
             S=S @ C_n0_n,
             z=z,
-            x0=np.zeros(STATES),
+            x0=np.zeros(STATES) if x0 is None else x0,
             P0=P0,
         )
 

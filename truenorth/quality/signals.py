@@ -62,13 +62,15 @@ def white_noise(record: ImuRecord) -> Array:
     duration, rows = 20.0, len(record)
     least = np.full(6, np.inf)
     scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
+    data = np.hstack([record.gyro, record.accel])
+    # Means of all lengths from one running sum; about the first row, so that gravity does not eat its digits.
+    total = np.vstack([np.zeros(6), np.cumsum(data - data[:1], axis=0)])
     for tau in (0.02, 0.1, 0.5, 1.0, 2.0):
         m = max(1, round(tau / record.interval))
         count = rows // m
         if count < 4:
             break
-        data = np.hstack([record.gyro[: count * m], record.accel[: count * m]])
-        means = data.reshape(count, m, 6).mean(axis=1) if m > 1 else data
+        means = np.diff(total[: count * m + 1 : m], axis=0) / m
         squares = np.square(np.diff(means, axis=0)) / 2.0
         group = min(len(squares), max(3, round(duration / (m * record.interval))))
         groups = len(squares) // group
