@@ -7,9 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.filters.dense import random_system
-from truenorth.analysis.cramer_rao import cramer_rao
+from tests.filters.nonlinear_models import tracking
+from truenorth.analysis.cramer_rao import cramer_rao, linearised_at
 from truenorth.errors import DataError, UsageError
-from truenorth.filters import LinearSystem, kalman
+from truenorth.filters import LinearSystem, extended, kalman
 
 RUNS, EPOCHS, LANDMARKS = 4000, 30, np.array([[0.0, 0.0], [40.0, 10.0]])
 Q = np.diag([1e-2, 1e-2, 1e-4])
@@ -102,6 +103,24 @@ def test_no_estimator_is_better_than_the_bound():
     ratio = np.linalg.eigvalsh(np.linalg.solve(L, np.swapaxes(half, 1, 2)))
     assert ratio.min() > 1.0 - 5.0 * np.sqrt(2.0 / RUNS)
     assert ratio[-1].max() < 1.3  # and it is a bound that can nearly be met
+
+
+def test_a_nonlinear_system_enters_by_its_tangent_at_the_truth():
+    # Targets by range and bearing: 300 trajectories for the bound, 2000 others for the extended filter's error. Their
+    # variance scatters by sqrt(2 / 2000) = 3.2 %; five of these below the bound in 12 directions: p < 1e-5.
+    rng = np.random.default_rng(4)
+    drawn, truth = tracking(300, 12, rng)
+    one = replace(drawn, z=np.zeros((12, 2)))
+    before = truth[:, :1]  # the motion is linear: its tangent is the same anywhere
+    bound = cramer_rao(linearised_at(one, np.concatenate([before, truth], axis=1)))
+    system, truth = tracking(2000, 12, rng)
+    e = extended(system, history="full").x - truth
+    L = np.linalg.cholesky(bound.P[-1])
+    ratio = np.linalg.eigvalsh(np.linalg.solve(L, np.linalg.solve(L, e[:, -1].T @ e[:, -1] / len(e)).T))
+    assert ratio.min() > 1.0 - 5.0 * np.sqrt(2.0 / len(e))
+    assert ratio.max() < 1.0 + 8.0 * np.sqrt(2.0 / len(e))  # nearly linear: the filter all but meets it
+    with pytest.raises(UsageError, match=r"truth has shape \(300, 12, 4\)"):
+        linearised_at(one, truth[:300])
 
 
 def test_bad_input_is_said():

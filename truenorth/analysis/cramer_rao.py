@@ -11,12 +11,14 @@ Trans. Signal Processing 46, 1998, eqs. 21 and 34-36.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError, UsageError
-from truenorth.filters import LinearSystem
+from truenorth.filters import LinearSystem, NonlinearSystem
+from truenorth.filters.nonlinear_system import ModelFunction, require_jacobians, require_vector_space
 
 Array = NDArray[np.float64]
 
@@ -84,6 +86,47 @@ def cramer_rao(system: LinearSystem) -> CramerRao:
         J = 0.5 * (J + J.T)
         out[k] = _inverse(J, _LOST)
     return CramerRao(out, np.sqrt(np.diagonal(out, axis1=-2, axis2=-1)))
+
+
+def linearised_at(system: NonlinearSystem, truth: Array) -> LinearSystem:
+    """The tangent of a nonlinear system along true trajectories: what :func:`cramer_rao` takes.
+
+    Parameters
+    ----------
+    system : NonlinearSystem
+        With both Jacobians and without retraction; of `z` only which rows are present matters.
+    truth : (L, K + 1, n) array
+        States of L drawn trajectories, the one before epoch 0 first. Draw them from the prior and the process noise.
+
+    Returns
+    -------
+    LinearSystem
+        With L runs.
+
+    Raises
+    ------
+    UsageError
+        A Jacobian is missing, the system has a retraction or runs of its own, or `truth` has another shape.
+    """
+    require_jacobians(system, "the Cramer-Rao bound")
+    F, H = cast(ModelFunction, system.transition_jacobian), cast(ModelFunction, system.measurement_jacobian)
+    require_vector_space(system, "the Cramer-Rao bound")
+    truth = np.ascontiguousarray(truth, dtype=np.float64)
+    n, m, K = system.states, system.rows, system.epochs
+    if truth.ndim != 3 or truth.shape[1:] != (K + 1, n):
+        raise UsageError(f"linearised_at: truth has shape {truth.shape}, expected (L, K + 1, n) = (L, {K + 1}, {n})")
+    p = np.zeros((1, 0)) if system.p is None else system.p
+    if p.ndim > 2 or system.z.ndim > 2:
+        raise UsageError("linearised_at: p or z has run axes, expected one scenario for all trajectories")
+    Phi, rows = np.zeros((len(truth), K, n, n)), np.zeros((len(truth), K, m, n))
+    for run in range(len(truth)):
+        for k in range(K):
+            at = p[k if len(p) > 1 else 0]
+            F(truth[run, k], at, Phi[run, k])
+            H(truth[run, k + 1], at, rows[run, k])
+    return LinearSystem(
+        Phi, system.Q, rows, system.R, np.where(np.isnan(system.z), np.nan, 0.0), np.zeros(n), system.P0
+    )
 
 
 _LOST = "the information is lost in rounding; bring the states to like sizes, or P0 nearer to what is known"
