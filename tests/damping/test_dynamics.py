@@ -64,5 +64,5 @@ def test_position_errors_in_angles():
 def test_uneven_epochs_are_refused():
     n = 5
     time = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
-    with pytest.raises(DataError, match="a step of 2.000 s after 2.000 s"):
+    with pytest.raises(DataError, match=r"a step of 2\.000 s after 2\.000 s"):
         Course(time, np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.zeros((n, 3)))

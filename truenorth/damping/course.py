@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth import earth
+from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.errors import DataError
-from truenorth.models.marine import MarineModel, position_in_angles
+from truenorth.models.marine import DV, PHI, MarineModel, position_in_angles
 
 Array = NDArray[np.float64]
 UNEVEN = 0.01  # share of the interval by which the time steps may differ
@@ -31,7 +32,7 @@ class Course:
     Raises
     ------
     DataError
-        Fewer than three epochs, or time steps that differ.
+        Fewer than two epochs, or time steps that differ.
     """
 
     time: Array
@@ -41,8 +42,8 @@ class Course:
 
     def __post_init__(self) -> None:
         steps = np.diff(self.time)
-        if len(steps) < 2:
-            raise DataError(f"damping: {len(self.time)} epochs of navigation, expected three at least")
+        if len(steps) < 1:
+            raise DataError(f"damping: {len(self.time)} epochs of navigation, expected two at least")
         odd = np.flatnonzero(np.abs(steps - np.median(steps)) > UNEVEN * np.median(steps))
         if odd.size:
             raise DataError(
@@ -80,6 +81,17 @@ class Course:
         f = np.diff(self.v_n, axis=0) / self.interval + np.cross(w, v) - earth.gravity_n(lat, alt)
         return model.linearise(np.full(self.epochs, self.interval), C, f, v, lat, alt)
 
+    def corrected(self, x: Array) -> Course:
+        """The course with errors (K+1, 7) or (7,) taken off, in the model's states (metres for position)."""
+        lat, _, alt = self.position.T
+        R_M, R_N = earth.radii(lat)
+        position, v_n = self.position.copy(), self.v_n.copy()
+        v_n[:, :2] -= x[..., DV]
+        position[:, 0] -= x[..., 3] / (R_M + alt)
+        position[:, 1] -= x[..., 2] / ((R_N + alt) * np.cos(lat))
+        C_nb = dcm_from_rotation_vector(x[..., PHI]) @ self.C_nb
+        return Course(self.time, C_nb, v_n, position)
+
     def in_angles(self, p: Array) -> Array:
         """Errors of latitude and longitude (..., K+1, 2) rad, of a position error east, north (..., K+1, 2) m."""
         return position_in_angles(p, self.position[:, 0], self.position[:, 2])
@@ -87,8 +99,6 @@ class Course:
 
 def errors_of(course: Course, truth: Course) -> Array:
     """(K+1, 7) errors of velocity, position (m) and attitude of a course against the true one, in the model's states."""
-    from truenorth.attitude import rotation_vector_from_dcm
-
     dv = course.v_n[:, :2] - truth.v_n[:, :2]
     lat, lon, alt = truth.position.T
     R_M, R_N = earth.radii(lat)

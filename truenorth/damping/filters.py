@@ -1,0 +1,299 @@
+"""Kalman filters that damp: on the velocity error, on its change, on both with the reference's own error, and the fusion.
+
+All estimate the errors of one undamped INS, open loop (output correction), on the model of :mod:`truenorth.models.marine`:
+
+- *filter 1*: ``z = v_INS - v_ref``;
+- *filter 2*: ``z = ((v_INS - v_ref)(t) - (v_INS - v_ref)(t - T))/T``, in which a constant error of the reference cancels; its
+  ``H`` is the mean of rows DV of F over T, since ``(dv(t) - dv(t - T))/T`` is the mean of ``dv'``. The reference is filter 1's
+  smoothed velocity (the paper's), or the raw one;
+- *augmented*: filter 1 with the reference's constant error as two more states.
+
+Windows of filter 2 overlap where it is updated more often than every T, and its noise is then not white; the paper's R takes
+no notice. What that and the common noise of both filters cost is measured in the study, not assumed.
+
+Source: L. Zhao, J. Li, J. Cheng, J. Harbin Inst. Technol. 50 (3), 2018, eq. 2-4; the augmented filter is not the paper's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.damping.course import Course
+from truenorth.errors import UsageError
+from truenorth.filters import FilterState, LinearSystem, gated, kalman
+from truenorth.models.marine import DV, MOTION, REF, MarineModel
+
+Array = NDArray[np.float64]
+
+BLOCK = 3600  # epochs linearised at a time: some 20 MB
+FRESH = 300  # epochs for which a filter that re-linearises does so
+SETTLING = 30.0  # s, in which filter 1 finds the velocity error from what it was told at the switch
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Errors of a course that a filter found, from the epoch on at which it was switched on.
+
+    Attributes
+    ----------
+    start : int
+        Epoch of the switch; rows are epochs ``start`` and on.
+    x, sigma : (K+1-start, n) arrays
+    P : (n, n) array
+        At the last epoch.
+    used : (K+1-start, 2) array
+        1 for a measurement taken, 0 for one rejected by the gate, NaN for none.
+    """
+
+    start: int
+    x: Array
+    sigma: Array
+    P: Array
+    used: Array = field(repr=False)
+
+    @property
+    def rejected(self) -> int:
+        """Measurements that the gate kept out."""
+        return int(np.sum(self.used == 0.0))
+
+
+@dataclass(frozen=True)
+class Filter:
+    """One of the filters: its model, its noise, what it knows at the switch.
+
+    Attributes
+    ----------
+    model : MarineModel
+        With two states of the reference: the augmented filter.
+    P0 : (n, n) array
+        Covariance of the errors at the switch.
+    sigma : float
+        Of the measurement: m/s, or m/s^2 of a velocity change.
+    window : float, s
+        T of filter 2; 0: the velocity error itself.
+    relinearise : bool
+        Take the model midway between the computed course and the one this filter finds, ``f(x_hat) - f(x) = F((x_hat + x)/2) e``
+        to second order; else about the computed course, as the paper does.
+    gate : float, optional
+        Probability with which a good measurement passes a chi-square gate; no gate when left out.
+    """
+
+    model: MarineModel
+    P0: Array
+    sigma: float
+    window: float = 0.0
+    relinearise: bool = False
+    gate: float | None = None
+
+    def __post_init__(self) -> None:
+        n = self.model.states
+        if np.shape(self.P0) != (n, n):
+            raise UsageError(f"P0 has shape {np.shape(self.P0)}, expected ({n}, {n}) as the model has states")
+        if not (self.sigma > 0.0 and self.window >= 0.0):
+            raise UsageError(
+                f"sigma {self.sigma:g}, window {self.window:g} s; expected sigma above zero, no negative window"
+            )
+
+    def lag(self, interval: float) -> int:
+        """Epochs from the beginning of a window to its end; 0 without a window."""
+        return max(1, round(self.window / interval)) if self.window > 0.0 else 0
+
+
+class _Stream:
+    """A filter that is fed block by block."""
+
+    def __init__(self, kind: Filter, course: Course, start: int) -> None:
+        self.kind, self.lag, self.interval = kind, kind.lag(course.interval), course.interval
+        count, n = course.epochs + 1 - start, kind.model.states
+        self.x, self.sigma, self.used = np.zeros((count, n)), np.empty((count, n)), np.full((count, 2), np.nan)
+        self.sigma[0] = np.sqrt(np.diagonal(kind.P0))
+        self.state: FilterState | None = None
+        self.rows = np.zeros((0, 2, n))
+        self.done = 1
+
+    def feed(self, part: Course, z: Array) -> None:
+        """Take the next epochs: K intervals of the course, z (K, 2)."""
+        if self.kind.relinearise and part.epochs > FRESH:
+            for begin in range(0, part.epochs, FRESH):
+                end = min(begin + FRESH, part.epochs)
+                self.feed(part.between(begin, end), z[begin:end])
+            return
+        if self.kind.relinearise:
+            last = self.x[self.done - 1, MOTION]
+            before = self.x[max(self.done - 1 - part.epochs, 0), MOTION]
+            ahead = last + (last - before if self.done > FRESH else 0.0) / 2.0  # at the middle of these epochs
+            part = part.corrected(ahead / 2.0)
+        F, Phi = part.linearise(self.kind.model)
+        n, K = self.kind.model.states, len(Phi)
+        if self.lag == 0:
+            H = np.zeros((1, 2, n))
+            H[:, :, DV] = np.eye(2)
+            if self.kind.model.with_reference:
+                H[:, :, REF] = -np.eye(2)
+        else:
+            rows = np.concatenate([self.rows, F[:, DV, :n]])
+            total = np.concatenate([np.zeros((1, 2, n)), np.cumsum(rows, axis=0)])
+            first = len(self.rows) + 1 + np.arange(K) - self.lag
+            H = (total[len(self.rows) + 1 :] - total[np.maximum(first, 0)]) / self.lag
+            z = np.where((first >= 0)[:, None], z, np.nan)
+            self.rows = rows[-self.lag :]
+        system = LinearSystem(
+            Phi=Phi[:, :n, :n],
+            Q=np.diag(self.kind.model.noise * self.interval)[None],
+            H=H,
+            R=self.kind.sigma**2 * np.eye(2)[None],
+            z=z,
+            x0=np.zeros(n),
+            P0=self.kind.P0,
+        )
+        place = slice(self.done, self.done + K)
+        if self.kind.gate is None:
+            found = kalman(system, self.state, history="sigma", innovations=False)
+            self.used[place] = np.where(np.isnan(system.z), np.nan, 1.0)
+        else:
+            found = gated(system, self.state, probability=self.kind.gate, history="sigma")
+            self.used[place] = found.adaptation
+        self.x[place], self.sigma[place] = found.x, found.sigma
+        self.state, self.done = found.state, self.done + K
+
+    def estimate(self, start: int) -> Estimate:
+        assert self.state is not None  # there is one block at least
+        return Estimate(start, self.x, self.sigma, self.state.P, self.used)
+
+
+def run_filters(
+    course: Course,
+    reference: Array,
+    *,
+    start: int,
+    first: Filter | None = None,
+    second: Filter | None = None,
+    raw: Filter | None = None,
+    augmented: Filter | None = None,
+    workers: int = 1,
+) -> dict[str, Estimate]:
+    """Run the filters that are asked for over a course.
+
+    Parameters
+    ----------
+    course : Course
+    reference : (K+1, 2) array, m/s
+        Reference velocity east, north; NaN where absent.
+    start : int
+        Epoch at which all are switched on.
+    first, second, raw, augmented : Filter, optional
+        Filter 1; filter 2 on the velocity that filter 1 smooths; filter 2 on the raw reference; 15 states.
+    workers : int
+        Threads; filter 2 follows filter 1, the others are free.
+
+    Returns
+    -------
+    dict of Estimate
+        ``filter1``, ``filter2``, ``filter2_raw``, ``augmented``: those asked for.
+
+    Raises
+    ------
+    UsageError
+        Filter 2 without filter 1; a start beyond the course.
+    """
+    if second is not None and first is None:
+        raise UsageError("filter 2 on the smoothed reference needs filter 1; expected both, or the raw filter 2")
+    if not 0 <= start < course.epochs:
+        raise UsageError(f"start at epoch {start}; expected 0 to {course.epochs - 1}")
+    kinds = {"filter1": first, "filter2": second, "filter2_raw": raw, "augmented": augmented}
+    streams = {name: _Stream(kind, course, start) for name, kind in kinds.items() if kind is not None}
+    if not streams:
+        raise UsageError("no filter is asked for; expected one at least")
+    z = course.v_n[:, :2] - reference
+    interval = course.interval
+    settling = max(1, round(SETTLING / interval))
+
+    def change(of: Array, lag: int, begin: int, end: int, since: int) -> Array:
+        """(end - begin, 2) of the epochs after `begin`; windows that begin before `since` are absent."""
+        ends = np.arange(begin + 1, end + 1)
+        out = np.full((len(ends), 2), np.nan)
+        there = ends - lag >= since
+        out[there] = (of[ends[there]] - of[ends[there] - lag]) / (lag * interval)
+        return out
+
+    smoothed = np.zeros_like(z)  # filter 1's estimate of dv: what is left of v_INS - v_ref, smoothed
+
+    def both(begin: int, end: int, part: Course) -> None:
+        if first is None:
+            return
+        one = streams["filter1"]
+        one.feed(part, z[begin + 1 : end + 1])
+        smoothed[begin + 1 : end + 1] = one.x[begin + 1 - start : end + 1 - start, DV]
+        if second is not None:
+            two = streams["filter2"]
+            two.feed(part, change(smoothed, two.lag, begin, end, start + settling))
+
+    def unsmoothed(begin: int, end: int, part: Course) -> None:
+        if raw is not None:
+            streams["filter2_raw"].feed(part, change(z, streams["filter2_raw"].lag, begin, end, start))
+
+    def constant(begin: int, end: int, part: Course) -> None:
+        if augmented is not None:
+            streams["augmented"].feed(part, z[begin + 1 : end + 1])
+
+    def run(chain: Callable[[int, int, Course], None]) -> None:
+        for begin in range(start, course.epochs, BLOCK):
+            end = min(begin + BLOCK, course.epochs)
+            chain(begin, end, course.between(begin, end))
+
+    with ThreadPoolExecutor(max(workers, 1)) as pool:
+        list(pool.map(run, (both, constant, unsmoothed)))
+    return {name: stream.estimate(start) for name, stream in streams.items()}
+
+
+@dataclass(frozen=True)
+class Fusion:
+    """The paper's fusion: by the diagonals of P, that of filter 1 enlarged by how far it has left filter 2.
+
+    ``beta P_11 = P_11 + gamma Xbar^2`` state by state, with ``Xbar`` the mean over `samples` epochs of the difference of the
+    estimates and ``gamma = 1/(1 + exp(-rate (t - t_0 - middle)))``.
+
+    Attributes
+    ----------
+    rate : float, 1/s
+        The paper's a.
+    middle : float, s
+        The paper's t_m: after the switch, when gamma is .5.
+    samples : int
+        The paper's N.
+    """
+
+    rate: float = 0.0005
+    middle: float = 4.0 * 3600.0
+    samples: int = 3600
+
+    def __post_init__(self) -> None:
+        if not (self.rate > 0.0 and self.middle >= 0.0 and self.samples >= 1):
+            raise UsageError(
+                f"fusion: rate {self.rate:g}, middle {self.middle:g} s, {self.samples} samples out of range"
+            )
+
+    def gamma(self, since: ArrayLike) -> Array:
+        """How far the difference is trusted, at times after the switch (s)."""
+        return np.asarray(1.0 / (1.0 + np.exp(-self.rate * (np.asarray(since, dtype=np.float64) - self.middle))))
+
+    def __call__(self, one: Estimate, two: Estimate, interval: float) -> Estimate:
+        """Fuse filter 1 and filter 2 of one course."""
+        difference = one.x - two.x
+        total = np.concatenate([np.zeros((1, difference.shape[1])), np.cumsum(difference, axis=0)])
+        ends = np.arange(1, len(total))
+        begins = np.maximum(ends - self.samples, 0)
+        mean = (total[ends] - total[begins]) / (ends - begins)[:, None]
+        gamma = self.gamma(interval * np.arange(len(difference)))
+        of_one = one.sigma**2 + gamma[:, None] * mean**2
+        of_two = two.sigma**2
+        whole = of_one + of_two
+        weight = np.divide(of_two, whole, out=np.full(whole.shape, 0.5), where=whole > 0.0)
+        variance = weight * of_one
+        x = weight * one.x + (1.0 - weight) * two.x
+        return Estimate(one.start, x, np.sqrt(variance), np.diag(variance[-1]), one.used)

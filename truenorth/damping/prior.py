@@ -1,0 +1,65 @@
+"""What a damping filter knows when it is switched on: the error of the INS as it is *then*."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth import earth
+from truenorth.damping.course import Course
+from truenorth.models.marine import BA, BG, DP, DV, PHI, REF, STATES, MarineModel
+from truenorth.units import parse
+
+Array = NDArray[np.float64]
+
+
+def paper_prior(course: Course, epoch: int) -> Array:
+    """(13, 13) of the paper's scenario at 2.5 h, in our units: 1 m/s, .05 deg, 1'/1'/15', 1e-4 g, .01 deg/h.
+
+    The paper does not state it; these match its figures.
+    """
+    lat, _, alt = course.position[epoch]
+    R_M, R_N = earth.radii(lat)
+    degree, minute = math.radians(1.0), math.radians(1.0 / 60.0)
+    sigma = np.zeros(STATES)
+    sigma[DV] = 1.0
+    sigma[DP] = 0.05 * degree * np.array([(R_N + alt) * math.cos(lat), R_M + alt])
+    sigma[PHI] = np.array([1.0, 1.0, 15.0]) * minute
+    sigma[BA], sigma[BG] = parse("100 ug", "acceleration"), parse("0.01 deg/h", "angular_rate")
+    return np.diag(sigma**2)
+
+
+def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array, reference_sigma: float = 0.0) -> Array:
+    """(n, n) covariance at an epoch, of errors that had `P0` at the beginning of the course.
+
+    Parameters
+    ----------
+    course : Course
+    epoch : int
+        Of the switch.
+    model : MarineModel
+        Its biases and noise, as they grow in the undamped INS.
+    P0 : (13, 13) array
+        At the beginning.
+    reference_sigma : float, m/s
+        Of the reference's constant error, for a model with these two states.
+    """
+    n = model.states
+    P = np.zeros((n, n))
+    P[:STATES, :STATES] = P0
+    stride = max(1, int(10.0 / course.interval + 1e-9))
+    head, rest = course.between(0, max(epoch, 1)).every(stride), epoch % stride
+    parts = [head.between(0, epoch // stride)] if epoch >= stride else []
+    if rest:
+        parts.append(course.between(epoch - rest, epoch))
+    for part in parts:
+        _, Phi = part.linearise(model)
+        Q = np.diag(model.noise * part.interval)
+        for step in Phi:
+            P = step @ P @ step.T + Q
+    P = 0.5 * (P + P.T)
+    if model.with_reference:
+        P[REF, REF] = reference_sigma**2 * np.eye(2)
+    return P
