@@ -59,7 +59,7 @@ def _predicted(kind, dx):
     kernel.set_matrix(s, sums.C_now)
     means.vectors[2] = W_B + dx[BG] + dx[model.slice_of("slow gyro bias")]
     w = workspace(padded(n), 3)
-    compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False, 0.0, 0.0)
+    compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False, 0.0, 0.0, False)
     kernel.measure(
         s, sums, means, _sources([source], model), 0, compiled_model, source.measured[0], aux, np.zeros((3, 3)), w
     )

@@ -206,6 +206,7 @@ def navigate_track(
     every: int = 5,
     covariance: bool = True,
     smooth: bool = False,
+    invariant: bool = False,
 ) -> Track:
     """Mechanise a log from a start, aided by measurements.
 
@@ -225,6 +226,8 @@ def navigate_track(
         Carry the covariance; needed for any aiding.
     smooth : bool
         Smooth over the whole log (Rauch, Tung, Striebel).
+    invariant : bool
+        Corrections turn velocity with attitude (:mod:`truenorth.models.in_motion`): for starts with a heading that is far off.
 
     Returns
     -------
@@ -233,12 +236,14 @@ def navigate_track(
     Raises
     ------
     UsageError
-        Smoothing with a vertical loop.
+        Smoothing with a vertical loop, or of invariant errors.
     DataError
         The filter broke down (see :func:`truenorth.filters.kalman`).
     """
     if smooth and any(source.loop > 0.0 for source in aiding):
         raise UsageError("a vertical loop has fixed gains and cannot be smoothed; expected a Kalman gain (no loop)")
+    if smooth and invariant:
+        raise UsageError("invariant errors are not smoothed; align first, then navigate with smooth=True")
     n = model.states
     steps = interval_lengths(record)
     begin = float(record.time[0] - steps[0])
@@ -276,7 +281,7 @@ def navigate_track(
         kernel.Samples(*(read_only(a) for a in (steps, record.time, dtheta, dvel))),
         kernel.Events(plan.time, plan.source, plan.output, plan.measured, plan.variance),
         _sources(aiding, model),
-        kernel.Model(model.decay, model.noise, model.sensor_states, model.fixed_altitude, *model.turn_noise),
+        kernel.Model(model.decay, model.noise, model.sensor_states, model.fixed_altitude, *model.turn_noise, invariant),
         s,
         aux,
         P,

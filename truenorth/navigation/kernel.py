@@ -18,6 +18,7 @@ from truenorth.filters.recursion import SOUND, row_variance, update, workspace
 from truenorth.linalg import load, multiply, propagate_covariance
 from truenorth.models.gnss import position_row, velocity_row
 from truenorth.models.height import height_row
+from truenorth.models.in_motion import reset
 from truenorth.models.ins import couple_sensors, error_dynamics, transition
 from truenorth.models.odometer import body_velocity_row
 from truenorth.models.rotation import rotation_row
@@ -76,6 +77,7 @@ class Model(NamedTuple):
     fixed_altitude: bool
     turn_scale: float
     turn_cross: float
+    invariant: bool
 
 
 class Kept(NamedTuple):
@@ -429,6 +431,8 @@ def run(
                     if smoothing:
                         for b in range(n):
                             kept.dx[link, b] = w.x[b]
+                    if model.invariant:
+                        reset(s, w.x, w.P)
                     feed_back(s, aux, n, w.x)
                     set_matrix(s, sums.C_now)
         if smoothing and (source >= 0 or events.output[k]):
