@@ -27,7 +27,7 @@ from truenorth.filters.innovation_adaptive import innovation_adaptive
 from truenorth.filters.jacobians import JacobianCheck, check_jacobians
 from truenorth.filters.kalman import kalman
 from truenorth.filters.nonlinear_system import NonlinearSystem, matrix_function, vector_function
-from truenorth.filters.particle import particle
+from truenorth.filters.particle import cloud_in, particle
 from truenorth.filters.robust import Gate, gated, robust
 from truenorth.filters.sage_husa import sage_husa
 from truenorth.filters.sigma_points import cubature, gauss_hermite, unscented
@@ -57,6 +57,7 @@ __all__ = [
     "StrongTracking",
     "around_circle",
     "check_jacobians",
+    "cloud_in",
     "covariance_intersection",
     "cross_covariance",
     "cubature",

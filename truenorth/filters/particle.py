@@ -464,3 +464,14 @@ def particle(
         adaptation=1,
         flatten=flatten,
     )
+
+
+def cloud_in(state: FilterState, particles: int) -> tuple[Array, Array]:
+    """Weights (..., L) and particles (..., L, n) that a state of :func:`particle` remembers.
+
+    Where the mean means little (an angle that has gone around, two hypotheses) they are what to ask. In linear states a
+    particle holds the mean of its normal distribution.
+    """
+    memory, n = state.memory, state.x.shape[-1]
+    X = memory[..., particles : particles * (1 + n)]
+    return np.exp(memory[..., :particles]), X.reshape(*memory.shape[:-1], particles, n)

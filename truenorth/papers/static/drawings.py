@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from truenorth.analysis.observability import Observability
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 from truenorth.papers.static.filtering import Errors
 from truenorth.papers.static.truth import ARCMIN, Truth
@@ -78,4 +79,50 @@ def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Err
         axes[1, 0].set_ylabel("level, arcmin")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
         figure.suptitle(f"Honest comparison, {runs} runs of each case", ha="left", x=0.01, fontsize=11)
+    return figure
+
+
+def draw_degrees(seen: Mapping[tuple[str, int], Observability]) -> Figure:
+    """Degrees of each direction, and the part of its prior sigma that each state keeps."""
+    with style():
+        figure = new_figure(12.0, 4.6)
+        left, right = figure.subplots(1, 2)
+        width = 0.8 / len(seen)
+        for number, ((case, states), result) in enumerate(seen.items()):
+            colour = COLOURS[number]
+            label = f"{case.replace('_', ' ')}, {states} states"
+            seen_at_all = np.maximum(result.degrees, 1e-4)
+            left.plot(np.arange(1, states + 1), seen_at_all, "o-", color=colour, label=label)
+            at = np.arange(states) + (number - 0.5 * (len(seen) - 1)) * width
+            right.bar(at, result.sigma_ratio, width, color=colour)
+        left.axhline(1.0, color=REFERENCE, linestyle="--", linewidth=1.0)
+        left.set(
+            yscale="log", xlabel="direction, best seen first", ylabel="degree (below 1e-4 drawn there)", title="Degrees"
+        )
+        left.margins(x=0.04)
+        names = max((result.names for result in seen.values()), key=len)
+        right.set_xticks(range(len(names)), names, rotation=45)
+        right.set(ylabel="sigma after 600 s / prior sigma", title="What each state keeps")
+        right.margins(x=0.02)
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=4)
+    return figure
+
+
+def draw_large(found: Mapping[str, tuple[Array, Array | None]], duration: float) -> Figure:
+    """Heading error of every run by method."""
+    with style():
+        figure = new_figure(10.0, 5.0)
+        ax = figure.subplots()
+        for row, (phi, _) in enumerate(found.values()):
+            heading = np.abs(phi[:, 2]) / ARCMIN
+            spread = row + 0.5 * (np.arange(len(heading)) / len(heading) - 0.5)
+            ax.plot(np.maximum(heading, 0.01), spread, ".", markersize=3, color=COLOURS[row % len(COLOURS)])
+            rms = float(np.sqrt(np.mean(heading**2)))
+            size = f"{rms:.2f}'" if rms < 60 else f"{rms / 60:.1f} deg"
+            ax.text(1.02, row, f"{np.mean(heading <= 60):.0%}, {size}", transform=ax.get_yaxis_transform(), va="center")
+        ax.axvline(60.0, color=REFERENCE, linestyle="--", linewidth=1.0)
+        ax.set_yticks(range(len(found)), [name.replace("_", " ") for name in found])
+        ax.invert_yaxis()
+        ax.set(xscale="log", xlabel=f"heading error after {duration:.0f} s, arcmin", xlim=(0.01, 180 * 60))
+        ax.set_title(f"From any azimuth, {len(next(iter(found.values()))[0])} runs; right: share below 1 deg, RMS")
     return figure

@@ -1,0 +1,53 @@
+"""Degrees of observability of the paper's states in each case: what the measurements take off the prior, in figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from truenorth.analysis.observability import Observability, observability
+from truenorth.filters import LinearSystem
+from truenorth.models.stationary import NAMES, STATE_UNITS
+from truenorth.papers.table import Figure, figure
+
+# Quantities of the table for each state.
+QUANTITIES = (
+    "phi_e",
+    "phi_n",
+    "phi_u",
+    "gyro_bias_x",
+    "gyro_bias_y",
+    "gyro_bias_z",
+    "accel_bias_x",
+    "accel_bias_y",
+    "v_e",
+    "v_n",
+)
+
+
+def degrees_of(system: LinearSystem) -> Observability:
+    """Of the first run; all runs have the same covariances."""
+    n = system.states
+    return observability(replace(system, z=system.z[0]), NAMES[:n], STATE_UNITS[:n])
+
+
+def degree_figures(seen: Mapping[tuple[str, int], Observability]) -> list[Figure]:
+    """Singular values, greatest first, and the part of its prior sigma that each state keeps."""
+    figures = []
+    for (case, states), result in seen.items():
+        method = f"states{states}"
+        for number, degree in enumerate(result.degrees, 1):
+            figures.append(figure(case, method, f"degree_{number}", "value", degree, "1"))
+        for quantity, kept in zip(QUANTITIES, result.sigma_ratio, strict=False):
+            figures.append(figure(case, method, quantity, "ratio", kept, "1"))
+    return figures
+
+
+def hardly_in_words(result: Observability) -> str:
+    """What keeps most of its prior sigma, state by state."""
+    kept = [
+        f"{name} {part:.2f}"
+        for name, part in zip(result.names, result.sigma_ratio, strict=True)
+        if part > result.not_estimated
+    ]
+    return ", ".join(kept) if kept else "none"
