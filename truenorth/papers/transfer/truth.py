@@ -1,0 +1,192 @@
+"""What the slave measures and the master says: the paper's flight, and the standard manoeuvres in its place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_master
+from truenorth.simulation.motion import MotionStates
+from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.simulation.streams import stream
+
+Array = NDArray[np.float64]
+
+SCENARIO = "transfer_flat_turn"
+BEGIN, STOP, END = 120.0, 150.0, 200.0  # s: the paper's turn, and its end
+ARCMIN = math.radians(1.0 / 60.0)
+LEVEL, HEADING = math.radians(0.5), math.radians(1.0)
+VELOCITY_NOISE = 0.2  # m/s
+ATTITUDE_NOISE = ARCMIN  # ours; the paper's master says no attitude
+TAU, ARM = 0.03, (1.0, 0.1, 0.2)  # the paper's; also sigmas, where they are drawn
+TAU_SIGMA, ARM_SIGMA = 0.05, 1.0  # as the filter believes
+FLEXURE = FlexureSpec(
+    sigma=tuple(parse(x, "angle") for x in ("3 arcmin", "3 arcmin", "6 arcmin")), correlation_time=5.0
+)
+MORE = 1.0  # s of flight after the end, so that rows that come late still find the slave there
+STREAM = 300  # of what this study draws
+
+STRAIGHT = {"kind": "straight", "duration": f"{BEGIN} s"}
+MANOEUVRES: dict[str, list[dict[str, Any]]] = {
+    "banked_turn": [{"kind": "turn", "angle": "90 deg", "rate": "3 deg/s", "bank": "coordinated"}],
+    "s_turn": [{"kind": "s_turn", "angle": "20 deg", "rate": "3 deg/s"}],
+    "accelerate": [
+        {"kind": "accelerate", "to": "250 m/s", "acceleration": "4 m/s^2"},
+        {"kind": "accelerate", "to": "200 m/s", "acceleration": "4 m/s^2"},
+    ],
+    "wing_rock": [{"kind": "wing_rock", "duration": "30 s", "amplitude": "20 deg", "period": "4 s"}],
+}
+
+
+def scenario_of(manoeuvre: str) -> Scenario:
+    """The paper's scenario with one of the standard manoeuvres in place of its turn."""
+    paper = read_scenario(SCENARIO)
+    if manoeuvre == "flat_turn":
+        return paper
+    content = paper.to_mapping()
+    legs = [STRAIGHT, *MANOEUVRES[manoeuvre], {"kind": "straight", "duration": "60 s"}]
+    return read_scenario(content | {"name": f"transfer_{manoeuvre}", "motion": {**content["motion"], "legs": legs}})
+
+
+@dataclass(frozen=True)
+class Case:
+    """A manoeuvre, and how the master stands and speaks.
+
+    Attributes
+    ----------
+    name : str
+    number : int
+        Of the random numbers.
+    manoeuvre : str
+    space_time : {"paper", "none", "drawn"}
+        Delay and lever arm: the paper's, none, or drawn with the paper's as sigmas.
+    flexure : bool
+        The slave's seat bends.
+    drop : tuple of (start, stop) or None, s
+        The master is silent.
+    extra_delay : float, s
+        By which the master is later still.
+    """
+
+    name: str
+    number: int
+    manoeuvre: str = "flat_turn"
+    space_time: str = "paper"
+    flexure: bool = False
+    drop: tuple[float, float] | None = None
+    extra_delay: float = 0.0
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """Of the manoeuvre."""
+        return scenario_of(self.manoeuvre)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run: records and truth.
+
+    Attributes
+    ----------
+    slave : ImuRecord
+    master : MasterRecord
+    truth : MotionStates
+        At the slave's samples.
+    C_nb, v_n : arrays
+        The slave's first attitude, handed over, and velocity.
+    mounting : (3,) array, rad
+        ``C_mb = exp([mounting x])``.
+    tau : float, s
+    arm : (3,) array, m
+    gyro_bias, accel_bias : (3,) arrays
+    """
+
+    slave: ImuRecord
+    master: MasterRecord
+    truth: MotionStates
+    C_nb: Array
+    v_n: Array
+    mounting: Array
+    tau: float
+    arm: Array
+    gyro_bias: Array
+    accel_bias: Array
+
+
+class Flights:
+    """All runs of a case; what they share is made once."""
+
+    def __init__(self, case: Case, seed: int) -> None:
+        self.case, self.seed = case, seed
+        self.scenario = case.scenario
+        self.body = self.scenario.build_motion()
+        self.start = self.body.states(np.array(self.scenario.start))
+        if not case.flexure:
+            self.ideal: IdealLog = self._ideal(self.body)
+            self.truth = self.body.states(self.ideal.edges[1:])
+
+    def _ideal(self, motion: Any) -> IdealLog:
+        return ideal_log(motion, rate=self.scenario.rate, duration=self.scenario.duration + MORE)
+
+    def __call__(self, run: int) -> Run:
+        """Make one run."""
+        case, draw = self.case, {"seed": self.seed, "run": run, "scenario": self.case.number}
+        rng = stream(self.seed, case.number, run, STREAM)
+        mounting = np.array([LEVEL, LEVEL, HEADING]) * rng.standard_normal(3)
+        dv = VELOCITY_NOISE * rng.standard_normal(3)
+        tau, arm = TAU, np.array(ARM)
+        if case.space_time == "none":
+            tau, arm = 0.0, np.zeros(3)
+        elif case.space_time == "drawn":
+            tau, arm = TAU_SIGMA * float(rng.standard_normal()), ARM_SIGMA * rng.standard_normal(3)
+        ideal, C_start = self._moving(run)
+        truth = self.truth if not case.flexure else ideal.motion.states(ideal.edges[1:])
+        log = simulate(ideal, imu=self.scenario.imu_spec, **draw)
+        master = self._master(run, tau + case.extra_delay, arm, mounting)
+        C_nb = C_start @ dcm_from_rotation_vector(-mounting)
+        return Run(
+            log.record,
+            master,
+            truth,
+            C_nb,
+            self.start.v_n + dv,
+            mounting,
+            tau + case.extra_delay,
+            arm,
+            log.errors.gyro_bias,
+            log.errors.accel_bias,
+        )
+
+    def _moving(self, run: int) -> tuple[IdealLog, Array]:
+        """What an ideal slave measures, and the attitude of the rigid body at the start."""
+        if not self.case.flexure:
+            return self.ideal, self.start.C_nb
+        span = {"duration": self.scenario.duration + MORE, "seed": self.seed, "run": run, "scenario": self.case.number}
+        return self._ideal(Flexed(self.body, FLEXURE, **span)), self.start.C_nb
+
+    def _master(self, run: int, tau: float, arm: Array, mounting: Array) -> MasterRecord:
+        heading, pitch, roll = (float(x) for x in euler_from_dcm(dcm_from_rotation_vector(mounting)))
+        usual = self.scenario.aiding_specs["master"]
+        assert isinstance(usual, MasterSpec)
+        spec = replace(
+            usual,
+            latency=0.0,
+            clock_offset=tau,
+            lever_arm=tuple(float(x) for x in arm),
+            mounting=(heading, pitch, roll),
+            attitude_noise=ATTITUDE_NOISE,
+        )
+        record = simulate_master(
+            self.body, spec, duration=self.scenario.duration + MORE, seed=self.seed, run=run, scenario=self.case.number
+        ).record
+        if self.case.drop is not None:
+            there = (record.time < self.case.drop[0]) | (record.time > self.case.drop[1])
+            record = MasterRecord(record.time[there], record.C_nb[there], record.v_n[there], source=record.source)  # type: ignore[index]
+        return record
