@@ -17,6 +17,7 @@ EXAMPLES = """
 \b
 Studies:
   static   Kalman filters for static alignment, with ten and with eight states
+  transfer  Transfer alignment with residual time delay and lever arm
 \b
 Examples:
   truenorth reproduce static -o static

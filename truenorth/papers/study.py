@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 # Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, full, workers, progress) -> Study`.
-STUDIES = {"static": "truenorth.papers.static.study"}
+STUDIES = {
+    "static": "truenorth.papers.static.study",
+    "transfer": "truenorth.papers.transfer.study",
+}
 Progress = Callable[[str], None]
 
 

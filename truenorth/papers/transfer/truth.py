@@ -27,9 +27,7 @@ VELOCITY_NOISE = 0.2  # m/s
 ATTITUDE_NOISE = ARCMIN  # ours; the paper's master says no attitude
 TAU, ARM = 0.03, (1.0, 0.1, 0.2)  # the paper's; also sigmas, where they are drawn
 TAU_SIGMA, ARM_SIGMA = 0.05, 1.0  # as the filter believes
-FLEXURE = FlexureSpec(
-    sigma=tuple(parse(x, "angle") for x in ("3 arcmin", "3 arcmin", "6 arcmin")), correlation_time=5.0
-)
+FLEXURE = FlexureSpec(sigma=(6 * ARCMIN, 3 * ARCMIN, 3 * ARCMIN), correlation_time=5.0)  # heading, pitch, roll
 MORE = 1.0  # s of flight after the end, so that rows that come late still find the slave there
 STREAM = 300  # of what this study draws
 
@@ -137,7 +135,7 @@ class Flights:
 
     def __call__(self, run: int) -> Run:
         """Make one run."""
-        case, draw = self.case, {"seed": self.seed, "run": run, "scenario": self.case.number}
+        case = self.case
         rng = stream(self.seed, case.number, run, STREAM)
         mounting = np.array([LEVEL, LEVEL, HEADING]) * rng.standard_normal(3)
         dv = VELOCITY_NOISE * rng.standard_normal(3)
@@ -148,7 +146,7 @@ class Flights:
             tau, arm = TAU_SIGMA * float(rng.standard_normal()), ARM_SIGMA * rng.standard_normal(3)
         ideal, C_start = self._moving(run)
         truth = self.truth if not case.flexure else ideal.motion.states(ideal.edges[1:])
-        log = simulate(ideal, imu=self.scenario.imu_spec, **draw)
+        log = simulate(ideal, imu=self.scenario.imu_spec, seed=self.seed, run=run, scenario=case.number)
         master = self._master(run, tau + case.extra_delay, arm, mounting)
         C_nb = C_start @ dcm_from_rotation_vector(-mounting)
         return Run(
@@ -179,7 +177,7 @@ class Flights:
             usual,
             latency=0.0,
             clock_offset=tau,
-            lever_arm=tuple(float(x) for x in arm),
+            lever_arm=(float(arm[0]), float(arm[1]), float(arm[2])),
             mounting=(heading, pitch, roll),
             attitude_noise=ATTITUDE_NOISE,
         )
