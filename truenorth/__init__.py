@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from truenorth.alignment import Alignment, align
+    from truenorth.alignment import Alignment, align, align_in_motion
     from truenorth.calibration import Calibration
     from truenorth.campaign import run_campaign
     from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
@@ -61,6 +61,7 @@ _HOMES = {
     "UsageError": "errors",
     "VelocityRecord": "records",
     "align": "alignment",
+    "align_in_motion": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
     "navigate": "navigation",
@@ -97,6 +98,7 @@ __all__ = [
     "UsageError",
     "VelocityRecord",
     "align",
+    "align_in_motion",
     "imu_spec",
     "inspect",
     "navigate",

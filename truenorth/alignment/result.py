@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
+    from truenorth.alignment.moving import Moving
     from truenorth.quality import Inspection
 
 Array = NDArray[np.float64]
@@ -114,6 +115,8 @@ class Alignment:
     history : History or None
     inspection : Inspection or None
     source : str
+    moving : Moving or None
+        Velocity, and how the wheel sits, of an alignment on the move; `position` is then that at the epoch.
     """
 
     status: Status
@@ -139,6 +142,7 @@ class Alignment:
     history: History | None = field(default=None, repr=False)
     inspection: Inspection | None = field(default=None, repr=False)
     source: str = ""
+    moving: Moving | None = field(default=None, repr=False)
 
     @property
     def attitude(self) -> Rotation:
@@ -254,6 +258,10 @@ class Alignment:
             "alt_m": self.position.alt,
             "source": self.source,
         }
+        if self.moving is not None:
+            result |= self.moving.summary()
+            if not self.heading_known:
+                result["vehicle_heading_deg"] = None
         if self.near_vertical:
             name, value, sigma = self.azimuth
             result[f"{name}_deg"] = float(deg(value)) if self.heading_known else None

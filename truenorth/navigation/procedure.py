@@ -157,7 +157,7 @@ def navigate(
 
     tell("navigating")
     track = run(aiding, smooth=smooth)
-    status, reasons = _verdict(track)
+    status, reasons = check_residuals(track)
     if why:
         reasons.append(why)
     if check_clocks and aiding:
@@ -289,7 +289,7 @@ def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
             )
 
 
-def _verdict(track: Track) -> tuple[bool, list[str]]:
+def check_residuals(track: Track) -> tuple[bool, list[str]]:
     """Whether the measurements agree with the model, and what there is to say."""
     sound, reasons = True, []
     for r in track.residuals:

@@ -45,6 +45,16 @@ def start_from_alignment(alignment: Alignment) -> Start:
             f"{alignment.source}: the alignment is {alignment.status!r}, its heading may not be used; navigation needs one: "
             "align longer, with a better IMU, or from motion"
         )
+    if alignment.moving is not None:
+        return _moving_start(
+            alignment.time,
+            alignment.C_nb,
+            alignment.moving.v_n,
+            alignment.moving.P,
+            alignment.gyro_bias,
+            alignment.accel_bias,
+            alignment.position,
+        )
     return _start(
         alignment.time,
         alignment.C_nb,
@@ -100,6 +110,15 @@ def _start(
     return Start(time, C_nb, np.zeros(3), lat, position.lon, alt, gyro_bias, accel_bias, positive(P))
 
 
+def _moving_start(
+    time: float, C_nb: Array, v_n: Array, P: Array, gyro_bias: Array, accel_bias: Array, position: Position
+) -> Start:
+    """Of an alignment on the move, which knows velocity and how all errors hang together."""
+    return Start(
+        time, C_nb, v_n, position.lat, position.lon, position.alt, gyro_bias, accel_bias, positive(np.asarray(P))
+    )
+
+
 def positive(P: Array) -> Array:
     """The nearest correlation structure without negative eigenvalues; variances stay as they are or grow by rounding."""
     sigma = np.sqrt(np.maximum(np.diag(P), 1e-300))
@@ -147,6 +166,11 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         )
         spec = imu_spec(n["imu"])
         disturbance = np.array([math.nan if v is None else v for v in s["disturbance_m_s"]])
+        if "P" in n:
+            v_n, P = np.array(n["v_n"], dtype=np.float64), np.array(n["P"], dtype=np.float64)
+            biases = numbers["gyro_bias"], numbers["accel_bias"]
+            start = _moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position)
+            return start, spec, str(s.get("source", ""))
         start = _start(float(s["time_s"]), **numbers, position=position, spec=spec, disturbance=disturbance)
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(
@@ -172,4 +196,6 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
     block["horizontal_sigma_m"] = alignment.position.horizontal_sigma
     block["vertical_sigma_m"] = alignment.position.vertical_sigma
     block["imu"] = alignment.imu.to_mapping()
+    if alignment.moving is not None:
+        block |= {"v_n": alignment.moving.v_n.tolist(), "P": alignment.moving.P.tolist()}
     return block

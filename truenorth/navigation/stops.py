@@ -75,6 +75,11 @@ def zero_updates(record: ImuRecord, stops: str | Sequence[tuple[float, float]], 
                 raise UsageError(f"stop from {start:g} s to {stop:g} s; expected its end after its beginning")
             seconds.append(np.arange(start, stop, 1.0) + 0.5)
         still, disturbed = np.empty(0), np.concatenate(seconds) if seconds else np.empty(0)
+    return updates_at(record, still, disturbed, interval)
+
+
+def updates_at(record: ImuRecord, still: Array, disturbed: Array, interval: float) -> list[Aiding]:
+    """Zero velocities in the seconds around these times, and zero rotations where nothing moves at all."""
     time = np.concatenate([still, disturbed])
     if time.size == 0:
         return []

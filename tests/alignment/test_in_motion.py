@@ -1,0 +1,152 @@
+"""Alignment on the move: the ring track of system 5, and what may be wrong with an odometer."""
+
+import math
+
+import numpy as np
+import pytest
+
+from truenorth import UsageError, align_in_motion, imu_spec, navigate
+from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.coarse.odometer import odometer_alignment
+from truenorth.models.ins import BG
+from truenorth.navigation import Mounting
+from truenorth.position import Position
+from truenorth.simulation.scenario import read_scenario
+
+ARCMIN = math.radians(1.0) / 60.0
+RING = read_scenario("odometer_ring")
+PLACE = Position(RING.position.lat, RING.position.lon, RING.position.alt)
+
+
+@pytest.fixture(scope="module")
+def ring():
+    """What all runs share: the motion."""
+    return RING.ideal()
+
+
+def changed(**content):
+    """The ring with other content."""
+    return read_scenario({**RING.to_mapping(), **content})
+
+
+def logs(ring, run, **odometer):
+    """IMU and odometer of a run, and the truth."""
+    scenario = changed(odometer={**RING.odometer, **odometer})
+    sim = scenario.simulate(run=run, seed=7, ideal=ring)
+    return sim, scenario.simulate_aiding(run=run, seed=7)["odometer"].record
+
+
+def error(answer, sim):
+    """(3,) phi, arcmin."""
+    C = sim.motion.states(np.array([answer.time])).C_nb[0]
+    return rotation_vector_from_dcm(C @ answer.C_nb.T) / ARCMIN
+
+
+def test_ring_from_any_heading(ring):
+    """Six runs; RMS over sigma of 6 numbers lies within .38 to 1.74 in 99.8 % (chi-square)."""
+    errors, sigmas = [], []
+    for run in range(6):
+        sim, odometer = logs(ring, run)
+        answer = align_in_motion(sim.record, RING.imu_spec, odometer=odometer, position=PLACE)
+        assert answer.status == "aligned"
+        errors.append(error(answer, sim))
+        sigmas.append(np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
+        assert abs(answer.moving.v_n - sim.motion.states(np.array([answer.time])).v_n[0]).max() < 0.03
+    errors, sigmas = np.array(errors), np.array(sigmas)
+    assert np.sqrt(np.mean(errors[:, 2] ** 2)) < 2.0
+    assert np.sqrt(np.mean(errors[:, :2] ** 2)) < 0.05
+    assert 0.38 < np.sqrt(np.mean((errors[:, 2] / sigmas[:, 2]) ** 2)) < 1.74
+
+
+def test_coarse_alignment_by_the_odometer(ring):
+    """Both forms, six runs, against the bars of 4 deg after 120 s and 10 arcmin after 600 s."""
+    found = {(form, end): [] for form in ("velocity", "position") for end in (120.0, 600.0)}
+    for run in range(6):
+        sim, odometer = logs(ring, run)
+        C = sim.motion.states(np.array([0.0])).C_nb[0]
+        for form, end in found:
+            coarse = odometer_alignment(sim.record.between(0.0, end), odometer, PLACE, form=form)
+            found[form, end].append(rotation_vector_from_dcm(C @ coarse.C_n0_i.T)[2])
+    rms = {key: np.sqrt(np.mean(np.square(values))) for key, values in found.items()}
+    assert max(rms["velocity", 120.0], rms["position", 120.0]) < math.radians(4.0)
+    assert max(rms["velocity", 600.0], rms["position", 600.0]) < 10.0 * ARCMIN
+
+
+@pytest.mark.parametrize(
+    ("wrong", "scale"),
+    [
+        ({"slips": [[f"{t} s", f"{t + 1.5} s", "30 %"] for t in (30, 130, 200, 300, 420, 500)]}, None),
+        ({"scale": "2 %"}, 0.02),
+        ({"lost": "1 %"}, -0.01),
+    ],
+    ids=["slip", "scale", "lost"],
+)
+def test_a_bad_odometer(ring, wrong, scale):
+    sim, odometer = logs(ring, 1, **{"scale_sigma": "0 %"}, **wrong)
+    answer = align_in_motion(sim.record, RING.imu_spec, odometer=odometer, position=PLACE)
+    assert answer.status == "aligned"
+    assert abs(error(answer, sim)[2]) < 3.5 * np.sqrt(answer.phi_covariance[2, 2]) / ARCMIN < 6.0
+    if scale is None:
+        assert 60 <= answer.moving.rejected["odometer"][0] <= 100  # 6 times 1.5 s at 10 Hz
+    else:
+        assert abs(answer.moving.wheel.scale - scale) < 1.5e-3
+        assert (
+            answer.moving.rejected["odometer"][0] < 0.02 * 6000
+        )  # two lost pulses of a tenth of a second are an outlier
+
+
+def test_mounting_and_lever_arm_are_found():
+    """The IMU stands askew, in front of the axle on which the vehicle turns; the wheel sits on that axle."""
+    arm, C = np.array([0.4, -0.8, 0.0]), dcm_from_euler(*np.radians([1.5, -1.0, 0.0]))  # C: vehicle's axes to the IMU's
+    scenario = changed(
+        lever_arm=[f"{-x} m" for x in arm], odometer={**RING.odometer, "lever_arm": [f"{x} m" for x in arm]}
+    )
+    sim = scenario.simulate(run=2, seed=7)
+    odometer = scenario.simulate_aiding(run=2, seed=7)["odometer"].record
+    answer = align_in_motion(sim.record.rotated(C), RING.imu_spec, odometer=odometer, position=PLACE)
+    assert answer.status == "aligned"
+    wheel, sigma = answer.moving.wheel, answer.moving.wheel.angle_sigma
+    assert np.allclose(rotation_vector_from_dcm(wheel.C_mb @ C)[[0, 2]], 0.0, atol=4.0 * sigma.max())
+    assert sigma.max() < math.radians(0.05)
+    assert np.all(np.abs(wheel.lever_arm - C @ arm)[:2] < 4.0 * wheel.lever_arm_sigma[:2])
+    assert np.all(wheel.lever_arm_sigma[:2] < 0.1)
+    # Of the vehicle, whose axes are those of the simulated body; the IMU's own heading is another one.
+    true = math.atan2(*sim.motion.states(np.array([answer.time])).C_nb[0, :2, 1])
+    off = (answer.moving.vehicle_heading - true + math.pi) % (2 * math.pi) - math.pi
+    assert abs(off) < 3.5 * answer.moving.vehicle_heading_sigma < math.radians(0.15)
+    assert abs(answer.heading - answer.moving.vehicle_heading) > math.radians(1.0)
+
+
+def test_navigation_goes_on_from_it(ring, tmp_path):
+    """Aligned over 300 s of driving, navigated to the end, from the result and from its folder, with the same odometer."""
+    sim, odometer = logs(ring, 0)
+    answer = align_in_motion(sim.record.between(0.0, 300.0), RING.imu_spec, odometer=odometer, position=PLACE)
+    wheel = Mounting(scale_sigma=0.01)
+    track = navigate(sim.record, answer, odometer=odometer, wheel=wheel, check_clocks=False).track
+    end = sim.motion.states(track.time[-1:])
+    assert abs(track.v_n[-1] - end.v_n[0]).max() < 0.05
+    start_off = 6371e3 * (answer.position.lat - sim.motion.states(np.array([300.0])).lat[0])
+    assert abs(6371e3 * (track.position[-1, 0] - end.lat[0]) - start_off) < 10.0
+    answer.save(tmp_path)
+    again = navigate(sim.record, tmp_path, odometer=odometer, wheel=wheel, check_clocks=False).track
+    assert np.allclose(again.position, track.position, rtol=0.0, atol=1e-12)
+    assert np.allclose(again.P[0, BG, BG], answer.moving.P[BG, BG], rtol=1e-6)
+
+
+def test_usage():
+    record = changed(duration="20 s").simulate(seed=1).record
+    with pytest.raises(UsageError, match="odometer=, gnss= or both"):
+        align_in_motion(record, "navigation", position=PLACE)
+    odometer = changed(duration="20 s").simulate_aiding(seed=1)["odometer"].record
+    with pytest.raises(UsageError, match="latitude is not known"):
+        align_in_motion(record, "navigation", odometer=odometer)
+
+
+def test_poor_gyros_and_an_odometer_tell_no_heading():
+    short = changed(duration="60 s", imu="industrial")
+    sim, odometer = short.simulate(seed=1), short.simulate_aiding(seed=1)["odometer"].record
+    answer = align_in_motion(sim.record, imu_spec("industrial"), odometer=odometer, position=PLACE)
+    assert answer.status == "level_only"
+    assert "an odometer tells nothing of north" in answer.reasons[0]
+    assert answer.summary()["heading_deg"] is None
+    assert answer.summary()["vehicle_heading_deg"] is None

@@ -1,0 +1,344 @@
+"""`align_in_motion`: attitude of a vehicle that moves from the first second on, from an odometer, GNSS, or both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.in_motion_start import (
+    Guess,
+    backtracked,
+    coarse_guess,
+    guesses_all_round,
+    seconds_at_rest,
+    start_at,
+)
+from truenorth.alignment.in_motion_verdict import judge_moving
+from truenorth.alignment.moving import fifteen, moving_of
+from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
+from truenorth.alignment.task import bridged, deflection_covariance
+from truenorth.calibration import Calibration
+from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.errors import AlignmentError, UsageError
+from truenorth.models.ins import BA, BG, PHI, InsModel
+from truenorth.navigation.aiding import Aiding
+from truenorth.navigation.driver import Track, navigate_track, with_states
+from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
+from truenorth.navigation.stops import updates_at
+from truenorth.position import Position
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.specs import ImuSpec, imu_spec
+
+Array = NDArray[np.float64]
+Method = Literal["auto", "gyrocompass", "motion"]
+
+HEADING_LIMIT = math.radians(5.0)
+SHORTEST = 10.0  # s
+INTERVAL = 0.5  # s, of the filter's prediction
+OUTPUT = 1.0  # s, of the history
+GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros are asked for north first
+BANK_TIME = 300.0  # s of log by which the headings of the bank compete
+WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
+PASSES = 2
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What all passes share."""
+
+    record: ImuRecord
+    spec: ImuSpec
+    model: InsModel
+    position: Position
+    odometer: OdometerRecord | None
+    gnss: GnssRecord | None
+    wheel: Mounting
+    antenna: Mounting
+    stops: Sequence[Aiding]
+
+    def aiding(self, *, gated: bool) -> list[Aiding]:
+        """Of all sensors; without gates as long as the filter may be wrong itself."""
+        wheel, antenna = (m if gated else replace(m, gate=0.0) for m in (self.wheel, self.antenna))
+        found = list(self.stops)
+        if self.odometer is not None:
+            found += from_odometer(self.odometer, wheel)
+        if self.gnss is not None:
+            found += from_gnss(self.gnss, antenna)
+        return found
+
+    def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
+        """One pass from a guess of the attitude at the start."""
+        record = self.record if until is None else self.record.between(self.record.time[0], until)
+        used = self.aiding(gated=gated)
+        start = start_at(self.record, guess, self.position, self.spec, self.odometer, self.gnss, self.wheel)
+        return navigate_track(
+            record,
+            start,
+            with_states(self.model, used),
+            used,
+            interval=INTERVAL,
+            every=max(1, round(OUTPUT / INTERVAL)),
+            invariant=self.odometer is not None,
+        )
+
+
+def align_in_motion(
+    record: ImuRecord,
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any],
+    *,
+    odometer: OdometerRecord | None = None,
+    gnss: GnssRecord | None = None,
+    position: Position | None = None,
+    wheel: Mounting | None = None,
+    antenna: Mounting | None = None,
+    zupt: bool = True,
+    method: Method = "auto",
+    heading_limit: float = HEADING_LIMIT,
+    calibration: Calibration | None = None,
+    offset: float = 0.0,
+    passes: int = PASSES,
+    progress: Callable[[str], None] | None = None,
+) -> Alignment:
+    """Find pitch, roll and heading of a vehicle under way, from no knowledge of its heading.
+
+    Coarse alignment in the inertial frame (:mod:`truenorth.coarse.odometer`), or a bank of headings all round where the gyros
+    are too poor to find north; a closed loop with invariant errors over the whole log; and the log once more from its
+    beginning, from where the first pass says it began (backtracking).
+
+    Parameters
+    ----------
+    record : ImuRecord
+        Body axes RFU, about: heading is that of the y axis.
+    imu : ImuSpec, str, path or mapping
+        Specification of the IMU; a log on the move cannot be asked for it.
+    odometer, gnss : records, one at least
+        On the IMU's clock.
+    position : Position, optional
+        At the start; not needed with GNSS positions.
+    wheel, antenna : Mounting, optional
+        How they sit. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m) of the wheel are estimated.
+    zupt : bool
+        Use stops: seconds in which the wheel, or GNSS, says that nothing moves.
+    method : {"auto", "gyrocompass", "motion"}
+        Where the heading begins: coarse alignment by the earth's rate, or a bank of headings that motion decides between.
+    heading_limit : float, rad
+        Largest one-sigma heading error that still counts as `aligned`.
+    calibration : Calibration, optional
+        Known errors, taken off first.
+    offset : float, s
+        Added to the times of the aiding logs.
+    passes : int
+        Over the log, two or more with backtracking.
+    progress : callable, optional
+        Told what is being done.
+
+    Returns
+    -------
+    Alignment
+        At the last sample, with `moving`: velocity, covariance, the wheel's scale and mounting.
+
+    Raises
+    ------
+    UsageError
+        Neither odometer nor GNSS; no position; an option out of range.
+    DataError
+        Aiding logs that do not overlap; a gap that cannot be bridged.
+    AlignmentError
+        Too short a log.
+    """
+    tell = progress or (lambda stage: None)
+    task = _task(record, imu, odometer, gnss, position, wheel, antenna, zupt, calibration, offset)
+    if method not in get_args(Method):
+        raise UsageError(f"method {method!r} is not known; choose one of {', '.join(get_args(Method))}")
+    if not heading_limit > 0.0 or passes < 1:
+        raise UsageError(
+            f"heading limit {math.degrees(heading_limit):g} deg, {passes} passes; expected a positive angle, one or more"
+        )
+    bias = float(np.sqrt(spec_variance(task.spec)[0]))
+    level_rate = EARTH_RATE * math.cos(task.position.lat)
+    able = bias < level_rate * math.sin(GYROCOMPASS)
+    if method == "auto":
+        method = "gyrocompass" if able else "motion"
+        why = f"gyro biases of {math.degrees(bias) * 3600:.3g} deg/h " + (
+            "let the earth's rate tell heading" if able else "hide the earth's rate: motion has to tell heading"
+        )
+    else:
+        why = "asked for"
+    tell("coarse alignment")
+    spread = 0.0
+    if method == "gyrocompass":
+        guess = coarse_guess(task.record, task.position, task.odometer, task.gnss, task.wheel, task.antenna)
+        tell("first pass")
+        track = task.run(guess, gated=False)
+    else:
+        guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
+        best, track, spread = _best_of_bank(task, guesses, tell)
+        guess = guesses[best]
+    for number in range(1, passes):
+        tell(f"pass {number + 1}")
+        guess = replace(guess, C_nb=backtracked(task.record, track))
+        track = task.run(guess, gated=True)
+    return _answer(task, track, method, why, spread, heading_limit)
+
+
+def _task(
+    record: ImuRecord,
+    imu: Any,
+    odometer: OdometerRecord | None,
+    gnss: GnssRecord | None,
+    position: Position | None,
+    wheel: Mounting | None,
+    antenna: Mounting | None,
+    zupt: bool,
+    calibration: Calibration | None,
+    offset: float,
+) -> _Task:
+    if odometer is None and gnss is None:
+        raise UsageError(
+            "alignment on the move without an odometer and without GNSS; expected odometer=, gnss= or both"
+        )
+    if imu is None:
+        raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
+    if calibration is not None:
+        record = calibration.apply(record)
+    record = bridged(record)
+    if record.duration < SHORTEST:
+        raise AlignmentError(f"{record.source}: {record.duration:g} s; at least {SHORTEST:g} s are needed on the move")
+    odometer = None if odometer is None else odometer.shifted(offset)
+    gnss = None if gnss is None else gnss.shifted(offset)
+    if position is None:
+        position = _first_fix(record, gnss)
+    spec = imu_spec(imu).with_random_walks(record.interval)
+    stops: list[Aiding] = []
+    if zupt:
+        still, disturbed = seconds_at_rest(record, odometer, gnss)
+        stops = updates_at(record, still, disturbed, INTERVAL)
+    return _Task(
+        record,
+        spec,
+        InsModel.from_spec(spec),
+        position,
+        odometer,
+        gnss,
+        WHEEL if wheel is None else wheel,
+        Mounting() if antenna is None else antenna,
+        stops,
+    )
+
+
+def _first_fix(record: ImuRecord, gnss: GnssRecord | None) -> Position:
+    """Where a log begins, by GNSS."""
+    if gnss is None or not gnss.has_position.any():
+        raise UsageError(
+            "the latitude is not known: the earth's rate and gravity depend on it; expected position= (--lat), or GNSS positions"
+        )
+    fixes = np.flatnonzero(gnss.has_position)
+    nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
+    alt = float(gnss.alt[nearest])
+    return Position(float(gnss.lat[nearest]), float(gnss.lon[nearest]), alt if np.isfinite(alt) else 0.0, 10.0, 20.0)
+
+
+def _best_of_bank(task: _Task, guesses: Sequence[Guess], tell: Callable[[str], None]) -> tuple[int, Track, float]:
+    """Which heading explains the measurements best, its track, and the spread of those that explain them as well, rad."""
+    until = float(task.record.time[0]) + BANK_TIME
+    until = until if until < task.record.time[-1] else None  # type: ignore[assignment]
+    costs, tracks = [], []
+    for number, guess in enumerate(guesses):
+        tell(f"heading {number + 1} of {len(guesses)}")
+        track = task.run(guess, gated=False, until=until)
+        tracks.append(track)
+        costs.append(
+            sum(
+                float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma)))
+                for r in track.residuals
+            )
+        )
+    cost = np.array(costs)
+    weight = np.exp(-0.5 * (cost - cost.min()))
+    weight /= weight.sum()
+    best = int(np.argmin(cost))
+    off = [_turn_between(track.C_nb[-1], tracks[best].C_nb[-1]) for track in tracks]
+    return best, tracks[best], float(np.sqrt(np.sum(weight * np.square(off))))
+
+
+def _turn_between(C: Array, D: Array) -> float:
+    """About the vertical, rad."""
+    R = C @ D.T
+    return float(math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
+
+
+def _answer(task: _Task, track: Track, method: str, why: str, spread: float, limit: float) -> Alignment:
+    place = track.position[-1]
+    sigma = track.sigma[-1]
+    position = Position(float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8]))
+    history = _history(track, task)
+    covariance = history.phi_covariance[-1].copy()
+    covariance[2, 2] = min(covariance[2, 2] + spread**2, UNIFORM_SIGMA**2)
+    mounting = None if task.odometer is None else (task.wheel.C_mb, task.wheel.lever_arm)
+    speed = np.linalg.norm(track.v_n, axis=1)
+    distance = float(np.trapezoid(speed, track.time))
+    prior = np.sqrt(spec_variance(task.spec))
+    moving = moving_of(track, distance, "the earth's rate" if method == "gyrocompass" else "motion", mounting)
+    answer = Alignment(
+        status="not_converged",
+        reasons=(),
+        method=method,
+        method_reason=why,
+        time=float(track.time[-1]),
+        C_nb=track.C_nb[-1],
+        phi_covariance=covariance,
+        phi_floor=history.phi_floor[-1],
+        gyro_bias=track.gyro_bias[-1],
+        gyro_bias_sigma=history.gyro_bias_sigma[-1],
+        gyro_bias_prior=prior[:3],
+        accel_bias=track.accel_bias[-1],
+        accel_bias_sigma=history.accel_bias_sigma[-1],
+        accel_bias_prior=prior[3:],
+        position=position,
+        imu=task.spec,
+        imu_source=f"specification {task.spec.name!r}",
+        duration=task.record.duration,
+        disturbance=np.full(3, np.nan),
+        history=history,
+        source=task.record.source,
+        moving=moving,
+    )
+    status, reasons = judge_moving(answer, track, limit)
+    return answer.with_verdict(status, reasons)
+
+
+def _history(track: Track, task: _Task) -> History:
+    P = fifteen(track)
+    sigma = np.sqrt(np.maximum(np.einsum("kii->ki", P), 0.0))
+    g = float(normal_gravity(task.position.lat, task.position.alt))
+    deflection = deflection_covariance(task.position.lat, g)
+    count = len(track.time)
+    # Attitude now, against what the end says of it: the difference shows in the history itself; the vehicle turns meanwhile.
+    aided = max((r for r in track.residuals if len(r.time)), key=lambda r: len(r.time), default=None)
+    innovation, expected, nis = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
+    if aided is not None:
+        last = np.searchsorted(aided.time, track.time, "right") - 1
+        known = last >= 0
+        innovation[known], expected[known] = aided.innovation[last[known]], aided.sigma[last[known]]
+        nis[known] = aided.nis[last[known]]
+    return History(
+        time=track.time,
+        C_nb=track.C_nb,
+        phi_covariance=P[:, PHI, PHI] + deflection,
+        phi_floor=np.broadcast_to(deflection, (count, 3, 3)),
+        departure=np.zeros((count, 3)),
+        gyro_bias=track.gyro_bias,
+        gyro_bias_sigma=sigma[:, BG],
+        accel_bias=track.accel_bias,
+        accel_bias_sigma=sigma[:, BA],
+        innovation=innovation,
+        innovation_sigma=expected,
+        nis=nis,
+    )

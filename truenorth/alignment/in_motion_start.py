@@ -1,0 +1,156 @@
+"""Where an alignment on the move begins: guesses of the attitude at the first sample, velocity, stops; and the way back there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.task import level_of
+from truenorth.attitude import dcm_from_euler, skew
+from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
+from truenorth.increments import increments
+from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
+from truenorth.navigation.driver import Start, Track
+from truenorth.navigation.sensors import Mounting
+from truenorth.navigation.stops import stops_in
+from truenorth.position import Position
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.specs import ImuSpec
+from truenorth.strapdown import inertial_integrals
+
+Array = NDArray[np.float64]
+
+COARSE_LEVEL, COARSE_HEADING = math.radians(0.5), math.radians(20.0)  # one sigma, by the earth's rate
+BANK_LEVEL = math.radians(4.0)  # of a level from the mean force of a vehicle that may be under way
+HEADINGS = 12  # of the bank, all round
+LEVEL_TIME = 4.0  # s
+ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of the velocity at the start
+STANDING = 0.15  # m/s: slower is standing, by GNSS
+STANDING_PULSES = 1.5  # pulses in a second: no more is standing
+NEAR = 1.0  # s, within which a second of rest must have been seen by the sensor
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Attitude at the beginning of the first sample, and its sigmas, rad."""
+
+    C_nb: Array
+    level_sigma: float
+    heading_sigma: float
+
+
+def coarse_guess(
+    record: ImuRecord,
+    position: Position,
+    odometer: OdometerRecord | None,
+    gnss: GnssRecord | None,
+    wheel: Mounting,
+    antenna: Mounting,
+) -> Guess:
+    """By optimisation-based alignment, with the odometer where there is one."""
+    if odometer is not None:
+        coarse = odometer_alignment(record, odometer, position, wheel)
+    else:
+        assert gnss is not None
+        coarse = gnss_alignment(record, gnss, antenna)
+    return Guess(coarse.C_n0_i, COARSE_LEVEL, COARSE_HEADING)
+
+
+def guesses_all_round(
+    record: ImuRecord, position: Position, odometer: OdometerRecord | None, wheel: Mounting
+) -> list[Guess]:
+    """Level from the first seconds, and headings all round."""
+    dtheta, dvel = increments(record)
+    rows = max(2, round(LEVEL_TIME / record.interval))
+    C, velocity, _ = inertial_integrals(dtheta[:rows], dvel[:rows], record.steps[:rows], [0, rows])
+    force = velocity[1]
+    if odometer is not None:  # what the wheel says of the acceleration is not gravity's
+        at = record.time[0] - record.steps[0] + np.array([0.0, float(record.steps[:rows].sum())])
+        speed = np.interp(at, odometer.time - wheel.latency, odometer.speed)
+        forward = wheel.C_mb[1]
+        force = force - (C[1] @ forward * speed[1] - C[0] @ forward * speed[0])
+    level = level_of(force)
+    step = 2.0 * math.pi / HEADINGS
+    return [Guess(dcm_from_euler(k * step, 0.0, 0.0) @ level, BANK_LEVEL, step) for k in range(HEADINGS)]
+
+
+def start_at(
+    record: ImuRecord,
+    guess: Guess,
+    position: Position,
+    spec: ImuSpec,
+    odometer: OdometerRecord | None,
+    gnss: GnssRecord | None,
+    wheel: Mounting,
+) -> Start:
+    """The state before the first sample: velocity by the wheel through the guessed attitude, else by GNSS."""
+    time = float(record.time[0] - record.steps[0])
+    P = np.zeros((STATES, STATES))
+    P[PHI, PHI] = np.diag([guess.level_sigma**2, guess.level_sigma**2, guess.heading_sigma**2])
+    v_n, sigma = np.zeros(3), UNKNOWN_START
+    if odometer is not None:
+        speed = float(np.interp(time, odometer.time - wheel.latency, odometer.speed))
+        v_n, sigma = guess.C_nb @ wheel.C_mb[1] * speed, math.hypot(ODOMETER_START, wheel.angle_sigma * speed)
+    elif gnss is not None:
+        v_n, sigma = gnss_track(gnss, np.array([time, time + 1e-3, record.time[-1]]))[0][0], GNSS_START
+    P[DV, DV] = sigma**2 * np.eye(3)
+    if odometer is not None:  # what the wheel says turns with the attitude: dv = dv_I + v x phi
+        turn = np.eye(STATES)
+        turn[DV, PHI] = skew(v_n)
+        P = turn @ P @ turn.T
+    P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
+    variance = spec_variance(spec)
+    # Slow parts are states of their own.
+    P[BG, BG] = np.eye(3) * (variance[0] - spec.gyro_bias_instability**2)
+    P[BA, BA] = np.eye(3) * (variance[3] - spec.accel_bias_instability**2)
+    zero = np.zeros(3)
+    return Start(time, guess.C_nb, v_n, position.lat, position.lon, position.alt, zero, zero, P)
+
+
+def backtracked(record: ImuRecord, track: Track) -> Array:
+    """``C_nb`` at the beginning of the log, from the end of a track and the gyros, with the bias found there."""
+    rows = int(np.searchsorted(record.time, track.time[-1] - 0.5 * record.interval)) + 1
+    dtheta, dvel = increments(record)
+    turned = dtheta[:rows] - record.steps[:rows, None] * track.gyro_bias[-1]
+    C_ib = inertial_integrals(turned, dvel[:rows], record.steps[:rows], [rows])[0][0]
+    elapsed = track.time - track.time[0]
+    C_n0_n = frames(elapsed, track.position)[-1]
+    return np.asarray(C_n0_n @ track.C_nb[-1] @ C_ib.T)
+
+
+def seconds_at_rest(record: ImuRecord, odometer: OdometerRecord | None, gnss: GnssRecord | None) -> tuple[Array, Array]:
+    """Middles of the seconds in which the IMU sees no motion and the other sensor no speed: still, and disturbed, s.
+
+    Steady driving on a good road looks like rest to an IMU alone; a wheel that stands may slide. Both must agree.
+    """
+    still, disturbed = stops_in(record)
+    moving = _speed_seen(odometer, gnss)
+    return still[~moving(still)], disturbed[~moving(disturbed)]
+
+
+def _speed_seen(odometer: OdometerRecord | None, gnss: GnssRecord | None):  # type: ignore[no-untyped-def]
+    """Tells of times whether the sensor saw motion near them, or did not look."""
+    if odometer is not None:
+        time, speed = odometer.time - 0.5 * odometer.steps, np.abs(odometer.speed)
+        limit = 0.02 if odometer.pulse_size is None else STANDING_PULSES * odometer.pulse_size / odometer.interval
+    else:
+        assert gnss is not None
+        time = gnss.time
+        speed = np.full(len(time), np.inf)
+        if gnss.v_n is not None:
+            speed = np.where(gnss.has_velocity, np.linalg.norm(np.nan_to_num(gnss.v_n[:, :2]), axis=1), np.inf)
+        limit = STANDING
+    moved = time[speed > limit]
+
+    def moving(at: Array) -> NDArray[np.bool_]:
+        if at.size == 0:
+            return np.zeros(0, dtype=bool)
+        near = np.searchsorted(time, at + NEAR) - np.searchsorted(time, at - NEAR) > 0
+        motion = np.searchsorted(moved, at + NEAR) - np.searchsorted(moved, at - NEAR) > 0
+        return np.asarray(~near | motion)
+
+    return moving

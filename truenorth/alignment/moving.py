@@ -1,0 +1,157 @@
+"""What an alignment on the move knows beside attitude: velocity, place, and how the wheel sits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm
+from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
+from truenorth.navigation.driver import Track
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """How the odometer was found to sit and to count.
+
+    Attributes
+    ----------
+    C_mb : (3, 3) array
+        IMU body to vehicle axes.
+    angle_sigma : (2,) array, rad
+        Of its pitch and yaw.
+    scale, scale_sigma : float
+        Relative error of what it counts.
+    lever_arm, lever_arm_sigma : (3,) arrays, m
+        IMU to wheel, body axes.
+    """
+
+    C_mb: Array
+    angle_sigma: Array
+    scale: float
+    scale_sigma: float
+    lever_arm: Array
+    lever_arm_sigma: Array
+
+
+@dataclass(frozen=True)
+class Moving:
+    """The rest of the state at the alignment's epoch.
+
+    Attributes
+    ----------
+    v_n : (3,) array, m/s
+    P : (15, 15) array
+        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.models.ins`).
+    distance : float, m
+        Travelled.
+    heading_from : str
+        "the earth's rate" or "motion": what told the heading.
+    rejected : mapping of sensor to (rejected, all) measurements
+    wheel : Wheel or None
+    vehicle_heading, vehicle_heading_sigma : float, rad
+        Of the vehicle's forward axis; the IMU's own where no odometer says how it sits.
+    track : Track
+        The whole way.
+    """
+
+    v_n: Array
+    P: Array
+    distance: float
+    heading_from: str
+    rejected: dict[str, tuple[int, int]]
+    wheel: Wheel | None
+    vehicle_heading: float
+    vehicle_heading_sigma: float
+    track: Track
+
+    def summary(self) -> dict[str, Any]:
+        """In datasheet units, ready for JSON."""
+        result: dict[str, Any] = {
+            "velocity_m_s": self.v_n.tolist(),
+            "velocity_sigma_m_s": np.sqrt(np.diag(self.P)[DV]).tolist(),
+            "position_sigma_m": np.sqrt(np.diag(self.P)[DP]).tolist(),
+            "distance_m": self.distance,
+            "heading_from": self.heading_from,
+            "rejected": {name: list(counts) for name, counts in self.rejected.items()},
+            "vehicle_heading_deg": math.degrees(self.vehicle_heading),
+            "vehicle_heading_sigma_deg": math.degrees(self.vehicle_heading_sigma),
+        }
+        if self.wheel is not None:
+            w = self.wheel
+            result |= {
+                "odometer_scale": w.scale,
+                "odometer_scale_sigma": w.scale_sigma,
+                "mounting_C_mb": w.C_mb.tolist(),
+                "mounting_deg": [math.degrees(_signed(float(a))) for a in euler_from_dcm(w.C_mb)],
+                "mounting_sigma_deg": np.degrees(w.angle_sigma).tolist(),
+                "wheel_arm_m": w.lever_arm.tolist(),
+                "wheel_arm_sigma_m": w.lever_arm_sigma.tolist(),
+            }
+        return result
+
+
+def _signed(angle: float) -> float:
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def fifteen(track: Track) -> Array:
+    """(K, 15, 15) covariance of phi, dv, dp and the whole biases, their slow parts included."""
+    model = track.model
+    M = np.zeros((STATES, model.states))
+    M[:, :STATES] = np.eye(STATES)
+    for group, slow in ((BG, SLOW_GYRO), (BA, SLOW_ACCEL)):
+        extra = model.slice_of(slow)
+        if extra is not None:
+            M[group, extra] = np.eye(3)
+    return np.asarray(M @ track.P @ M.T)
+
+
+def wheel_of(track: Track, C_mb: Array, lever_arm: Array) -> Wheel:
+    """How the wheel sits after a track, from what was assumed."""
+    model, sensors, sigma = track.model, track.sensors[-1], track.sigma[-1]
+    scale, angles, arm = (model.slice_of(f"odometer {role}") for role in ("scale", "mounting", "lever arm"))
+    if angles is not None:
+        about_x, about_z = sensors[angles]
+        C_mb = dcm_from_rotation_vector(-np.array([about_x, 0.0, about_z])) @ C_mb
+    return Wheel(
+        C_mb=C_mb,
+        angle_sigma=np.zeros(2) if angles is None else sigma[angles],
+        scale=0.0 if scale is None else float(sensors[scale.start]),
+        scale_sigma=0.0 if scale is None else float(sigma[scale.start]),
+        lever_arm=lever_arm if arm is None else lever_arm + sensors[arm],
+        lever_arm_sigma=np.zeros(3) if arm is None else sigma[arm],
+    )
+
+
+def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[Array, Array] | None) -> Moving:
+    """The rest of the state at the end of a track; `mounting` is ``C_mb`` and lever arm as assumed of an odometer."""
+    P, C_nb = fifteen(track)[-1], track.C_nb[-1]
+    wheel = None if mounting is None else wheel_of(track, *mounting)
+    C_mb = np.eye(3) if wheel is None else wheel.C_mb
+    forward = C_nb @ C_mb[1]
+    variance = P[PHI, PHI][2, 2]
+    if wheel is not None:
+        # Heading and mounting yaw hang together: the error of the vehicle's heading is phi_U and what is left of the yaw.
+        angles = track.model.slice_of("odometer mounting")
+        if angles is not None:
+            full = track.P[-1]
+            yaw = angles.start + 1
+            variance = max(full[2, 2] + full[yaw, yaw] + 2.0 * full[2, yaw], 0.0)
+    return Moving(
+        v_n=track.v_n[-1],
+        P=P,
+        distance=distance,
+        heading_from=heading_from,
+        rejected={r.name: (r.rejected, len(r.time)) for r in track.residuals},
+        wheel=wheel,
+        vehicle_heading=float(np.arctan2(forward[0], forward[1]) % (2.0 * np.pi)),
+        vehicle_heading_sigma=float(np.sqrt(variance)),
+        track=track,
+    )

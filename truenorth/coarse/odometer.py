@@ -1,0 +1,267 @@
+"""Coarse alignment on the move: gravity in the inertial frame, with the vehicle's own motion taken from an odometer or GNSS.
+
+The velocity of a vehicle, seen from the frame ``n0`` that is frozen at the start, obeys
+
+    d/dt (C_n0_n v_n) = C_n0_n (C_nb f - w_ie x v_n + g)
+
+and ``C_n0_n C_nb = C_n0_i C_ib`` with one constant rotation, which is sought. A wheel tells velocity in body axes,
+``v_n = C_nb v_b``; GNSS tells it in navigation axes. Collected on the side on which they are known,
+
+    odometer   C_n0_i [int C_ib f dt - C_ib v_b - int w_ie_i x C_ib v_b dt]  =  -int C_n0_n g dt - C_n0_n0 v_n(0)
+    GNSS       C_n0_i [int C_ib f dt]  =  C_n0_n v_n - int C_n0_n (g - w_ie x v_n) dt - v_n(0)
+
+Each is a pair of vectors ``C b = r``. Both are averaged over the filter intervals, so that an odometer enters with distance,
+not with the noise of its pulses; in the *position* form they are integrated once more. Differences against the first interval
+(with GNSS, whose velocities are noisier, over the last three quarters of the time elapsed) drop the constants, and
+Davenport's q-method finds the rotation.
+
+The odometer's small terms need the answer themselves (the earth rate in i; how far the vehicle went, which turns
+``C_n0_n``): they are found by iteration from zero, which converges by the ratio of these terms to gravity.
+
+Sources: M. Wu, Y. Wu, X. Hu, D. Hu, "Optimization-based alignment for inertial navigation systems: theory and algorithm",
+Aerosp. Sci. Technol. 15 (2011); Y. Wu, X. Pan, "Velocity/position integration formula part I: application to in-flight
+coarse alignment", IEEE Trans. Aerosp. Electron. Syst. 49 (2013).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.coarse.inertial import Form
+from truenorth.coarse.wahba import davenport_matrices, rotation_from_davenport
+from truenorth.earth import EARTH_RATE, earth_rate_n, ecef_axes, normal_gravity, radii
+from truenorth.errors import DataError
+from truenorth.increments import increments
+from truenorth.inertial import InertialIntegrals, integrate
+from truenorth.navigation.sensors import Mounting
+from truenorth.position import Position
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.strapdown import inertial_integrals
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 3  # of the odometer's small terms; each is a thousandth of the one before
+LEAST_FIXES = 5
+FIRST = 0.25  # of the time elapsed, that GNSS's noise at a single epoch shall not be in all pairs
+
+
+@dataclass(frozen=True)
+class MovingAttitude:
+    """What coarse alignment on the move found.
+
+    Attributes
+    ----------
+    time : (K+1,) array, s
+        Ends of the intervals, since the beginning of the first sample.
+    C_n0_i : (3, 3) array
+        Body to ENU at the beginning of the first sample.
+    history : (K, 3, 3) array
+        The same as known at each epoch but the first.
+    position : (K+1, 3) array
+        Latitude, longitude (rad) and height (m) along the way.
+    """
+
+    time: Array
+    C_n0_i: Array
+    history: Array
+    position: Array
+
+
+def odometer_alignment(
+    record: ImuRecord,
+    odometer: OdometerRecord,
+    position: Position,
+    mounting: Mounting | None = None,
+    form: Form = "velocity",
+    interval: float = 1.0,
+) -> MovingAttitude:
+    """Attitude at the start of a drive, from inertial sensors and an odometer; from any heading.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    odometer : OdometerRecord
+    position : Position
+        At the start.
+    mounting : Mounting, optional
+        Of the wheel: its axes and lever arm as far as known.
+    form : {"velocity", "position"}
+    interval : float, s
+
+    Raises
+    ------
+    DataError
+        The odometer does not cover the log.
+    """
+    mounting = mounting or Mounting()
+    integrals = integrate(record, interval)
+    moved = _wheel_displacement(record, odometer, mounting, integrals)  # (K+1, 3) in i, since the start
+    T = integrals.intervals
+    velocity = np.diff(moved, axis=0) / T[:, None]  # mean over each interval
+    C = np.eye(3)
+    place = _stay(position, len(T) + 1)
+    for iteration in range(ITERATIONS):
+        C_n0_n = frames(integrals.time, place)
+        # w_ie in i, not known at first.
+        w = np.zeros(3) if iteration == 0 else C.T @ earth_rate_n(position.lat)
+        back = np.cross(w, 0.5 * (moved[1:] + moved[:-1]))  # mean of int w x v dt
+        b = integrals.mean_velocity - velocity - back
+        r = _mean_of_integral(-_gravity(C_n0_n, place), T)
+        found = _solve(integrals.time, b, r, form, place, 0.0)
+        C = found.C_n0_i
+        v_n = np.einsum("kji,kj->ki", 0.5 * (C_n0_n[1:] + C_n0_n[:-1]), velocity @ C.T)
+        place = _travelled(position, v_n, T)
+    return found
+
+
+def gnss_alignment(
+    record: ImuRecord,
+    gnss: GnssRecord,
+    mounting: Mounting | None = None,
+    form: Form = "velocity",
+    interval: float = 1.0,
+) -> MovingAttitude:
+    """Attitude at the start of a log, from inertial sensors and a GNSS receiver; from any heading.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    gnss : GnssRecord
+        Velocities where it has them, else differences of positions.
+    mounting : Mounting, optional
+        Of the antenna: its latency; the lever arm, against unknown attitude, is of no use yet.
+    form : {"velocity", "position"}
+    interval : float, s
+
+    Raises
+    ------
+    DataError
+        Fewer than five fixes in the log.
+    """
+    integrals = integrate(record, interval)
+    latency = 0.0 if mounting is None else mounting.latency
+    at = integrals.start + integrals.time
+    velocity, place = gnss_track(gnss, at, latency)
+    T = integrals.intervals
+    C_n0_n = frames(integrals.time, place)
+    v_n0 = np.einsum("kij,kj->ki", C_n0_n, velocity)
+    w = np.asarray(earth_rate_n(float(place[0, 0])))
+    rate = np.cross(w, v_n0) - _gravity(C_n0_n, place)
+    r = 0.5 * (v_n0[1:] + v_n0[:-1]) + _mean_of_integral(rate, T)
+    return _solve(integrals.time, integrals.mean_velocity, r, form, place, FIRST)
+
+
+def gnss_track(gnss: GnssRecord, at: Array, latency: float = 0.0) -> tuple[Array, Array]:
+    """Velocity (K, 3), m/s, and position (K, 3) of the antenna at some times, between its fixes by straight lines.
+
+    Raises
+    ------
+    DataError
+        Fewer than five fixes within these times.
+    """
+    time = gnss.time - latency
+    fixed = gnss.has_position
+    inside = fixed & (time >= at[0] - 1.0) & (time <= at[-1] + 1.0)
+    if inside.sum() < LEAST_FIXES:
+        raise DataError(
+            f"{gnss.source}: {int(inside.sum())} positions between {at[0]:.1f} s and {at[-1]:.1f} s; expected at least "
+            f"{LEAST_FIXES} within the IMU's log, on its clock: check --offset"
+        )
+    height = np.where(np.isfinite(gnss.alt), gnss.alt, 0.0)
+    place = np.stack([np.interp(at, time[fixed], a[fixed]) for a in (gnss.lat, gnss.lon, height)], axis=1)
+    known = gnss.has_velocity
+    if gnss.v_n is not None and known.sum() >= LEAST_FIXES:
+        v, when = np.nan_to_num(gnss.v_n[known]), time[known]
+    else:
+        t, lat, lon, alt = time[fixed], gnss.lat[fixed], gnss.lon[fixed], height[fixed]
+        R_M, R_N = radii(lat[:-1])
+        T = np.diff(t)
+        v = np.stack(
+            [
+                np.diff(lon) * (R_N + alt[:-1]) * np.cos(lat[:-1]) / T,
+                np.diff(lat) * (R_M + alt[:-1]) / T,
+                np.diff(alt) / T,
+            ],
+            axis=1,
+        )
+        when = 0.5 * (t[1:] + t[:-1])
+    return np.stack([np.interp(at, when, v[:, i]) for i in range(3)], axis=1), place
+
+
+def frames(time: Array, place: Array) -> Array:
+    """``C_n0_n``, (K, 3, 3): ENU at each time and place seen from ENU at the start, in inertial space."""
+    C_en = ecef_axes(place[:, 0], place[:, 1])
+    turn = dcm_from_rotation_vector(EARTH_RATE * time[:, None] * np.array([0.0, 0.0, 1.0]))
+    return np.asarray(C_en[0].T @ turn @ C_en)
+
+
+def _wheel_displacement(
+    record: ImuRecord, odometer: OdometerRecord, mounting: Mounting, integrals: InertialIntegrals
+) -> Array:
+    """(K+1, 3) how far the IMU went in i since the start, by the wheel, m, at the ends of the intervals."""
+    ends = odometer.time - mounting.latency
+    starts = ends - odometer.steps
+    at = integrals.start + integrals.time
+    if starts[0] > at[0] + 2.0 or ends[-1] < at[-1] - 2.0:
+        raise DataError(
+            f"{odometer.source}: runs from {starts[0]:.3f} s to {ends[-1]:.3f} s, {record.source} from {at[0]:.3f} s to "
+            f"{at[-1]:.3f} s; expected an odometer that covers the log, on its clock: check --offset"
+        )
+    # Attitude half way through each row's interval; the wheel goes along the vehicle's forward axis.
+    edges = np.concatenate([[at[0]], record.time])
+    rows = np.clip(np.searchsorted(edges, 0.5 * (starts + ends)), 0, len(record))
+    dtheta, dvel = increments(record)
+    every, back = np.unique(rows, return_inverse=True)
+    C_ib = inertial_integrals(dtheta, dvel, record.steps, every)[0][back]
+    forward = mounting.C_mb[1]
+    steps = odometer.distance[:, None] * (C_ib @ forward)
+    path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    clock = np.concatenate([starts[:1], ends])
+    moved = np.stack([np.interp(at, clock, path[:, i]) for i in range(3)], axis=1)
+    # The wheel's way less that of the lever arm's end about the IMU.
+    moved -= integrals.C_ib @ mounting.lever_arm
+    return moved - moved[0]
+
+
+def _stay(position: Position, count: int) -> Array:
+    return np.tile([position.lat, position.lon, position.alt], (count, 1))
+
+
+def _travelled(position: Position, v_n: Array, T: Array) -> Array:
+    """(K+1, 3) positions of a way with mean velocities over intervals; flat but for the two radii, metres over kilometres."""
+    R_M, R_N = radii(position.lat)
+    way = np.concatenate([np.zeros((1, 3)), np.cumsum(v_n * T[:, None], axis=0)])
+    scale = np.array([(R_N + position.alt) * math.cos(position.lat), R_M + position.alt, 1.0])
+    lon, lat, alt = (way / scale).T
+    return np.stack([position.lat + lat, position.lon + lon, position.alt + alt], axis=1)
+
+
+def _gravity(C_n0_n: Array, place: Array) -> Array:
+    """(K, 3) gravity in n0, m/s^2."""
+    return -C_n0_n[:, :, 2] * normal_gravity(place[:, 0], place[:, 2])[:, None]
+
+
+def _mean_of_integral(rate: Array, T: Array) -> Array:
+    """(K, 3) mean over each interval of the integral since the start of a rate given at its ends; the rate is straight between."""
+    whole = np.concatenate([np.zeros((1, 3)), np.cumsum(0.5 * T[:, None] * (rate[1:] + rate[:-1]), axis=0)])
+    return whole[:-1] + T[:, None] * (rate[:-1] / 3.0 + rate[1:] / 6.0)
+
+
+def _solve(time: Array, b: Array, r: Array, form: Form, place: Array, first: float) -> MovingAttitude:
+    """q-method over the time elapsed but for its first part."""
+    T = np.diff(time)[:, None]
+    if form == "position":
+        b, r = np.cumsum(b * T, axis=0), np.cumsum(r * T, axis=0)
+        if len(b) > 2:  # the unknown velocity at the start has become a slope
+            b, r = b - np.outer(np.arange(len(b)), b[1] - b[0]), r - np.outer(np.arange(len(r)), r[1] - r[0])
+    ends = np.arange(1, len(b))
+    starts = (first * ends).astype(int)
+    db, dr = b[ends] - b[starts], r[ends] - r[starts]
+    weights = np.ones(len(ends))
+    history = rotation_from_davenport(np.cumsum(davenport_matrices(db, dr, weights), axis=0))
+    return MovingAttitude(time, history[-1], np.concatenate([history[:1], history]), place)
