@@ -46,9 +46,9 @@ def reference(truth, c, seed=0, sigma=0.05):
 def paper_filters(course):
     P0 = paper_prior(course, START)
     return {
-        "first": Filter(PAPER, P0, 0.05),
-        "second": Filter(PAPER, P0, 0.001, window=10.0),
-        "raw": Filter(PAPER, P0, 0.01, window=10.0),
+        "filter1": Filter(PAPER, P0, 0.05),
+        "filter2": Filter(PAPER, P0, 0.001, window=10.0),
+        "filter2_raw": Filter(PAPER, P0, 0.01, window=10.0),
     }
 
 
@@ -66,7 +66,9 @@ def test_the_mean_of_the_rows_of_F_is_the_change_of_velocity(linear):
 def test_a_constant_reference_error_cancels(linear):
     """In filter 2 on the raw reference to rounding, on the smoothed one to 1 %; in filter 1 not at all."""
     truth, _, course = linear
-    none, some = (run_filters(course, reference(truth, c), start=START, **paper_filters(course)) for c in (0.0, -0.3))
+    none, some = (
+        run_filters(course, reference(truth, c), start=START, kinds=paper_filters(course)) for c in (0.0, -0.3)
+    )
     sizes = np.abs(none["filter2_raw"].x).max(axis=0)
     np.testing.assert_array_less(np.abs(none["filter2_raw"].x - some["filter2_raw"].x).max(axis=0), 1e-9 * sizes)
     late = slice(360, None)  # an hour after the switch
@@ -83,7 +85,7 @@ def test_filter1_is_the_kalman_filter_of_the_whole(linear):
     truth, _, course = linear
     part, ref = course.between(0, 5000), reference(truth, -0.1)[:5001]
     P0 = paper_prior(course, START)
-    found = run_filters(part, ref, start=START, first=Filter(PAPER, P0, 0.05))["filter1"]
+    found = run_filters(part, ref, start=START, kinds={"filter1": Filter(PAPER, P0, 0.05)})["filter1"]
     _, Phi = part.between(START, 5000).linearise(PAPER)
     H = np.zeros((1, 2, 13))
     H[0, :, DV] = np.eye(2)
@@ -150,7 +152,7 @@ def test_the_augmented_filter_is_honest():
             course,
             reference(truth, c, seed=1000 + run),
             start=START,
-            augmented=Filter(model, P0, 0.05, relinearise=True),
+            kinds={"augmented": Filter(model, P0, 0.05, relinearise=True)},
         )["augmented"]
         e = errors_of(course, truth)
         for hours in nees:
@@ -193,11 +195,9 @@ def test_what_is_refused(linear):
     truth, _, course = linear
     P0 = paper_prior(course, START)
     ref = reference(truth, 0.0)
-    with pytest.raises(UsageError, match="needs filter 1"):
-        run_filters(course, ref, start=START, second=Filter(PAPER, P0, 0.001, window=10.0))
-    with pytest.raises(UsageError, match="no filter is asked for"):
-        run_filters(course, ref, start=START)
+    with pytest.raises(UsageError, match="that filter1 smooths"):
+        run_filters(course, ref, start=START, kinds={"filter2": Filter(PAPER, P0, 0.001, window=10.0)})
     with pytest.raises(UsageError, match="start at epoch"):
-        run_filters(course, ref, start=10**6, first=Filter(PAPER, P0, 0.05))
+        run_filters(course, ref, start=10**6, kinds={"filter1": Filter(PAPER, P0, 0.05)})
     with pytest.raises(UsageError, match=r"expected \(15, 15\)"):
         Filter(MarineModel(0.0, 0.0, with_reference=True), P0, 0.05)

@@ -18,6 +18,7 @@ EXAMPLES = """
 Studies:
   static   Kalman filters for static alignment, with ten and with eight states
   transfer  Transfer alignment with residual time delay and lever arm
+  damping  Double-filter external damping of a marine INS over 48 h
 \b
 Examples:
   truenorth reproduce static -o static

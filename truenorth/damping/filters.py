@@ -16,7 +16,7 @@ Source: L. Zhao, J. Li, J. Cheng, J. Harbin Inst. Technol. 50 (3), 2018, eq. 2-4
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -116,8 +116,8 @@ class _Stream:
         self.rows = np.zeros((0, 2, n))
         self.done = 1
 
-    def feed(self, part: Course, z: Array) -> None:
-        """Take the next epochs: K intervals of the course, z (K, 2)."""
+    def feed(self, part: Course, z: Array, linear: tuple[Array, Array] | None = None) -> None:
+        """Take the next epochs: K intervals of the course, z (K, 2), F and Phi (K, n, n) where they are known."""
         if self.kind.relinearise and part.epochs > FRESH:
             for begin in range(0, part.epochs, FRESH):
                 end = min(begin + FRESH, part.epochs)
@@ -128,7 +128,7 @@ class _Stream:
             before = self.x[max(self.done - 1 - part.epochs, 0), MOTION]
             ahead = last + (last - before if self.done > FRESH else 0.0) / 2.0  # at the middle of these epochs
             part = part.corrected(ahead / 2.0)
-        F, Phi = part.linearise(self.kind.model)
+        F, Phi = part.linearise(self.kind.model) if linear is None else linear
         n, K = self.kind.model.states, len(Phi)
         if self.lag == 0:
             H = np.zeros((1, 2, n))
@@ -167,17 +167,9 @@ class _Stream:
 
 
 def run_filters(
-    course: Course,
-    reference: Array,
-    *,
-    start: int,
-    first: Filter | None = None,
-    second: Filter | None = None,
-    raw: Filter | None = None,
-    augmented: Filter | None = None,
-    workers: int = 1,
+    course: Course, reference: Array, *, start: int, kinds: Mapping[str, Filter], workers: int = 1
 ) -> dict[str, Estimate]:
-    """Run the filters that are asked for over a course.
+    """Run filters over a course, all switched on at one epoch.
 
     Parameters
     ----------
@@ -185,30 +177,27 @@ def run_filters(
     reference : (K+1, 2) array, m/s
         Reference velocity east, north; NaN where absent.
     start : int
-        Epoch at which all are switched on.
-    first, second, raw, augmented : Filter, optional
-        Filter 1; filter 2 on the velocity that filter 1 smooths; filter 2 on the raw reference; 15 states.
+        Epoch of the switch.
+    kinds : mapping of name to Filter
+        A filter with a window is on the raw reference; but the one named ``filter2`` is on the velocity that ``filter1``
+        smooths, as in the paper.
     workers : int
         Threads; filter 2 follows filter 1, the others are free.
 
     Returns
     -------
-    dict of Estimate
-        ``filter1``, ``filter2``, ``filter2_raw``, ``augmented``: those asked for.
+    dict of name to Estimate
 
     Raises
     ------
     UsageError
         Filter 2 without filter 1; a start beyond the course.
     """
-    if second is not None and first is None:
-        raise UsageError("filter 2 on the smoothed reference needs filter 1; expected both, or the raw filter 2")
+    if "filter2" in kinds and ("filter1" not in kinds or kinds["filter1"].window > 0.0):
+        raise UsageError("filter2 is on the velocity that filter1 smooths; expected both, or another name for it alone")
     if not 0 <= start < course.epochs:
         raise UsageError(f"start at epoch {start}; expected 0 to {course.epochs - 1}")
-    kinds = {"filter1": first, "filter2": second, "filter2_raw": raw, "augmented": augmented}
-    streams = {name: _Stream(kind, course, start) for name, kind in kinds.items() if kind is not None}
-    if not streams:
-        raise UsageError("no filter is asked for; expected one at least")
+    streams = {name: _Stream(kind, course, start) for name, kind in kinds.items()}
     z = course.v_n[:, :2] - reference
     interval = course.interval
     settling = max(1, round(SETTLING / interval))
@@ -223,31 +212,24 @@ def run_filters(
 
     smoothed = np.zeros_like(z)  # filter 1's estimate of dv: what is left of v_INS - v_ref, smoothed
 
-    def both(begin: int, end: int, part: Course) -> None:
-        if first is None:
-            return
-        one = streams["filter1"]
-        one.feed(part, z[begin + 1 : end + 1])
-        smoothed[begin + 1 : end + 1] = one.x[begin + 1 - start : end + 1 - start, DV]
-        if second is not None:
-            two = streams["filter2"]
-            two.feed(part, change(smoothed, two.lag, begin, end, start + settling))
-
-    def unsmoothed(begin: int, end: int, part: Course) -> None:
-        if raw is not None:
-            streams["filter2_raw"].feed(part, change(z, streams["filter2_raw"].lag, begin, end, start))
-
-    def constant(begin: int, end: int, part: Course) -> None:
-        if augmented is not None:
-            streams["augmented"].feed(part, z[begin + 1 : end + 1])
-
-    def run(chain: Callable[[int, int, Course], None]) -> None:
+    def run(name: str) -> None:
+        stream = streams[name]
         for begin in range(start, course.epochs, BLOCK):
             end = min(begin + BLOCK, course.epochs)
-            chain(begin, end, course.between(begin, end))
+            part = course.between(begin, end)
+            linear = None if stream.kind.relinearise else part.linearise(stream.kind.model)
+            if stream.lag:
+                stream.feed(part, change(z, stream.lag, begin, end, start), linear)
+            else:
+                stream.feed(part, z[begin + 1 : end + 1], linear)
+            if name == "filter1" and "filter2" in streams:
+                two, rows = streams["filter2"], slice(begin + 1, end + 1)
+                smoothed[rows] = stream.x[begin + 1 - start : end + 1 - start, DV]
+                same = two.kind.model == stream.kind.model and not two.kind.relinearise
+                two.feed(part, change(smoothed, two.lag, begin, end, start + settling), linear if same else None)
 
     with ThreadPoolExecutor(max(workers, 1)) as pool:
-        list(pool.map(run, (both, constant, unsmoothed)))
+        list(pool.map(run, [name for name in kinds if name != "filter2"]))
     return {name: stream.estimate(start) for name, stream in streams.items()}
 
 

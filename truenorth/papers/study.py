@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 STUDIES = {
     "static": "truenorth.papers.static.study",
     "transfer": "truenorth.papers.transfer.study",
+    "damping": "truenorth.papers.damping.study",
 }
 Progress = Callable[[str], None]
 

@@ -1,0 +1,43 @@
+"""Eigenvalues of the error dynamics under a Kalman filter's own gain: how fast what it does not know dies away."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.damping.course import Course
+from truenorth.damping.filters import Filter
+from truenorth.damping.loop import Mode
+from truenorth.models.marine import DV, REF
+
+Array = NDArray[np.float64]
+ROUNDING = 1e-9  # of an eigenvalue of one step: constants stay where they are, and their eigenvalue is 1
+
+
+def filter_modes(course: Course, kind: Filter, P: Array, epoch: int = -1) -> list[Mode]:
+    """Modes of ``(I - K H) Phi``, constants left out, with the gain of a covariance after an update, ``K = P H' R^-1``.
+
+    Parameters
+    ----------
+    course : Course
+    kind : Filter
+    P : (n, n) array
+        Such as an estimate's last one.
+    epoch : int
+        Interval about which the dynamics are taken; a window of filter 2 is no longer than it.
+    """
+    first = epoch % course.epochs
+    F, Phi = course.between(first, first + 1).linearise(kind.model)
+    n = kind.model.states
+    H = np.zeros((2, n))
+    if kind.window > 0.0:
+        H[:] = F[0, DV]
+    else:
+        H[:, DV] = np.eye(2)
+        if kind.model.with_reference:
+            H[:, REF] = -np.eye(2)
+    K = P @ H.T / kind.sigma**2
+    values = np.linalg.eigvals((np.eye(n) - K @ H) @ Phi[0]).astype(np.complex128)
+    rates = np.log(values) / course.interval
+    kept = [complex(v) for v in rates if v.imag >= -ROUNDING / course.interval]
+    return [Mode("filter", v) for v in sorted(kept, key=abs, reverse=True) if abs(v) > ROUNDING / course.interval]

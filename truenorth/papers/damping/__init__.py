@@ -1,0 +1,1 @@
+"""Zhao, Li, Cheng (2018): a double filter that damps a marine INS, reproduced."""

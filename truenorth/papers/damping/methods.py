@@ -1,0 +1,113 @@
+"""All methods on one course: what they leave of its errors."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.damping.course import Course, errors_of
+from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
+from truenorth.damping.loop import Loop, network_correction
+from truenorth.damping.networks import second_order
+from truenorth.damping.prior import carried_prior, paper_prior
+from truenorth.models.marine import DP, REF, STATES, MarineModel
+from truenorth.papers.damping.truth import HOUR, LOG_NOISE, Voyage
+from truenorth.units import parse
+
+Array = NDArray[np.float64]
+
+SWITCH = 2.5 * HOUR
+WINDOW = 5.0  # s, the paper's T
+R2 = 0.001  # m/s^2
+FUSION = Fusion()
+REFERENCE_PRIOR = 0.5  # m/s, of the 15-state filter beside the paper's P0
+LONG_REFERENCE_PRIOR = 0.3  # m/s, of its long-run tuning
+NETWORK = Loop(second_order(0.5))
+AZIMUTH = Loop(second_order(0.5), azimuth_damping=0.5)
+
+# The two tunings of the 15-state filter: constant biases, and the random walks that it believes in.
+SHORT = MarineModel(
+    accel_random_walk=parse("1 ug/sqrt(Hz)", "velocity_random_walk"),
+    gyro_random_walk=parse("0.0001 deg/sqrt(h)", "angle_random_walk"),
+    with_reference=True,
+)
+LONG = MarineModel(
+    accel_random_walk=parse("10 ug/sqrt(Hz)", "velocity_random_walk"),
+    gyro_random_walk=parse("0.001 deg/sqrt(h)", "angle_random_walk"),
+    with_reference=True,
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What every method left on one course.
+
+    Attributes
+    ----------
+    course : Course
+        Of the free INS.
+    time : (K+1,) array, s
+    errors : dict of (K+1, 7) arrays
+        By method: v_e, v_n (m/s), lat, lon (rad), phi_e, phi_n, phi_u (rad), computed minus true after its correction.
+    estimates : dict of Estimate
+        Of the filters.
+    filters : dict of Filter
+    runtime : float, s
+        Of all methods together.
+    """
+
+    course: Course
+    time: Array
+    errors: dict[str, Array]
+    estimates: dict[str, Estimate]
+    filters: dict[str, Filter]
+    runtime: float
+
+
+def filters_of(voyage: Voyage, course: Course, *, raw: bool = True) -> dict[str, Filter]:
+    """The paper's filters and the two 15-state ones, for a course that has a log of this voyage beside it."""
+    start = round(SWITCH / course.interval)
+    noise = LOG_NOISE / np.sqrt(course.interval)
+    P0, paper = paper_prior(course, start), MarineModel.of_paper()
+    wide = np.zeros((REF.stop, REF.stop))
+    wide[:STATES, :STATES] = P0
+    wide[REF, REF] = REFERENCE_PRIOR**2 * np.eye(2)
+    carried = carried_prior(course, start, LONG, np.diag(voyage.paper_errors() ** 2), LONG_REFERENCE_PRIOR)
+    kinds = {
+        "filter1": Filter(paper, P0, noise),
+        "filter2": Filter(paper, P0, R2, window=WINDOW),
+        "augmented": Filter(SHORT, wide, noise, relinearise=True),
+        "augmented_long": Filter(LONG, carried, noise, relinearise=True),
+    }
+    if raw:
+        kinds["filter2_raw"] = Filter(paper, P0, np.sqrt(2.0) * noise / WINDOW, window=WINDOW)
+    return kinds
+
+
+def run_all(
+    voyage: Voyage, course: Course, reference: Array, *, networks: bool = True, raw: bool = True, workers: int = 1
+) -> Case:
+    """Run every method on a course; its filters are switched on at 2.5 h, its networks with them."""
+    begun = time.perf_counter()
+    start = round(SWITCH / course.interval)
+    kinds = filters_of(voyage, course, raw=raw)
+    found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
+    found["fused"] = FUSION(found["filter1"], found["filter2"], course.interval)
+    corrections = {"undamped": np.zeros((course.epochs + 1, 7))}
+    if networks:
+        corrections["network_internal"] = network_correction(course, NETWORK, start=SWITCH, ramp=HOUR)
+        corrections["network_external"] = network_correction(course, AZIMUTH, reference, start=SWITCH)
+    for name, estimate in found.items():
+        corrections[name] = np.zeros((course.epochs + 1, 7))
+        corrections[name][start:] = estimate.x[:, :7]
+    runtime = time.perf_counter() - begun
+    free = errors_of(course, voyage.truth)
+    errors = {}
+    for name, x in corrections.items():
+        left = free - x
+        left[:, DP] = voyage.truth.in_angles(left[:, DP])
+        errors[name] = left
+    return Case(course, course.time, errors, found, kinds, runtime)

@@ -1,0 +1,89 @@
+"""The paper's voyage: a ship at rest, then two days under way, its INS navigating freely with given errors, and its log."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth import earth
+from truenorth.damping.course import Course
+from truenorth.models.marine import BA, BG, DP, DV, PHI, STATES
+from truenorth.simulation import IdealLog, simulate
+from truenorth.simulation.scenario import read_scenario
+from truenorth.specs import ImuSpec
+from truenorth.strapdown import NavigationState, mechanise
+from truenorth.units import parse
+
+Array = NDArray[np.float64]
+
+HOUR = 3600.0
+ARCMIN = math.radians(1.0 / 60.0)
+GYRO_BIAS = parse("0.005 deg/h", "angular_rate")
+ACCEL_BIAS = parse("50 ug", "acceleration")
+LOG_NOISE = 0.05  # m/s, of each row at 1 Hz
+
+
+@dataclass(frozen=True)
+class Voyage:
+    """The ideal log of the ship's IMU, and where it truly was.
+
+    Attributes
+    ----------
+    ideal : IdealLog
+    truth : Course
+    log_noise : (K+1, 2) array, m/s
+        White, of a speed log with a row an epoch.
+    """
+
+    ideal: IdealLog
+    truth: Course
+    log_noise: Array
+
+    def reference(self, c: float | Array) -> Array:
+        """(K+1, 2) what the log says with a constant error (m/s)."""
+        return self.truth.v_n[:, :2] + c + self.log_noise
+
+    def paper_errors(self) -> Array:
+        """(13,) errors of the INS at the beginning and its biases, all with the paper's (positive) signs."""
+        lat, _, alt = self.truth.position[0]
+        R_M, R_N = earth.radii(lat)
+        x = np.zeros(STATES)
+        x[DV] = 0.1
+        x[DP] = ARCMIN / 30.0 * np.array([(R_N + alt) * math.cos(lat), R_M + alt])
+        x[PHI] = np.array([0.7, 0.7, 7.7]) * ARCMIN
+        x[BA], x[BG] = ACCEL_BIAS, GYRO_BIAS
+        return x
+
+    def navigate(self, x0: Array, spec: ImuSpec | None = None, seed: int = 0, run: int = 0) -> Course:
+        """What a free INS says that begins with errors `x0` (13,), biases with them, and draws its noise from a specification."""
+        given = {"gyro_bias": x0[BG], "accel_bias": x0[BA]}
+        record = simulate(self.ideal, imu=spec, seed=seed, run=run, errors=given).record
+        begin = self.truth.between(0, 1).corrected(-x0[:7])
+        lat, lon, alt = (float(value) for value in begin.position[0])
+        start = NavigationState.at(begin.C_nb[0], lat, lon, alt, begin.v_n[0])
+        out = mechanise(record, start, altitude="fixed")
+        C_nb, v_n, position = (
+            np.concatenate([first[:1], rest])
+            for first, rest in ((begin.C_nb, out.C_nb), (begin.v_n, out.v_n), (begin.position, out.position))
+        )
+        return Course(self.truth.time, C_nb, v_n, position)
+
+
+def sail(interval: float, seed: int, run: int = 0) -> Voyage:
+    """The shipped scenario `marine_damping`, sampled at an interval (s).
+
+    Its motion is smooth: an IMU and a log at 1 Hz lose nothing (3 cm in two days). The IMU sits with its axes east, north,
+    up (the paper's heading 0), not along the hull.
+    """
+    scenario = read_scenario("marine_damping")
+    scenario = scenario.model_copy(update={"rate": 1.0 / interval})
+    ideal = scenario.ideal()
+    at = ideal.motion.states(ideal.edges)
+    C = at.C_nb[0]  # the ship keeps its course: this mounting has the heading 0 throughout
+    ideal = replace(ideal, dtheta=ideal.dtheta @ C.T, dvel=ideal.dvel @ C.T)
+    truth = Course(ideal.edges, at.C_nb @ C.T, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    noise = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3, run))).standard_normal((len(at.lat), 2))
+    return Voyage(ideal, truth, LOG_NOISE / math.sqrt(interval) * noise)
