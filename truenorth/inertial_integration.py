@@ -66,8 +66,10 @@ def inertial_integrals(
 ) -> tuple[Array, Array, Array]:
     """Attitude, and first and second integral of specific force, in the inertial frame of the body at the start.
 
-    Algorithm "previous": one sample an update, with the one before it. Position is the trapezoid of velocity, so that
-    the mean velocity between two epochs is the difference of their positions over their time.
+    Algorithm "previous": one sample an update, with the one before it. Position is the trapezoid of velocity with the
+    end correction of Euler and Maclaurin, ``- T (f_k - f_{k-1})/12`` a step: the trapezoid alone loses ``(w T)^2/12`` of a ship's
+    roll at an arm's end, tenths of a mm/s at 100 Hz, in step with the sway. The mean velocity between two epochs is the
+    difference of their positions over their time.
 
     Parameters
     ----------
@@ -98,7 +100,7 @@ def inertial_integrals(
 def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, k: Any, k_before: float, out: Any) -> None:
     q = (1.0, 0.0, 0.0, 0.0)
     vx = vy = vz = px = py = pz = 0.0
-    a = b = (0.0, 0.0, 0.0)
+    a = b = before = (0.0, 0.0, 0.0)
     row = 0
     for j in range(len(epochs)):
         while row < epochs[j]:
@@ -106,9 +108,12 @@ def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, k: Any,
             L, B, b = update_sums(dvel, row, 1, k, k_before, b)
             f = rotate(q, velocity_increment(K, A, a, L, B, b))
             T = steps[row]
-            px += (vx + 0.5 * f[0]) * T
-            py += (vy + 0.5 * f[1]) * T
-            pz += (vz + 0.5 * f[2]) * T
+            if row == 0:
+                before = f
+            px += (vx + 0.5 * f[0] - (f[0] - before[0]) / 12.0) * T
+            py += (vy + 0.5 * f[1] - (f[1] - before[1]) / 12.0) * T
+            pz += (vz + 0.5 * f[2] - (f[2] - before[2]) / 12.0) * T
+            before = f
             vx += f[0]
             vy += f[1]
             vz += f[2]

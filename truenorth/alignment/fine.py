@@ -51,7 +51,7 @@ class FineAlignment:
         With the whole history of x and P.
     gains : Gains
         That the filter used.
-    floor : (K, 12, 12) array
+    floor : (K, n, n) array
         The part of the covariance that the biases alone make, ``P = floor + random``: what waiting does not improve.
     disturbance : (3,) array, m/s
         RMS mean velocity of the base (E, N, U) as the filter took it.
@@ -73,18 +73,18 @@ class FineAlignment:
 
     @property
     def x(self) -> Array:
-        """(12,) the last state estimate."""
+        """(n,) the last state estimate."""
         return self.estimates.x[-1]
 
     @property
     def P(self) -> Array:
-        """(12, 12) its covariance."""
+        """(n, n) its covariance."""
         return self.estimates.P[-1]
 
     @property
     def bias(self) -> Array:
         """(6,) gyro and accelerometer bias at the last epoch."""
-        return self.nominal_bias + self.x[6:]
+        return self.nominal_bias + self.x[6:STATES]
 
     def misalignment_at(self, C_ib: Array, time: float) -> tuple[Array, Array, Array]:
         """Attitude, misalignment covariance and its floor at any time of the log (smoothed to the end of the data).
@@ -103,7 +103,7 @@ class FineAlignment:
         """
         # phi(t) = phi_end + int_t^end C_n0_b eps: the whole log's knowledge carried back (or a little on) to t.
         turned = self._turned_between(time)
-        J = np.zeros((3, STATES))
+        J = np.zeros((3, len(self.x)))
         J[:, PHI] = np.eye(3)
         J[:, BG] = turned
         phi = J @ self.x
