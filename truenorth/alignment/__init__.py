@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from truenorth.alignment.moving import Moving, Wheel
@@ -10,14 +11,16 @@ from truenorth.alignment.result import Alignment, History
 
 if TYPE_CHECKING:
     from truenorth.alignment.in_motion import align_in_motion
+    from truenorth.alignment.transfer import align_transfer
 
-__all__ = ["Alignment", "History", "Moving", "Wheel", "align", "align_in_motion"]
+__all__ = ["Alignment", "History", "Moving", "Wheel", "align", "align_in_motion", "align_transfer"]
+
+# They stand on navigation, which stands on the results here: loaded when first used.
+LATER = {"align_in_motion": "truenorth.alignment.in_motion", "align_transfer": "truenorth.alignment.transfer"}
 
 
 def __getattr__(name: str) -> Any:
-    """Stands on navigation, which stands on the results here: loaded when it is first used."""
-    if name != "align_in_motion":
+    """Procedures that are loaded when they are first used."""
+    if name not in LATER:
         raise AttributeError(f"module 'truenorth.alignment' has no attribute {name!r}")
-    from truenorth.alignment.in_motion import align_in_motion
-
-    return align_in_motion
+    return getattr(import_module(LATER[name]), name)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
     from truenorth.alignment.moving import Moving
+    from truenorth.alignment.transfer_result import Transfer
     from truenorth.quality import Inspection
 
 Array = NDArray[np.float64]
@@ -117,6 +118,8 @@ class Alignment:
     source : str
     moving : Moving or None
         Velocity, and how the wheel sits, of an alignment on the move; `position` is then that at the epoch.
+    transfer : Transfer or None
+        Delay, lever arm and mounting against a master, of a transfer alignment.
     """
 
     status: Status
@@ -143,6 +146,7 @@ class Alignment:
     inspection: Inspection | None = field(default=None, repr=False)
     source: str = ""
     moving: Moving | None = field(default=None, repr=False)
+    transfer: Transfer | None = field(default=None, repr=False)
 
     @property
     def attitude(self) -> Rotation:
@@ -267,6 +271,8 @@ class Alignment:
             result[f"{name}_deg"] = float(deg(value)) if self.heading_known else None
             result[f"{name}_sigma_deg"] = float(deg(sigma))
             result["C_nb"] = self.C_nb.tolist()
+        if self.transfer is not None:
+            result |= self.transfer.summary()
         return result
 
     def to_frame(self) -> pd.DataFrame:
