@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from truenorth.alignment import Alignment, align, align_in_motion, align_transfer
+    from truenorth.alignment import Alignment, align, align_in_motion
     from truenorth.calibration import Calibration
     from truenorth.campaign import run_campaign
     from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
@@ -62,7 +62,6 @@ _HOMES = {
     "VelocityRecord": "records",
     "align": "alignment",
     "align_in_motion": "alignment",
-    "align_transfer": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
     "navigate": "navigation",
@@ -100,7 +99,6 @@ __all__ = [
     "VelocityRecord",
     "align",
     "align_in_motion",
-    "align_transfer",
     "imu_spec",
     "inspect",
     "navigate",

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
-
-if TYPE_CHECKING:
-    from truenorth.navigation.driver import Track
+from truenorth.navigation.driver import Track
 
 Array = NDArray[np.float64]
 

@@ -26,6 +26,7 @@ Examples:
   truenorth align bag/ --lat 48.1 --axes FLU --from 10 --to 310 --json
   truenorth align old.csv --lat -33.9 --units deg/s,g --rate 100
   truenorth align log.csv --lat 34.246 --imu my_imu.yaml --method oba
+  truenorth align turntable.csv --lat 39.98 --imu tactical --positions auto
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
@@ -67,6 +68,17 @@ def align(
     any_attitude: Annotated[
         bool, typer.Option("--any-attitude", help="The IMU really lies on its head: do not refuse z pointing down.")
     ] = False,
+    positions: Annotated[
+        str | None,
+        typer.Option(
+            help="auto: a turntable takes the IMU from position to position; turns are found in the gyros.",
+            rich_help_panel="Turntable",
+            show_default=False,
+        ),
+    ] = None,
+    arm_sigma: Annotated[
+        float, typer.Option(help="How far the IMU may sit from the table's axes, m.", rich_help_panel="Turntable")
+    ] = 0.05,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -100,16 +112,23 @@ def align(
         from truenorth.alignment import align as align_record
         from truenorth.calibration import Calibration
 
-        result = align_record(
-            record,
-            position,
-            imu,
-            method,  # type: ignore[arg-type]  # checked there, with the list of methods in the message
-            at=at,
-            calibration=None if calibration is None else Calibration.from_file(calibration),
-            heading_limit=math.radians(heading_limit),
-            progress=tell,
-        )
+        known = None if calibration is None else Calibration.from_file(calibration)
+        limit = math.radians(heading_limit)
+        if positions is not None:
+            from truenorth.cli.align_positions import align_table
+
+            result = align_table(positions, method, at, record, position, imu, known, arm_sigma, limit, tell)
+        else:
+            result = align_record(
+                record,
+                position,
+                imu,
+                method,  # type: ignore[arg-type]  # checked there, with the list of methods in the message
+                at=at,
+                calibration=known,
+                heading_limit=limit,
+                progress=tell,
+            )
         paths: list[Path] = []
         if output is not None:
             from dataclasses import replace
@@ -180,6 +199,10 @@ def _print(result: Alignment, paths: list[Path]) -> None:
         console.print(f"{name}: {', '.join(axes_shown)}", soft_wrap=True)
     console.print(f"attitude at {result.time:.3f} s, method {result.method}: {result.method_reason}", soft_wrap=True)
     console.print(f"IMU: {result.imu_source}", soft_wrap=True)
+    if result.table is not None:
+        from truenorth.cli.align_positions import print_table
+
+        print_table(console, result)
     for path in paths:
         console.print(f"wrote {path}", soft_wrap=True)
 

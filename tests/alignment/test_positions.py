@@ -1,0 +1,189 @@
+"""Alignment over positions of a turntable: honest sigmas, what turns separate, a touched table, and bad input."""
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from truenorth.alignment import align, align_positions
+from truenorth.alignment.positions import find_positions
+from truenorth.alignment.task import deflection_covariance
+from truenorth.alignment.touched import find_touch
+from truenorth.attitude import rotation_vector_from_dcm
+from truenorth.cli import main
+from truenorth.earth import normal_gravity
+from truenorth.errors import AlignmentError, UsageError
+from truenorth.formats import write_imu
+from truenorth.position import Position
+from truenorth.quality.regimes import motion_summary
+from truenorth.records import ImuRecord
+from truenorth.simulation import Axis, Indexed, Indexer, Spin, rest, simulate, steps
+from truenorth.specs import imu_spec
+
+PLACE = Position.from_degrees(45.0, 9.0, 100.0, horizontal_sigma=0.0, vertical_sigma=0.0)
+
+
+def turned(turns, spec, seed, dwell, duration=600.0, rate=20.0):
+    """A log of a table whose outer axis is vertical, its inner one across."""
+    axes = steps(turns, dwell=dwell, duration=duration, rate=math.radians(18.0))
+    names = "zx"[: len(axes)]
+    table = Indexed(
+        rest(PLACE, 0.6, 0.003, -0.002), Indexer(tuple(Axis(n, a) for n, a in zip(names, axes, strict=True)))
+    )
+    made = simulate(table, imu=spec, rate=rate, duration=duration, seed=seed)
+    return made, table.states(np.array([duration])).C_nb[0]
+
+
+def errors_of(turns, spec, runs, dwell):
+    """Misalignments, their covariances without the deflection of the vertical, and the answers."""
+    deflection = deflection_covariance(PLACE.lat, float(normal_gravity(PLACE.lat, PLACE.alt)))
+    phi, P, answers = [], [], []
+    for seed in range(runs):
+        made, C = turned(turns, spec, seed, dwell)
+        answer = align_positions(made.record, PLACE, spec)
+        phi.append(-rotation_vector_from_dcm(answer.C_nb @ C.T))
+        P.append(answer.phi_covariance - deflection)
+        answers.append((answer, made.errors))
+    return np.array(phi), np.array(P), answers
+
+
+@pytest.mark.parametrize(
+    ("grade", "turns", "dwell"),
+    [
+        ("navigation", [(0, math.pi)], 300.0),
+        ("tactical", [(0, math.pi), (1, math.pi / 2), (1, -math.pi / 2)], 120.0),
+    ],
+)
+def test_sigma_is_honest(grade, turns, dwell):
+    """NEES of 12 runs: 36 numbers, within their 99.9 % band, 15.3 to 72.1 in sum."""
+    phi, P, answers = errors_of(turns, imu_spec(grade), 12, dwell)
+    nees = np.einsum("ri,rij,rj->r", phi, np.linalg.inv(P), phi)
+    assert 15.3 < nees.sum() < 72.1
+    for answer, errors in answers:
+        assert answer.status == ("aligned" if grade == "navigation" else answer.status)
+        apart = (answer.accel_bias - errors.accel.bias) / answer.accel_bias_sigma
+        assert np.all(np.abs(apart) < 5.0)
+
+
+def test_two_positions_take_the_biases_out():
+    """600 s with and without a turn by 180 deg: what the biases leave in level and heading."""
+    spec = imu_spec("navigation")
+    made, _ = turned([(0, math.pi)], spec, 3, 300.0)
+    still = simulate(rest(PLACE, 0.6, 0.003, -0.002), imu=spec, rate=20.0, duration=600.0, seed=3).record
+    two, one = align_positions(made.record, PLACE, spec), align(still, PLACE, spec)
+    assert np.sqrt(two.phi_floor[2, 2]) < 0.15 * np.sqrt(one.phi_floor[2, 2])
+    assert two.euler_sigma[0] < 0.5 * one.euler_sigma[0]
+    assert [round(np.degrees(np.linalg.norm(p.turn))) for p in two.table.positions] == [0, 180]
+    assert np.all(two.accel_bias_sigma[:2] < 0.5 * two.accel_bias_prior[:2])
+    assert np.all(two.accel_bias_estimated[:2])
+    assert not one.accel_bias_estimated[:2].any()
+
+
+def test_a_large_turn_needs_scale_factor_states():
+    """500 ppm over 180 deg are 5.4 arcmin of heading that the answer does not have: the state takes them."""
+    spec = imu_spec({"gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "scale_factor": "500 ppm"},
+                     "accel": {"bias": "50 ug", "random_walk": "10 ug/sqrt(Hz)"}})  # fmt: skip
+    phi, P, answers = errors_of([(0, math.pi)], spec, 6, 300.0)
+    assert np.all(np.abs(phi[:, 2]) < 5.0 * np.sqrt(P[:, 2, 2]))
+    assert np.all(np.degrees(np.sqrt(P[:, 2, 2])) * 60 < 2.5)
+    for (
+        answer,
+        errors,
+    ) in answers:  # seen as the difference of two gyrocompassings, in which the east gyro's bias is, too
+        sigma = answer.table.gyro_matrix_sigma[2, 2]
+        assert sigma < 400e-6
+        assert abs(answer.table.gyro_matrix[2, 2] - errors.gyro.scale_factor[2]) < 5 * sigma
+
+
+def test_a_touched_table_is_noticed_and_an_untouched_one_is_not():
+    """A step of 1 mg in one accelerometer, which the gyros do not show; the log without it is not accused."""
+    spec = imu_spec("navigation")
+    record = turned([(0, math.pi)], spec, 5, 300.0)[0].record
+    assert align_positions(record, PLACE, spec).table.touch is None
+    accel = record.accel.copy()
+    accel[record.time > 150.0, 0] += 9.8e-3 * record.interval
+    answer = align_positions(ImuRecord(record.time, record.gyro, accel, record.kind), PLACE, spec)
+    assert answer.status == "inconsistent"
+    assert "touched" in answer.reasons[0]
+    assert "--from" in answer.reasons[0]
+    assert answer.table.touch.time == pytest.approx(150.0, abs=15.0)
+    assert answer.table.touch.size == pytest.approx(9.8e-3, rel=0.1)
+
+
+def test_chance_does_not_touch_the_table():
+    """White noise of any size: 2000 positions, none accused (false alarm below 1e-5 each)."""
+    rng = np.random.default_rng(0)
+    for count in (40, 120, 600):
+        for _ in range(700):
+            assert find_touch(np.arange(count), rng.standard_normal((count, 2)), 9.8) is None
+
+
+def test_positions_are_found_in_the_gyros():
+    made, _ = turned([(0, math.pi / 2), (1, -math.pi / 2)], imu_spec("tactical"), 1, 40.0, duration=200.0)
+    found = find_positions(motion_summary(made.record))
+    assert len(found) == 5
+    for start, stop in found[:-1]:
+        assert stop - start == pytest.approx(40.0, abs=2.5)
+
+
+def test_a_table_that_never_rests_is_refused():
+    table = Indexed(rest(PLACE, 0.6), Indexer((Axis("z", Spin(0.3)),)))
+    record = simulate(table, imu=imu_spec("tactical"), rate=20.0, duration=60.0).record
+    with pytest.raises(AlignmentError, match="no position of 5 s"):
+        align_positions(record, PLACE, "tactical")
+
+
+def test_options_that_make_no_sense():
+    record = simulate(rest(PLACE), rate=20.0, duration=30.0).record
+    with pytest.raises(UsageError, match="arm_sigma"):
+        align_positions(record, PLACE, arm_sigma=-1.0)
+    with pytest.raises(UsageError, match="heading limit"):
+        align_positions(record, PLACE, heading_limit=0.0)
+
+
+class TestCommand:
+    @pytest.fixture(scope="module")
+    def log(self, tmp_path_factory):
+        path = tmp_path_factory.mktemp("table") / "table.csv"
+        write_imu(turned([(0, math.pi)], imu_spec("navigation"), 2, 140.0, duration=300.0)[0].record, path)
+        return path
+
+    def run(self, capsys, monkeypatch, *arguments):
+        monkeypatch.setattr(sys, "argv", ["truenorth", "align", *map(str, arguments)])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return code, capsys.readouterr()
+
+    def test_prints_positions(self, capsys, monkeypatch, log):
+        code, out = self.run(capsys, monkeypatch, log, "--lat", 45, "--imu", "navigation", "--positions", "auto")
+        assert code == 0
+        assert "turned, deg" in out.out
+        assert "179.9" in out.out or "180.0" in out.out
+
+    def test_json_and_folder(self, capsys, monkeypatch, log, tmp_path):
+        where = ("--lat", 45, "--imu", "navigation", "--positions", "auto")
+        code, out = self.run(capsys, monkeypatch, log, *where, "--json", "-o", tmp_path / "out")
+        assert code == 0
+        found = json.loads(out.out)
+        assert found["method"] == "positions"
+        assert len(found["positions"]) == 2
+        assert found["touched_at_s"] is None
+        assert (tmp_path / "out" / "report.html").stat().st_size > 0
+
+    @pytest.mark.parametrize(
+        ("more", "text"),
+        [
+            (("--positions", "three"), "expected auto"),
+            (("--positions", "auto", "--method", "oba"), "does not go with"),
+            (("--positions", "auto", "--at", "50"), "--at does not go with"),
+        ],
+    )
+    def test_what_does_not_go_together(self, capsys, monkeypatch, log, more, text):
+        code, out = self.run(capsys, monkeypatch, log, "--lat", 45, *more)
+        assert code == 2
+        assert text in out.err

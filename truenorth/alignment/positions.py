@@ -1,0 +1,383 @@
+"""`align_positions`: from the log of a turntable that takes an IMU from position to position to attitude, biases and a verdict.
+
+One filter goes through the whole log, turns included (:mod:`truenorth.models.turntable`), re-linearised until it stands still.
+The table's angles are not asked for: the gyros measure each turn, and their scale factors and misalignments are states.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.answer import at_epoch, without_heading
+from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.check import LogCheck, check_means, is_blind
+from truenorth.alignment.fine import (
+    CONVERGED,
+    HEADING_PRIOR,
+    LEVEL_PRIOR,
+    MAX_PASSES,
+    ROUGHLY,
+    VELOCITY_PRIOR,
+    FineAlignment,
+    attitude_history,
+    base_variance,
+    white_variance,
+)
+from truenorth.alignment.inference import infer_spec, noise_of
+from truenorth.alignment.result import Alignment, History
+from truenorth.alignment.table import TablePosition, TurntableErrors
+from truenorth.alignment.task import Task, bridged, level_of, make_task
+from truenorth.alignment.touched import Touch, find_touch
+from truenorth.alignment.verdict import Circumstances, judge
+from truenorth.analysis.allan import noise_coefficients
+from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.calibration import Calibration
+from truenorth.coarse import Means, means, oba
+from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.errors import AlignmentError, UsageError
+from truenorth.filters import Estimates, LinearSystem, kalman
+from truenorth.filters.gains import filter_gains, initial_part
+from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
+from truenorth.models import turntable
+from truenorth.models.static import DV, PHI, StaticModel, mean_velocity
+from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX, matrices, without_errors
+from truenorth.position import Position
+from truenorth.quality.regimes import MotionSummary
+from truenorth.records import ImuRecord
+from truenorth.specs import PRESETS, ImuSpec, imu_spec
+
+Array = NDArray[np.float64]
+
+HEADING_LIMIT = math.radians(5.0)
+SLEW_RATE = math.radians(0.2)  # rad/s: a table that turns faster is between positions
+SHORTEST_POSITION = 5.0  # s
+NOISE_PASSES = 4
+SAME_NOISE = 0.1
+FEWEST = 5  # intervals that a variance is fitted to
+ARM_SIGMA = 0.05  # m: of the IMU from the table's axes
+WIDER = 4.0  # steps in which an inferred accelerometer bias is tried wider, ...
+WORTH = 4.0  # ... as long as the log-likelihood grows by more than this
+BIASES = slice(6, 12)
+SENSORS = slice(6, 30)  # errors that can be taken off a record
+PARAMETERS = slice(6, turntable.STATES)
+
+
+def align_positions(
+    record: ImuRecord,
+    position: Position,
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
+    *,
+    calibration: Calibration | None = None,
+    arm_sigma: float = ARM_SIGMA,
+    heading_limit: float = HEADING_LIMIT,
+    progress: Callable[[str], None] | None = None,
+) -> Alignment:
+    """Find pitch, roll and true heading, and the sensors' errors, from a log with several positions of a turntable.
+
+    Any sequence of positions: turns are found in the gyros. The more the positions differ, the more of the biases is told
+    apart from tilt and heading; two that differ by 180 deg about the vertical are enough for the level sensors.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        Body axes RFU.
+    position : Position
+    imu : ImuSpec, str, path or mapping, optional
+        Specification; its scale factors and misalignments are the prior of the matrices. Inferred from the log without one.
+    calibration : Calibration, optional
+        Known errors, taken off first.
+    arm_sigma : float, m
+        How far the IMU may sit from where the table's axes meet. At a constant rate its centripetal force is an accelerometer
+        bias to all eyes: ``rate^2 arm``.
+    heading_limit : float, rad
+        Largest one-sigma heading error that still counts as `aligned`.
+    progress : callable, optional
+        Called with a word about each stage.
+
+    Returns
+    -------
+    Alignment
+        At the last sample; its `table` holds positions, matrices and whether the table was touched.
+
+    Raises
+    ------
+    UsageError
+        A limit that is not positive.
+    DataError
+        A gap in the log that cannot be bridged.
+    AlignmentError
+        No position of 5 s is found.
+    """
+    tell = progress or (lambda stage: None)
+    if not heading_limit > 0.0:
+        raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
+    if not arm_sigma >= 0.0:
+        raise UsageError(f"arm_sigma {arm_sigma:g} m; expected zero or more")
+    spec = None if imu is None else imu_spec(imu).with_random_walks(record.interval)
+    if calibration is not None:
+        record = calibration.apply(record)
+    task = make_task(bridged(record), position, None)
+    tell("looking for positions")
+    stretches = find_positions(task.motion)
+    if not stretches:
+        raise AlignmentError(
+            f"{record.source}: no position of {SHORTEST_POSITION:g} s and more was found in {record.duration:.0f} s: the table "
+            f"never turns slower than {np.degrees(SLEW_RATE):g} deg/s for so long; record longer positions"
+        )
+    longest = max(stretches, key=lambda s: s[1] - s[0])
+    part = task.record.between(longest[0] + 1e-6, longest[1] - 1e-6)
+    still = means(part)
+    check = check_means(still, position.lat, task.gravity)
+    used, where = (spec, f"specification {spec.name!r}") if spec else (_inferred(check, part), "inferred from the log")
+    blind = is_blind(replace(task.motion, kind=np.zeros(1, np.int8)), check)
+
+    tell(f"aligning over {len(stretches)} positions")
+    rest = still if blind else None
+    fine, x = _fine(task, stretches, used, rest, arm_sigma)
+    while spec is None:  # level biases show in no single position: only turns say how large they are
+        wider = replace(used, accel_bias=WIDER * used.accel_bias)
+        again, x_again = _fine(task, stretches, wider, rest, arm_sigma)
+        if not again.estimates.log_likelihood > fine.estimates.log_likelihood + WORTH:
+            break
+        used, fine, x = wider, again, x_again
+    C_n0_b, covariance, floor = fine.misalignment_at(fine.integrals.C_ib_at[0], task.epoch.elapsed)
+    answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
+    if blind:
+        answer = replace(
+            answer, phi_covariance=without_heading(answer.phi_covariance), phi_floor=without_heading(answer.phi_floor)
+        )
+    touch = _touched(task, fine, stretches)
+    found = _positions(fine, stretches, position.lat)
+    sigma = np.sqrt(np.diag(fine.P))
+    answer = replace(
+        answer,
+        method="positions",
+        method_reason=f"{len(found)} position{'s' if len(found) > 1 else ''} in the log, turns between them by the gyros",
+        gyro_bias=x[6:9],
+        gyro_bias_sigma=sigma[6:9],
+        accel_bias=x[9:12],
+        accel_bias_sigma=sigma[9:12],
+        disturbance=fine.disturbance,
+        history=_history(task, fine),
+        table=_errors(found, touch, x, fine.P),
+    )
+    status, reasons = judge(answer, Circumstances(heading_limit, check, None, fine.settled, None))
+    if touch is not None:
+        advice = f"; align the part after it (--from {touch.time + 5:.0f}), or the part before it"
+        status, reasons = "inconsistent", (touch.words(task.gravity) + advice, *reasons)
+    return answer.with_verdict(status, reasons)
+
+
+def find_positions(motion: MotionSummary) -> list[tuple[float, float]]:
+    """Start and stop (s, on the record's clock) of each stretch of 5 s and more in which the table does not turn."""
+    noise = 5.0 * float(np.max(motion.angle_noise))  # of a rate over one second
+    rests = np.linalg.norm(motion.rate, axis=1) < SLEW_RATE + noise
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rests, [False]]).astype(np.int8)))
+    step = float(motion.time[1] - motion.time[0])
+    stretches = [(float(motion.time[a]) - step, float(motion.time[b - 1])) for a, b in edges.reshape(-1, 2)]
+    return [s for s in stretches if s[1] - s[0] >= SHORTEST_POSITION]
+
+
+def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:
+    """What a still position tells, and scale factors of the class of IMU with such biases."""
+    gyro, accel = noise_coefficients(part)
+    noise = StaticModel(float(np.max(gyro.random_walk)), float(np.max(accel.random_walk)))
+    spec = infer_spec(check, noise)
+    classes = [imu_spec(name) for name in PRESETS]
+    same = next((c for c in classes if c.gyro_bias >= 0.5 * spec.gyro_bias), classes[-1])
+    names = ("gyro_scale_factor", "gyro_misalignment", "accel_scale_factor", "accel_misalignment")
+    return replace(
+        spec,
+        gyro_bias_instability=float(np.max(gyro.bias_instability)),
+        accel_bias_instability=float(np.max(accel.bias_instability)),
+        **{name: getattr(same, name) for name in names},
+    )
+
+
+def _prior(spec: ImuSpec, position: Position, arm_sigma: float) -> Array:
+    """(33, 33) covariance before the first interval."""
+    sigma = np.zeros(turntable.STATES)
+    sigma[PHI] = LEVEL_PRIOR, LEVEL_PRIOR, HEADING_PRIOR
+    sigma[DV] = VELOCITY_PRIOR
+    sigma[BIASES] = np.sqrt(spec_variance(spec))
+    slope = float(normal_gravity(position.lat, position.alt + 1.0) - normal_gravity(position.lat, position.alt))
+    sigma[9:12] = np.hypot(sigma[9:12], slope * position.vertical_sigma)
+    sigma[GYRO_MATRIX] = np.where(np.eye(3), spec.gyro_scale_factor, spec.gyro_misalignment).ravel()
+    sigma[ACCEL_MATRIX] = np.where(np.eye(3), spec.accel_scale_factor, spec.accel_misalignment).ravel()
+    sigma[ARM] = arm_sigma
+    return np.diag(sigma**2)
+
+
+def _fine(
+    task: Task, stretches: list[tuple[float, float]], spec: ImuSpec, rest: Means | None, arm_sigma: float
+) -> tuple[FineAlignment, Array]:
+    """Gauss-Newton over the whole log; the last pass, and the sensors' errors in all (33,).
+
+    `rest` are the means of a position of an IMU whose gyros do not see the earth turn: they tell the gyros' biases at once.
+    """
+    lat, alt = task.position.lat, task.position.alt
+    model: StaticModel = noise_of(spec)
+    rows = np.array([task.epoch.row])
+    P0 = _prior(spec, task.position, arm_sigma)
+    expected = np.zeros(turntable.STATES)
+    if rest is not None:
+        expected[6:9], P0[6:9, 6:9] = _bias_at_rest(rest, lat)
+    total = expected.copy()  # nominal errors, those that are taken off the record
+    record = without_errors(task.record, total[BIASES], *matrices(total))
+    integrals = integrate(record, task.interval, rows_at=rows)
+    rests = _resting(integrals, stretches)
+    if rest is not None:  # no north to be found: i is the body at the first sample
+        C_n0_i = level_of(integrals.mean_force[np.flatnonzero(rests)[0]])
+    else:
+        C_n0_i = oba(integrals, lat, alt).C_n0_i
+    parts = [part for part in (rests, ~rests) if np.count_nonzero(part) >= FEWEST]
+    velocity = mean_velocity(integrals, C_n0_i, lat, alt)
+    R = np.tile(white_variance(velocity[rests]), (len(velocity), 1))
+
+    for passes in range(1, MAX_PASSES + 1):
+        x0 = expected - total
+        estimates, system, R = _filtered(model, record, integrals, C_n0_i, task.position, P0, R, x0, parts)
+        x, P = estimates.x[-1], estimates.P[-1]
+        moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
+        if moved < CONVERGED or passes == MAX_PASSES:
+            break
+        back = np.einsum("kij,j->i", system.Phi[:, PHI, PARAMETERS], x[PARAMETERS])
+        C_n0_i = dcm_from_rotation_vector(x[PHI] - back) @ C_n0_i
+        total[SENSORS] += x[SENSORS]
+        record = without_errors(task.record, total[BIASES], *matrices(total))
+        integrals = integrate(record, task.interval, rows_at=rows)
+
+    gains = filter_gains(system, estimates)
+    P0_sensors = np.zeros_like(P0)
+    P0_sensors[PARAMETERS, PARAMETERS] = P0[PARAMETERS, PARAMETERS]
+    fine = FineAlignment(
+        integrals=integrals,
+        C_n0_i=C_n0_i,
+        nominal_bias=total[BIASES],
+        system=system,
+        estimates=estimates,
+        gains=gains,
+        floor=initial_part(gains.step, P0_sensors),
+        disturbance=np.sqrt(R[rests][0]),
+        passes=passes,
+        settled=moved < ROUGHLY,
+    )
+    return fine, total + x
+
+
+def _bias_at_rest(rest: Means, lat: float) -> tuple[Array, Array]:
+    """Gyro biases of a base that does not turn, and their covariance: the mean rate but for the earth's about the level."""
+    up = rest.f_b / np.linalg.norm(rest.f_b)
+    level = 0.5 * (EARTH_RATE * math.cos(lat)) ** 2 * (np.eye(3) - np.outer(up, up))
+    return rest.w_ib_b - EARTH_RATE * math.sin(lat) * up, rest.w_covariance + level
+
+
+def _filtered(
+    model: StaticModel,
+    record: ImuRecord,
+    integrals: InertialIntegrals,
+    C_n0_i: Array,
+    position: Position,
+    P0: Array,
+    R: Array,
+    x0: Array,
+    parts: list[NDArray[np.bool_]],
+) -> tuple[Estimates, LinearSystem, Array]:
+    """Filter with the variances of the base's velocity that the innovations ask for: in positions, and on the way.
+
+    `R` (K, 3) holds them for each interval; `parts` are the intervals that share one.
+    """
+    system = turntable.linearise(model, record, integrals, C_n0_i, position.lat, position.alt, P0, R, x0)
+    estimates = kalman(system, history="full")
+    for _ in range(NOISE_PASSES):
+        R_next, same = R.copy(), True
+        for part in parts:
+            seen = replace(
+                estimates,
+                innovation=estimates.innovation[part],
+                innovation_covariance=estimates.innovation_covariance[part],
+            )
+            before = R[part][0]
+            R_next[part], expected = base_variance(seen, before)
+            same &= bool(np.all(np.abs(R_next[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
+        if same:
+            break
+        system = replace(system, R=system.R + (R_next - R)[:, None] * np.eye(3))
+        R = R_next
+        estimates = kalman(system, history="full")
+    return estimates, system, R
+
+
+def _resting(integrals: InertialIntegrals, stretches: list[tuple[float, float]]) -> NDArray[np.bool_]:
+    """(K,) whether an interval lies in a position."""
+    begin, end = integrals.start + integrals.time[:-1], integrals.start + integrals.time[1:]
+    inside = [(begin >= a - 1e-6) & (end <= b + 1e-6) for a, b in stretches]
+    return np.asarray(np.any(inside, axis=0))
+
+
+def _touched(task: Task, fine: FineAlignment, stretches: list[tuple[float, float]]) -> Touch | None:
+    """The largest step of level specific force within a position."""
+    time = fine.integrals.time
+    gravity = np.diff(gravity_velocity(time, task.position.lat, task.position.alt), axis=0)
+    force = fine.integrals.mean_force @ fine.C_n0_i.T + gravity / fine.integrals.intervals[:, None]
+    found = []
+    for stretch in stretches:
+        here = _resting(fine.integrals, [stretch])
+        touch = find_touch((fine.integrals.start + time[1:])[here], force[here, :2], task.gravity)
+        if touch is not None:
+            found.append(touch)
+    return max(found, key=lambda touch: touch.size, default=None)
+
+
+def _positions(fine: FineAlignment, stretches: list[tuple[float, float]], lat: float) -> tuple[TablePosition, ...]:
+    """Where each position stands, and how the body came there from the one before."""
+    found: list[TablePosition] = []
+    C_n0_b = dcm_from_rotation_vector(fine.x[PHI]) @ fine.C_n0_i @ fine.integrals.C_ib[1:]
+    C_nb = np.swapaxes(earth_rotation(fine.integrals.time[1:], lat), 1, 2) @ C_n0_b
+    for start, stop in stretches:
+        here = np.flatnonzero(_resting(fine.integrals, [(start, stop)]))
+        if here.size == 0:
+            continue
+        C = C_nb[here[here.size // 2]]
+        turn = rotation_vector_from_dcm(found[-1].C_nb.T @ C) if found else np.zeros(3)
+        found.append(TablePosition(start, stop, C, turn))
+    return tuple(found)
+
+
+def _errors(found: tuple[TablePosition, ...], touch: Touch | None, x: Array, P: Array) -> TurntableErrors:
+    (gyro, accel), sigma = matrices(x), np.sqrt(np.diag(P))
+    gyro_sigma, accel_sigma = matrices(sigma)
+    return TurntableErrors(found, touch, gyro, gyro_sigma, accel, accel_sigma, x[ARM], sigma[ARM])
+
+
+def _history(task: Task, fine: FineAlignment) -> History:
+    """How the filter came to its answer, in navigation axes."""
+    C_nb, covariance, floor = attitude_history(fine, task.position.lat)
+    e = fine.estimates
+    sigma = np.sqrt(np.einsum("kii->ki", e.P))
+    # The final answer carried back: phi(t) = phi_end - int_t^end (what the sensors' errors turn).
+    turns = np.einsum("kij,j->ki", fine.system.Phi[:, PHI, PARAMETERS], fine.x[PARAMETERS])
+    after = np.concatenate([np.cumsum(turns[:0:-1], axis=0)[::-1], np.zeros((1, 3))])
+    C_n_n0 = np.swapaxes(earth_rotation(fine.integrals.time[1:], task.position.lat), 1, 2)
+    departure = np.einsum("kij,kj->ki", C_n_n0, fine.x[PHI] - after - e.x[:, PHI])
+    return History(
+        time=fine.integrals.start + fine.integrals.time[1:],
+        C_nb=C_nb,
+        phi_covariance=covariance + task.deflection,
+        phi_floor=floor + task.deflection,
+        departure=departure,
+        gyro_bias=fine.nominal_bias[:3] + e.x[:, 6:9],
+        gyro_bias_sigma=sigma[:, 6:9],
+        accel_bias=fine.nominal_bias[3:] + e.x[:, 9:12],
+        accel_bias_sigma=sigma[:, 9:12],
+        innovation=e.innovation,
+        innovation_sigma=np.sqrt(np.einsum("kii->ki", e.innovation_covariance)),
+        nis=e.nis,
+    )

@@ -1,0 +1,92 @@
+"""Was the table touched? Steps of the specific force that the gyros do not explain.
+
+On a base that stays, specific force carried by the gyros into axes that do not turn is gravity's reaction and nothing else.
+Where it steps from one level to another within a position, either the IMU was tilted in a way that its gyros do not see, or an
+accelerometer's offset has jumped; to an alignment both are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.quality.signals import STILL_ANGLE
+
+Array = NDArray[np.float64]
+
+BLOCKS = 40  # into which a position is cut
+SHORTEST = 12  # blocks that say what is usual
+BESIDE = 3  # blocks on either side whose means are compared, ...
+GAP = 2  # ... and between them, for what takes its time
+FACTOR = 10.0  # of the usual scatter of such differences: a false alarm in less than 1e-5 of logs with Gaussian noise
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A step of the specific force.
+
+    Attributes
+    ----------
+    time : float, s
+        On the record's clock, about.
+    step : (2,) array, m/s^2
+        Along east and north, of the answer's heading.
+    usual : float, m/s^2
+        Scatter of such differences elsewhere in the position.
+    """
+
+    time: float
+    step: Array
+    usual: float
+
+    @property
+    def size(self) -> float:
+        """m/s^2."""
+        return float(np.linalg.norm(self.step))
+
+    def words(self, gravity: float) -> str:
+        """What it means."""
+        tilt = np.degrees(self.size / gravity)
+        angle = f"{tilt:.2f} deg" if tilt > 0.1 else f"{60 * tilt:.2f} arcmin"
+        step, usual = self.size / gravity * 1e3, self.usual / gravity * 1e3
+        return (
+            f"the table was touched, or an accelerometer's offset jumped, at about {self.time:.0f} s: the level specific force "
+            f"steps by {step:.2g} mg (as a tilt of {angle} would make it; usual {usual:.2g} mg), and the gyros show no turn"
+        )
+
+
+def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
+    """The largest step within one position, if it is not chance.
+
+    Parameters
+    ----------
+    time : (K,) array, s
+    force : (K, 2) array, m/s^2
+        Level specific force in axes that do not turn.
+    gravity : float, m/s^2
+
+    Returns
+    -------
+    Touch or None
+    """
+    length = max(1, len(time) // BLOCKS)
+    count = len(time) // length
+    if count < SHORTEST:
+        return None
+    blocks = force[: count * length].reshape(count, length, 2).mean(axis=1)
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(blocks, axis=0)])
+    before = (sums[BESIDE:] - sums[:-BESIDE])[: -BESIDE - GAP] / BESIDE
+    after = (sums[BESIDE:] - sums[:-BESIDE])[BESIDE + GAP :] / BESIDE
+    steps = after - before
+    size = np.linalg.norm(steps, axis=1)
+    # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
+    usual = np.median(np.abs(np.diff(blocks, axis=0)), axis=0) / 0.6745 / math.sqrt(BESIDE)
+    scatter = float(np.linalg.norm(usual))
+    best = int(np.argmax(size))
+    if size[best] < max(FACTOR * scatter, STILL_ANGLE * gravity):
+        return None
+    middle = (best + BESIDE) * length + GAP * length // 2
+    return Touch(float(time[middle]), steps[best], scatter)
