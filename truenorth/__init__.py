@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from truenorth.alignment import Alignment, align, align_in_motion
+    from truenorth.alignment import Alignment, align, align_in_motion, align_positions, align_transfer
     from truenorth.calibration import Calibration
     from truenorth.campaign import run_campaign
     from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
@@ -62,6 +62,8 @@ _HOMES = {
     "VelocityRecord": "records",
     "align": "alignment",
     "align_in_motion": "alignment",
+    "align_positions": "alignment",
+    "align_transfer": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
     "navigate": "navigation",
@@ -99,6 +101,8 @@ __all__ = [
     "VelocityRecord",
     "align",
     "align_in_motion",
+    "align_positions",
+    "align_transfer",
     "imu_spec",
     "inspect",
     "navigate",

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
-from truenorth.navigation.driver import Track
+
+if TYPE_CHECKING:
+    from truenorth.navigation.driver import Track
 
 Array = NDArray[np.float64]
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from truenorth.alignment.moving import Moving
     from truenorth.alignment.table import TurntableErrors
+    from truenorth.alignment.transfer_result import Transfer
     from truenorth.quality import Inspection
 
 Array = NDArray[np.float64]
@@ -118,6 +119,8 @@ class Alignment:
     source : str
     moving : Moving or None
         Velocity, and how the wheel sits, of an alignment on the move; `position` is then that at the epoch.
+    transfer : Transfer or None
+        Delay, lever arm and mounting against a master, of a transfer alignment.
     table : TurntableErrors or None
         Of an alignment over positions of a turntable.
     """
@@ -146,6 +149,7 @@ class Alignment:
     inspection: Inspection | None = field(default=None, repr=False)
     source: str = ""
     moving: Moving | None = field(default=None, repr=False)
+    transfer: Transfer | None = field(default=None, repr=False)
     table: TurntableErrors | None = field(default=None, repr=False)
 
     @property
@@ -271,8 +275,10 @@ class Alignment:
             result[f"{name}_deg"] = float(deg(value)) if self.heading_known else None
             result[f"{name}_sigma_deg"] = float(deg(sigma))
             result["C_nb"] = self.C_nb.tolist()
+        if self.transfer is not None:
+            result |= self.transfer.summary()
         if self.table is not None:
-            result.update(self.table.summary(self.heading_known))
+            result |= self.table.summary(self.heading_known)
         return result
 
     def to_frame(self) -> pd.DataFrame:
