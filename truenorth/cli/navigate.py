@@ -14,6 +14,7 @@ from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, Kind, Log, Rate, To, Topic, Units, read_log
 
 if TYPE_CHECKING:
+    from truenorth.damping.options import Damper
     from truenorth.navigation import Mounting, Navigation
 
 # The \b keeps the lines as they are, ready to be copied.
@@ -26,6 +27,7 @@ Examples:
   truenorth navigate log.csv --start start --odometer odo.csv --estimate scale,mounting --zupt auto
   truenorth navigate log.csv --start start --velocity dvl.csv --altitude fixed --json
   truenorth navigate log.csv --start start --baro baro.csv --altitude baro --offset -0.35
+  truenorth navigate log.csv --start start --damping augmented --velocity log.csv -o damped
 
 Exit codes: 0 navigated; 2 wrong usage; 3 bad data; 4 the alignment has no usable heading, or the measurements contradict
 the track (the result is written all the same).
@@ -94,6 +96,26 @@ def navigate(
     calibration: Annotated[
         Path | None, typer.Option(help="YAML file of known errors of the IMU, taken off first.", show_default=False)
     ] = None,
+    damping: Annotated[
+        str | None,
+        typer.Option(
+            help="Damp a free INS at sea: none, internal, external, kalman, double or augmented; --velocity is the reference.",
+            rich_help_panel="Damping",
+            show_default=False,
+        ),
+    ] = None,
+    damping_ratio: Annotated[
+        float, typer.Option(help="Of the networks (internal, external).", rich_help_panel="Damping")
+    ] = 0.5,
+    azimuth_damping: Annotated[
+        float, typer.Option(help="Ratio for the 24 h oscillation (external); 0: none.", rich_help_panel="Damping")
+    ] = 0.0,
+    damping_start: Annotated[
+        float, typer.Option(help="Seconds after the start, when it is switched on.", rich_help_panel="Damping")
+    ] = 0.0,
+    log_error: Annotated[
+        float, typer.Option(help="One-sigma constant error of the reference velocity, m/s.", rich_help_panel="Damping")
+    ] = 0.3,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -114,6 +136,7 @@ def navigate(
     antenna = _mounting(lever_arm, "--lever-arm", None, parts & {"lever_arm", "latency"})
     wheel = _mounting(wheel_arm, "--wheel-arm", mounting, parts - {"latency"})
     stops = _stops(zupt)
+    damper = _damper(damping, damping_ratio, azimuth_damping, damping_start, log_error)
     read_start(start)  # what is wrong with it, before a long log is read
     if output is not None:
         writable_folder(output)
@@ -149,6 +172,7 @@ def navigate(
             calibration=None if calibration is None else Calibration.from_file(calibration),
             offset=offset,
             output=every,
+            damping=damper,
             progress=tell,
         )
         paths: list[Path] = []
@@ -214,6 +238,14 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
     )
 
 
+def _damper(method: str | None, ratio: float, azimuth: float, start: float, log_error: float) -> Damper | None:
+    from truenorth.damping.options import Damper
+
+    if method is None:
+        return None
+    return Damper(method, ratio, azimuth, start, log_error)  # type: ignore[arg-type]  # checked there
+
+
 def _barometer() -> Mounting:
     from truenorth.navigation import Mounting
 
@@ -277,6 +309,8 @@ def _print(result: Navigation, paths: list[Path]) -> None:
         if not name.startswith("slow"):
             shown = ", ".join(f"{v:.4g} ± {e:.2g}" for v, e in zip(told["value"], told["sigma"]))
             console.print(f"{name}: {shown}", soft_wrap=True)
+    if result.damping is not None:
+        console.print(f"damping: {result.damping.in_words()}", soft_wrap=True)
     console.print(f"height: {result.altitude}; IMU: {result.imu_source}", soft_wrap=True)
     for path in paths:
         console.print(f"wrote {path}", soft_wrap=True)

@@ -201,12 +201,13 @@ def run_filters(
     z = course.v_n[:, :2] - reference
     interval = course.interval
     settling = max(1, round(SETTLING / interval))
+    firm = ~_silences(np.asarray(np.isnan(z).any(axis=1)), settling)
 
     def change(of: Array, lag: int, begin: int, end: int, since: int) -> Array:
-        """(end - begin, 2) of the epochs after `begin`; windows that begin before `since` are absent."""
+        """(end - begin, 2) of the epochs after `begin`; windows that begin before `since` or in a silence are absent."""
         ends = np.arange(begin + 1, end + 1)
         out = np.full((len(ends), 2), np.nan)
-        there = ends - lag >= since
+        there = (ends - lag >= since) & firm[ends] & firm[np.maximum(ends - lag, 0)]
         out[there] = (of[ends[there]] - of[ends[there] - lag]) / (lag * interval)
         return out
 
@@ -231,6 +232,16 @@ def run_filters(
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         list(pool.map(run, [name for name in kinds if name != "filter2"]))
     return {name: stream.estimate(start) for name, stream in streams.items()}
+
+
+def _silences(absent: NDArray[np.bool_], settling: int) -> NDArray[np.bool_]:
+    """(K+1,) epochs in a silence as long as filter 1 takes to settle, or before it has settled again."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], absent.astype(np.int8), [0]])))
+    out = np.zeros(len(absent), dtype=bool)
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first >= settling:
+            out[first : last + settling] = True
+    return out
 
 
 @dataclass(frozen=True)

@@ -215,10 +215,10 @@ def network_correction(
     listening = np.full(len(on), True) if warm else on
     s = np.zeros(M.shape[1])
     out = np.zeros((coarse.epochs + 1, MOTION.stop))
-    steps, inputs = _rk4(M, N, coarse.interval)
+    steps, inputs = transition_and_input(M, N, coarse.interval)
     deaf = np.isnan(z).any(axis=1) | ~listening
     M[:, :, DV] += N
-    alone, _ = _rk4(M[deaf], N[deaf], coarse.interval)
+    alone, _ = transition_and_input(M[deaf], N[deaf], coarse.interval)
     coast = dict(zip(np.flatnonzero(deaf), alone))
     switched = False
     for k in range(coarse.epochs):
@@ -239,7 +239,7 @@ def _means(z: Array, stride: int, count: int) -> Array:
     return np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0)
 
 
-def _rk4(M: Array, N: Array, h: float) -> tuple[Array, Array]:
+def transition_and_input(M: Array, N: Array, h: float) -> tuple[Array, Array]:
     """Transition and input of Runge and Kutta's fourth-order step, for a loop that is constant in it."""
     eye = np.broadcast_to(np.eye(M.shape[1]), M.shape)
     hM = h * M

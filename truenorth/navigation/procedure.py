@@ -25,6 +25,7 @@ from truenorth.specs import ImuSpec, imu_spec
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
     from truenorth.calibration import Calibration
+    from truenorth.damping.options import Damper
 
 Array = NDArray[np.float64]
 R = TypeVar("R", bound=Record)
@@ -74,6 +75,7 @@ def navigate(
     check_clocks: bool = True,
     interval: float | None = None,
     output: float | None = None,
+    damping: Damper | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Navigation:
     """Carry a log on from an alignment.
@@ -110,6 +112,8 @@ def navigate(
         Of the filter; .2 s, and 1 s for logs beyond an hour.
     output : float, s, optional
         Of the track; 1 s, more for very long logs.
+    damping : Damper, optional
+        Damp the oscillations of a free INS at sea; `velocity` is then the reference, and there is no other aiding.
     progress : callable, optional
         Told what is being done.
 
@@ -133,6 +137,8 @@ def navigate(
         record = calibration.apply(record)
     record = _from_start(record, begin)
     record, gaps, disturbances = _bridge(record)
+    reference = None if damping is None else _shifted(velocity, offset)
+    velocity = velocity if damping is None else None
     sources = Sources(
         _shifted(gnss, offset), _shifted(odometer, offset), _shifted(velocity, offset), _shifted(baro, offset)
     )
@@ -163,7 +169,7 @@ def navigate(
     if check_clocks and aiding:
         tell("checking clocks and lever arms")
         reasons += _clock_warnings(run, sources, mounting, height, baro_loop)
-    return Navigation(
+    result = Navigation(
         status="navigated" if status else "inconsistent",
         reasons=tuple(reasons),
         track=track,
@@ -174,6 +180,12 @@ def navigate(
         imu_source=imu_source,
         source=record.source,
     )
+    if damping is None:
+        return result
+    from truenorth.damping.navigation import damp_navigation
+
+    tell(f"damping: {damping.method}")
+    return damp_navigation(result, reference, noise, damping)
 
 
 def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:

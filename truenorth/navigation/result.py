@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
+    from truenorth.damping.navigation import Damping
     from truenorth.records import Trajectory
 
 Array = NDArray[np.float64]
@@ -51,6 +52,8 @@ class Navigation:
         Seconds at rest that were used.
     imu_source : str
     source : str
+    damping : Damping or None
+        How its oscillations were damped, and what the velocity log did.
     """
 
     status: Status
@@ -62,6 +65,7 @@ class Navigation:
     stops: int
     imu_source: str
     source: str
+    damping: Damping | None = None
 
     @property
     def time(self) -> Array:
@@ -229,6 +233,7 @@ class Navigation:
             "estimated": self.estimated(),
             "imu_source": self.imu_source,
             "source": self.source,
+            **({} if self.damping is None else {"damping": self.damping.summary()}),
         }
 
     def estimated(self) -> dict[str, dict[str, list[float]]]:

@@ -1,0 +1,94 @@
+"""What a log does wrong is found, sized and told; a healthy one is left as it is."""
+
+import numpy as np
+import pytest
+
+from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
+from truenorth.damping.reference import cleaned, reference_of
+from truenorth.errors import DataError
+from truenorth.models.marine import BA, BG, MarineModel
+from truenorth.records import VelocityRecord
+
+NOISE = 0.05
+
+
+@pytest.fixture(scope="module")
+def course():
+    """A free INS with errors of 3 m/s, at 2 s over 12 h: the worst slopes that a healthy log can show."""
+    _, truth = ideal_and_truth(interval=2.0, hours=12.0)
+    x = np.zeros(13)
+    x[:7] = [0.1, 0.1, 43.0, 62.0, *np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)]
+    x[BG], x[BA] = 0.005 * DEG_PER_HOUR, 50 * MICRO_G
+    _, Phi = truth.linearise(MarineModel(0.0, 0.0))
+    states = [x]
+    for step in Phi:
+        states.append(step @ states[-1])
+    return truth, truth.corrected(-np.array(states)[:, :7])
+
+
+def log(truth, seed):
+    rng = np.random.default_rng(seed)
+    return truth.v_n[:, :2] - 0.3 + NOISE * rng.standard_normal((len(truth.time), 2)), rng
+
+
+def test_a_healthy_log_is_left_as_it_is(course):
+    """Over 43 000 numbers: limits of 6 and 8 sigma with room for curvature make a false alarm rarer than one in 1e5 logs."""
+    truth, free = course
+    velocity, _ = log(truth, 1)
+    found = cleaned(free, velocity)
+    np.testing.assert_array_equal(found.velocity, velocity)
+    assert found.noise == pytest.approx(NOISE, rel=0.05)
+    assert (found.outliers, found.jumps, found.gaps, found.reasons()) == (0, (), (), [])
+
+
+def test_outliers_jumps_and_gaps(course):
+    truth, free = course
+    healthy, rng = log(truth, 2)
+    velocity = healthy.copy()
+    velocity[6000:] += [0.6, -1.0]
+    hit = rng.random(len(velocity)) < 0.01
+    hit[5990:6010] = False
+    velocity[hit] += 3.0 * np.sign(rng.standard_normal((hit.sum(), 2)))
+    velocity[12000:13800] = np.nan
+    found = cleaned(free, velocity)
+    gone = np.isnan(found.velocity[:, 0]) & np.isfinite(velocity[:, 0])
+    assert found.outliers == gone.sum()
+    assert gone[hit & np.isfinite(velocity[:, 0])].all()
+    assert gone.sum() - (hit & np.isfinite(velocity[:, 0])).sum() <= 2
+    ((time, east, north),) = found.jumps
+    assert time == pytest.approx(truth.time[6000], abs=4.0)
+    assert (east, north) == (pytest.approx(0.6, abs=0.12), pytest.approx(-1.0, abs=0.12))  # lines of 31: 4 sigma
+    ((since, length),) = found.gaps
+    assert since == pytest.approx(truth.time[11999], abs=6.0)
+    assert length == pytest.approx(3602.0, abs=12.0)
+    late = found.velocity[14000:] - healthy[14000:]
+    assert np.abs(np.nanmean(late, axis=0)).max() < 0.12
+    text = " ".join(found.reasons())
+    assert "left out as outliers" in text
+    assert "jumps by +0." in text
+    assert "silent for 36" in text
+
+
+def test_a_log_in_body_axes_is_turned(course):
+    """Forward and right at 10 Hz, a heading of 51.34 deg: the mean of an epoch, east and north."""
+    truth, _ = course
+    part = truth.between(0, 199)
+    time = np.arange(0.0, 398.0, 0.1)
+    body = VelocityRecord(time, np.tile([0.0, 12.0, np.nan], (len(time), 1)), "body")
+    found = reference_of(part, body)
+    heading = np.radians(51.3401917)
+    np.testing.assert_allclose(
+        np.nanmean(found.velocity, axis=0), 12.0 * np.array([np.sin(heading), np.cos(heading)]), rtol=1e-3
+    )
+
+
+def test_what_is_refused(course):
+    _, free = course
+    far = np.arange(1e6, 1e6 + 100.0)
+    with pytest.raises(DataError, match="no overlap"):
+        reference_of(free, VelocityRecord(far, np.ones((100, 3)), "navigation"))
+    near = np.arange(100.0)
+    with pytest.raises(DataError, match="VE or VN is missing"):
+        reference_of(free, VelocityRecord(near, np.tile([1.0, np.nan, 0.0], (100, 1)), "navigation"))
+    with pytest.raises(DataError, match="v_forward is missing"):
+        reference_of(free, VelocityRecord(near, np.tile([1.0, np.nan, 0.0], (100, 1)), "body"))

@@ -1,0 +1,278 @@
+"""A free navigation, damped: its track corrected, its bands, what the log did, spectra before and after."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.damping.bands import constant_error_sigma, network_sigma
+from truenorth.damping.course import Course
+from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
+from truenorth.damping.loop import Loop, Mode, eigenvalues, network_correction
+from truenorth.damping.networks import NO_NETWORK, second_order
+from truenorth.damping.options import Damper
+from truenorth.damping.reference import Reference, reference_of
+from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
+from truenorth.errors import DataError, UsageError
+from truenorth.models import ins
+from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI, REF, STATES, MarineModel
+from truenorth.records import VelocityRecord
+from truenorth.specs import ImuSpec
+
+if TYPE_CHECKING:
+    from truenorth.navigation.driver import Track
+    from truenorth.navigation.result import Navigation
+
+Array = NDArray[np.float64]
+
+GATE = 1.0 - 1e-6  # with which a good row passes: one in six days at 1 Hz is lost
+WINDOW = 5.0  # s, of filter 2
+CHANGE_SIGMA = 0.001  # m/s^2, of filter 2's measurement
+SHORTEST = 16  # epochs of a spectrum
+LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of models.ins: PHI, and the level parts of DV and DP
+
+
+@dataclass(frozen=True)
+class Damping:
+    """What damping did to a navigation.
+
+    Attributes
+    ----------
+    damper : Damper
+    switch : float, s
+        When it was switched on.
+    reference : Reference or None
+    before, after : Spectrum or None
+        Of the velocity, east + i north, less the reference's where there is one: undamped and damped, from the switch on.
+    lines : (float, float)
+        Periods of the undamped Schuler lines, s; NaN in a short log.
+    modes : tuple of Mode
+        Of the loop, for networks; of the undamped INS otherwise.
+    reference_error, reference_error_sigma : (2,) arrays or None, m/s
+        The reference's constant error east, north as the 15-state filter found it.
+    rejected : int
+        Measurements that the filter's gate kept out.
+    """
+
+    damper: Damper
+    switch: float
+    reference: Reference | None = field(repr=False)
+    before: Spectrum | None = field(repr=False)
+    after: Spectrum | None = field(repr=False)
+    lines: tuple[float, float]
+    modes: tuple[Mode, ...] = field(repr=False)
+    reference_error: Array | None = None
+    reference_error_sigma: Array | None = None
+    rejected: int = 0
+
+    def in_words(self) -> str:
+        """One line: method, switch, the lines it had, and what the log's error was found to be."""
+        parts = [f"{self.damper.method} from {self.switch:.0f} s on"]
+        if not np.isnan(self.lines[0]):
+            parts.append("undamped Schuler lines at " + " and ".join(f"{x / 60.0:.1f}" for x in self.lines) + " min")
+        if self.reference is not None:
+            parts.append(f"log noise {self.reference.noise:.3f} m/s")
+        if self.reference_error is not None and self.reference_error_sigma is not None:
+            found = zip(("east", "north"), self.reference_error, self.reference_error_sigma)
+            parts.append("log error " + ", ".join(f"{axis} {x:+.3f} ± {e:.3f} m/s" for axis, x, e in found))
+        return "; ".join(parts)
+
+    def summary(self) -> dict[str, Any]:
+        """One dictionary, ready for JSON."""
+        told: dict[str, Any] = {
+            "method": self.damper.method,
+            "switch_s": self.switch,
+            "schuler_periods_min": [None if np.isnan(x) else x / 60.0 for x in self.lines],
+            "modes": [
+                {
+                    "name": m.name,
+                    "period_min": m.period / 60.0 if np.isfinite(m.period) else None,
+                    "damping_ratio": m.damping,
+                }
+                for m in self.modes
+                if m.name != "still"
+            ],
+        }
+        if self.reference is not None:
+            told["reference"] = {
+                "noise_m_s": self.reference.noise,
+                "outliers": self.reference.outliers,
+                "jumps": [list(jump) for jump in self.reference.jumps],
+                "gaps": [list(gap) for gap in self.reference.gaps],
+                "rejected": self.rejected,
+            }
+        if self.reference_error is not None and self.reference_error_sigma is not None:
+            told["reference_error_m_s"] = self.reference_error.tolist()
+            told["reference_error_sigma_m_s"] = self.reference_error_sigma.tolist()
+        return told
+
+
+def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: ImuSpec, damper: Damper) -> Navigation:
+    """Damp a free inertial navigation afterwards.
+
+    Parameters
+    ----------
+    result : Navigation
+        Without aiding, its height held.
+    velocity : VelocityRecord, optional
+        Needed by all methods but ``none`` and ``internal``.
+    spec : ImuSpec
+        Of the IMU: noise of the filters and of the bands.
+    damper : Damper
+
+    Returns
+    -------
+    Navigation
+        With `damping`.
+
+    Raises
+    ------
+    UsageError
+        No velocity log where one is needed; a navigation that was aided, or whose height was free.
+    DataError
+        Uneven epochs; a log that does not overlap; a switch after the end.
+    """
+    if result.residuals or result.smoothed:
+        raise UsageError("damping corrects a free INS; expected no aiding sensor, no stops and no smoothing beside it")
+    if result.altitude != "fixed":
+        raise UsageError(f"damping with altitude {result.altitude!r}; expected 'fixed': the height is held at sea")
+    if velocity is None and damper.needs_reference:
+        raise UsageError(f"damping {damper.method} needs a reference velocity; hand one in with --velocity")
+    track = _even(result.track)
+    course = Course(track.time, track.C_nb, track.v_n, track.position)
+    start = round(damper.start / course.interval)
+    if start >= course.epochs - 1:
+        raise DataError(
+            f"damping begins {damper.start:g} s after {course.time[0]:.1f} s, the log ends at {course.time[-1]:.1f} s; expected an "
+            "earlier start"
+        )
+    reference = None if velocity is None else reference_of(course, velocity)
+    P0 = track.P[start][np.ix_(OF_INS, OF_INS)]
+    x, sigma, estimate = _damped(course, reference, spec, damper, start, P0)
+    damped = course.corrected(x)
+    seen = slice(start, None)
+    base = 0.0 if reference is None else reference.velocity[seen]
+    spectra = [_spectrum(c.v_n[seen, :2] - base, course.interval) for c in (course, damped)]
+    loop = _loop(damper)
+    report = Damping(
+        damper=damper,
+        switch=float(course.time[start]),
+        reference=reference,
+        before=spectra[0],
+        after=spectra[1],
+        lines=_lines(course.v_n[seen, :2] - base, course.interval),
+        modes=tuple(eigenvalues(course, loop, course.epochs // 2)),
+        rejected=0 if estimate is None else estimate.rejected,
+    )
+    if estimate is not None and damper.method == "augmented":
+        last, last_sigma = estimate.x[-1, REF], estimate.sigma[-1, REF]
+        report = replace(report, reference_error=last, reference_error_sigma=last_sigma)
+    words = [] if reference is None else reference.reasons()
+    if report.rejected:
+        words.append(f"velocity log: {report.rejected} measurements rejected by the filter's gate")
+    if damper.method == "internal":
+        words.append("internal damping: what the vehicle's own manoeuvres add is not in the bands")
+    return replace(
+        result,
+        track=track if damper.method == "none" else _corrected(track, damped, sigma, start, estimate),
+        reasons=(*result.reasons, *words),
+        damping=report,
+    )
+
+
+def _loop(damper: Damper) -> Loop:
+    if damper.method in ("internal", "external"):
+        return Loop(second_order(damper.ratio), damper.azimuth)
+    return Loop(NO_NETWORK)
+
+
+def _damped(
+    course: Course, reference: Reference | None, spec: ImuSpec, damper: Damper, start: int, P0: Array
+) -> tuple[Array, Array, Estimate | None]:
+    """Errors (K+1, 7), what is left of them, one-sigma (K+1-start, 7), and the filter's estimate where it is one."""
+    x = np.zeros((course.epochs + 1, 7))
+    model = MarineModel.from_spec(spec, with_reference=damper.method == "augmented")
+    if damper.method == "none":
+        return x, np.zeros((0, 7)), None
+    if damper.method in ("internal", "external"):
+        loop, at = _loop(damper), float(course.time[start])
+        used = None if damper.method == "internal" or reference is None else reference.velocity
+        x = network_correction(course, loop, used, start=at)
+        noise = 0.0 if used is None or reference is None else reference.noise
+        constant = 0.0 if used is None else damper.reference_sigma
+        sigma = network_sigma(course, loop, P0, model, start=start, reference_noise=noise, reference_sigma=constant)
+        return x, sigma, None
+    assert reference is not None  # checked before
+    kinds = _kinds(damper, model, P0, reference.noise)
+
+    def found(velocity: Array) -> Estimate:
+        estimates = run_filters(course, velocity, start=start, kinds=kinds)
+        if damper.method != "double":
+            return next(iter(estimates.values()))
+        samples = max(1, round(3600.0 / course.interval))
+        return Fusion(samples=samples)(estimates["filter1"], estimates["filter2"], course.interval)
+
+    estimate = found(reference.velocity)
+    x[start:] = estimate.x[:, :7]
+    sigma = estimate.sigma[:, :7]
+    if damper.method != "augmented":
+        moved = constant_error_sigma(
+            lambda velocity: found(velocity).x[:, :7], reference.velocity, damper.reference_sigma, estimate.x[:, :7]
+        )
+        sigma = np.hypot(sigma, moved)
+    return x, sigma, estimate
+
+
+def _kinds(damper: Damper, model: MarineModel, P0: Array, noise: float) -> dict[str, Filter]:
+    if damper.method == "double":
+        paper = MarineModel.of_paper()
+        return {"filter1": Filter(paper, P0, noise), "filter2": Filter(paper, P0, CHANGE_SIGMA, window=WINDOW)}
+    P = np.zeros((model.states, model.states))
+    P[:STATES, :STATES] = P0
+    if model.with_reference:
+        P[REF, REF] = damper.reference_sigma**2 * np.eye(2)
+        return {"augmented": Filter(model, P, noise, relinearise=True, gate=GATE)}
+    return {"filter1": Filter(model, P, noise, relinearise=True)}
+
+
+def _even(track: Track) -> Track:
+    """The track without a last epoch that comes too early."""
+    steps = np.diff(track.time)
+    if len(steps) > 1 and abs(steps[-1] - steps[0]) > 0.01 * steps[0]:
+        return replace(
+            track,
+            time=track.time[:-1],
+            C_nb=track.C_nb[:-1],
+            v_n=track.v_n[:-1],
+            position=track.position[:-1],
+            sensors=track.sensors[:-1],
+            P=track.P[:-1],
+        )
+    return track
+
+
+def _corrected(track: Track, damped: Course, sigma: Array, start: int, estimate: Estimate | None) -> Track:
+    """The track with the errors taken off and the bands that are left; correlations are not told."""
+    P, sensors = track.P.copy(), track.sensors.copy()
+    variance = np.einsum("kii->ki", P)[start:].copy()
+    variance[:, LEVEL] = np.concatenate([sigma[:, PHI], sigma[:, DV], sigma[:, DP]], axis=1) ** 2
+    if estimate is not None:
+        for own, there in ((BG, ins.BG), (BA, ins.BA)):
+            sensors[start:, there] += estimate.x[:, own]
+            variance[:, there] = estimate.sigma[:, own] ** 2
+    P[start:] = 0.0
+    states = np.arange(P.shape[1])
+    P[start:, states, states] = variance
+    return replace(track, C_nb=damped.C_nb, v_n=damped.v_n, position=damped.position, P=P, sensors=sensors)
+
+
+def _spectrum(v: Array, interval: float) -> Spectrum | None:
+    there = np.isfinite(v).all(axis=1)
+    return spectrum(v[:, 0] + 1j * v[:, 1], interval) if there.sum() >= SHORTEST else None
+
+
+def _lines(v: Array, interval: float) -> tuple[float, float]:
+    return schuler_lines(v, interval) if np.isfinite(v).any() else (np.nan, np.nan)

@@ -1,0 +1,214 @@
+"""A reference velocity made ready for damping: on the navigation's epochs, along east and north, freed of outliers and jumps.
+
+The difference between an undamped INS and a healthy log is smooth: Schuler's oscillation changes it by millimetres a second
+in a second, and its curvature over a minute is below a centimetre a second. So what jumps is the log, and it is found before
+any filter sees it: no damping method has to survive it.
+
+- An *outlier* differs from the running median by more than noise can: left out.
+- A *jump* of the level, of either axis, is where straight lines through the minute before and the minute after do not meet:
+  the log is held to its level before. Damping needs its changes, not its level; which of the two levels was right nobody knows.
+- A *gap* stays one: methods coast.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.damping.course import Course
+from truenorth.errors import DataError
+from truenorth.records import VelocityRecord
+
+Array = NDArray[np.float64]
+
+MINUTE = 60.0  # s, of a running median and of the lines on both sides of a jump
+FEWEST = 5  # measurements of them, where the epochs are far apart
+SPLIT = 10.0  # s, of a gap over which nothing is compared
+OUTLIER = 6.0  # sigmas of one measurement
+JUMP = 8.0  # sigmas of the lines' difference
+CURVATURE = 0.03  # m/s by which healthy lines may miss each other, or a healthy value its median: waves, curvature
+LEAST_NOISE = 1e-4  # m/s
+GAP = 60.0  # s, from which a gap is told
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference velocity on the epochs of a course.
+
+    Attributes
+    ----------
+    velocity : (K+1, 2) array, m/s
+        East, north; NaN where absent.
+    noise : float, m/s
+        One-sigma white noise of an epoch.
+    outliers : int
+        Epochs left out.
+    jumps : tuple of (float, float, float)
+        Time (s) and size east, north (m/s) of each jump that was taken out.
+    gaps : tuple of (float, float)
+        Time and length (s) of each gap.
+    source : str
+    """
+
+    velocity: Array
+    noise: float
+    outliers: int
+    jumps: tuple[tuple[float, float, float], ...]
+    gaps: tuple[tuple[float, float], ...]
+    source: str
+
+    def reasons(self) -> list[str]:
+        """What was wrong with it, in words."""
+        words = []
+        if self.outliers:
+            words.append(f"velocity log: {self.outliers} epochs left out as outliers")
+        for time, east, north in self.jumps:
+            words.append(
+                f"velocity log: at {time:.0f} s its level jumps by {east:+.2f} m/s east, {north:+.2f} m/s north; held to the "
+                "level before"
+            )
+        for time, length in self.gaps:
+            words.append(f"velocity log: silent for {length:.0f} s after {time:.0f} s; undamped in between")
+        return words
+
+
+def reference_of(course: Course, record: VelocityRecord) -> Reference:
+    """Bring a velocity log onto a course.
+
+    A log in body axes is turned by the course's attitude; one of forward speed alone is taken to make no leeway.
+
+    Parameters
+    ----------
+    course : Course
+    record : VelocityRecord
+
+    Raises
+    ------
+    DataError
+        No measurement within the course; navigation axes without east or north.
+    """
+    there = record.measured
+    if record.frame == "navigation" and not there[:2].all():
+        raise DataError(f"{record.source}: VE or VN is missing; expected both for damping")
+    if record.frame == "body" and not there[1]:
+        raise DataError(f"{record.source}: v_forward is missing; expected it for damping")
+    T = course.interval
+    nearest = np.floor((record.time - course.time[0]) / T + 0.5).astype(int)
+    value = record.velocity[:, [1]] if record.frame == "body" else record.velocity[:, :2]
+    inside = (nearest >= 0) & (nearest <= course.epochs) & np.isfinite(value).all(axis=1)
+    if not inside.any():
+        raise DataError(
+            f"{record.source}: runs from {record.time[0]:.3f} s to {record.time[-1]:.3f} s, navigation from "
+            f"{course.time[0]:.3f} s to {course.time[-1]:.3f} s: no overlap; expected one clock: see --offset"
+        )
+    nearest, velocity = nearest[inside], np.nan_to_num(record.velocity[inside])
+    if record.frame == "body":
+        velocity = np.einsum("kij,kj->ki", course.C_nb[nearest], velocity)
+    count = np.bincount(nearest, minlength=course.epochs + 1)
+    mean = np.full((course.epochs + 1, 2), np.nan)
+    full = count > 0
+    for axis in range(2):
+        total = np.bincount(nearest, velocity[:, axis], minlength=course.epochs + 1)
+        mean[full, axis] = total[full] / count[full]
+    given = None
+    if record.sigma is not None:
+        known = record.sigma[inside][np.isfinite(record.sigma[inside])]
+        if known.size:
+            given = float(np.median(known) / np.sqrt(np.median(count[full])))
+    return cleaned(course, mean, record.source, given)
+
+
+def cleaned(course: Course, velocity: Array, source: str = "reference", noise: float | None = None) -> Reference:
+    """Free a reference velocity (K+1, 2) on a course's epochs of outliers and jumps.
+
+    Parameters
+    ----------
+    course : Course
+    velocity : (K+1, 2) array, m/s
+        NaN where absent.
+    source : str
+    noise : float, optional
+        White noise of an epoch, if known; the larger of this and what the data show is used.
+    """
+    rows = np.flatnonzero(np.isfinite(velocity).all(axis=1))
+    n = max(FEWEST, round(MINUTE / course.interval)) | 1
+    apart = max(SPLIT, 2.0 * course.interval) / course.interval
+    d = course.v_n[:, :2] - velocity
+    sigma = max(noise or 0.0, *(_white(column) for column in d[rows].T), LEAST_NOISE)
+    kept, outliers, jumps = [], 0, []
+    out = np.full_like(velocity, np.nan)
+    level = np.zeros(2)
+    for part in np.split(rows, np.flatnonzero(np.diff(rows) > apart) + 1):
+        good = np.ones(len(part), dtype=bool)
+        for column in d[part].T:
+            good &= np.abs(column - _running_median(column, n)) <= OUTLIER * sigma + CURVATURE
+        outliers += int(np.sum(~good))
+        part = part[good]
+        held = np.tile(level, (len(part), 1))
+        for k in _jumps(d[part], sigma, n):
+            size = _step(d[part], k, n)
+            held[k:] += size
+            jumps.append((float(course.time[part[k]]), float(-size[0]), float(-size[1])))
+        out[part] = velocity[part] + held
+        level = held[-1] if len(held) else level
+        kept.append(part)
+    return Reference(out, float(sigma), outliers, tuple(jumps), _gaps(course, np.concatenate(kept)), source)
+
+
+def _white(x: Array) -> float:
+    """White noise of a smooth signal's samples, from the median size of its second differences."""
+    if len(x) < 10:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(x[2:] - 2.0 * x[1:-1] + x[:-2])) / np.sqrt(6.0))
+
+
+def _running_median(x: Array, n: int) -> Array:
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(x, size=n, mode="nearest"))
+
+
+def _end_weights(n: int) -> Array:
+    """(n,) weights that give, of n values in a row, the straight line's value half a step behind the last."""
+    i = np.arange(n) - 0.5 * (n - 1)
+    return np.asarray(1.0 / n + i * (0.5 * n) / np.sum(i**2))
+
+
+def _differences(d: Array, n: int) -> Array:
+    """(N, 2) of each place between rows k-1 and k, the line after it less the line before; zero near the ends."""
+    weights = _end_weights(n)
+    out = np.zeros_like(d)
+    for axis in range(2):
+        before = np.convolve(d[:, axis], weights[::-1], "valid")  # of rows k-n .. k-1, for k = n .. N
+        after = np.convolve(d[:, axis], weights, "valid")  # of rows k .. k+n-1, for k = 0 .. N-n
+        out[n : len(d) - n + 1, axis] = after[n:] - before[: len(d) - 2 * n + 1]
+    return out
+
+
+def _jumps(d: Array, sigma: float, n: int) -> list[int]:
+    """Rows at which the level jumps, in order: the largest first found, none within a window of another."""
+    if len(d) < 2 * n + 1:
+        return []
+    limit = JUMP * sigma * np.sqrt(2.0 * np.sum(_end_weights(n) ** 2)) + CURVATURE
+    size = np.abs(_differences(d, n)).max(axis=1)
+    found: list[int] = []
+    while size.max() > limit:
+        k = int(np.argmax(size))
+        found.append(k)
+        size[max(k - n, 0) : k + n] = 0.0
+    return sorted(found)
+
+
+def _step(d: Array, k: int, n: int) -> Array:
+    """(2,) the line after row k-1 less the line before."""
+    weights = _end_weights(n)
+    return np.asarray(weights[::-1] @ d[k : k + n] - weights @ d[k - n : k])
+
+
+def _gaps(course: Course, rows: NDArray[np.int64]) -> tuple[tuple[float, float], ...]:
+    edges = course.time[np.concatenate([[0], rows, [course.epochs]])]
+    steps = np.diff(edges)
+    least = max(GAP, 3.0 * course.interval)
+    return tuple((float(edges[i]), float(steps[i])) for i in np.flatnonzero(steps > least))
