@@ -1,0 +1,218 @@
+"""`align_transfer`: a slave IMU aligned against the solution of a master INS on the same vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.procedure import HEADING_LIMIT
+from truenorth.alignment.result import Alignment
+from truenorth.alignment.task import bridged
+from truenorth.alignment.transfer_answer import assemble_transfer
+from truenorth.alignment.transfer_filter import Matching, TransferTrack, transfer_filter
+from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec
+from truenorth.attitude import dcm_from_euler
+from truenorth.calibration import Calibration
+from truenorth.errors import DataError, UsageError
+from truenorth.position import Position
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.simulation.flexure import FlexureSpec
+from truenorth.specs import ImuSpec, imu_spec
+
+Array = NDArray[np.float64]
+What = Literal["auto", "velocity", "attitude", "both"]
+
+LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, s, rad
+DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
+GATE = 1e-6  # probability of rejecting a sound row
+VELOCITY_NOISE, ATTITUDE_NOISE = 0.1, math.radians(0.05)  # m/s, rad: to begin the fit with
+FITS = 3  # passes that fit the noise of the master's rows
+LEAST = 0.1  # of the noise to begin with: less is not believed
+SHORTEST = 5.0  # s
+
+
+def align_transfer(
+    slave: ImuRecord,
+    master: MasterRecord,
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
+    *,
+    matching: What = "auto",
+    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+    lever_arm_sigma: float = LEVER_ARM_SIGMA,
+    delay: float = 0.0,
+    delay_sigma: float = DELAY_SIGMA,
+    mounting: Sequence[float] = (0.0, 0.0, 0.0),
+    mounting_sigma: float = MOUNTING_SIGMA,
+    flexure: FlexureSpec | None = None,
+    velocity_noise: float | None = None,
+    attitude_noise: float | None = None,
+    position: Position | None = None,
+    heading: float | None = None,
+    calibration: Calibration | None = None,
+    heading_limit: float = HEADING_LIMIT,
+    progress: Callable[[str], None] | None = None,
+) -> Alignment:
+    """Find attitude and biases of a slave IMU from a master INS on the same vehicle, with delay, lever arm and mounting.
+
+    The known delay and lever arm are compensated first; what is left of them is estimated (see
+    :mod:`truenorth.models.transfer`). A master on another clock, or late by more than was said, is recognised by its motion.
+
+    Parameters
+    ----------
+    slave : ImuRecord
+        Body axes RFU.
+    master : MasterRecord
+        At any rate and times, rows may be missing; attitude or velocity or both, position where there is one.
+    imu : ImuSpec, str, path or mapping, optional
+        Specification of the slave; the preset "industrial" when left out.
+    matching : {"auto", "velocity", "attitude", "both"}
+        What of the master is matched; all that it tells when left out.
+    lever_arm : three floats, m
+        From the master to the slave, slave axes (right, forward, up).
+    lever_arm_sigma : float, m
+        0: known, and not estimated.
+    delay, delay_sigma : float, s
+        By which the master's stamps are late, and what that is uncertain by; 0: known.
+    mounting : three floats, rad
+        Heading, pitch and roll of the slave's axes seen from the master's.
+    mounting_sigma : float, rad
+        About each axis; 0: known.
+    flexure : FlexureSpec, optional
+        The slave's seat bends: second-order Gauss-Markov states, with attitude matching.
+    velocity_noise, attitude_noise : float, optional, m/s and rad
+        White noise of the master's rows; fitted to the innovations when left out.
+    position : Position, optional
+        Where the master tells none.
+    heading : float, rad, optional
+        Of the slave at the start, where the master tells no attitude; its course when left out.
+    calibration : Calibration, optional
+        Of the slave, taken off first.
+    heading_limit : float, rad
+        Largest one-sigma heading error that still counts as `aligned`.
+    progress : callable, optional
+        Called with a word about each stage.
+
+    Returns
+    -------
+    Alignment
+        With `transfer`: delay, lever arm, mounting, each with sigma, and what the motion could not tell apart.
+
+    Raises
+    ------
+    UsageError
+        A matching that the master does not allow, a negative sigma, neither place nor heading.
+    DataError
+        Gaps in the slave's log; logs that have no time in common and whose motion does not bring them together.
+    """
+    tell = progress or (lambda stage: None)
+    what = _matching(matching, master)
+    arm = _three(lever_arm, "lever_arm", "metres: right, forward, up of the slave, from the master")
+    angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
+    for name, value in (
+        ("lever_arm_sigma", lever_arm_sigma),
+        ("delay_sigma", delay_sigma),
+        ("mounting_sigma", mounting_sigma),
+    ):
+        if not 0.0 <= value < math.inf:
+            raise UsageError(f"{name} is {value}; expected zero (known) or a positive one-sigma")
+    if not math.isfinite(delay):
+        raise UsageError(f"delay is {delay}; expected seconds")
+    if not heading_limit > 0.0:
+        raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
+    if flexure is not None and what == "velocity":
+        raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
+    spec = imu_spec("industrial" if imu is None else imu).with_random_walks(slave.interval)
+    where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
+    if calibration is not None:
+        slave = calibration.apply(slave)
+    slave = bridged(slave)
+
+    tell("comparing the clocks")
+    C_mb = np.asarray(dcm_from_euler(*angles))
+    if what == "attitude":
+        lever_arm_sigma = 0.0  # attitude does not see it
+    assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
+    assumed, notes = common_clock(slave, master, assumed)
+    bend = None
+    if flexure is not None:
+        turn, pitch, roll = flexure.sigma
+        bend = np.array([pitch, roll, turn]), flexure.beta
+    model = model_from_spec(spec, assumed, what != "velocity", bend, DELAY_WALK)
+
+    noise = _noise(velocity_noise, attitude_noise, what)
+    fitted = [velocity_noise is None and what != "attitude", attitude_noise is None and what != "velocity"]
+    for number in range(FITS * any(fitted)):
+        tell(f"fitting the master's noise, pass {number + 1}")
+        part, start = hand_over(slave, master, model, spec, assumed, noise, position)
+        track = transfer_filter(part, master, model, start, Matching(*noise))
+        noise = _refitted(track, noise, fitted)
+    tell("aligning")
+    part, start = hand_over(slave, master, model, spec, assumed, noise, position)
+    if part.duration < SHORTEST:
+        raise DataError(
+            f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check --delay "
+            "and the clocks"
+        )
+    track = transfer_filter(part, master, model, start, Matching(*noise, gate=GATE), covariances=True)
+    answer = assemble_transfer(
+        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit
+    )
+    if position is not None and master.lat is None:
+        answer = replace(
+            answer,
+            position=replace(
+                answer.position, horizontal_sigma=position.horizontal_sigma, vertical_sigma=position.vertical_sigma
+            ),
+        )
+    return answer
+
+
+def _matching(asked: What, master: MasterRecord) -> str:
+    if asked not in get_args(What):
+        raise UsageError(f"matching {asked!r} is not known; choose one of {', '.join(get_args(What))}")
+    has = {"velocity": master.v_n is not None, "attitude": master.C_nb is not None}
+    has["both"] = all(has.values())
+    if asked == "auto":
+        return "both" if has["both"] else "velocity" if has["velocity"] else "attitude"
+    if not has[asked]:
+        missing = "attitude" if has["velocity"] else "velocity"
+        raise UsageError(f"{master.source}: matching {asked!r} needs its {missing}, which it does not hold")
+    return asked
+
+
+def _three(values: Sequence[float], name: str, meaning: str) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise UsageError(f"{name} is {values!r}; expected three finite numbers, {meaning}")
+    return array
+
+
+def _noise(velocity: float | None, attitude: float | None, what: str) -> tuple[float, float]:
+    for name, value in (("velocity_noise", velocity), ("attitude_noise", attitude)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise UsageError(f"{name} is {value}; expected a positive one-sigma, or nothing: it is fitted then")
+    v = VELOCITY_NOISE if velocity is None else velocity
+    a = ATTITUDE_NOISE if attitude is None else attitude
+    return (math.inf if what == "attitude" else v), (math.inf if what == "velocity" else a)
+
+
+def _refitted(track: TransferTrack, noise: tuple[float, float], fitted: Sequence[bool]) -> tuple[float, float]:
+    """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout."""
+    later = slice(len(track.time) // 4, None)
+    result = list(noise)
+    for kind, (sigma, least) in enumerate(zip(noise, (VELOCITY_NOISE, ATTITUDE_NOISE), strict=True)):
+        if not fitted[kind]:
+            continue
+        columns = slice(3 * kind, 3 * kind + 3)
+        nu, claimed = track.innovation[later, columns], track.innovation_sigma[later, columns]
+        if np.isfinite(nu).any():
+            spread = (1.4826 * float(np.nanmedian(np.abs(nu)))) ** 2
+            of_state = max(0.0, float(np.nanmedian(claimed**2)) - sigma**2)
+            result[kind] = math.sqrt(max(spread - of_state, (LEAST * least) ** 2))
+    return result[0], result[1]

@@ -1,0 +1,328 @@
+"""From the closed loop of transfer alignment to an `Alignment`: history, verdict, and what the motion could not tell apart."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment import transfer_loop as loop
+from truenorth.alignment.result import Alignment, History, Status, euler_sigma
+from truenorth.alignment.transfer_filter import Handover, TransferTrack
+from truenorth.alignment.transfer_result import Transfer
+from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
+from truenorth.alignment.transfer_system import system_along
+from truenorth.analysis.observability import observability
+from truenorth.attitude import (
+    dcm_from_quaternion,
+    dcm_from_rotation_vector,
+    euler_from_dcm,
+    rotation_vector_from_dcm,
+)
+from truenorth.earth import earth_rate_n, transport_rate_n
+from truenorth.increments import increments, interval_lengths
+from truenorth.inertial_integration import integrate_attitude
+from truenorth.models.transfer import ARM, BA, BG, MOUNT, TAU, TransferModel
+from truenorth.position import Position
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.simulation.motion import MotionStates
+from truenorth.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+MOST_EPOCHS = 400  # of the linear system that says what is told apart
+MOST_ROWS = 5000  # of the history
+DISTRUST = 0.2  # share of rejected rows above which master and slave contradict each other
+LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
+TIED = 0.95  # correlation of two states beyond which one is not told without the other
+OUTLIER = 5.0  # sigmas by which a delay, a lever arm or a mounting may miss what was assumed
+
+WORDS = {
+    "dv_E": "velocity error east",
+    "dv_N": "velocity error north",
+    "dv_U": "velocity error up",
+    "phi_E": "tilt about east",
+    "phi_N": "tilt about north",
+    "phi_U": "heading error",
+    "tau": "delay",
+    "r_right": "lever arm right",
+    "r_forward": "lever arm forward",
+    "r_up": "lever arm up",
+    **{f"nabla_{axis}": f"accelerometer bias {axis}" for axis in "xyz"},
+    **{f"eps_{axis}": f"gyro bias {axis}" for axis in "xyz"},
+    **{f"mu_{axis}": f"mounting about {axis}" for axis in "xyz"},
+    **{f"theta_{axis}": f"flexure about {axis}" for axis in "xyz"},
+    **{f"theta'_{axis}": f"rate of flexure about {axis}" for axis in "xyz"},
+}
+
+
+def assemble_transfer(
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    spec: ImuSpec,
+    where: str,
+    assumed: Assumed,
+    start: Handover,
+    track: TransferTrack,
+    noise: tuple[float, float],
+    what: str,
+    notes: tuple[str, ...],
+    heading_limit: float,
+) -> Alignment:
+    """The answer at the last row of the master, judged."""
+    P = track.last_P
+    phi_covariance, floor = misalignment_covariance(P)
+    gyro_prior, accel_prior = bias_sigmas(spec)
+    lat, lon, alt = (float(x) for x in track.position[-1])
+    transfer = _transfer(slave, master, model, assumed, start, track, noise, what, notes)
+    sigma = track.sigma[-1]
+    status, reasons = _judge(track, transfer, start, euler_sigma(track.C_nb[-1], phi_covariance), heading_limit)
+    return Alignment(
+        status=status,
+        reasons=reasons,
+        method=f"transfer, {'velocity and attitude' if what == 'both' else what} matching",
+        method_reason=f"{model.states} states, closed loop over {transfer.used} rows of {master.source}",
+        time=float(track.time[-1]),
+        C_nb=track.C_nb[-1],
+        phi_covariance=phi_covariance,
+        phi_floor=floor,
+        gyro_bias=track.aux[-1, BG],
+        gyro_bias_sigma=sigma[BG],
+        gyro_bias_prior=gyro_prior,
+        accel_bias=track.aux[-1, BA],
+        accel_bias_sigma=sigma[BA],
+        accel_bias_prior=accel_prior,
+        position=Position(lat, lon, alt),
+        imu=spec,
+        imu_source=where,
+        duration=slave.duration,
+        disturbance=np.full(3, np.nan),
+        history=_history(slave, track, what),
+        source=slave.source,
+        transfer=transfer,
+    )
+
+
+def _transfer(
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    assumed: Assumed,
+    start: Handover,
+    track: TransferTrack,
+    noise: tuple[float, float],
+    what: str,
+    notes: tuple[str, ...],
+) -> Transfer:
+    sigma, aux = track.sigma[-1], track.aux[-1]
+    tau, arm, mount = (model.slice_of(which) for which in (TAU, ARM, MOUNT))
+    silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
+    silences = tuple(
+        f"the master is silent for {master.steps[k]:.1f} s after {master.time[k - 1]:.1f} s" for k in silent[:3]
+    )
+    kinds = [kind for kind, matched in enumerate((what != "attitude", what != "velocity")) if matched]
+    verdict = track.verdict[:, kinds]
+    return Transfer(
+        matching=what,
+        delay=assumed.delay + (0.0 if tau is None else float(aux[tau][0])),
+        delay_sigma=0.0 if tau is None else float(sigma[tau][0]),
+        delay_prior=assumed.delay_sigma,
+        lever_arm=assumed.lever_arm + (0.0 if arm is None else aux[arm]),
+        lever_arm_sigma=np.zeros(3) if arm is None else sigma[arm],
+        lever_arm_prior=np.full(3, assumed.lever_arm_sigma),
+        mounting=_signed(np.array(euler_from_dcm(track.C_mb[-1]))),
+        mounting_sigma=sigma_of_mounting(track.last_P, mount),
+        mounting_prior=np.full(3, 0.0 if mount is None else assumed.mounting_sigma),
+        velocity_noise=noise[0] if np.isfinite(noise[0]) else math.nan,
+        attitude_noise=noise[1] if np.isfinite(noise[1]) else math.nan,
+        used=int(np.sum(np.any((verdict == loop.USED) | (verdict == loop.REOPENED), axis=1))),
+        rejected=int(np.sum(np.any(verdict == loop.REJECTED, axis=1))),
+        jumps=_jumps(track),
+        open=_open(slave, model, assumed, start, track, noise),
+        notes=(*notes, *silences),
+    )
+
+
+def _signed(angles: Array) -> Array:
+    return np.asarray((angles + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _jumps(track: TransferTrack) -> tuple[str, ...]:
+    found = []
+    for k, kind in np.argwhere(track.verdict == loop.REOPENED):
+        size = float(np.linalg.norm(track.innovation[k, 3 * kind : 3 * kind + 3]))
+        what = f"velocity jumped by {size:.2g} m/s" if kind == 0 else f"attitude jumped by {math.degrees(size):.2g} deg"
+        found.append(f"the master's {what} shortly before {track.time[k]:.1f} s and stays so: taken up from there")
+    return tuple(found)
+
+
+def _open(
+    slave: ImuRecord,
+    model: TransferModel,
+    assumed: Assumed,
+    start: Handover,
+    track: TransferTrack,
+    noise: tuple[float, float],
+) -> tuple[str, ...]:
+    """What the motion as it was could not tell apart, from the model along the track."""
+    every = max(1, len(track.time) // MOST_EPOCHS)
+    k = np.arange(0, len(track.time), every)
+    if len(k) < 3:
+        return ()
+    middle, at, T = _states(slave, track, k)
+    speed = float(np.max(np.linalg.norm(track.v_n, axis=1)))
+    P0 = model.prior(
+        1.0,
+        max(assumed.mounting_sigma, math.radians(1.0)),
+        np.sqrt(np.diag(start.P)[BA]),
+        np.sqrt(np.diag(start.P)[BG]),
+        tau=assumed.delay_sigma,
+        # As long as the way driven in the delay's sigma, so that neither is favoured in the words.
+        arm=max(assumed.lever_arm_sigma, speed * assumed.delay_sigma),
+        mounting=assumed.mounting_sigma,
+    )
+    R = np.repeat([s**2 / every if np.isfinite(s) else np.inf for s in noise], 3)
+    system = system_along(middle, at, T, model, P0, R, assumed.lever_arm)
+    names = [WORDS[name] for name in model.names]
+    told = observability(system, names, model.units)
+    if not np.isfinite(noise[0]):  # attitude alone: nothing of velocity and force is expected
+        quiet = {WORDS[f"dv_{axis}"] for axis in "ENU"} | {WORDS[f"nabla_{axis}"] for axis in "xyz"}
+    else:
+        quiet = set()
+    unseen = [group.states[0] for group in told.hardly if len(group.states) == 1 and group.states[0] not in quiet]
+    words = [str(group) for group in told.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
+    if unseen:
+        words.append(f"not seen at all: {', '.join(unseen)}")
+    return (*words, *_tied(names, track.last_P, quiet | set(unseen)))
+
+
+def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
+    """States whose errors go together in the end: each is worse known than the group would be with one of them given."""
+    sigma = np.sqrt(np.diag(P))
+    correlation = np.abs(P / np.outer(sigma, sigma)) > TIED
+    left, found = set(range(len(names))), []
+    while left:
+        group, grown = {min(left)}, set[int]()
+        while group != grown:
+            grown, group = group, {int(j) for i in group for j in np.flatnonzero(correlation[i])}
+        left -= group
+        told = [names[i] for i in sorted(group) if names[i] not in quiet]
+        if len(told) > 1:
+            listed = f"{', '.join(told[:-1])} and {told[-1]}"
+            found.append(f"{listed} are told together far better than each alone (correlation above {TIED})")
+    return tuple(found)
+
+
+def _states(slave: ImuRecord, track: TransferTrack, k: NDArray[np.intp]) -> tuple[MotionStates, MotionStates, Array]:
+    """The slave's motion as estimated: means over the intervals between the rows k, and at their ends."""
+    dtheta, dvel = increments(slave)
+    turned = np.vstack([np.zeros(3), np.cumsum(dtheta, axis=0)])
+    moved = np.vstack([np.zeros(3), np.cumsum(dvel, axis=0)])
+    row = track.sample[k] + 1
+    keep = np.concatenate([[True], np.diff(row) > 0])
+    k, row = k[keep], row[keep]
+    T = np.diff(slave.time[row - 1])
+    gyro, accel = track.aux[k[1:], BG], track.aux[k[1:], BA]
+    w = np.diff(turned[row], axis=0) / T[:, None] - gyro
+    f = np.diff(moved[row], axis=0) / T[:, None] - accel
+    half = rotation_vector_from_dcm(np.swapaxes(track.C_nb[k[:-1]], 1, 2) @ track.C_nb[k[1:]]) / 2
+    middle = track.C_nb[k[:-1]] @ dcm_from_rotation_vector(half)
+    v = 0.5 * (track.v_n[k[1:]] + track.v_n[k[:-1]])
+
+    def states(C: Array, v: Array, at: NDArray[np.intp], w: Array, f: Array) -> MotionStates:
+        place = track.position[at]
+        return MotionStates(track.time[at], C, v, place[:, 0], place[:, 1], place[:, 2], w, f, np.zeros_like(w))
+
+    # Rate and force at an end: as over the interval before; a row of a tenth of a second does not show the difference.
+    return states(middle, v, k[1:], w, f), states(track.C_nb[k[1:]], track.v_n[k[1:]], k[1:], w, f), T
+
+
+def _history(slave: ImuRecord, track: TransferTrack, what: str) -> History:
+    columns = slice(3, 6) if what == "attitude" else slice(0, 3)
+    present = np.flatnonzero(np.isfinite(track.innovation[:, columns]).all(axis=1))
+    k = present[:: max(1, -(-len(present) // MOST_ROWS))]
+    covariance, floor = misalignment_covariance(track.P[k])
+    final = _final_attitudes(slave, track)[k]
+    return History(
+        time=track.time[k],
+        C_nb=track.C_nb[k],
+        phi_covariance=covariance,
+        phi_floor=floor,
+        departure=-rotation_vector_from_dcm(track.C_nb[k] @ np.swapaxes(final, 1, 2)),
+        gyro_bias=track.aux[k, BG],
+        gyro_bias_sigma=track.sigma[k, BG],
+        accel_bias=track.aux[k, BA],
+        accel_bias_sigma=track.sigma[k, BA],
+        innovation=track.innovation[k, columns],
+        innovation_sigma=track.innovation_sigma[k, columns],
+        nis=track.nis[k, 1 if what == "attitude" else 0],
+    )
+
+
+def _final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
+    """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases taken off."""
+    dtheta, _ = increments(slave)
+    dtheta = dtheta - track.aux[-1, BG] * interval_lengths(slave)[:, None]
+    C_0b = dcm_from_quaternion(integrate_attitude(dtheta)[1:][track.sample])
+    lat, alt, v = track.position[:, 0], track.position[:, 2], track.v_n
+    w_in = earth_rate_n(lat) + transport_rate_n(lat, alt, v)
+    steps = np.diff(track.time, prepend=track.time[0])[:, None]
+    turned = np.cumsum(w_in * steps, axis=0)
+    # Of n against its last orientation; the turn is small enough to be one about one axis.
+    C_last_n = dcm_from_rotation_vector(turned[-1] - turned)
+    return C_last_n @ track.C_nb[-1] @ np.swapaxes(C_0b[-1:], 1, 2) @ C_0b
+
+
+def _judge(
+    track: TransferTrack, transfer: Transfer, start: Handover, sigma: Array, limit: float
+) -> tuple[Status, tuple[str, ...]]:
+    """Status and reasons."""
+    told = [*transfer.notes, *transfer.jumps]
+    told += [f"not well told apart by this motion: {words}" for words in transfer.open]
+    share = transfer.rejected / max(1, transfer.rejected + transfer.used)
+    if share > DISTRUST:
+        return "inconsistent", (
+            f"{share:.0%} of the master's rows contradict the slave: check the axes, --lever-arm, --mounting and --delay, "
+            "and whether both sit on one rigid body (--flexure)",
+            *told,
+        )
+    for name, found, prior, scale, unit in (
+        ("delay", transfer.delay - start.delay, transfer.delay_prior, 1e3, "ms"),
+        ("lever arm", transfer.lever_arm - start.arm, transfer.lever_arm_prior[0], 1.0, "m"),
+        ("mounting", _between(start.C_mb, track.C_mb[-1]), transfer.mounting_prior[0], math.degrees(1.0), "deg"),
+    ):
+        miss = float(np.max(np.abs(found)))
+        if prior > 0.0 and miss > OUTLIER * prior:
+            return "inconsistent", (
+                f"the {name} comes out {scale * miss:.3g} {unit} from the assumed one, which was said to be known to "
+                f"{scale * prior:.3g} {unit}: check the slave's axes and --{name.replace(' ', '-')}",
+                *told,
+            )
+    if sigma[0] <= limit:
+        return "aligned", (
+            f"heading is known to {_angle(float(sigma[0]))}, level to {_angle(float(max(sigma[1:])))} (one sigma)",
+            *told,
+        )
+    if transfer.matching == "attitude":
+        why = (
+            "attitude matching tells the slave only as well as its mounting on the master is known: match velocity too"
+        )
+    else:
+        why = "it takes horizontal acceleration to tell heading by velocity: a turn, an S-turn, a change of speed"
+    if max(sigma[1:]) <= math.radians(3.0):
+        return "level_only", (
+            f"heading is known to {_angle(float(sigma[0]))} only, {_angle(limit)} is wanted; {why}",
+            *told,
+        )
+    return "not_converged", (f"level is known to {_angle(float(max(sigma[1:])))} only; {why}", *told)
+
+
+def _between(before: Array, after: Array) -> Array:
+    """(3,) rotation vector from one mounting to another, rad."""
+    return np.asarray(rotation_vector_from_dcm(before.T @ after))
+
+
+def _angle(x: float) -> str:
+    return f"{math.degrees(x):.2f} deg" if x >= math.radians(0.5) else f"{60 * math.degrees(x):.2f} arcmin"

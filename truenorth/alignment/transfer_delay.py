@@ -1,0 +1,157 @@
+"""How late is a master, before any filter: its rates and forces held against the slave's at all shifts of time.
+
+Rates compare axis by axis where the master tells attitude: a constant bias and a mounting of some degrees do not matter.
+Where it tells velocity alone, the length of the specific force compares; that needs acceleration of the vehicle.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.attitude import rotation_vector_from_dcm
+from truenorth.earth import GRAVITY_EQUATOR
+from truenorth.increments import increments
+from truenorth.records import ImuRecord, MasterRecord
+
+Array = NDArray[np.float64]
+
+GRID = 0.02  # s; finer rows of a master are not used
+WINDOW = {"rate": 0.2, "force": 1.0}  # s over which the signals are averaged
+SHORTEST = 10.0  # s that both must have in common
+SURE = 0.5  # correlation below this is no agreement
+UNIQUE = (
+    20.0  # log-likelihood by which the peak must exceed another elsewhere; signals taken as white beyond their window
+)
+CHANCE = 5.0  # sigmas by which a correlation must exceed that of unrelated signals
+
+
+class Found(NamedTuple):
+    """A delay that the motion itself tells.
+
+    Attributes
+    ----------
+    delay : float, s
+        Of the master's stamps behind the slave's clock.
+    correlation : float
+        Of the signals at that shift.
+    rival : float
+        The highest correlation elsewhere.
+    sure : bool
+        The correlation is high, no chance, and the only one.
+    """
+
+    delay: float
+    correlation: float
+    rival: float
+    sure: bool
+
+
+def find_delay(
+    slave: ImuRecord, master: MasterRecord, C_mb: Array, around: float = 0.0, within: float = math.inf
+) -> Found:
+    """Find the delay of a master by correlation.
+
+    Parameters
+    ----------
+    slave : ImuRecord
+    master : MasterRecord
+    C_mb : (3, 3) array
+        Slave to master axes, within some ten degrees.
+    around, within : float, s
+        Delays from ``around - within`` to ``around + within`` are tried; all at which both logs have 10 s in common when left out.
+
+    Returns
+    -------
+    Found
+        Not sure, with NaN, where the logs are too short.
+    """
+    kind = "rate" if master.C_nb is not None else "force"
+    step = max(GRID, master.interval) if master.interval < WINDOW[kind] else 0.5 * WINDOW[kind]
+    a = _slave_signal(slave, kind, step)
+    b = _master_signal(master, C_mb, kind, step)
+    least = round(SHORTEST / step)
+    if len(a) < least or len(b) < least:
+        return Found(math.nan, 0.0, 0.0, False)
+    # Shift k puts row j of the master on row j + k of the slave: delay = (start of master) - (start of slave) - k step.
+    offset = float(master.time[0] - slave.time[0])
+    shifts, score, common = _correlations(a, b)
+    delays = offset - step * shifts
+    possible = (common >= least) & (np.abs(delays - around) <= within)
+    if not possible.any():
+        return Found(math.nan, 0.0, 0.0, False)
+    score = np.where(possible, score, -1.0)
+    k = int(np.argmax(score))
+    peak = float(score[k])
+    fraction = 0.0
+    if 0 < k < len(score) - 1 and min(score[k - 1], score[k + 1]) > -1.0:
+        left, right = float(score[k - 1]), float(score[k + 1])
+        bend = left - 2.0 * peak + right
+        fraction = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+    elsewhere = np.abs(shifts - shifts[k]) * step > 2.0 * WINDOW[kind]
+    rival = float(np.max(score[elsewhere], initial=0.0))
+    independent = float(common[k]) * step / WINDOW[kind] * a.shape[1]
+    better = 0.5 * independent * math.log(max(1.0 - rival**2, 1e-12) / max(1.0 - peak**2, 1e-12))
+    sure = peak > max(SURE, CHANCE / math.sqrt(independent)) and better > UNIQUE
+    return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure)
+
+
+def _slave_signal(slave: ImuRecord, kind: str, step: float) -> Array:
+    dtheta, dvel = increments(slave)
+    whole = np.vstack([np.zeros((1, 3)), np.cumsum(dtheta if kind == "rate" else dvel, axis=0)])
+    time = np.concatenate([[slave.time[0] - slave.interval], slave.time])
+    mean = _means(time, whole, slave.time[0], step, WINDOW[kind])
+    return mean if kind == "rate" else np.linalg.norm(mean, axis=1, keepdims=True)
+
+
+def _master_signal(master: MasterRecord, C_mb: Array, kind: str, step: float) -> Array:
+    if kind == "rate":
+        assert master.C_nb is not None
+        C = master.C_nb @ C_mb
+        turns = rotation_vector_from_dcm(np.swapaxes(C[:-1], 1, 2) @ C[1:])
+        whole = np.vstack([np.zeros((1, 3)), np.cumsum(turns, axis=0)])
+        return _means(master.time, whole, master.time[0], step, WINDOW[kind])
+    assert master.v_n is not None
+    force = _means(master.time, master.v_n, master.time[0], step, WINDOW[kind])
+    force[:, 2] += GRAVITY_EQUATOR
+    return np.linalg.norm(force, axis=1, keepdims=True)
+
+
+def _means(time: Array, whole: Array, start: float, step: float, window: float) -> Array:
+    """Mean rates over a window about each time of a grid from `start` on, of integrals `whole` at `time`."""
+    count = max(0, math.floor((time[-1] - start) / step) + 1)
+    t = start + step * np.arange(count)
+    ends = [np.clip(t + sign * 0.5 * window, time[0], time[-1]) for sign in (-1, 1)]
+    low, high = (np.stack([np.interp(t, time, column) for column in whole.T], axis=1) for t in ends)
+    return np.asarray((high - low) / (ends[1] - ends[0])[:, None])
+
+
+def _correlations(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Shifts, correlation coefficient of ``a[j + shift]`` with ``b[j]`` over all columns, and rows in common."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    length = next_fast_len(len(a) + len(b))
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+
+    def lagged(x: Array, y: Array) -> Array:
+        return np.asarray(irfft(rfft(x, length, axis=0) * np.conj(rfft(y, length, axis=0)), length, axis=0))
+
+    shifts = np.arange(-(len(b) - 1), len(a))
+    ones_a, ones_b = np.ones((len(a), 1)), np.ones((len(b), 1))
+    at = shifts % length
+    common = np.round(lagged(ones_a, ones_b)[at, 0])
+    # Means and energies are those of the rows in common at each shift.
+    many = np.maximum(common, 1.0)[:, None]
+    sum_a, sum_b = lagged(a, ones_b)[at], lagged(ones_a, b)[at]
+    power_a, power_b = lagged(a**2, ones_b)[at] - sum_a**2 / many, lagged(ones_a, b**2)[at] - sum_b**2 / many
+    product = lagged(a, b)[at] - sum_a * sum_b / many
+    scale = np.sqrt(np.maximum(power_a.sum(axis=1), 0.0) * np.maximum(power_b.sum(axis=1), 0.0))
+    floor = 1e-12 * math.sqrt(float(np.sum(a**2) * np.sum(b**2)))
+    return (
+        shifts.astype(np.float64),
+        np.where(scale > floor, product.sum(axis=1) / np.maximum(scale, floor), 0.0),
+        common,
+    )

@@ -1,0 +1,99 @@
+"""What a transfer alignment tells beside the slave's attitude and biases: delay, lever arm, mounting, and what stays open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+NOT_ESTIMATED = 0.9  # of its prior sigma: what stays above has not been estimated
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Relation of the slave to its master, each with one-sigma now and before; sigma 0 where it was taken as known.
+
+    Attributes
+    ----------
+    matching : {"velocity", "attitude", "both"}
+    delay, delay_sigma, delay_prior : float, s
+        The master's stamps are late by this much.
+    lever_arm, lever_arm_sigma, lever_arm_prior : (3,) arrays, m
+        From the master to the slave, slave axes (right, forward, up).
+    mounting, mounting_sigma, mounting_prior : (3,) arrays, rad
+        Heading, pitch and roll of the slave's axes seen from the master's; of the sigmas the first is that about the slave's z
+        axis, the others those about x and y.
+    velocity_noise, attitude_noise : float, m/s and rad
+        One-sigma white noise of the master's rows, as fitted or given; NaN where not matched.
+    used, rejected : int
+        Rows of the master.
+    jumps : tuple of str
+        Where the master jumped, in words.
+    open : tuple of str
+        Combinations that the motion could not tell apart, in words.
+    notes : tuple of str
+        What was found and mended on the way: delay of another clock, drop-outs.
+    """
+
+    matching: str
+    delay: float
+    delay_sigma: float
+    delay_prior: float
+    lever_arm: Array
+    lever_arm_sigma: Array
+    lever_arm_prior: Array
+    mounting: Array
+    mounting_sigma: Array
+    mounting_prior: Array
+    velocity_noise: float
+    attitude_noise: float
+    used: int
+    rejected: int
+    jumps: tuple[str, ...] = ()
+    open: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def delay_estimated(self) -> bool:
+        """Whether the data told the delay."""
+        return self.delay_sigma < NOT_ESTIMATED * self.delay_prior
+
+    @property
+    def lever_arm_estimated(self) -> NDArray[np.bool_]:
+        """(3,) whether the data told this component."""
+        return self.lever_arm_sigma < NOT_ESTIMATED * self.lever_arm_prior
+
+    @property
+    def mounting_estimated(self) -> NDArray[np.bool_]:
+        """(3,) whether the data told this angle."""
+        return self.mounting_sigma < NOT_ESTIMATED * self.mounting_prior
+
+    def summary(self) -> dict[str, Any]:
+        """Flat, in datasheet units, ready for JSON."""
+
+        def known(value: float) -> float | None:
+            return float(value) if np.isfinite(value) else None
+
+        return {
+            "matching": self.matching,
+            "delay_ms": 1e3 * self.delay,
+            "delay_sigma_ms": 1e3 * self.delay_sigma,
+            "delay_estimated": bool(self.delay_estimated),
+            "lever_arm_m": self.lever_arm.tolist(),
+            "lever_arm_sigma_m": self.lever_arm_sigma.tolist(),
+            "lever_arm_estimated": self.lever_arm_estimated.tolist(),
+            "mounting_deg": np.degrees(self.mounting).tolist(),
+            "mounting_sigma_deg": np.degrees(self.mounting_sigma).tolist(),
+            "mounting_estimated": self.mounting_estimated.tolist(),
+            "master_velocity_noise_m_s": known(self.velocity_noise),
+            "master_attitude_noise_deg": known(float(np.degrees(self.attitude_noise))),
+            "master_rows_used": self.used,
+            "master_rows_rejected": self.rejected,
+            "master_jumps": list(self.jumps),
+            "not_told_apart": list(self.open),
+            "notes": list(self.notes),
+        }

@@ -1,0 +1,233 @@
+"""Where a transfer alignment begins: clocks brought together, the slave's first state and its covariance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.transfer_delay import find_delay
+from truenorth.alignment.transfer_filter import Handover
+from truenorth.attitude import dcm_from_euler, euler_from_dcm
+from truenorth.earth import GRAVITY_EQUATOR
+from truenorth.errors import DataError, UsageError
+from truenorth.increments import increments
+from truenorth.models.transfer import PHI, TransferModel, turn_noise
+from truenorth.position import Position
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.interpolation import interpolated
+from truenorth.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+SURPRISE = 3.0  # sigmas by which a delay found by correlation must miss the given one to be taken in its place
+SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
+COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
+FIRST = 1.0  # s over which those are taken
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """What is assumed of the master, one-sigma beside it; a sigma of 0: known, no state.
+
+    Attributes
+    ----------
+    lever_arm : (3,) array, m
+        Master to slave, slave axes.
+    lever_arm_sigma : float, m
+    delay, delay_sigma : float, s
+    C_mb : (3, 3) array
+        Slave to master axes.
+    mounting_sigma : float, rad
+    heading : float or None, rad
+        Of the slave at the start, where no master tells attitude; else its course.
+    """
+
+    lever_arm: Array
+    lever_arm_sigma: float
+    delay: float
+    delay_sigma: float
+    C_mb: Array
+    mounting_sigma: float
+    heading: float | None = None
+
+
+def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:
+    """The delay assumed, or that which the motion tells where the two contradict each other, with notes in words.
+
+    Raises
+    ------
+    DataError
+        The logs have no time in common and their motion does not say how they belong together.
+    """
+    found = find_delay(slave, master, assumed.C_mb)
+    start, stop = master.time[0] - assumed.delay, master.time[-1] - assumed.delay
+    apart = start >= slave.time[-1] or stop <= slave.time[0]
+    miss = abs(found.delay - assumed.delay)
+    if found.sure and (apart or miss > SURPRISE * max(assumed.delay_sigma, 0.5 * master.interval)):
+        return replace(assumed, delay=found.delay), (
+            f"the master's stamps are {found.delay:.3f} s behind the slave's clock by their motion (correlation "
+            f"{found.correlation:.3f}), where {assumed.delay:.3f} s were given: the found delay is taken",
+        )
+    if apart:
+        raise DataError(
+            f"{master.source}: it runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s, the slave's log from "
+            f"{slave.time[0]:.3f} s to {slave.time[-1]:.3f} s, and no shift makes their motion agree (best correlation "
+            f"{found.correlation:.2f}, elsewhere {found.rival:.2f}): give --delay, the offset of the master's clock, or logs with "
+            "more motion in common"
+        )
+    return assumed, ()
+
+
+def model_from_spec(
+    spec: ImuSpec, assumed: Assumed, attitude: bool, flexure: tuple[Array, float] | None, delay_walk: float
+) -> TransferModel:
+    """The error model of a specification; instabilities become random walks of the biases."""
+    sigma, beta = ((0.0, 0.0, 0.0), 1.0) if flexure is None else (tuple(float(x) for x in flexure[0]), flexure[1])
+    wander = math.sqrt(2.0 / spec.correlation_time)
+    return TransferModel(
+        spec.gyro_random_walk,
+        spec.accel_random_walk,
+        gyro_rate_walk=math.hypot(spec.gyro_rate_random_walk, wander * spec.gyro_bias_instability),
+        accel_rate_walk=math.hypot(spec.accel_rate_random_walk, wander * spec.accel_bias_instability),
+        turn_noise=turn_noise(spec.gyro_scale_factor, spec.gyro_misalignment),
+        delay=assumed.delay_sigma > 0.0,
+        lever_arm=assumed.lever_arm_sigma > 0.0,
+        mounting=attitude and assumed.mounting_sigma > 0.0,
+        delay_walk=delay_walk if assumed.delay_sigma > 0.0 else 0.0,
+        flexure_sigma=sigma,  # type: ignore[arg-type]  # three of them
+        flexure_beta=beta,
+    )
+
+
+def bias_sigmas(spec: ImuSpec) -> tuple[Array, Array]:
+    """(3,) sigmas of what acts as gyro and accelerometer bias: at level, scale factor and misalignment times gravity too."""
+    variance = spec_variance(spec)
+    force = math.hypot(spec.accel_scale_factor, spec.accel_misalignment) * GRAVITY_EQUATOR
+    return np.sqrt(variance[:3]), np.hypot(np.sqrt(variance[3:]), force)
+
+
+def hand_over(
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    spec: ImuSpec,
+    assumed: Assumed,
+    noise: tuple[float, float],
+    position: Position | None,
+) -> tuple[ImuRecord, Handover]:
+    """The slave's record from the master's first row on, and its first state as the master tells it.
+
+    Parameters
+    ----------
+    noise : (velocity, attitude) floats, m/s and rad
+        Of the master's rows.
+    position : Position or None
+        Where the master tells none.
+
+    Raises
+    ------
+    DataError
+        No rows in common.
+    UsageError
+        Neither a place nor a heading is known.
+    """
+    first = int(np.searchsorted(slave.time, master.time[0] - assumed.delay))
+    if first > len(slave) - 2 or master.time[-1] - assumed.delay <= slave.time[0]:
+        raise DataError(
+            f"{master.source}: no row falls into the slave's record ({slave.time[0]:.3f} s to {slave.time[-1]:.3f} s, the master's "
+            f"from {master.time[0]:.3f} s to {master.time[-1]:.3f} s less {assumed.delay:.3f} s): check --delay"
+        )
+    part = slave[first + 1 :]
+    begin = float(slave.time[first])
+    at: dict[str, Any] = {
+        k: v if v is None else v[0] for k, v in interpolated(master, np.array([begin + assumed.delay])).items()
+    }
+    if at["lat"] is not None:
+        lat, lon, alt = float(at["lat"]), float(at["lon"]), float(at["alt"])
+    elif position is not None:
+        lat, lon, alt = position.lat, position.lon, position.alt
+    else:
+        raise UsageError(f"{master.source}: no position in it; give one (--lat, --lon, --alt)")
+
+    dtheta, dvel = increments(part)
+    rows = max(1, round(FIRST / part.interval))
+    w, f = dtheta[:2].mean(axis=0) / part.interval, dvel[:rows].mean(axis=0) / part.interval
+    C_nm = at["C_nb"]
+    if C_nm is not None:
+        C = np.asarray(C_nm @ assumed.C_mb)
+        phi = np.full(3, noise[1] if np.isfinite(noise[1]) else math.radians(0.02))
+        phi = np.hypot(phi, float(np.linalg.norm(w)) * assumed.delay_sigma)
+        if not model.mounting:
+            phi = np.hypot(phi, assumed.mounting_sigma)
+    else:
+        C = _from_course(master, assumed, f)
+        phi = np.array([LEVEL_SIGMA, LEVEL_SIGMA, COURSE_SIGMA])
+    v = np.zeros(3) if at["v_n"] is None else at["v_n"] + C @ np.cross(w, assumed.lever_arm)
+    force = float(np.linalg.norm(C @ f - [0.0, 0.0, GRAVITY_EQUATOR]))
+    slack = math.hypot(force * assumed.delay_sigma, float(np.linalg.norm(w)) * assumed.lever_arm_sigma)
+    dv = math.hypot(0.1 if at["v_n"] is not None else 300.0, slack)
+    if np.isfinite(noise[0]):
+        dv = math.hypot(dv, noise[0])
+    gyro, accel = bias_sigmas(spec)
+    P = model.prior(
+        dv,
+        phi,
+        accel,
+        gyro,
+        tau=assumed.delay_sigma,
+        arm=assumed.lever_arm_sigma,
+        mounting=assumed.mounting_sigma,
+        C_nb=None if C_nm is None else C,
+    )
+    start = Handover(C, v, lat, lon, alt, P, C_mb=assumed.C_mb, arm=assumed.lever_arm, delay=assumed.delay)
+    return part, start
+
+
+def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:
+    """Attitude from the course (or a given heading) and the specific force less the vehicle's own acceleration."""
+    assert master.v_n is not None
+    rows = max(2, round(FIRST / master.interval))
+    v = master.v_n[:rows]
+    east, north = v[:, :2].mean(axis=0)
+    if assumed.heading is not None:
+        heading = assumed.heading
+    elif math.hypot(east, north) > SLOWEST:
+        heading = math.atan2(east, north) + float(euler_from_dcm(assumed.C_mb)[0])
+    else:
+        raise UsageError(
+            f"{master.source}: it tells velocity alone, and {math.hypot(east, north):.1f} m/s at the start, too slow for a course: "
+            "give the slave's heading (--heading)"
+        )
+    t = master.time[:rows] - master.time[:rows].mean()
+    a_n = t @ v / float(t @ t)
+    up_n = a_n + np.array([0.0, 0.0, GRAVITY_EQUATOR])
+    level = dcm_from_euler(heading, 0.0, 0.0).T @ up_n  # in the level axes of that heading
+    # Pitch and roll that turn the measured force into it, to first order in the lean of the force itself.
+    g = float(np.linalg.norm(f))
+    roll = math.asin(max(-1.0, min(1.0, (level[0] - f[0]) / g)))
+    pitch = math.asin(max(-1.0, min(1.0, (f[1] - level[1]) / g)))
+    return np.asarray(dcm_from_euler(heading, pitch, roll))
+
+
+def sigma_of_mounting(P: Array, at: slice | None) -> Array:
+    """(3,) sigmas about z, x and y: those of heading, pitch and roll at small angles."""
+    return np.zeros(3) if at is None else np.sqrt(np.diag(P)[at])[[2, 0, 1]]
+
+
+def misalignment_covariance(P: Array) -> tuple[Array, Array]:
+    """Covariance of phi, and the part of it that goes along with what does not change: biases, delay, lever arm, mounting.
+
+    That part (the regression on those states) is what more time in the same motion does not improve.
+    """
+    rest = slice(PHI.stop, P.shape[-1])
+    whole, cross, own = P[..., PHI, PHI], P[..., PHI, rest], P[..., rest, rest]
+    scale = np.sqrt(np.diagonal(own, axis1=-2, axis2=-1))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    unit = own / (scale[..., :, None] * scale[..., None, :]) + 1e-10 * np.eye(own.shape[-1])
+    c = cross / scale[..., None, :]
+    return whole, c @ np.linalg.solve(unit, np.swapaxes(c, -1, -2))
