@@ -9,11 +9,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from truenorth.alignment import Alignment, align, align_in_motion, align_positions, align_transfer
+    from truenorth.alignment import (
+        Alignment,
+        align,
+        align_in_motion,
+        align_positions,
+        align_rotary,
+        align_transfer,
+    )
     from truenorth.calibration import Calibration
     from truenorth.campaign import run_campaign
     from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
     from truenorth.formats import (
+        read_encoder,
         read_gnss,
         read_height,
         read_imu,
@@ -63,10 +71,12 @@ _HOMES = {
     "align": "alignment",
     "align_in_motion": "alignment",
     "align_positions": "alignment",
+    "align_rotary": "alignment",
     "align_transfer": "alignment",
     "imu_spec": "specs",
     "inspect": "quality",
     "navigate": "navigation",
+    "read_encoder": "formats",
     "read_gnss": "formats",
     "read_height": "formats",
     "read_imu": "formats",
@@ -102,10 +112,12 @@ __all__ = [
     "align",
     "align_in_motion",
     "align_positions",
+    "align_rotary",
     "align_transfer",
     "imu_spec",
     "inspect",
     "navigate",
+    "read_encoder",
     "read_gnss",
     "read_height",
     "read_imu",

@@ -147,14 +147,20 @@ def test_still_base_sigmas_are_honest():
     assert sum(a.status == "aligned" for a in answers) >= 97
 
 
-def test_swaying_base_sigma_is_never_below_the_error():
+def test_swaying_base_sigma_is_honest():
+    """24 runs on an unrotated base: heading is the gyro bias, levels the accelerometers' and the plumb line's sigma.
+
+    RMS over sigma of 24 runs lies within .52 to 1.48 in 99.9 % of cases where the two are equal (levels are drawn from the
+    biases alone: the deflection of the vertical is in sigma, not in the simulated gravity).
+    """
     spec = imu_spec("navigation")
-    errors, covariance, answers = _study(SHIP, spec, 100, 300.0, rate=50.0)
+    errors, covariance, answers = _study(SHIP, spec, 24, 300.0, rate=50.0)
     rms = np.sqrt(np.mean(errors**2, axis=0))
     sigma = np.sqrt(np.mean(np.einsum("kii->ki", covariance), axis=0))
-    # 1.15 is the 95 % band of the RMS of 100 runs where the two are equal (levels are at their floor).
-    assert np.all(rms < 1.15 * sigma), (rms, sigma)
-    assert sum(a.status == "aligned" for a in answers) >= 97
+    assert np.all(rms < 1.48 * sigma), (rms, sigma)
+    assert rms[2] > 0.52 * sigma[2]
+    assert all(a.method == "swaying" for a in answers)
+    assert sum(a.status == "aligned" for a in answers) >= 23
 
 
 def test_floor_and_random_part_on_a_still_base():

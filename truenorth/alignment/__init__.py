@@ -9,12 +9,23 @@ from truenorth.alignment.moving import Moving, Wheel
 from truenorth.alignment.positions import align_positions
 from truenorth.alignment.procedure import align
 from truenorth.alignment.result import Alignment, History
+from truenorth.alignment.rotary import align_rotary
 
 if TYPE_CHECKING:
     from truenorth.alignment.in_motion import align_in_motion
     from truenorth.alignment.transfer import align_transfer
 
-__all__ = ["Alignment", "History", "Moving", "Wheel", "align", "align_in_motion", "align_positions", "align_transfer"]
+__all__ = [
+    "Alignment",
+    "History",
+    "Moving",
+    "Wheel",
+    "align",
+    "align_in_motion",
+    "align_positions",
+    "align_rotary",
+    "align_transfer",
+]
 
 # They stand on navigation, which stands on the results here: loaded when first used.
 LATER = {"align_in_motion": "truenorth.alignment.in_motion", "align_transfer": "truenorth.alignment.transfer"}

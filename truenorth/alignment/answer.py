@@ -11,10 +11,14 @@ from truenorth.alignment.bias import spec_variance, true_bias
 from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
 from truenorth.alignment.task import Task
+from truenorth.earth import EARTH_RATE, radii
 from truenorth.inertial import earth_rotation
+from truenorth.models.static import STATES
 from truenorth.specs import ImuSpec
 
 Array = NDArray[np.float64]
+
+EXCURSION = 0.3  # m, one sigma: how far the place about which a base sways may have moved over a log
 
 
 def at_epoch(
@@ -59,12 +63,26 @@ def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Arr
     )
 
 
-def make_history(task: Task, fine: FineAlignment, used: ImuSpec) -> History:
-    """How a filter came to its answer, in navigation axes."""
+def creep(task: Task, elapsed: Array | float) -> Array:
+    """(..., 3, 3) covariance of phi from a base that sways about a place which moves by `EXCURSION` in the time elapsed (s).
+
+    A constant north velocity v cannot be seen by anyone: it equals a heading error of ``v / (R w_ie cos L)``.
+    """
+    R_M, _ = radii(task.position.lat)
+    v = EXCURSION / np.asarray(elapsed, dtype=np.float64)
+    result = np.zeros((*v.shape, 3, 3))
+    result[..., 2, 2] = (v / (R_M * EARTH_RATE * math.cos(task.position.lat))) ** 2
+    return result
+
+
+def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = False) -> History:
+    """How a filter came to its answer, in navigation axes; on a base that sways with the allowance for its creep."""
     C_nb, covariance, floor = attitude_history(fine, task.position.lat)
+    if sways:
+        covariance = covariance + creep(task, fine.integrals.time[1:])
     e = fine.estimates
-    bias, variance = fine.nominal_bias + e.x[:, 6:], np.einsum("kii->ki", e.P)[:, 6:]
-    prior = np.diag(fine.system.P0)[9:]
+    bias, variance = fine.nominal_bias + e.x[:, 6:STATES], np.einsum("kii->ki", e.P)[:, 6:STATES]
+    prior = np.diag(fine.system.P0)[9:STATES]
     accel_bias, accel_sigma = true_bias(bias[:, 3:], variance[:, 3:], prior, spec_variance(used)[3:])
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],

@@ -11,13 +11,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.answer import assemble, at_epoch, make_history, pays_until, without_heading
+from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
 from truenorth.alignment.bias import spec_variance, true_bias
 from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
-from truenorth.alignment.fine import fine_align
+from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.inference import allan_noise, infer_spec, noise_of, usual_noise
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
 from truenorth.alignment.verdict import Circumstances, judge
 from truenorth.calibration import Calibration
@@ -26,17 +27,18 @@ from truenorth.coarse.uncertainty import base_velocity
 from truenorth.earth import EARTH_RATE
 from truenorth.errors import AlignmentError, UsageError
 from truenorth.inertial import integrate
-from truenorth.models.static import StaticModel
+from truenorth.models.static import STATES, StaticModel
 from truenorth.position import Position
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
-Method = Literal["auto", "analytic", "inertial", "oba", "kalman"]
+Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying"]
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
+SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be told
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
 
@@ -60,10 +62,11 @@ def align(
     position : Position
     imu : ImuSpec, str, path or mapping, optional
         Specification, a preset's name, or a YAML file. Without one the scale of the errors is inferred from the log.
-    method : {"auto", "analytic", "inertial", "oba", "kalman"}
+    method : {"auto", "analytic", "inertial", "oba", "kalman", "swaying"}
         ``analytic``: TRIAD on mean rate and specific force (still base only). ``inertial``: dual vector in the
         inertial frame. ``oba``: optimisation-based alignment. ``kalman``: coarse (oba), then a Kalman filter on
-        velocity, re-linearised. ``auto`` looks at the motion, picks, and says why.
+        velocity, re-linearised. ``swaying``: the same with the base's motion and the IMU's lever arm as states.
+        ``auto`` looks at the motion, picks, and says why.
     at : float, s, optional
         Epoch of the answer on the record's clock; the last sample when left out.
     calibration : Calibration, optional
@@ -141,14 +144,20 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
         return "analytic", (
             f"the log is {task.record.duration:.1f} s long, too short for a filter ({SHORTEST_FILTER:g} s): mean values only"
         )
+    overall = task.motion.overall
+    if overall == "still":
+        return (
+            "kalman",
+            "the base is still: the filter weighs sensor noise and bias as it should, from the first second on",
+        )
     words = {
-        "still": "the base is still: the filter weighs sensor noise and bias as it should, from the first second on",
         "disturbed": "the base is disturbed: mean rates would be off, the inertial frame is not",
         "swaying": "the base sways: mean rates mean nothing, the inertial frame follows every motion",
     }
-    return "kalman", words.get(
-        task.motion.overall, f"the base is {task.motion.overall}: only the inertial frame follows it"
-    )
+    why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
+    if overall != "swaying" or task.record.duration < SHORTEST_SWAYING:
+        return "kalman", why
+    return "swaying", f"{why}; its own motion is fitted to the log"
 
 
 def _align_analytic(task: Task, spec: ImuSpec | None) -> _Found:
@@ -190,19 +199,32 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     used, where = _specification(spec, check, noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
-    if method != "kalman":
+    if method not in ("kalman", "swaying"):
         disturbance = np.sqrt(np.mean(base_velocity(integrals, coarse.C_n0_i, lat, alt) ** 2, axis=0))
         covariance, floor = coarse_covariance(coarse, integrals, noise_of(used), P, disturbance)
         C_n0_b = coarse.C_n0_i @ task.epoch.attitude(integrals.C_ib_at[0])
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
-    fine = fine_align(task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows, integrals)
+    start = (task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows)
+    sways = method == "swaying"
+    fine = sway_align(*start) if sways else fine_align(*start, integrals)
+    return _Found(answer_of(task, fine, used, where, P, sways), check, fine.settled, detect_drift(fine))
+
+
+def answer_of(
+    task: Task, fine: FineAlignment, used: ImuSpec, where: str, P_bias: Array, sways: bool = False
+) -> Alignment:
+    """The answer of a filter at the epoch asked for, with its history."""
     C_ib = task.epoch.attitude(fine.integrals.C_ib_at[0])
     answer = at_epoch(task, used, where, *fine.misalignment_at(C_ib, task.epoch.elapsed))
-    history = make_history(task, fine, used)
-    accel_bias, accel_sigma = true_bias(fine.bias[3:], np.diag(fine.P)[9:], np.diag(P)[3:], spec_variance(used)[3:])
-    answer = replace(
+    if sways:
+        answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
+    history = make_history(task, fine, used, sways)
+    accel_bias, accel_sigma = true_bias(
+        fine.bias[3:], np.diag(fine.P)[9:STATES], np.diag(P_bias)[3:], spec_variance(used)[3:]
+    )
+    return replace(
         answer,
         gyro_bias=fine.bias[:3],
         gyro_bias_sigma=np.sqrt(np.diag(fine.P)[6:9]),
@@ -212,7 +234,6 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         history=history,
         pays_until=pays_until(history, answer, fine),
     )
-    return _Found(answer, check, fine.settled, detect_drift(fine))
 
 
 def _moves_from(motion: MotionSummary) -> float | None:

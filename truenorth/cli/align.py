@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truenorth.cli.align_rotary import Indexer, IndexerAxes, LeverArm, align_on_indexer
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
 
@@ -27,6 +28,7 @@ Examples:
   truenorth align old.csv --lat -33.9 --units deg/s,g --rate 100
   truenorth align log.csv --lat 34.246 --imu my_imu.yaml --method oba
   truenorth align turntable.csv --lat 39.98 --imu tactical --positions auto
+  truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv --indexer-axes z,x
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
@@ -45,7 +47,7 @@ def align(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[str, typer.Option(help="auto, analytic, inertial, oba or kalman.")] = "auto",
+    method: Annotated[str, typer.Option(help="auto, analytic, inertial, oba, kalman or swaying.")] = "auto",
     axes: Axes = None,
     units: Units = None,
     rate: Rate = None,
@@ -79,6 +81,9 @@ def align(
     arm_sigma: Annotated[
         float, typer.Option(help="How far the IMU may sit from the table's axes, m.", rich_help_panel="Turntable")
     ] = 0.05,
+    indexer: Indexer = None,
+    indexer_axes: IndexerAxes = "z,x",
+    lever_arm: LeverArm = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -108,7 +113,8 @@ def align(
             start=start,
             stop=stop,
         )
-        _refuse_implausible(record, position.lat, any_attitude, units_given=units is not None)
+        if indexer is None:  # which turns its IMU on its head, and fast
+            _refuse_implausible(record, position.lat, any_attitude, units_given=units is not None)
         from truenorth.alignment import align as align_record
         from truenorth.calibration import Calibration
 
@@ -118,6 +124,10 @@ def align(
             from truenorth.cli.align_positions import align_table
 
             result = align_table(positions, method, at, record, position, imu, known, arm_sigma, limit, tell)
+        elif indexer is not None:
+            result = align_on_indexer(
+                record, position, imu, indexer, indexer_axes, lever_arm, known, at=at, limit=limit, progress=tell
+            )
         else:
             result = align_record(
                 record,

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Literal
 
 from truenorth.errors import UsageError
-from truenorth.formats.aiding import read_height, read_master, read_odometer, read_trajectory, read_velocity
+from truenorth.formats.aiding import (
+    read_encoder,
+    read_height,
+    read_master,
+    read_odometer,
+    read_trajectory,
+    read_velocity,
+)
 from truenorth.formats.detect import FORMATS, format_of
 from truenorth.formats.gnss import read_gnss
 from truenorth.formats.layout import layout_for
@@ -17,6 +24,7 @@ from truenorth.records import ImuRecord, Record
 
 __all__ = [
     "FORMATS",
+    "read_encoder",
     "read_gnss",
     "read_height",
     "read_imu",

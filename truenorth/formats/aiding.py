@@ -1,4 +1,4 @@
-"""Readers of aiding logs: odometer, velocity log, GNSS receiver, master INS, trajectory, height.
+"""Readers of aiding logs: odometer, velocity log, GNSS receiver, master INS, trajectory, height, encoder.
 
 CSV (comma, semicolon, tab or blanks), Parquet, npz and mat files of named columns. A YAML file beside the log (``LOG.yaml``
 for ``LOG.csv``) may hold the same options as the call; those of the call win.
@@ -20,7 +20,7 @@ from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, columns_of, find
 from truenorth.formats.table import check_order
-from truenorth.records import HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
+from truenorth.records import EncoderRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
 Array = NDArray[np.float64]
 FilePath = str | PathLike[str]
@@ -61,6 +61,10 @@ ANGLES = (
     Quantity("roll", "angle", "deg", (), (), "attitude"),
 )
 QUATERNION = tuple(Quantity(f"q_{axis}", aliases=(f"q{axis}",)) for axis in "wxyz")
+INDEXER = tuple(
+    Quantity(f"angle_{i}", "angle", "deg", (f"axis_{i}", "angle") if i == 1 else (f"axis_{i}",), (), "angles")
+    for i in (1, 2, 3)
+)
 SENSORS = (
     *(Quantity(f"gyro_{axis}", "angular_rate", "rad/s", (), (), "gyro") for axis in "xyz"),
     *(Quantity(f"accel_{axis}", "acceleration", "m/s^2", (), (), "accel") for axis in "xyz"),
@@ -189,6 +193,27 @@ def read_velocity(
         frame=chosen,
         sigma=known(found.stack(*(f"sigma_{name}" for name in names[chosen]))),
     )
+
+
+def read_encoder(
+    path: FilePath, *, format: str | None = None, columns: Pairs | None = None, units: Pairs | None = None
+) -> EncoderRecord:
+    """Read the log of an indexer's encoder: ``time`` and ``angle_1``, ``angle_2``, ... (degrees), the outermost axis first.
+
+    Angles that jump by about a turn are counted on.
+
+    Raises
+    ------
+    UsageError, DataError
+        As for :func:`read_odometer`.
+    """
+    found, _ = open_log(path, format, (TIME, *INDEXER), {"columns": columns, "units": units})
+    names = [q.name for q in INDEXER if found.has(q.name)]
+    if not names or names != [q.name for q in INDEXER[: len(names)]]:
+        raise found.missing("time and angle_1 (with angle_2, angle_3, the outermost axis first)")
+    angles = np.unwrap(np.asarray(whole(found, *names)), axis=0)
+    record: EncoderRecord = made(found, EncoderRecord, angles=angles[:, 0] if len(names) == 1 else angles)
+    return record
 
 
 def read_height(

@@ -1,0 +1,198 @@
+"""Alignment of a base that sways, and of an IMU on an indexer: against the truth, and against what it says of itself."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from truenorth.alignment import align_rotary
+from truenorth.alignment.rotary import angles_at, angles_from_gyros
+from truenorth.attitude import rotation_vector_from_dcm
+from truenorth.cli import app
+from truenorth.earth import ecef_axes
+from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.formats import read_encoder, write_record
+from truenorth.inertial import integrate
+from truenorth.papers.rotary.truth import simulate_run
+from truenorth.position import Position
+from truenorth.records import EncoderRecord, ImuRecord
+from truenorth.simulation import Axis, C_bs_from_angles, Indexed, Indexer, Spin, rest, simulate
+
+ARCMIN = math.radians(1 / 60)
+
+
+def body_attitude(run, time):
+    """True ``C_nb`` of the body against the level at the IMU's mean place."""
+    at = run.motion.motion.states(np.asarray(time))
+    return ecef_axes(run.place.lat, run.place.lon).T @ ecef_axes(at.lat, at.lon) @ at.C_nb
+
+
+def error(answer, C_nb):
+    return -rotation_vector_from_dcm(answer.C_nb @ C_nb.T) / ARCMIN
+
+
+@pytest.fixture(scope="module")
+def ship():
+    run = simulate_run("B", 1, 3)
+    return replace(run, record=run.record.between(None, 250.001))
+
+
+@pytest.fixture(scope="module")
+def answer(ship):
+    return align_rotary(ship.record, ship.encoder, ship.place, ship.imu)
+
+
+def test_the_body_is_found(ship, answer):
+    """4 sigma of each angle; heading is known to a tenth of an arcmin, levels to the plumb line's deflection."""
+    phi = error(answer, body_attitude(ship, answer.time))
+    sigma = np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN
+    assert answer.status == "aligned", answer.reasons
+    assert np.all(np.abs(phi) < 4 * sigma), (phi, sigma)
+    assert sigma[2] < 0.15
+    assert np.all(np.abs(phi[:2]) < 0.02)
+    assert "indexer" in answer.method_reason
+
+
+def test_biases_are_told_along_the_axes_of_the_imu(ship, answer):
+    """Within 4 sigma of what was put in: the indexer tells the accelerometers' within 250 s, the gyros' in part."""
+    true = simulate_errors(ship)
+    for found, sigma, value in (
+        (answer.gyro_bias, answer.gyro_bias_sigma, true[0]),
+        (answer.accel_bias, answer.accel_bias_sigma, true[1]),
+    ):
+        assert np.all(np.abs(found - value) < 4 * sigma)
+    assert np.all(answer.accel_bias_sigma < 0.05 * np.abs(true[1]))
+
+
+def simulate_errors(ship):
+    from truenorth.papers.rotary.truth import scenario_of
+    from truenorth.simulation import given_errors
+
+    given = given_errors(scenario_of("B", 1, 3).errors, "errors")
+    return np.asarray(given["gyro_bias"]), np.asarray(given["accel_bias"])
+
+
+def test_a_known_arm_gives_the_same(ship, answer):
+    """The arm is told by the sway itself; to know it changes nothing beyond a sigma."""
+    known = align_rotary(ship.record, ship.encoder, ship.place, ship.imu, lever_arm=ship.arm)
+    apart = rotation_vector_from_dcm(known.C_nb @ answer.C_nb.T) / ARCMIN
+    assert np.all(np.abs(apart) < np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
+
+
+def test_an_earlier_epoch(ship):
+    """Between two samples, too: the body's own attitude there."""
+    middle = align_rotary(ship.record, ship.encoder, ship.place, ship.imu, at=123.4567)
+    phi = error(middle, body_attitude(ship, 123.4567))
+    assert np.all(np.abs(phi) < 4 * np.sqrt(np.diag(middle.phi_covariance)) / ARCMIN)
+
+
+def test_a_base_that_leaves_is_told(ship):
+    """A north ramp to .05 m/s over the second half."""
+    record = ship.record
+    acceleration = np.where(record.time > 125.0, 0.05 / 125.0, 0.0)[:, None] * np.array([0.0, 1.0, 0.0])
+    C_ns = ship.C_ns(record.time)
+    force = np.einsum("kji,kj->ki", C_ns, acceleration)
+    leaving = ImuRecord(record.time, record.gyro, record.accel + force * record.interval, "increments")
+    found = align_rotary(leaving, ship.encoder, ship.place, ship.imu)
+    assert found.status == "inconsistent"
+    assert any("drifts north" in reason for reason in found.reasons)
+
+
+@pytest.fixture(scope="module")
+def still():
+    position = Position.from_degrees(40.0, 118.0)
+    spin = (Axis("z", Spin(math.radians(18.0))), Axis("x", Spin(math.radians(3.0))))
+    motion = Indexed(rest(position, 0.7, 0.05, -0.03), Indexer(spin))
+    return simulate(motion, rate=50.0, duration=120.0, imu=simulate_run_spec(), seed=5), position
+
+
+def simulate_run_spec():
+    from truenorth.specs import imu_spec
+
+    return imu_spec("navigation")
+
+
+def test_angles_from_the_gyros_of_a_still_body(still):
+    simulation, position = still
+    found = align_rotary(simulation.record, None, position, "navigation")
+    C_nb = simulation.motion.motion.states(np.array(0.0)).C_nb
+    phi = error(found, C_nb)
+    assert np.all(np.abs(phi) < 4 * np.sqrt(np.diag(found.phi_covariance)) / ARCMIN)
+    integrals = integrate(simulation.record, 1.0)
+    angles, off = angles_from_gyros(integrals, C_nb, position.lat, ("z", "x"))
+    # Scale factors of 5 ppm on 38 rad; 4 sigma.
+    np.testing.assert_allclose(angles, simulation.motion.indexer.angles(integrals.time), atol=4 * 5e-6 * 38)
+    assert off < 4 * 5e-6 * 38
+
+
+@pytest.mark.parametrize("axes", ["zx", "xz", "yx", "zy", "z"])
+def test_angles_of_any_two_axes(axes):
+    """On a body that does not turn at all: the angles come back."""
+    from types import SimpleNamespace
+
+    rng = np.random.default_rng(2)
+    angles = np.cumsum(rng.uniform(-0.6, 0.6, (50, len(axes))), axis=0)
+    angles -= angles[0]
+    integrals = SimpleNamespace(time=np.zeros(50), C_ib=C_bs_from_angles(axes, angles))
+    found, off = angles_from_gyros(integrals, np.eye(3), 0.6, tuple(axes))
+    np.testing.assert_allclose(found, angles, atol=1e-9)
+    assert off < 1e-6
+
+
+def test_a_body_without_encoder_that_is_not_still_is_refused(ship):
+    with pytest.raises(DataError, match="give the encoder's log"):
+        align_rotary(ship.record.between(None, 100.0), None, ship.place, ship.imu)
+
+
+def test_angles_between_and_just_beyond_the_rows():
+    encoder = EncoderRecord(np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 4.0]), "e")
+    np.testing.assert_allclose(angles_at(encoder, [0.0, 0.15, 0.35], ("z",))[:, 0], [0.0, 1.5, 5.0])
+    with pytest.raises(DataError, match="expected the encoder's log to cover"):
+        angles_at(encoder, [0.0, 9.0], ("z",))
+    with pytest.raises(UsageError, match="outermost first"):
+        angles_at(encoder, [0.1], ("z", "x"))
+
+
+def test_mistakes_are_told(ship):
+    with pytest.raises(AlignmentError, match="record longer"):
+        align_rotary(ship.record.between(None, 30.0), ship.encoder, ship.place, ship.imu)
+    with pytest.raises(UsageError, match="three numbers"):
+        align_rotary(ship.record, ship.encoder, ship.place, ship.imu, lever_arm=[1.0, 2.0])
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "npz"])
+def test_an_encoder_is_read_back(ship, tmp_path, suffix):
+    path = tmp_path / f"encoder.{suffix}"
+    encoder = EncoderRecord(ship.encoder.time[:2000], ship.encoder.angles[:2000], "e")
+    write_record(encoder, path)
+    found = read_encoder(path)
+    np.testing.assert_allclose(found.angles, encoder.angles, atol=1e-12)
+    single = EncoderRecord(encoder.time, encoder.angles[:, 0], "e")
+    write_record(single, path)
+    assert read_encoder(path).angles.ndim == 1
+
+
+def test_wrapped_angles_are_counted_on(tmp_path):
+    (tmp_path / "e.csv").write_text("time,angle_1\n0.1,350\n0.2,355\n0.3,1\n0.4,6\n")
+    np.testing.assert_allclose(np.degrees(read_encoder(tmp_path / "e.csv").angles), [350, 355, 361, 366])
+    (tmp_path / "bad.csv").write_text("time,angle_2\n0.1,350\n0.2,355\n")
+    with pytest.raises(DataError, match="angle_1"):
+        read_encoder(tmp_path / "bad.csv")
+
+
+def test_the_command(ship, tmp_path):
+    for name, record in (("imu.parquet", ship.record), ("encoder.parquet", ship.encoder)):
+        write_record(record, tmp_path / name)
+    arguments = ["align", str(tmp_path / "imu.parquet"), "--lat", repr(math.degrees(ship.place.lat)), "--json"]
+    more = ["--indexer", str(tmp_path / "encoder.parquet"), "--lever-arm", "10,30,10", "--to", "120"]
+    result = CliRunner().invoke(app, arguments + more)
+    assert result.exit_code == 0, result.output
+    summary = json.loads(result.stdout)
+    C = body_attitude(ship, 120.0)
+    heading = math.degrees(math.atan2(C[0, 1], C[1, 1])) % 360.0
+    assert abs(summary["heading_deg"] - heading) < 4 * summary["heading_sigma_deg"]
+    wrong = CliRunner().invoke(app, [*arguments, "--indexer", "gyros", "--lever-arm", "10,x"])
+    assert isinstance(wrong.exception, UsageError)

@@ -1,0 +1,240 @@
+"""`align_rotary`: attitude of the body that carries an IMU on an indexer (a rotary SINS).
+
+The IMU's own attitude is found as that of any IMU on a base that sways: in the inertial frame its turning is motion like any
+other, and it turns the biases about, so that they average out or can be told. The encoder ties the IMU to the body, at the epoch
+of the answer and wherever the body's lever arm moves the IMU.
+
+Without an encoder the angles can be read from the gyros where the body is still: it turns with the earth alone, and what the
+gyros show beside that is the indexer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.check import LogCheck
+from truenorth.alignment.drift import detect_drift
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.inference import noise_of
+from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
+from truenorth.alignment.result import Alignment
+from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
+from truenorth.alignment.task import Task, bridged, make_task
+from truenorth.alignment.verdict import Circumstances, judge
+from truenorth.coarse import oba
+from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
+from truenorth.position import Position
+from truenorth.records import EncoderRecord, ImuRecord
+from truenorth.simulation.indexer import C_bs_from_angles
+from truenorth.specs import ImuSpec, imu_spec
+
+Array = NDArray[np.float64]
+
+SHORTEST = 60.0  # s: below that sway cannot be told from tilt
+KNOWN_ARM = 0.1  # m, one sigma along each axis of an arm that was measured
+COVER = 0.05  # s by which an encoder's log may begin late or end early
+OFF_AXIS = math.radians(0.5)  # of a body that is said to be still, and an indexer of two axes
+
+
+def align_rotary(
+    record: ImuRecord,
+    encoder: EncoderRecord | None,
+    position: Position,
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any] = "navigation",
+    *,
+    axes: Sequence[str] = ("z", "x"),
+    lever_arm: ArrayLike | None = None,
+    at: float | None = None,
+    heading_limit: float = HEADING_LIMIT,
+    progress: Callable[[str], None] | None = None,
+) -> Alignment:
+    """Find pitch, roll and true heading of a body that carries an IMU on an indexer, still or swaying.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        Of the IMU, its own axes; at angles of zero they are the body's (RFU).
+    encoder : EncoderRecord or None
+        Angles of the indexer, over the whole record. None: the body is still, its axes are the IMU's at the record's beginning.
+    position : Position
+    imu : ImuSpec, str, path or mapping
+        Specification, a preset's name, or a YAML file.
+    axes : sequence of {"x", "y", "z"}
+        Of the indexer, the outermost first.
+    lever_arm : (3,) array, m, optional
+        From the body's centre of rotation to the IMU, body axes; estimated where it is left out.
+    at, heading_limit, progress
+        As in :func:`truenorth.align`.
+
+    Returns
+    -------
+    Alignment
+        Attitude of the body; biases along the IMU's axes.
+
+    Raises
+    ------
+    UsageError
+        Axes that do not fit the angles, or a lever arm that is none.
+    DataError
+        The encoder's log does not cover the record, or a body without encoder that is not still.
+    AlignmentError
+        Too short a record.
+    """
+    tell = progress or (lambda stage: None)
+    spec = imu_spec(imu).with_random_walks(record.interval)
+    record = bridged(record)
+    if record.duration < SHORTEST:
+        raise AlignmentError(
+            f"{record.source}: {record.duration:.1f} s; a base that may sway needs {SHORTEST:g} s at least: record longer"
+        )
+    task = make_task(record, position, at)
+    rows = np.array([task.epoch.row])
+    coarse = integrate(record, task.interval, rows_at=rows)
+    C_n0_i = oba(coarse, position.lat, position.alt).C_n0_i
+    tell("aligning: swaying")
+    P_bias = np.diag(spec_variance(spec)) + _place_covariance(task, spec)
+    if encoder is None:
+        mount = Mount(np.zeros(3))
+    else:
+        angles = angles_at(encoder, coarse.start + coarse.time, axes)
+        C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
+        mount = Mount(*_arm(lever_arm), C_sb)
+    fine = sway_align(record, C_n0_i, position, noise_of(spec), P_bias, task.interval, rows, mount)
+    source = f"specification {spec.name!r}"
+    answer = answer_of(task, fine, spec, source, P_bias, sways=True)
+
+    if encoder is None:
+        C_sb_at = _still_body(task, fine, axes)
+        how = "angles from the gyros of a still body"
+    else:
+        C_sb_at = C_bs_from_angles(axes, angles_at(encoder, np.array([task.epoch.time]), axes))[0].T
+        how = f"angles of {len(axes)} axes from {encoder.source}"
+    if answer.history is not None and mount.C_sb is not None:
+        answer = replace(answer, history=replace(answer.history, C_nb=answer.history.C_nb @ mount.C_sb[1:]))
+    answer = replace(
+        answer,
+        C_nb=answer.C_nb @ C_sb_at,
+        method="swaying",
+        method_reason=f"the IMU turns on an indexer ({how}), the base may sway: its own motion is fitted to the log",
+    )
+    around = Circumstances(heading_limit, _nothing_to_check(), None, fine.settled, detect_drift(fine))
+    return answer.with_verdict(*judge(answer, around))
+
+
+def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:
+    """(K, A) angles of an encoder at times (s), rad; straight lines between its rows.
+
+    Raises
+    ------
+    UsageError
+        Axes that do not fit its columns.
+    DataError
+        Times that its log does not cover.
+    """
+    time = np.asarray(time, dtype=np.float64)
+    angles = encoder.angles if encoder.angles.ndim == 2 else encoder.angles[:, None]
+    if angles.shape[1] != len(axes) or not set(axes) <= set("xyz"):
+        raise UsageError(
+            f"axes {','.join(axes)} for {angles.shape[1]} angle(s) in {encoder.source}; expected one of x, y and z for each "
+            "angle, the outermost first, such as z,x"
+        )
+    slack = COVER + 1.5 * float(np.median(np.diff(encoder.time)))
+    if time.min() < encoder.time[0] - slack or time.max() > encoder.time[-1] + slack:
+        raise DataError(
+            f"{encoder.source}: angles from {encoder.time[0]:.3f} s to {encoder.time[-1]:.3f} s, wanted from {time.min():.3f} s to "
+            f"{time.max():.3f} s: expected the encoder's log to cover the IMU's; cut the IMU's log (--from, --to)"
+        )
+    columns = [np.interp(time, encoder.time, column) for column in angles.T]
+    # Beyond its ends by a row at most: on along the first or last two rows.
+    for column, given in zip(columns, angles.T, strict=True):
+        for outside, (a, b) in ((time < encoder.time[0], (0, 1)), (time > encoder.time[-1], (-2, -1))):
+            slope = (given[b] - given[a]) / (encoder.time[b] - encoder.time[a])
+            edge = 0 if a == 0 else -1
+            column[outside] = given[edge] + slope * (time[outside] - encoder.time[edge])
+    return np.stack(columns, axis=-1)
+
+
+def angles_from_gyros(
+    integrals: InertialIntegrals, C_n0_i: Array, lat: float, axes: Sequence[str]
+) -> tuple[Array, float]:
+    """Angles of an indexer of one or two axes on a still body, read from the gyros.
+
+    Parameters
+    ----------
+    integrals : InertialIntegrals
+    C_n0_i : (3, 3) array
+        Attitude of the IMU at the beginning, which is the body's.
+    lat : float, rad
+    axes : sequence of {"x", "y", "z"}
+
+    Returns
+    -------
+    angles : (K+1, A) array, rad
+    off_axis : float, rad
+        Largest turn that is none about these axes.
+    """
+    # The body stays as it is in n: C_n0_b(t) = C_n0_n(t) C_n0_i, and C_bs = C_b_n0 C_n0_i C_is.
+    C_n0_b = earth_rotation(integrals.time, lat) @ C_n0_i
+    C_bs = np.swapaxes(C_n0_b, 1, 2) @ C_n0_i @ integrals.C_ib
+    if len(axes) == 1:
+        i = "xyz".index(axes[0])
+        j, k = (i + 1) % 3, (i + 2) % 3
+        angles = np.unwrap(np.arctan2(C_bs[:, k, j], C_bs[:, j, j]))[:, None]
+    else:
+        outer, inner = ("xyz".index(axis) for axis in axes)
+        # C_bs = R_outer(a) R_inner(b): the inner axis is turned by a alone, the outer one, seen from s, by b.
+        third = 3 - outer - inner
+        sign = 1.0 if (outer + 1) % 3 == inner else -1.0
+        a = np.arctan2(sign * C_bs[:, third, inner], C_bs[:, inner, inner])
+        b = np.arctan2(sign * C_bs[:, outer, third], C_bs[:, outer, outer])
+        angles = np.unwrap(np.stack([a, b], axis=1), axis=0)
+    again = C_bs_from_angles(axes, angles)
+    cosine = (np.einsum("kij,kij->k", again, C_bs) - 1.0) / 2.0
+    off = float(np.max(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    return angles, off
+
+
+def _still_body(task: Task, fine: FineAlignment, axes: Sequence[str]) -> Array:
+    """``C_sb`` at the epoch of a body that is still: back to its attitude at the record's beginning."""
+    lat = task.position.lat
+    C_n0_i = fine.misalignment_at(np.eye(3), 0.0)[0]
+    _, off = angles_from_gyros(fine.integrals, C_n0_i, lat, axes)
+    if off > OFF_AXIS:
+        raise DataError(
+            f"{task.record.source}: the gyros show turns of {np.degrees(off):.2f} deg that are none about the axes "
+            f"{','.join(axes)}; angles can be read from the gyros where the body is still and the axes are these: give the "
+            "encoder's log"
+        )
+    C_n0_s = fine.misalignment_at(task.epoch.attitude(fine.integrals.C_ib_at[0]), task.epoch.elapsed)[0]
+    C_n0_b = earth_rotation(task.epoch.elapsed, lat) @ C_n0_i
+    return np.asarray(C_n0_s.T @ C_n0_b)
+
+
+def _arm(given: ArrayLike | None) -> tuple[Array, float]:
+    if given is None:
+        return np.zeros(3), ARM_PRIOR
+    arm = np.asarray(given, dtype=np.float64)
+    if arm.shape != (3,) or not np.all(np.isfinite(arm)):
+        raise UsageError(f"lever arm {given!r}; expected three numbers (right, forward, up), m")
+    return arm, KNOWN_ARM
+
+
+def _place_covariance(task: Task, spec: ImuSpec) -> Array:
+    """(6, 6) what an accelerometer's scale factor and misalignment act as on an IMU that may lie any way."""
+    P = np.zeros((6, 6))
+    P[3:, 3:] = (spec.accel_scale_factor**2 + spec.accel_misalignment**2) * task.gravity**2 * np.eye(3)
+    return P
+
+
+def _nothing_to_check() -> LogCheck:
+    """An indexer makes the biases known; what the log shows of them along north and up is no contradiction."""
+    return LogCheck(np.zeros(2), np.full(2, np.inf), 0.0, math.inf)

@@ -1,0 +1,87 @@
+"""`truenorth align --indexer`: a log of an IMU that turns on an indexer, and the angles of its encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment
+    from truenorth.calibration import Calibration
+    from truenorth.position import Position
+    from truenorth.records import ImuRecord
+
+PANEL = "IMU on an indexer"
+GYROS = "gyros"
+Indexer = Annotated[
+    str | None,
+    typer.Option(
+        "--indexer",
+        help="Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns.",
+        show_default=False,
+        rich_help_panel=PANEL,
+    ),
+]
+IndexerAxes = Annotated[
+    str, typer.Option("--indexer-axes", help="Axes of the indexer, the outermost first.", rich_help_panel=PANEL)
+]
+LeverArm = Annotated[
+    str | None,
+    typer.Option(
+        "--lever-arm",
+        help="Right, forward, up from the body's centre of rotation to the IMU, m; estimated without it.",
+        show_default=False,
+        rich_help_panel=PANEL,
+    ),
+]
+
+
+def align_on_indexer(
+    record: ImuRecord,
+    position: Position,
+    imu: str | None,
+    indexer: str,
+    axes: str,
+    lever_arm: str | None,
+    calibration: Calibration | None,
+    *,
+    at: float | None,
+    limit: float,
+    progress: Callable[[str], None],
+) -> Alignment:
+    """Read the encoder's log and align the body."""
+    from truenorth.alignment.rotary import align_rotary
+    from truenorth.formats import read_encoder
+
+    if calibration is not None:
+        record = calibration.apply(record)
+    encoder = None
+    if indexer != GYROS:
+        progress(f"reading {Path(indexer).name}")
+        encoder = read_encoder(indexer)
+    return align_rotary(
+        record,
+        encoder,
+        position,
+        imu or "navigation",
+        axes=tuple(axes.replace(" ", "").lower().replace(",", "")),
+        lever_arm=None if lever_arm is None else _numbers(lever_arm),
+        at=at,
+        heading_limit=limit,
+        progress=progress,
+    )
+
+
+def _numbers(text: str) -> list[float]:
+    from truenorth.errors import UsageError
+
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 3:
+        raise UsageError(f"--lever-arm {text!r}: expected three numbers in metres, such as 10,30,10")
+    return values
