@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from truenorth.alignment import (
         Alignment,
+        advise,
         align,
         align_in_motion,
         align_positions,
@@ -68,6 +69,7 @@ _HOMES = {
     "TruenorthError": "errors",
     "UsageError": "errors",
     "VelocityRecord": "records",
+    "advise": "alignment",
     "align": "alignment",
     "align_in_motion": "alignment",
     "align_positions": "alignment",
@@ -109,6 +111,7 @@ __all__ = [
     "TruenorthError",
     "UsageError",
     "VelocityRecord",
+    "advise",
     "align",
     "align_in_motion",
     "align_positions",

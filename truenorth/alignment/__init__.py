@@ -12,6 +12,7 @@ from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.rotary import align_rotary
 
 if TYPE_CHECKING:
+    from truenorth.alignment.advice import advise
     from truenorth.alignment.in_motion import align_in_motion
     from truenorth.alignment.transfer import align_transfer
 
@@ -20,6 +21,7 @@ __all__ = [
     "History",
     "Moving",
     "Wheel",
+    "advise",
     "align",
     "align_in_motion",
     "align_positions",
@@ -27,8 +29,12 @@ __all__ = [
     "align_transfer",
 ]
 
-# They stand on navigation, which stands on the results here: loaded when first used.
-LATER = {"align_in_motion": "truenorth.alignment.in_motion", "align_transfer": "truenorth.alignment.transfer"}
+# They stand on navigation or simulation, which stand on the results here: loaded when first used.
+LATER = {
+    "advise": "truenorth.alignment.advice",
+    "align_in_motion": "truenorth.alignment.in_motion",
+    "align_transfer": "truenorth.alignment.transfer",
+}
 
 
 def __getattr__(name: str) -> Any:

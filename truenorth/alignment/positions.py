@@ -201,7 +201,7 @@ def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:
     )
 
 
-def _prior(spec: ImuSpec, position: Position, arm_sigma: float) -> Array:
+def prior_covariance(spec: ImuSpec, position: Position, arm_sigma: float) -> Array:
     """(33, 33) covariance before the first interval."""
     sigma = np.zeros(turntable.STATES)
     sigma[PHI] = LEVEL_PRIOR, LEVEL_PRIOR, HEADING_PRIOR
@@ -225,7 +225,7 @@ def _fine(
     lat, alt = task.position.lat, task.position.alt
     model: StaticModel = noise_of(spec)
     rows = np.array([task.epoch.row])
-    P0 = _prior(spec, task.position, arm_sigma)
+    P0 = prior_covariance(spec, task.position, arm_sigma)
     expected = np.zeros(turntable.STATES)
     if rest is not None:
         expected[6:9], P0[6:9, 6:9] = _bias_at_rest(rest, lat)

@@ -1,4 +1,4 @@
-"""The command line: `truenorth align`, `inspect`, `navigate`, `simulate`, `campaign`, `tune`, `reproduce`.
+"""The command line: `truenorth align`, `advise`, `inspect`, `navigate`, `simulate`, `campaign`, `tune`, `reproduce`.
 
 Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
@@ -12,6 +12,7 @@ import sys
 import typer
 
 from truenorth import __version__
+from truenorth.cli.advise import advise
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.inspect import inspect
@@ -33,6 +34,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("align")(align)
+app.command("advise")(advise)
 app.command("inspect")(inspect)
 app.command("navigate")(navigate)
 app.command("simulate")(simulate)

@@ -84,6 +84,14 @@ def align(
     indexer: Indexer = None,
     indexer_axes: IndexerAxes = "z,x",
     lever_arm: LeverArm = None,
+    advise: Annotated[
+        float | None,
+        typer.Option(
+            help="A wanted one-sigma of heading, deg: say how long, and in which positions, this IMU on this base needs for it.",
+            rich_help_panel="Turntable",
+            show_default=False,
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -149,10 +157,18 @@ def align(
             result = replace(result, inspection=inspect(record, position.lat))
             tell("writing the report")
             paths = result.save(output)
+    advice = None
+    if advise is not None:
+        from truenorth.cli.advise import advice_after, print_advice
+
+        advice = advice_after(result, advise)
     if as_json:
-        print(json.dumps(result.summary(), allow_nan=False))
+        more = {} if advice is None else {"advice": advice.summary()}
+        print(json.dumps(result.summary() | more, allow_nan=False))
     else:
         _print(result, paths)
+        if advice is not None:
+            print_advice(make_console(), advice)
     if result.status not in ("aligned", "level_only"):
         raise typer.Exit(4)
 

@@ -72,7 +72,8 @@ def linearise(
     LinearSystem
     """
     n = static.STATES
-    core = model.linearise(integrals, C_n0_i, lat, alt, P0[:n, :n], np.zeros(3))
+    least = R.min(axis=0)
+    core = model.linearise(integrals, C_n0_i, lat, alt, P0[:n, :n], least)
     T = integrals.intervals[:, None, None]
     gyro, accel = _moments(record, integrals)
     C_n_n0 = np.swapaxes(earth_rotation((integrals.time[1:] + integrals.time[:-1]) / 2, lat), 1, 2)
@@ -97,7 +98,7 @@ def linearise(
     Q[:, :n, :n] = core.Q
     assert core.S is not None
     S[:, :n] = core.S
-    return replace(core, Phi=Phi, Q=Q, H=H, R=core.R + R[:, None] * np.eye(3), S=S, x0=x0, P0=P0)
+    return replace(core, Phi=Phi, Q=Q, H=H, R=core.R + (R - least)[:, None] * np.eye(3), S=S, x0=x0, P0=P0)
 
 
 def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_matrix: Array) -> ImuRecord:

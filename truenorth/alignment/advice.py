@@ -1,0 +1,321 @@
+"""How long, and in which positions, to reach a wanted heading: covariance analysis before any data are recorded.
+
+The filter of `align_positions` is run on the log that an ideal IMU would give in each scheme of positions, for its covariance
+alone: what the specification allows, over time. An error budget says which source is in the way.
+
+Source: A. Gelb (ed.), *Applied Optimal Estimation*, 1974, chapter 7 (covariance analysis, error budgets).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.inference import noise_of
+from truenorth.alignment.positions import ARM_SIGMA, SHORTEST_POSITION, prior_covariance
+from truenorth.alignment.task import DEFLECTION
+from truenorth.analysis.error_budget import Source, error_budget
+from truenorth.errors import UsageError
+from truenorth.filters import LinearSystem, kalman
+from truenorth.inertial import earth_rotation, integrate
+from truenorth.models import turntable
+from truenorth.models.static import BA, BG, DV, PHI, StaticModel
+from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX
+from truenorth.position import Position
+from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
+from truenorth.simulation.sensing import Moving
+from truenorth.specs import ImuSpec, imu_spec
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+# Turns about the vertical between positions that share the time equally, deg.
+SCHEMES: dict[str, tuple[float, ...]] = {
+    "one position": (),
+    "two positions, 180 deg apart": (180.0,),
+    "four positions, 90 deg apart": (90.0, 90.0, 90.0),
+}
+SLEW = math.radians(10.0)  # rad/s
+SHORTEST, LONGEST, TIMES = 60.0, 3600.0, 9  # s, and how many lengths are tried between
+EPOCHS = 240  # of the filter, at least 1 s each
+IDEAL_RATE = 5.0  # Hz
+DISTURBANCE = 1e-4  # m/s: RMS velocity of a quiet base, over one second
+
+
+@dataclass(frozen=True)
+class SchemeAdvice:
+    """What one scheme of positions reaches.
+
+    Attributes
+    ----------
+    name : str
+    time : (N,) array, s
+        Lengths of data, turns included.
+    sigma : (N,) array, rad
+        One-sigma of heading after each.
+    reached : float or None, s
+        Length after which the wanted sigma is reached; None if not within the longest.
+    share : mapping of str to float
+        Part of each error source in the variance of heading, at `reached` or else at `least`; greatest first.
+    """
+
+    name: str
+    time: Array
+    sigma: Array
+    reached: float | None
+    share: Mapping[str, float]
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """Length (s) with the smallest sigma (rad), and that: of biases that wander, more data is not always better."""
+        k = int(np.argmin(self.sigma))
+        return float(self.time[k]), float(self.sigma[k])
+
+
+@dataclass(frozen=True)
+class Advice:
+    """How to reach a heading.
+
+    Attributes
+    ----------
+    wanted : float, rad
+        One-sigma of heading.
+    imu : ImuSpec
+    position : Position
+    disturbance : float, m/s
+    schemes : tuple of SchemeAdvice
+    """
+
+    wanted: float
+    imu: ImuSpec
+    position: Position
+    disturbance: float
+    schemes: tuple[SchemeAdvice, ...]
+
+    @property
+    def best(self) -> SchemeAdvice | None:
+        """The scheme that reaches the wanted sigma first; None if none does."""
+        reaching = [scheme for scheme in self.schemes if scheme.reached is not None]
+        return min(reaching, key=lambda scheme: scheme.reached or 0.0, default=None)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The advice, scheme by scheme, the answer first."""
+        lines = []
+        best = self.best
+        if best is not None:
+            lines.append(f"{_angle(self.wanted)} of heading (one sigma): {best.name}, {best.reached:.0f} s in all")
+        else:
+            least = min(self.schemes, key=lambda scheme: scheme.least[1])
+            lines.append(
+                f"{_angle(self.wanted)} of heading (one sigma) is out of reach of IMU {self.imu.name!r} within "
+                f"{least.time[-1]:.0f} s: {least.name} come nearest, {_angle(least.least[1])} after {least.least[0]:.0f} s; in "
+                f"the way: {next(iter(least.share))}"
+            )
+        for scheme in self.schemes:
+            what, part = next(iter(scheme.share.items()))
+            where = f"{scheme.reached:.0f} s" if scheme.reached is not None else "not reached"
+            time, sigma = scheme.least
+            lines.append(
+                f"{scheme.name}: {where}; at best {_angle(sigma)}, after {time:.0f} s; {part:.0%} of the variance "
+                f"{'then' if scheme.reached is not None else 'there'} is {what}"
+            )
+        return tuple(lines)
+
+    def summary(self) -> dict[str, Any]:
+        """One dictionary in datasheet units, ready for JSON."""
+        return {
+            "wanted_heading_sigma_deg": math.degrees(self.wanted),
+            "imu": self.imu.name,
+            "lat_deg": math.degrees(self.position.lat),
+            "disturbance_m_s": self.disturbance,
+            "best": None if self.best is None else self.best.name,
+            "time_s": None if self.best is None else self.best.reached,
+            "schemes": [
+                {
+                    "name": scheme.name,
+                    "time_s": scheme.time.tolist(),
+                    "heading_sigma_deg": np.degrees(scheme.sigma).tolist(),
+                    "reached_s": scheme.reached,
+                    "share": dict(scheme.share),
+                }
+                for scheme in self.schemes
+            ],
+        }
+
+    def plot(self) -> Figure:
+        """Sigma of heading over the length of data in each scheme, and what it is made of."""
+        from truenorth.figures.advice import plot_advice
+
+        return plot_advice(self)
+
+
+def advise(
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any],
+    position: Position,
+    heading_sigma: float,
+    *,
+    disturbance: float = DISTURBANCE,
+    longest: float = LONGEST,
+    rate: float = 100.0,
+    schemes: Mapping[str, Sequence[float]] = SCHEMES,
+    arm_sigma: float = ARM_SIGMA,
+) -> Advice:
+    """Say how long, and in which positions, an IMU needs for a wanted heading.
+
+    Parameters
+    ----------
+    imu : ImuSpec, str, path or mapping
+    position : Position
+    heading_sigma : float, rad
+        Wanted one-sigma.
+    disturbance : float, m/s
+        RMS of the base's own velocity, its mean over one second, white.
+    longest : float, s
+        Of the lengths that are looked at.
+    rate : float, Hz
+        Of the IMU: noise that a specification gives for each sample is spread over it.
+    schemes : mapping of str to sequence of float, deg
+        Turns about the vertical between positions that share the time equally.
+    arm_sigma : float, m
+        How far the IMU may sit from the table's axis.
+
+    Returns
+    -------
+    Advice
+
+    Raises
+    ------
+    UsageError
+        A sigma, disturbance or length that makes no sense.
+    """
+    for name, value, least in (
+        ("heading_sigma", heading_sigma, 0.0),
+        ("disturbance", disturbance, 0.0),
+        ("rate", rate, 0.0),
+        ("longest", longest, 2 * SHORTEST),
+    ):
+        if not (math.isfinite(value) and value > least):
+            raise UsageError(f"advise: {name} is {value:g}; expected a number above {least:g}")
+    if not schemes:
+        raise UsageError("advise: no schemes; expected one at least, such as {'two positions': (180,)}")
+    spec = imu_spec(imu).with_random_walks(1.0 / rate)
+    found = []
+    for name, turns in schemes.items():
+        time = np.geomspace(SHORTEST, longest, TIMES)
+        lengths = [_Scheme(spec, position, turns, T, disturbance, arm_sigma) for T in time.tolist()]
+        sigma = np.sqrt([length.heading_variance() for length in lengths])
+        reached = _first(time, sigma, heading_sigma)
+        at = lengths[int(np.argmin(sigma))]
+        if reached is not None:
+            at = _Scheme(spec, position, turns, reached, disturbance, arm_sigma)
+        found.append(SchemeAdvice(name, time, sigma, reached, at.shares()))
+    return Advice(heading_sigma, spec, position, disturbance, tuple(found))
+
+
+class _Scheme:
+    """The filter's model of an ideal log of a scheme of some length."""
+
+    def __init__(
+        self, spec: ImuSpec, position: Position, turns: Sequence[float], T: float, disturbance: float, arm_sigma: float
+    ) -> None:
+        self.position, self.T = position, T
+        self.P0 = prior_covariance(spec, position, arm_sigma)
+        self.model = noise_of(spec)
+        self.record = simulate(_motion(position, turns, T), rate=IDEAL_RATE, duration=T).record
+        self.integrals = integrate(self.record, max(1.0, T / EPOCHS))
+        self.base = np.tile((disturbance**2 / self.integrals.intervals)[:, None], (1, 3))
+
+    def system(self, model: StaticModel) -> LinearSystem:
+        """With some noise of the sensors."""
+        C, lat, alt = rest(self.position).states(np.array(0.0)).C_nb, self.position.lat, self.position.alt
+        x0 = np.zeros(turntable.STATES)
+        return turntable.linearise(model, self.record, self.integrals, C, lat, alt, self.P0, self.base, x0)
+
+    def heading_variance(self) -> float:
+        """At the end, deflection of the vertical included, rad^2."""
+        P = kalman(self.system(self.model), innovations=False).state.P
+        return self.about_vertical(P) + _deflected(self.position)
+
+    def shares(self) -> dict[str, float]:
+        """Parts of the sources in the variance of heading at the end, greatest first."""
+        budget = error_budget(self.system(self.model), self.sources())
+        parts = {name: self.about_vertical(P[-1]) for name, P in zip(budget.sources, budget.P, strict=True)}
+        parts["deflection of the vertical"] = _deflected(self.position)
+        total = sum(parts.values())
+        return {name: part / total for name, part in sorted(parts.items(), key=lambda item: -item[1])}
+
+    def sources(self) -> dict[str, Source]:
+        """What the model is made of."""
+        parts = {
+            "initial attitude and velocity": (PHI, DV),
+            "gyro bias": (BG,),
+            "accelerometer bias": (BA,),
+            "gyro scale factors and misalignments": (GYRO_MATRIX,),
+            "accelerometer scale factors and misalignments": (ACCEL_MATRIX,),
+            "lever arm": (ARM,),
+        }
+        sources = {name: Source(P0=_part(self.P0, slices)) for name, slices in parts.items()}
+        names = ("gyro noise", "accelerometer noise", "gyro bias instability", "accelerometer bias instability")
+        base = self.base[:, None] * np.eye(3)
+        for name, which, walk in zip(names, np.eye(4), astuple(self.model), strict=True):
+            one = self.system(StaticModel(*(walk * which).tolist()))
+            sources[name] = Source(Q=one.Q, R=one.R - base, S=one.S)
+        sources["motion of the base"] = Source(R=base)
+        return sources
+
+    def about_vertical(self, P: Array) -> float:
+        """Variance of phi about the vertical of the end, of a covariance of states in n0."""
+        up = earth_rotation(self.T, self.position.lat)[:, 2]
+        return float(up @ P[PHI, PHI] @ up)
+
+
+def _motion(position: Position, turns: Sequence[float], T: float) -> Moving:
+    if not turns:
+        return rest(position)
+    slews = sum(abs(math.radians(turn)) / SLEW + 0.5 for turn in turns)
+    dwell = (T - slews) / (len(turns) + 1)
+    if dwell < SHORTEST_POSITION:
+        raise UsageError(
+            f"advise: {len(turns) + 1} positions in {T:.0f} s leave {dwell:.1f} s for each; expected "
+            f"{SHORTEST_POSITION:g} s at least"
+        )
+    angles = [(0, math.radians(turn)) for turn in turns]
+    (axis,) = steps(angles, dwell=dwell, duration=T, rate=SLEW, start=(0.0,))
+    return Indexed(rest(position), Indexer((Axis("z", axis),)))
+
+
+def _part(P0: Array, slices: Sequence[slice]) -> Array:
+    part = np.zeros_like(P0)
+    for here in slices:
+        part[here, here] = P0[here, here]
+    return part
+
+
+def _deflected(position: Position) -> float:
+    return float((DEFLECTION * math.tan(position.lat)) ** 2)
+
+
+def _first(time: Array, sigma: Array, wanted: float) -> float | None:
+    """When the curve first comes down to `wanted`, by a power law between neighbours."""
+    below = np.flatnonzero(sigma <= wanted)
+    if below.size == 0:
+        return None
+    k = int(below[0])
+    if k == 0:
+        return float(time[0])
+    x, y = np.log(time[k - 1 : k + 1]), np.log(sigma[k - 1 : k + 1])
+    return float(np.exp(x[0] + (math.log(wanted) - y[0]) * (x[1] - x[0]) / (y[1] - y[0])))
+
+
+def _angle(x: float) -> str:
+    degrees = math.degrees(x)
+    return f"{degrees:.2f} deg" if degrees >= 0.5 else f"{60 * degrees:.2f} arcmin"

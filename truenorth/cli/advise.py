@@ -1,0 +1,106 @@
+"""`truenorth advise`, and `--advise` of `truenorth align`: how long, and in which positions, for a wanted heading."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from truenorth.cli.console import make_console, stages
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from truenorth.alignment import Alignment
+    from truenorth.alignment.advice import Advice
+
+# The \b keeps the lines as they are, ready to be copied.
+EXAMPLES = """
+\b
+Examples:
+  truenorth advise --lat 45 --imu navigation --heading 0.05
+  truenorth advise --lat 45 --imu my_imu.yaml --heading 0.02 --longest 7200 -o advice
+\b
+Exit codes: 0 within reach; 2 wrong usage; 4 out of reach.
+"""
+
+
+def advise(
+    lat: Annotated[float, typer.Option(help="Latitude, deg, north positive.", show_default=False)],
+    imu: Annotated[
+        str,
+        typer.Option(
+            help="Specification: navigation, tactical, industrial, consumer, or a YAML file.", show_default=False
+        ),
+    ],
+    heading: Annotated[float, typer.Option(help="Wanted one-sigma of heading, deg.", show_default=False)],
+    disturbance: Annotated[float, typer.Option(help="RMS velocity of the base, mean over one second, m/s.")] = 1e-4,
+    longest: Annotated[float, typer.Option(help="Longest recording that is considered, s.")] = 3600.0,
+    rate: Annotated[float, typer.Option(help="Sampling rate of the IMU, Hz.")] = 100.0,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for advice.json and advice.png.", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Say how long, and in which positions of a turntable, an IMU needs for a wanted heading."""
+    from truenorth.alignment.advice import advise as advise_for
+    from truenorth.atomic import writable_folder
+    from truenorth.position import Position
+
+    if output is not None:
+        writable_folder(output)  # before the work, not after it
+    with stages(quiet=as_json) as tell:
+        tell("covariances of each scheme")
+        advice = advise_for(
+            imu,
+            Position.from_degrees(lat, 0.0),
+            math.radians(heading),
+            disturbance=disturbance,
+            longest=longest,
+            rate=rate,
+        )
+    paths = [] if output is None else _save(advice, output)
+    if as_json:
+        print(json.dumps(advice.summary(), allow_nan=False))
+    else:
+        console = make_console()
+        print_advice(console, advice)
+        for path in paths:
+            console.print(f"wrote {path}", soft_wrap=True)
+    if advice.best is None:
+        raise typer.Exit(4)
+
+
+def advice_after(result: Alignment, heading: float) -> Advice:
+    """Advice for the IMU and the base that an alignment has seen; `heading` in degrees."""
+    from truenorth.alignment.advice import DISTURBANCE
+    from truenorth.alignment.advice import advise as advise_for
+
+    seen = float(max(result.disturbance[:2]))
+    disturbance = seen if math.isfinite(seen) and seen > 0.0 else DISTURBANCE
+    return advise_for(result.imu, result.position, math.radians(heading), disturbance=disturbance)
+
+
+def print_advice(console: Console, advice: Advice) -> None:
+    """The answer, then scheme by scheme."""
+    first, *others = advice.words
+    console.print(f"advice: {first}", soft_wrap=True)
+    for line in others:
+        console.print(f"  {line}", soft_wrap=True)
+
+
+def _save(advice: Advice, folder: Path) -> list[Path]:
+    from truenorth.atomic import atomic_path
+
+    paths = [folder / "advice.json", folder / "advice.png"]
+    with atomic_path(paths[0]) as temporary:
+        temporary.write_text(json.dumps(advice.summary(), indent=2, allow_nan=False), "utf-8")
+    with atomic_path(paths[1]) as temporary:
+        advice.plot().savefig(temporary, format="png")
+    return paths
+
+
+advise.__doc__ = f"{advise.__doc__}\n{EXAMPLES}"
