@@ -30,7 +30,7 @@ def test_every_column_is_that_of_the_strapdown(lat, heading):
 
     What is left is how the radii change with latitude, which the model leaves out (1/300 of the effect).
     """
-    ideal, truth = ideal_and_truth(lat, heading)
+    ideal, truth = ideal_and_truth(lat, heading, interval=20.0)
     still = errors_of(navigate(ideal, truth, np.zeros(7), np.zeros(3), np.zeros(3)), truth)
     for state in range(13):
         x = np.zeros(13)
@@ -46,7 +46,7 @@ def test_every_column_is_that_of_the_strapdown(lat, heading):
 
 def test_the_papers_errors_over_two_days():
     """The paper's own errors: 20 km and .2 deg of heading, within 1 % of the linear model."""
-    ideal, truth = ideal_and_truth()
+    ideal, truth = ideal_and_truth(interval=20.0)
     x = np.zeros(13)
     x[:7] = [0.1, 0.1, 43.0, 62.0, *np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)]
     x[BG], x[BA] = 0.005 * DEG_PER_HOUR, 50.0 * MICRO_G

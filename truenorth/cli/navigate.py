@@ -113,6 +113,9 @@ def navigate(
     damping_start: Annotated[
         float, typer.Option(help="Seconds after the start, when it is switched on.", rich_help_panel="Damping")
     ] = 0.0,
+    damping_ramp: Annotated[
+        float, typer.Option(help="Seconds in which a network is switched on.", rich_help_panel="Damping")
+    ] = 0.0,
     log_error: Annotated[
         float, typer.Option(help="One-sigma constant error of the reference velocity, m/s.", rich_help_panel="Damping")
     ] = 0.3,
@@ -136,7 +139,7 @@ def navigate(
     antenna = _mounting(lever_arm, "--lever-arm", None, parts & {"lever_arm", "latency"})
     wheel = _mounting(wheel_arm, "--wheel-arm", mounting, parts - {"latency"})
     stops = _stops(zupt)
-    damper = _damper(damping, damping_ratio, azimuth_damping, damping_start, log_error)
+    damper = _damper(damping, damping_ratio, azimuth_damping, damping_start, log_error, damping_ramp)
     read_start(start)  # what is wrong with it, before a long log is read
     if output is not None:
         writable_folder(output)
@@ -238,12 +241,12 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
     )
 
 
-def _damper(method: str | None, ratio: float, azimuth: float, start: float, log_error: float) -> Damper | None:
-    from truenorth.damping.options import Damper
-
+def _damper(method: str | None, *figures: float) -> Damper | None:
     if method is None:
         return None
-    return Damper(method, ratio, azimuth, start, log_error)  # type: ignore[arg-type]  # checked there
+    from truenorth.damping.options import Damper
+
+    return Damper(method, *figures)  # type: ignore[arg-type]  # checked there
 
 
 def _barometer() -> Mounting:

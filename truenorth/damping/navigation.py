@@ -200,7 +200,7 @@ def _damped(
     if damper.method in ("internal", "external"):
         loop, at = _loop(damper), float(course.time[start])
         used = None if damper.method == "internal" or reference is None else reference.velocity
-        x = network_correction(course, loop, used, start=at)
+        x = network_correction(course, loop, used, start=at, ramp=damper.ramp)
         noise = 0.0 if used is None or reference is None else reference.noise
         constant = 0.0 if used is None else damper.reference_sigma
         sigma = network_sigma(course, loop, P0, model, start=start, reference_noise=noise, reference_sigma=constant)

@@ -25,6 +25,8 @@ class Damper:
         Damping ratio of the 24 h oscillation, of the external network; 0: none.
     start : float, s
         After the beginning of navigation, when it is switched on.
+    ramp : float, s
+        In which a network goes from undamped to damped; its bands are those of an abrupt switch.
     reference_sigma : float, m/s
         One-sigma constant error of the reference velocity (a log in a current; a wrong zero).
     """
@@ -34,6 +36,7 @@ class Damper:
     azimuth: float = 0.0
     start: float = 0.0
     reference_sigma: float = 0.3
+    ramp: float = 0.0
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
@@ -50,6 +53,8 @@ class Damper:
             raise UsageError(
                 f"damping starts at {self.start:g} s; expected zero or later, from the beginning of navigation"
             )
+        if not self.ramp >= 0.0:
+            raise UsageError(f"damping with a ramp of {self.ramp:g} s; expected zero or more")
         if not self.reference_sigma >= 0.0:
             raise UsageError(f"constant log error {self.reference_sigma:g} m/s; expected zero or more")
 
