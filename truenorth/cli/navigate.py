@@ -107,6 +107,7 @@ def navigate(
     damping_ratio: Annotated[
         float, typer.Option(help="Of the networks (internal, external).", rich_help_panel="Damping")
     ] = 0.5,
+    damping_order: Annotated[int, typer.Option(help="Of the networks: 1 or 2.", rich_help_panel="Damping")] = 2,
     azimuth_damping: Annotated[
         float, typer.Option(help="Ratio for the 24 h oscillation (external); 0: none.", rich_help_panel="Damping")
     ] = 0.0,
@@ -139,7 +140,15 @@ def navigate(
     antenna = _mounting(lever_arm, "--lever-arm", None, parts & {"lever_arm", "latency"})
     wheel = _mounting(wheel_arm, "--wheel-arm", mounting, parts - {"latency"})
     stops = _stops(zupt)
-    damper = _damper(damping, damping_ratio, azimuth_damping, damping_start, log_error, damping_ramp)
+    damper = _damper(
+        damping,
+        ratio=damping_ratio,
+        order=damping_order,
+        azimuth=azimuth_damping,
+        start=damping_start,
+        ramp=damping_ramp,
+        reference_sigma=log_error,
+    )
     read_start(start)  # what is wrong with it, before a long log is read
     if output is not None:
         writable_folder(output)
@@ -241,12 +250,12 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
     )
 
 
-def _damper(method: str | None, *figures: float) -> Damper | None:
+def _damper(method: str | None, **figures: Any) -> Damper | None:
     if method is None:
         return None
     from truenorth.damping.options import Damper
 
-    return Damper(method, *figures)  # type: ignore[arg-type]  # checked there
+    return Damper(method, **figures)  # type: ignore[arg-type]  # checked there
 
 
 def _barometer() -> Mounting:

@@ -9,7 +9,7 @@ All estimate the errors of one undamped INS, open loop (output correction), on t
 - *augmented*: filter 1 with the reference's constant error as two more states.
 
 Windows of filter 2 overlap where it is updated more often than every T, and its noise is then not white; the paper's R takes
-no notice. What that and the common noise of both filters cost is measured in the study, not assumed.
+no notice. What that and the common noise of both filters cost is measured in the study (:mod:`truenorth.papers.damping`).
 
 Source: L. Zhao, J. Li, J. Cheng, J. Harbin Inst. Technol. 50 (3), 2018, eq. 2-4; the augmented filter is not the paper's.
 """
@@ -76,6 +76,9 @@ class Filter:
         Of the measurement: m/s, or m/s^2 of a velocity change.
     window : float, s
         T of filter 2; 0: the velocity error itself.
+    overlap : bool
+        Update at every epoch, with windows that overlap and noise that is then not white, as the paper does; else at the end
+        of every window only.
     relinearise : bool
         Take the model midway between the computed course and the one this filter finds, ``f(x_hat) - f(x) = F((x_hat + x)/2) e``
         to second order; else about the computed course, as the paper does.
@@ -87,6 +90,7 @@ class Filter:
     P0: Array
     sigma: float
     window: float = 0.0
+    overlap: bool = True
     relinearise: bool = False
     gate: float | None = None
 
@@ -203,11 +207,13 @@ def run_filters(
     settling = max(1, round(SETTLING / interval))
     firm = ~_silences(np.asarray(np.isnan(z).any(axis=1)), settling)
 
-    def change(of: Array, lag: int, begin: int, end: int, since: int) -> Array:
+    def change(of: Array, stream: _Stream, begin: int, end: int, since: int) -> Array:
         """(end - begin, 2) of the epochs after `begin`; windows that begin before `since` or in a silence are absent."""
-        ends = np.arange(begin + 1, end + 1)
+        lag, ends = stream.lag, np.arange(begin + 1, end + 1)
         out = np.full((len(ends), 2), np.nan)
         there = (ends - lag >= since) & firm[ends] & firm[np.maximum(ends - lag, 0)]
+        if not stream.kind.overlap:
+            there &= (ends - since) % lag == 0
         out[there] = (of[ends[there]] - of[ends[there] - lag]) / (lag * interval)
         return out
 
@@ -220,14 +226,14 @@ def run_filters(
             part = course.between(begin, end)
             linear = None if stream.kind.relinearise else part.linearise(stream.kind.model)
             if stream.lag:
-                stream.feed(part, change(z, stream.lag, begin, end, start), linear)
+                stream.feed(part, change(z, stream, begin, end, start), linear)
             else:
                 stream.feed(part, z[begin + 1 : end + 1], linear)
             if name == "filter1" and "filter2" in streams:
                 two, rows = streams["filter2"], slice(begin + 1, end + 1)
                 smoothed[rows] = stream.x[begin + 1 - start : end + 1 - start, DV]
                 same = two.kind.model == stream.kind.model and not two.kind.relinearise
-                two.feed(part, change(smoothed, two.lag, begin, end, start + settling), linear if same else None)
+                two.feed(part, change(smoothed, two, begin, end, start + settling), linear if same else None)
 
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         list(pool.map(run, [name for name in kinds if name != "filter2"]))

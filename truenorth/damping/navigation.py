@@ -12,7 +12,7 @@ from truenorth.damping.bands import constant_error_sigma, network_sigma
 from truenorth.damping.course import Course
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.loop import Loop, Mode, eigenvalues, network_correction
-from truenorth.damping.networks import NO_NETWORK, second_order
+from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import Reference, reference_of
 from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
@@ -185,7 +185,8 @@ def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: I
 
 def _loop(damper: Damper) -> Loop:
     if damper.method in ("internal", "external"):
-        return Loop(second_order(damper.ratio), damper.azimuth)
+        network = first_order(damper.ratio) if damper.order == 1 else second_order(damper.ratio)
+        return Loop(network, damper.azimuth)
     return Loop(NO_NETWORK)
 
 

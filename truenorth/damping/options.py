@@ -25,6 +25,8 @@ class Damper:
         Damping ratio of the 24 h oscillation, of the external network; 0: none.
     start : float, s
         After the beginning of navigation, when it is switched on.
+    order : {1, 2}
+        Of the networks.
     ramp : float, s
         In which a network goes from undamped to damped; its bands are those of an abrupt switch.
     reference_sigma : float, m/s
@@ -37,6 +39,7 @@ class Damper:
     start: float = 0.0
     reference_sigma: float = 0.3
     ramp: float = 0.0
+    order: Literal[1, 2] = 2
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
@@ -53,6 +56,8 @@ class Damper:
             raise UsageError(
                 f"damping starts at {self.start:g} s; expected zero or later, from the beginning of navigation"
             )
+        if self.order not in (1, 2):
+            raise UsageError(f"network of order {self.order}; expected 1 or 2")
         if not self.ramp >= 0.0:
             raise UsageError(f"damping with a ramp of {self.ramp:g} s; expected zero or more")
         if not self.reference_sigma >= 0.0:

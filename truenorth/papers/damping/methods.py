@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,3 +111,14 @@ def run_all(
         left[:, DP] = voyage.truth.in_angles(left[:, DP])
         errors[name] = left
     return Case(course, course.time, errors, found, kinds, runtime)
+
+
+def without_overlap(voyage: Voyage, case: Case, reference: Array) -> tuple[Array, Array]:
+    """Filter 2 updated once a window: (K+1, 7) errors in the units of a case, and (K+1-start, 7) their claimed sigma."""
+    start = round(SWITCH / case.course.interval)
+    kinds = {"filter1": case.filters["filter1"], "filter2": replace(case.filters["filter2"], overlap=False)}
+    found = run_filters(case.course, reference, start=start, kinds=kinds)["filter2"]
+    left = errors_of(case.course, voyage.truth)
+    left[start:] -= found.x[:, :7]
+    left[:, DP] = voyage.truth.in_angles(left[:, DP])
+    return left, found.sigma[:, :7]
