@@ -23,13 +23,14 @@ from truenorth.alignment.in_motion_start import (
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.moving import fifteen, moving_of
 from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
-from truenorth.alignment.task import bridged, deflection_covariance
+from truenorth.alignment.task import deflection_covariance
 from truenorth.calibration import Calibration
 from truenorth.earth import EARTH_RATE, normal_gravity
 from truenorth.errors import AlignmentError, UsageError
 from truenorth.models.ins import BA, BG, PHI, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Track, navigate_track, with_states
+from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
 from truenorth.navigation.stops import updates_at
 from truenorth.position import Position
@@ -47,6 +48,8 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
 PASSES = 2
+POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
+RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class _Task:
     gnss: GnssRecord | None
     wheel: Mounting
     antenna: Mounting
-    stops: Sequence[Aiding]
+    stops: Sequence[Aiding]  # and gaps of the log
 
     def aiding(self, *, gated: bool) -> list[Aiding]:
         """Of all sensors; without gates as long as the filter may be wrong itself."""
@@ -208,18 +211,18 @@ def _task(
         raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
     if calibration is not None:
         record = calibration.apply(record)
-    record = bridged(record)
+    record, _, gaps = bridge_gaps(record)
     if record.duration < SHORTEST:
         raise AlignmentError(f"{record.source}: {record.duration:g} s; at least {SHORTEST:g} s are needed on the move")
     odometer = None if odometer is None else odometer.shifted(offset)
-    gnss = None if gnss is None else gnss.shifted(offset)
+    gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
     if position is None:
         position = _first_fix(record, gnss)
     spec = imu_spec(imu).with_random_walks(record.interval)
-    stops: list[Aiding] = []
+    stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)
-        stops = updates_at(record, still, disturbed, INTERVAL)
+        stops += updates_at(record, still, disturbed, INTERVAL)
     return _Task(
         record,
         spec,
@@ -228,9 +231,29 @@ def _task(
         odometer,
         gnss,
         WHEEL if wheel is None else wheel,
-        Mounting() if antenna is None else antenna,
+        _antenna(gnss) if antenna is None else antenna,
         stops,
     )
+
+
+def _with_floors(gnss: GnssRecord) -> GnssRecord:
+    """A receiver's own sigma leaves out clocks, and what moves between its antenna and the IMU."""
+
+    def floored(sigma: Array | None, floor: float) -> Array | None:
+        return None if sigma is None else np.where(np.isfinite(sigma), np.hypot(sigma, floor), sigma)
+
+    return replace(
+        gnss,
+        position_sigma=floored(gnss.position_sigma, POSITION_FLOOR),
+        velocity_sigma=floored(gnss.velocity_sigma, VELOCITY_FLOOR),
+    )
+
+
+def _antenna(gnss: GnssRecord | None) -> Mounting:
+    """Of an antenna of which nothing is said: fixes without sigmas of their own are off together for minutes."""
+    if gnss is None or gnss.position_sigma is not None:
+        return Mounting()
+    return Mounting(bias_sigma=RECEIVER_BIAS, bias_time=RECEIVER_TIME)
 
 
 def _first_fix(record: ImuRecord, gnss: GnssRecord | None) -> Position:

@@ -19,6 +19,7 @@ Studies:
   static   Kalman filters for static alignment, with ten and with eight states
   transfer  Transfer alignment with residual time delay and lever arm
   damping  Double-filter external damping of a marine INS over 48 h
+  odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
 \b
 Examples:
   truenorth reproduce static -o static

@@ -136,7 +136,7 @@ def navigate(
     if calibration is not None:
         record = calibration.apply(record)
     record = _from_start(record, begin)
-    record, gaps, disturbances = _bridge(record)
+    record, gaps, disturbances = bridge_gaps(record)
     reference = None if damping is None else _shifted(velocity, offset)
     velocity = velocity if damping is None else None
     sources = Sources(
@@ -224,7 +224,7 @@ def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
     return record[first:]
 
 
-def _bridge(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float], ...], list[Aiding]]:
+def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float], ...], list[Aiding]]:
     """Gaps filled with the rate after them, and what they add to the uncertainty.
 
     What the base did in a gap is as different from that as its rates differ over the log.

@@ -26,6 +26,7 @@ STUDIES = {
     "static": "truenorth.papers.static.study",
     "transfer": "truenorth.papers.transfer.study",
     "damping": "truenorth.papers.damping.study",
+    "odometer": "truenorth.papers.odometer.study",
 }
 Progress = Callable[[str], None]
 

@@ -1,0 +1,1 @@
+"""System 5: odometer-aided alignment on the move, by nonlinear filters and by invariant errors."""

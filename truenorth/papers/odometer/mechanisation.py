@@ -1,0 +1,104 @@
+"""The INS of many runs over one filter interval, with all that the error model needs to know of it, compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth import earth
+from truenorth.compiled import compiled
+from truenorth.models.in_motion_azimuth import PARAMETERS
+from truenorth.navigation.kernel import set_matrix
+from truenorth.wander import advance, curvature, earth_axis
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def mechanise_interval(
+    steps: Any,
+    dtheta: Any,
+    dvel: Any,
+    wheel: Any,
+    which: Any,
+    first: int,
+    last: int,
+    errors: Any,
+    s: Any,
+    p: Any,
+    z: Any,
+) -> None:
+    """Carry each run through the samples ``first`` to ``last - 1``.
+
+    Parameters
+    ----------
+    steps : (N,) array, s
+    dtheta, dvel : (R, N, 3) arrays, rad and m/s
+    wheel : (R, N) array, m
+        Distance by the odometer in each sample.
+    which : (B,) array of int
+        Of the R logs, which each run has.
+    errors : (B, 7) array
+        Gyro and accelerometer bias and odometer scale as known so far, taken off.
+    s : (B, 24) array
+        The state (:mod:`truenorth.wander`); changed in place.
+    p : (B, 28) array
+        Parameters of the error model (:mod:`truenorth.models.in_motion_azimuth`), filled in.
+    z : (B, 3) array, m
+        Displacement of the INS less that of the odometer; filled in.
+    """
+    C, mean = np.zeros((3, 3)), np.zeros((3, 3))
+    length = 0.0
+    for i in range(first, last):
+        length += steps[i]
+    for b in range(len(which)):
+        r = which[b]
+        state, out = s[b], p[b]
+        for k in range(PARAMETERS):
+            out[k] = 0.0
+        for j in range(3):
+            z[b, j] = 0.0
+            for k in range(3):
+                mean[j, k] = 0.0
+        set_matrix(state, C)
+        elapsed = 0.0
+        for i in range(first, last):
+            T = steps[i]
+            w = (
+                dtheta[r, i, 0] - T * errors[b, 0],
+                dtheta[r, i, 1] - T * errors[b, 1],
+                dtheta[r, i, 2] - T * errors[b, 2],
+            )
+            f = (
+                dvel[r, i, 0] - T * errors[b, 3],
+                dvel[r, i, 1] - T * errors[b, 4],
+                dvel[r, i, 2] - T * errors[b, 5],
+            )
+            way = 0.5 * wheel[r, i] / (1.0 + errors[b, 6])
+            for j in range(3):  # trapezoids: attitude and velocity before and after the sample
+                z[b, j] += 0.5 * T * state[4 + j]
+                out[16 + j] += way * C[j, 1]
+                for k in range(3):
+                    mean[j, k] += 0.5 * T / length * C[j, k]
+            advance(state, T, 1.0, w, f, True, False)
+            set_matrix(state, C)
+            elapsed += T
+            for j in range(3):
+                z[b, j] += 0.5 * T * state[4 + j]
+                out[16 + j] += way * C[j, 1]
+                out[10 + j] += state[21 + j]
+                out[13 + j] += (elapsed - 0.5 * T) / length * state[21 + j]
+                for k in range(3):
+                    mean[j, k] += 0.5 * T / length * C[j, k]
+        out[0] = length
+        axis = earth_axis(state)
+        Kxx, Kxy, Kyy = curvature(axis, state[11])
+        out[25], out[26], out[27] = Kxx, Kxy, Kyy
+        for j in range(3):
+            out[19 + j] = z[b, j] / length
+            out[22 + j] = earth.EARTH_RATE * axis[j]
+            z[b, j] -= out[16 + j]
+            for k in range(3):
+                out[1 + 3 * j + k] = mean[j, k]

@@ -1,0 +1,186 @@
+"""The drives of the study: the ring, a straight road, wheel slip, a stop at the end; the logs of many runs, and their truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.position import Position
+from truenorth.records import ImuRecord, OdometerRecord
+from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.simulation.streams import stream
+from truenorth.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+SLIPS, SLIP_TIME, SLIP_SIZE = 6, 1.5, 0.3
+STANDING = 300.0  # s of static alignment after the drive, the paper's reference
+STOPPED = 615.0  # s: the ring's drive and its stop have ended
+SLIP_STREAM, START_STREAM = 310, 311
+
+
+def ring() -> Scenario:
+    """The shipped scenario."""
+    return read_scenario("odometer_ring")
+
+
+def changed(**content: Any) -> Scenario:
+    """The ring with other content."""
+    return read_scenario({**ring().to_mapping(), **content})
+
+
+def straight() -> Scenario:
+    """Ten minutes straight on, at a steady speed."""
+    legs = [
+        {"kind": "straight", "duration": "5 s"},
+        {"kind": "accelerate", "to": "10 m/s", "acceleration": "1 m/s^2"},
+        {"kind": "straight", "duration": "600 s"},
+    ]
+    return changed(motion={"kind": "legs", "heading": "40 deg", "legs": legs})
+
+
+def with_stop() -> Scenario:
+    """The ring, then a stop and five minutes at rest."""
+    content = ring().to_mapping()
+    more = [
+        {"kind": "accelerate", "to": "0 m/s", "acceleration": "1 m/s^2"},
+        {"kind": "straight", "duration": f"{STANDING + 60.0} s"},
+    ]
+    return changed(
+        motion={**content["motion"], "legs": [*content["motion"]["legs"], *more]}, duration=f"{STOPPED + STANDING} s"
+    )
+
+
+def with_walk(walk: str) -> Scenario:
+    """The ring with another random walk of the gyros."""
+    content = ring().to_mapping()
+    imu = dict(content["imu"])
+    return changed(imu={**imu, "gyro": {**imu["gyro"], "random_walk": walk}})
+
+
+@dataclass(frozen=True)
+class Drives:
+    """The logs of R runs of one motion, and the truth at the ends of the K filter intervals.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    records, odometers : lists of the records
+    steps : (N,) array, s
+    dtheta, dvel : (R, N, 3) arrays
+    wheel : (R, N) array, m
+        Distance in each sample.
+    rows : (K+1,) array of int
+        Samples before each epoch.
+    time : (K,) array, s
+    C_nb, v_n : (K+1, 3, 3) and (K+1, 3) arrays
+        True, the start first.
+    place : tuple
+        Latitude, longitude (rad), height (m) at the start.
+    gyro_bias, accel_bias : (R, 3) arrays
+        True.
+    """
+
+    scenario: Scenario
+    records: list[ImuRecord]
+    odometers: list[OdometerRecord]
+    steps: Array
+    dtheta: Array
+    dvel: Array
+    wheel: Array
+    rows: NDArray[np.int64]
+    time: Array
+    C_nb: Array
+    v_n: Array
+    place: tuple[float, float, float]
+    gyro_bias: Array
+    accel_bias: Array
+
+    @property
+    def spec(self) -> ImuSpec:
+        """Of the IMU."""
+        return self.scenario.imu_spec
+
+    @property
+    def scale_sigma(self) -> float:
+        """Of the odometer."""
+        return float(self.scenario.aiding_specs["odometer"].scale_sigma)  # type: ignore[attr-defined]
+
+    @property
+    def position(self) -> Position:
+        """At the start, known well: what the filters of the study are told."""
+        return Position(*self.place)
+
+
+def drive(scenario: Scenario, runs: int, seed: int, *, until: float | None = None) -> Drives:
+    """Simulate the logs of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    runs, seed : int
+    until : float, s, optional
+        Of the drive; the whole without it.
+    """
+    ideal = scenario.ideal()
+    records, odometers, gyro, accel = [], [], [], []
+    for run in range(runs):
+        simulated = scenario.simulate(seed=seed, run=run, ideal=ideal)
+        record = simulated.record
+        if until is not None:
+            record = record.between(0.0, until)
+        odometers.append(scenario.simulate_aiding(seed=seed, run=run)["odometer"].record)
+        records.append(record)
+        gyro.append(simulated.errors.gyro_bias)
+        accel.append(simulated.errors.accel_bias)
+    interval = ideal.interval
+    count = len(records[0])
+    edges: Array = interval * np.arange(count + 1.0)
+    per_second = round(1.0 / interval)
+    rows = np.arange(0, count + 1, per_second)
+    truth = ideal.motion.states(edges[rows])
+    return Drives(
+        scenario,
+        records,
+        odometers,
+        np.full(count, interval),
+        np.stack([r.gyro for r in records]),
+        np.stack([r.accel for r in records]),
+        _by_sample(odometers, edges),
+        rows.astype(np.int64),
+        edges[rows[1:]],
+        truth.C_nb,
+        truth.v_n,
+        (float(truth.lat[0]), float(truth.lon[0]), float(truth.alt[0])),
+        np.stack(gyro),
+        np.stack(accel),
+    )
+
+
+def slipping(drives: Drives, seed: int) -> Drives:
+    """The same drives with six windows of 1.5 s, drawn for each run, in which the wheel counts 30 % too much."""
+    content, duration = drives.scenario.to_mapping(), drives.scenario.duration
+    odometers = []
+    for run in range(len(drives.records)):
+        begins = stream(seed, 0, run, SLIP_STREAM).uniform(20.0, duration - 20.0, SLIPS)
+        slips = [[f"{t} s", f"{t + SLIP_TIME} s", f"{100 * SLIP_SIZE} %"] for t in begins]
+        own = read_scenario({**content, "odometer": {**content["odometer"], "slips": slips}})
+        odometers.append(own.simulate_aiding(seed=seed, run=run)["odometer"].record)
+    edges = np.append(0.0, np.cumsum(drives.steps))
+    return replace(drives, odometers=odometers, wheel=_by_sample(odometers, edges))
+
+
+def _by_sample(odometers: list[OdometerRecord], edges: Array) -> Array:
+    """(R, N) distance in each sample, m: an odometer's row shared evenly."""
+    ways = [np.interp(edges, np.append(0.0, o.time), np.append(0.0, np.cumsum(o.distance))) for o in odometers]
+    return np.diff(np.stack(ways), axis=1)
+
+
+def starts(runs: int, seed: int, azimuth: float, level_sigma: float) -> Array:
+    """(R, 3) what each run begins with, rad: drawn tilts, and the azimuth to one side or the other."""
+    draws = [stream(seed, 0, run, START_STREAM) for run in range(runs)]
+    phi = np.stack([rng.standard_normal(3) for rng in draws])
+    return np.column_stack([level_sigma * phi[:, :2], azimuth * np.sign(phi[:, 2])])
