@@ -246,7 +246,9 @@ def test_from_the_shell(tmp_path):
     done = CliRunner().invoke(app, [*base, "augmented", "--log-error", "0.2", "-o", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     assert "damping: augmented from 200 s on" in done.output
-    assert "Spectrum of the velocity" in (tmp_path / "out" / "report.html").read_text()
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Spectrum of the velocity" in page
+    assert "schuler 8" in page
     told = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert told["damping"]["reference_error_m_s"] == pytest.approx([0.1, 0.1], abs=0.03)
     wrong = CliRunner().invoke(app, [*base, "strong"])

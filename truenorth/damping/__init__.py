@@ -2,7 +2,7 @@
 
 from truenorth.damping.course import Course, errors_of
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
-from truenorth.damping.loop import Loop, Mode, eigenvalues, network_correction
+from truenorth.damping.loop import Loop, Mode, eigenvalues, in_words, network_correction
 from truenorth.damping.navigation import Damping, damp_navigation
 from truenorth.damping.networks import NO_NETWORK, Network, first_order, second_order
 from truenorth.damping.options import Damper
@@ -32,6 +32,7 @@ __all__ = [
     "errors_of",
     "filter_modes",
     "first_order",
+    "in_words",
     "network_correction",
     "paper_prior",
     "reference_of",

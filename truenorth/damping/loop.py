@@ -21,6 +21,7 @@ against the loop itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -162,6 +163,20 @@ def modes(M: Array) -> list[Mode]:
         return "still" if abs(v) < 0.1 * earth.EARTH_RATE else "network"
 
     return [Mode(name(v), v) for v in kept]
+
+
+def in_words(modes: Sequence[Mode]) -> str:
+    """Periods and damping ratios, or time constants, of all modes that move."""
+    parts = []
+    for m in modes:
+        if m.name == "still":
+            continue
+        label = "" if m.name == "filter" else f"{m.name} "
+        if m.eigenvalue.imag:
+            parts.append(f"{label}{m.period / 60.0:.1f} min with ratio {m.damping:.2f}")
+        else:
+            parts.append(f"{label}{-1.0 / m.eigenvalue.real / 60.0:.1f} min time constant")
+    return ", ".join(parts)
 
 
 def network_correction(

@@ -63,11 +63,11 @@ def charts(result: Alignment) -> list[tuple[str, str, Any]]:
     ]
 
 
-def new_chart(height: int, titles: list[str]) -> Any:
-    """Rows of axes over one time axis, in the pages' look."""
+def new_chart(height: int, titles: list[str], over: str = "time, s") -> Any:
+    """Rows of axes over one axis, as a rule time, in the pages' look."""
     from plotly.subplots import make_subplots
 
-    figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.05, x_title="time, s")
+    figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.05, x_title=over)
     figure.update_layout(
         height=height,
         template="plotly_white",

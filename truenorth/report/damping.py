@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truenorth.damping.loop import in_words
 from truenorth.damping.spectrum import PADDING
 from truenorth.figures.style import COLOURS
 from truenorth.report.charts import new_chart, single
@@ -13,7 +14,13 @@ from truenorth.report.charts import new_chart, single
 if TYPE_CHECKING:
     from truenorth.damping.navigation import Damping
 
-SHORTEST_PERIOD = 60.0  # s, that is drawn
+SHORTEST_PERIOD = 120.0  # s, that is drawn
+
+
+def damping_facts(damping: Damping) -> list[tuple[str, str]]:
+    """Rows of the page's table: what was done, and the eigenvalues of the loop."""
+    loop = "Modes of the loop" if damping.damper.method in ("internal", "external") else "Modes of the undamped INS"
+    return [("Damping", damping.in_words()), (loop, in_words(damping.modes))]
 
 
 def damping_charts(damping: Damping) -> list[tuple[str, str, Any]]:
@@ -22,7 +29,7 @@ def damping_charts(damping: Damping) -> list[tuple[str, str, Any]]:
         return []
     import plotly.graph_objects as go
 
-    figure = new_chart(460, ["anticlockwise, m/s", "clockwise, m/s"])
+    figure = new_chart(460, ["anticlockwise, m/s", "clockwise, m/s"], over="period, min")
     for name, found, colour in (("undamped", damping.before, "#999999"), ("damped", damping.after, COLOURS[0])):
         for row, sign in ((1, 1.0), (2, -1.0)):
             f = sign * found.frequency
@@ -41,8 +48,7 @@ def damping_charts(damping: Damping) -> list[tuple[str, str, Any]]:
                 row=row,
                 col=1,
             )
-    figure.update_xaxes(type="log", title_text="period, min", row=2, col=1)
-    figure.update_xaxes(type="log", row=1, col=1)
+    figure.update_xaxes(type="log")
     figure.update_yaxes(type="log")
     figure.update_layout(showlegend=True, legend={"orientation": "h", "y": 1.1})
     what = "velocity less the log's" if damping.reference is not None else "velocity"

@@ -17,7 +17,7 @@ from truenorth.figures.style import COLOURS, evenly
 from truenorth.navigation.export import geojson
 from truenorth.navigation.result import mean_nis
 from truenorth.report.charts import POINTS, band_trace, bound, line, new_chart, single
-from truenorth.report.damping import damping_charts
+from truenorth.report.damping import damping_charts, damping_facts
 from truenorth.report.page import CHART_OPTIONS, short
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def _facts(result: Navigation) -> list[tuple[str, str]]:
         ("Gaps of the IMU", gaps),
         ("Seconds at rest used", str(result.stops)),
         ("IMU", result.imu_source),
-        *([] if result.damping is None else [("Damping", result.damping.in_words())]),
+        *([] if result.damping is None else damping_facts(result.damping)),
     ]
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.campaign.comparison import paired
 from truenorth.campaign.summary import bootstrap_rms
-from truenorth.damping.loop import Loop, Mode, eigenvalues
+from truenorth.damping.loop import Loop, eigenvalues, in_words
 from truenorth.damping.networks import NO_NETWORK
 from truenorth.damping.poles import filter_modes
 from truenorth.damping.spectrum import earth_line, schuler_lines
@@ -132,8 +132,8 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "eigenvalues": "Rates of decay and periods of the error dynamics, undamped, with networks, and under the filters' gains.",
         "switching": "Velocity error about the switch. A cold internal network takes the ship's own speed for an error.",
     }
-    words = [f"Eigenvalues, {name}: {_in_words(found)}." for name, found in modes.items()]
-    words += [f"Eigenvalues, {name} (its own gain at 48 h): {_in_words(found)}." for name, found in of_filters.items()]
+    words = [f"Eigenvalues, {name}: {in_words(found)}." for name, found in modes.items()]
+    words += [f"Eigenvalues, {name} (its own gain at 48 h): {in_words(found)}." for name, found in of_filters.items()]
     remarks = [
         "The full strapdown navigates a simulated log (1 Hz increments); all methods correct its output. Filters as SYSTEMS "
         "reads the paper: start 45.78 N, heading 0, updates every 1 s, tau = 300 s, Q as printed per second, N = 3600.",
@@ -259,19 +259,6 @@ def _correlation(signs: Signs) -> Array:
     since = signs.time[-len(signs.correlation) :]
     window = (since >= 18 * HOUR) & (since < 24 * HOUR)
     return np.asarray(np.median(signs.correlation[window], axis=0))
-
-
-def _in_words(modes: Sequence[Mode]) -> str:
-    parts = []
-    for m in modes:
-        if m.name == "still":
-            continue
-        label = "" if m.name == "filter" else f"{m.name} "
-        if m.eigenvalue.imag:
-            parts.append(f"{label}{m.period / 60:.1f} min with ratio {m.damping:.2f}")
-        else:
-            parts.append(f"{label}{-1 / m.eigenvalue.real / 60:.1f} min time constant")
-    return ", ".join(parts)
 
 
 def _claims(
