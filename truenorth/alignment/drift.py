@@ -67,8 +67,9 @@ def detect_drift(fine: FineAlignment) -> Drift:
     names, columns = [], []
     for onset in ONSETS:
         start = onset * t[-1]
-        since = np.maximum(middle - start, 0.0)
-        for kind, shape in (("step", (since > 0).astype(float)), ("ramp", since / (t[-1] - start))):
+        since = np.maximum((middle if fine.form == "velocity" else t) - start, 0.0)
+        for kind, velocity in (("step", (since > 0).astype(float)), ("ramp", since / (t[-1] - start))):
+            shape = velocity if fine.form == "velocity" else np.diff(velocity)
             for axis in (0, 1):
                 z = np.zeros((len(middle), 3))
                 z[:, axis] = shape

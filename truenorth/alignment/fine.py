@@ -7,16 +7,18 @@ it is, is read from the log itself, axis by axis, by making the innovations as l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.form import Form
 from truenorth.attitude import dcm_from_rotation_vector
 from truenorth.filters import Estimates, LinearSystem, kalman
 from truenorth.filters.gains import Gains, filter_gains, initial_part
 from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
+from truenorth.models.static_force import force_system, gained_velocity
 from truenorth.position import Position
 from truenorth.records import ImuRecord
 
@@ -31,6 +33,7 @@ LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
 HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
 VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
 QUIETEST_BASE = 1e-6  # m/s: keeps R positive on a base of stone and an IMU without noise
+SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at least
 COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
 COLOUR_RUNS = 5  # fewer blocks than this say nothing of it
 
@@ -58,6 +61,8 @@ class FineAlignment:
     passes : int
     settled : bool
         Whether the last pass moved nothing by more than a small part of its sigma.
+    form : {"velocity", "force"}
+        What the innovations and the disturbance are of: the base's mean velocity, or the velocity it gains in an interval.
     """
 
     integrals: InertialIntegrals
@@ -70,6 +75,7 @@ class FineAlignment:
     disturbance: Array
     passes: int
     settled: bool
+    form: Form = field(default="velocity", kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -138,6 +144,7 @@ def fine_align(
     interval: float,
     rows_at: Array | None = None,
     integrals: InertialIntegrals | None = None,
+    form: Form = "velocity",
 ) -> FineAlignment:
     """Estimate attitude and biases from a whole log.
 
@@ -156,6 +163,8 @@ def fine_align(
         Rows after which the integrated attitude is wanted.
     integrals : InertialIntegrals, optional
         Of the log as it is, with `interval` and `rows_at`, where they are known already.
+    form : {"velocity", "force"}
+        Measure the mean velocity of each interval, or the velocity gained in it.
 
     Returns
     -------
@@ -171,12 +180,18 @@ def fine_align(
 
     if integrals is None:
         integrals = integrate(record, interval, rows_at=rows)
-    R = white_variance(mean_velocity(integrals, C_n0_i, lat, alt))
+    if form == "velocity":
+        R = white_variance(mean_velocity(integrals, C_n0_i, lat, alt))
+    else:
+        expected = model.accel_random_walk**2 * interval
+        R = np.maximum(white_variance(gained_velocity(integrals, C_n0_i, lat, alt)) - expected, SLIGHT * expected)
 
     for passes in range(1, MAX_PASSES + 1):
         x0 = np.zeros(STATES)
         x0[6:] = -bias
         system = model.linearise(integrals, C_n0_i, lat, alt, P0, R, x0)
+        if form == "force":
+            system = force_system(system, integrals, C_n0_i, lat, alt, R)
         system, estimates, R = _with_base_variance(system, R)
         x, P = estimates.x[-1], estimates.P[-1]
         moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
@@ -202,6 +217,7 @@ def fine_align(
         disturbance=np.sqrt(R),
         passes=passes,
         settled=moved < ROUGHLY,
+        form=form,
     )
 
 

@@ -16,6 +16,7 @@ from truenorth.alignment.bias import spec_variance, true_bias
 from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
+from truenorth.alignment.form import pick_form
 from truenorth.alignment.inference import allan_noise, infer_spec, noise_of, usual_noise
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
@@ -28,6 +29,7 @@ from truenorth.earth import EARTH_RATE
 from truenorth.errors import AlignmentError, UsageError
 from truenorth.inertial import integrate
 from truenorth.models.static import STATES, StaticModel
+from truenorth.models.static_force import gained_velocity
 from truenorth.position import Position
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
@@ -120,6 +122,7 @@ def align(
         found = _align_analytic(task, spec)
     else:
         found = _align_inertial(task, spec, chosen)
+    why = f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     status, reasons = judge(
         answer, Circumstances(heading_limit, found.check, _moves_from(task.motion), found.settled, found.drift)
@@ -135,6 +138,7 @@ class _Found:
     check: LogCheck
     settled: bool = True
     drift: Drift | None = None
+    form: str = ""
 
 
 def _choose(method: Method, task: Task) -> tuple[str, str]:
@@ -208,8 +212,11 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
 
     start = (task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows)
     sways = method == "swaying"
-    fine = sway_align(*start) if sways else fine_align(*start, integrals)
-    return _Found(answer_of(task, fine, used, where, P, sways), check, fine.settled, detect_drift(fine))
+    picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
+    fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
+    return _Found(
+        answer_of(task, fine, used, where, P, sways), check, fine.settled, detect_drift(fine), "" if sways else form
+    )
 
 
 def answer_of(

@@ -1,0 +1,62 @@
+"""Velocity or accelerometers? The form of the filter's measurement, picked by the disturbance that the log shows.
+
+Bounded motion of a base is a velocity that comes and goes: seen as specific force it is differentiated, and neighbouring
+intervals are correlated. Accelerometer noise is white. So the level specific force of the log itself says whether the base
+moves beyond the noise of its sensors.
+
+Source: G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time series models, Biometrika 65, 1978.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.quality.regimes import MotionSummary
+
+Array = NDArray[np.float64]
+Form = Literal["velocity", "force"]
+
+LAGS = 10
+WHITE = 45.3  # chi-square of 2 x 10 degrees of freedom exceeds it in 1 of 1000 logs of white noise
+FEWEST = 50  # intervals
+TREND = 3  # parameters of a tilt, a wrong heading and a gyro bias: a parabola in time
+
+
+def pick_form(gained: Array, motion: MotionSummary) -> tuple[Form, str]:
+    """The form, and why.
+
+    Parameters
+    ----------
+    gained : (K, 3) array, m/s
+        Velocity gained in each interval, level axes first, of an INS that is about aligned.
+    motion : MotionSummary
+    """
+    if motion.overall != "still" or len(gained) < FEWEST:
+        return "velocity", "velocity form"
+    portmanteau = _portmanteau(gained[:, :2])
+    if portmanteau > WHITE:
+        return "velocity", (
+            f"velocity form: the level specific force is coloured (Ljung-Box {portmanteau:.0f}, white noise stays below "
+            f"{WHITE:.0f}), so the base moves a little"
+        )
+    return "force", (
+        f"accelerometer form: the level specific force is white (Ljung-Box {portmanteau:.0f} of {WHITE:.0f}), so the base "
+        "does not move beyond the noise of its sensors"
+    )
+
+
+def _portmanteau(x: Array) -> float:
+    """Ljung and Box's statistic of both columns (K, 2), a parabola taken out."""
+    count = len(x)
+    t = np.linspace(-1.0, 1.0, count)
+    trend = np.vander(t, TREND)
+    e = x - trend @ np.linalg.lstsq(trend, x, rcond=None)[0]
+    power = np.sum(e**2, axis=0)
+    total = 0.0
+    for lag in range(1, LAGS + 1):
+        rho = np.sum(e[lag:] * e[:-lag], axis=0) / power
+        total += float(np.sum(rho**2)) / (count - lag)
+    return count * (count + 2) * total
