@@ -14,7 +14,8 @@ from truenorth.damping.course import Course, errors_of
 from truenorth.damping.options import Damper
 from truenorth.errors import UsageError
 from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI
-from truenorth.navigation import Start, navigate
+from truenorth.navigation import Mounting, Start, navigate
+from truenorth.navigation.sensors import mounting_angles
 from truenorth.records import VelocityRecord
 from truenorth.simulation import simulate
 from truenorth.specs import ImuSpec
@@ -198,6 +199,23 @@ def test_a_real_recording():
     k = found["augmented"]
     assert (np.abs(k.displacement[-1]) < 3 * k.position_sigma[-1, :2]).all()
     assert (np.abs(k.v_n[-1, :2]) < 3 * k.v_sigma[-1, :2]).all()
+
+
+def test_a_log_in_body_axes_mounted_askew(ship):
+    """Forward and right as the hull has them, the IMU turned in it by 20 deg: the same answer as in navigation axes."""
+    log = ship.log()
+    C_mb = mounting_angles(np.radians(20.0), 0.0, 0.0)
+    v_b = np.einsum("kij,ki->kj", ship.truth.C_nb, log.velocity)
+    body = VelocityRecord(log.time, v_b @ C_mb.T, "body")
+    options = {"altitude": "fixed", "imu": SPEC, "damping": Damper("augmented"), "output": 1.0}
+    one = navigate(ship.record, ship.start, velocity=log, **options)
+    two = navigate(ship.record, ship.start, velocity=body, log=Mounting(C_mb=C_mb), **options)
+    late = one.time > 12 * 3600.0
+    assert np.abs(one.v_n - two.v_n)[late].max() < 0.05  # the INS's heading error of .1 deg turns 12.8 m/s by .02
+    with pytest.raises(UsageError, match="no lever arm"):
+        navigate(ship.record, ship.start, velocity=body, log=Mounting(lever_arm=np.array([0, 1.0, 0])), **options)
+    with pytest.raises(UsageError, match="see --every"):
+        navigate(ship.record, ship.start, velocity=body, **options | {"output": 40.0})
 
 
 def test_a_ramp_throws_the_switch_slowly(ship):

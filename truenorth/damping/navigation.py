@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truenorth.damping.bands import constant_error_sigma, network_sigma
 from truenorth.damping.course import Course
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
-from truenorth.damping.loop import Loop, Mode, eigenvalues, network_correction
+from truenorth.damping.loop import LONGEST_STEP, Loop, Mode, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import Reference, reference_of
@@ -25,6 +25,7 @@ from truenorth.specs import ImuSpec
 if TYPE_CHECKING:
     from truenorth.navigation.driver import Track
     from truenorth.navigation.result import Navigation
+    from truenorth.navigation.sensors import Mounting
 
 Array = NDArray[np.float64]
 
@@ -110,7 +111,13 @@ class Damping:
         return told
 
 
-def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: ImuSpec, damper: Damper) -> Navigation:
+def damp_navigation(
+    result: Navigation,
+    velocity: VelocityRecord | None,
+    spec: ImuSpec,
+    damper: Damper,
+    mounting: Mounting | None = None,
+) -> Navigation:
     """Damp a free inertial navigation afterwards.
 
     Parameters
@@ -122,6 +129,8 @@ def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: I
     spec : ImuSpec
         Of the IMU: noise of the filters and of the bands.
     damper : Damper
+    mounting : Mounting, optional
+        Of the velocity log: the angles of one in body axes, and its latency.
 
     Returns
     -------
@@ -131,7 +140,8 @@ def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: I
     Raises
     ------
     UsageError
-        No velocity log where one is needed; a navigation that was aided, or whose height was free.
+        No velocity log where one is needed; a navigation that was aided, whose height was free, or whose epochs are far apart;
+        a mounting with a lever arm, or with something to be estimated.
     DataError
         Uneven epochs; a log that does not overlap; a switch after the end.
     """
@@ -143,13 +153,17 @@ def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: I
         raise UsageError(f"damping {damper.method} needs a reference velocity; hand one in with --velocity")
     track = _even(result.track)
     course = Course(track.time, track.C_nb, track.v_n, track.position)
+    if course.interval > LONGEST_STEP * 1.01:
+        raise UsageError(
+            f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most: see --every"
+        )
     start = round(damper.start / course.interval)
     if start >= course.epochs - 1:
         raise DataError(
             f"damping begins {damper.start:g} s after {course.time[0]:.1f} s, the log ends at {course.time[-1]:.1f} s; expected an "
             "earlier start"
         )
-    reference = None if velocity is None else reference_of(course, velocity)
+    reference = None if velocity is None else reference_of(course, _mounted(velocity, mounting))
     P0 = track.P[start][np.ix_(OF_INS, OF_INS)]
     x, sigma, estimate = _damped(course, reference, spec, damper, start, P0)
     damped = course.corrected(x)
@@ -181,6 +195,22 @@ def damp_navigation(result: Navigation, velocity: VelocityRecord | None, spec: I
         reasons=(*result.reasons, *words),
         damping=report,
     )
+
+
+def _mounted(velocity: VelocityRecord, mounting: Mounting | None) -> VelocityRecord:
+    """The log along the IMU's axes, on its clock."""
+    if mounting is None:
+        return velocity
+    unknown = (mounting.lever_arm_sigma, mounting.angle_sigma, mounting.scale_sigma, mounting.latency_sigma)
+    if np.any(mounting.lever_arm) or any(unknown):
+        raise UsageError(
+            "damping takes the log's velocity for the IMU's; expected no lever arm (--wheel-arm) and nothing to --estimate of it"
+        )
+    if velocity.frame == "body" and not np.array_equal(mounting.C_mb, np.eye(3)):
+        turned = np.nan_to_num(velocity.velocity) @ mounting.C_mb
+        turned[np.isnan(velocity.velocity[:, 1])] = np.nan
+        velocity = replace(velocity, velocity=turned, sigma=None)
+    return velocity.shifted(-mounting.latency) if mounting.latency else velocity
 
 
 def _loop(damper: Damper) -> Loop:

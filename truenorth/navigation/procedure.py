@@ -185,7 +185,7 @@ def navigate(
     from truenorth.damping.navigation import damp_navigation
 
     tell(f"damping: {damping.method}")
-    return damp_navigation(result, reference, noise, damping)
+    return damp_navigation(result, reference, noise, damping, log)
 
 
 def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
