@@ -79,7 +79,7 @@ def _measured(motion, t, dx, arm, C_mb):
     """What the model calls z, of a slave with errors `dx` and a simulated master with the delay, arm and mounting of `dx`."""
     at = motion.states(t)
     true_mb = (
-        C_mb @ dcm_from_rotation_vector(dx[ALL.slice_of(MOUNT)]) @ dcm_from_rotation_vector(dx[ALL.slice_of(FLEX)])
+        dcm_from_rotation_vector(dx[ALL.slice_of(MOUNT)]) @ C_mb @ dcm_from_rotation_vector(dx[ALL.slice_of(FLEX)])
     )
     heading, pitch, roll = euler_from_dcm(true_mb)
     tau = float(dx[ALL.places[TAU]])
@@ -97,7 +97,7 @@ def _measured(motion, t, dx, arm, C_mb):
     H, z = np.zeros((6, ALL.states)), np.zeros((2, 3))
     args = arm, ALL.places
     velocity_rows(C, at.v_n + dx[DV], np.zeros(3), w_eb, *args, master.v_n[0], H[:3], z[0])
-    attitude_rows(C, w_nb, master.C_nb[0] @ C_mb, ALL.places, H[3:], z[1])
+    attitude_rows(C, w_nb, master.C_nb[0] @ C_mb, master.C_nb[0], ALL.places, H[3:], z[1])
     return z.ravel()
 
 
@@ -117,7 +117,7 @@ def test_rows_are_the_derivative_of_the_measurement(flight, state):
         return s.v_n - s.C_nb @ np.cross(s.w_ib_b - s.C_nb.T @ earth_rate_n(s.lat), arm)
 
     a = (master_velocity(t + h) - master_velocity(t - h)) / (2 * h)
-    H = ALL.observe(at.C_nb[None], at.v_n[None], a[None], w_eb[None], w_nb[None], arm)[0]
+    H = ALL.observe(at.C_nb[None], at.v_n[None], a[None], w_eb[None], w_nb[None], arm, C_mb)[0]
     dx = np.zeros(ALL.states)
     dx[state] = {0: 1e-2, 1: 1e-4, 2: 1e-2, 3: 1e-3}.get(state // 3, 1e-3)
     zero = _measured(motion, t, np.zeros(ALL.states), arm, C_mb)
@@ -153,8 +153,8 @@ def test_states_by_switches():
 
 
 def test_a_handed_over_attitude_is_wrong_by_mounting_and_flexure_together():
-    C = dcm_from_rotation_vector([0.1, 0.2, 2.0])
-    P = ALL.prior(0.1, 1e-5, 0.0, 0.0, mounting=1e-2, C_nb=C)
+    C, C_mb = dcm_from_rotation_vector([0.1, 0.2, 2.0]), dcm_from_rotation_vector([0.0, 0.3, 1.0])
+    P = ALL.prior(0.1, 1e-5, 0.0, 0.0, mounting=1e-2, C_nb=C, C_mb=C_mb)
     J = np.zeros((3, ALL.states))
-    J[:, PHI], J[:, ALL.slice_of(MOUNT)], J[:, ALL.slice_of(FLEX)] = np.eye(3), -C, -C
+    J[:, PHI], J[:, ALL.slice_of(MOUNT)], J[:, ALL.slice_of(FLEX)] = np.eye(3), -C @ C_mb.T, -C
     np.testing.assert_allclose(J @ P @ J.T, 1e-10 * np.eye(3), atol=1e-16)

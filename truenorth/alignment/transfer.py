@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
-from truenorth.alignment.transfer_answer import assemble_transfer
-from truenorth.alignment.transfer_filter import Matching, TransferTrack, transfer_filter
+from truenorth.alignment.transfer_answer import assemble_transfer, final_attitudes
+from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, transfer_filter
 from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec
 from truenorth.attitude import dcm_from_euler
 from truenorth.calibration import Calibration
@@ -32,7 +32,7 @@ LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 GATE = 1e-6  # probability of rejecting a sound row
 VELOCITY_NOISE, ATTITUDE_NOISE = 0.1, math.radians(0.05)  # m/s, rad: to begin the fit with
-FITS = 3  # passes that fit the noise of the master's rows
+PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
 LEAST = 0.1  # of the noise to begin with: less is not believed
 SHORTEST = 5.0  # s
 
@@ -147,11 +147,13 @@ def align_transfer(
 
     noise = _noise(velocity_noise, attitude_noise, what)
     fitted = [velocity_noise is None and what != "attitude", attitude_noise is None and what != "velocity"]
-    for number in range(FITS * any(fitted)):
-        tell(f"fitting the master's noise, pass {number + 1}")
+    linear: Linear | None = None
+    for number in range(PASSES):
+        tell(f"pass {number + 1}")
         part, start = hand_over(slave, master, model, spec, assumed, noise, position)
-        track = transfer_filter(part, master, model, start, Matching(*noise))
+        track = transfer_filter(part, master, model, start, Matching(*noise), linear=linear)
         noise = _refitted(track, noise, fitted)
+        linear = _linear(part, master, track)
     tell("aligning")
     part, start = hand_over(slave, master, model, spec, assumed, noise, position)
     if part.duration < SHORTEST:
@@ -159,7 +161,8 @@ def align_transfer(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check --delay "
             "and the clocks"
         )
-    track = transfer_filter(part, master, model, start, Matching(*noise, gate=GATE), covariances=True)
+    matched = Matching(*noise, gate=GATE)
+    track = transfer_filter(part, master, model, start, matched, covariances=True, linear=linear)
     answer = assemble_transfer(
         part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit
     )
@@ -200,6 +203,16 @@ def _noise(velocity: float | None, attitude: float | None, what: str) -> tuple[f
     v = VELOCITY_NOISE if velocity is None else velocity
     a = ATTITUDE_NOISE if attitude is None else attitude
     return (math.inf if what == "attitude" else v), (math.inf if what == "velocity" else a)
+
+
+def _linear(slave: ImuRecord, master: MasterRecord, track: TransferTrack) -> Linear:
+    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master tells its own."""
+    C_nb = np.full((len(master), 3, 3), np.nan)
+    C_nb[track.row] = final_attitudes(slave, track)
+    C_nm = C_nb @ track.C_mb[-1].T
+    if master.C_nb is not None:
+        C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
+    return Linear(C_nm, C_nb)
 
 
 def _refitted(track: TransferTrack, noise: tuple[float, float], fitted: Sequence[bool]) -> tuple[float, float]:

@@ -35,6 +35,7 @@ MOST_EPOCHS = 400  # of the linear system that says what is told apart
 MOST_ROWS = 5000  # of the history
 DISTRUST = 0.2  # share of rejected rows above which master and slave contradict each other
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
+LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
 TIED = 0.95  # correlation of two states beyond which one is not told without the other
 OUTLIER = 5.0  # sigmas by which a delay, a lever arm or a mounting may miss what was assumed
 
@@ -133,7 +134,7 @@ def _transfer(
         lever_arm_sigma=np.zeros(3) if arm is None else sigma[arm],
         lever_arm_prior=np.full(3, assumed.lever_arm_sigma),
         mounting=_signed(np.array(euler_from_dcm(track.C_mb[-1]))),
-        mounting_sigma=sigma_of_mounting(track.last_P, mount),
+        mounting_sigma=sigma_of_mounting(track.last_P, mount, track.C_mb[-1]),
         mounting_prior=np.full(3, 0.0 if mount is None else assumed.mounting_sigma),
         velocity_noise=noise[0] if np.isfinite(noise[0]) else math.nan,
         attitude_noise=noise[1] if np.isfinite(noise[1]) else math.nan,
@@ -176,15 +177,15 @@ def _open(
     P0 = model.prior(
         1.0,
         max(assumed.mounting_sigma, math.radians(1.0)),
-        np.sqrt(np.diag(start.P)[BA]),
-        np.sqrt(np.diag(start.P)[BG]),
+        np.maximum(np.sqrt(np.diag(start.P)[BA]), LEAST_ACCEL),
+        np.maximum(np.sqrt(np.diag(start.P)[BG]), LEAST_GYRO),
         tau=assumed.delay_sigma,
         # As long as the way driven in the delay's sigma, so that neither is favoured in the words.
         arm=max(assumed.lever_arm_sigma, speed * assumed.delay_sigma),
         mounting=assumed.mounting_sigma,
     )
     R = np.repeat([s**2 / every if np.isfinite(s) else np.inf for s in noise], 3)
-    system = system_along(middle, at, T, model, P0, R, assumed.lever_arm)
+    system = system_along(middle, at, T, model, P0, R, assumed.lever_arm, assumed.C_mb)
     names = [WORDS[name] for name in model.names]
     told = observability(system, names, model.units)
     if not np.isfinite(noise[0]):  # attitude alone: nothing of velocity and force is expected
@@ -201,12 +202,13 @@ def _open(
 def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
     """States whose errors go together in the end: each is worse known than the group would be with one of them given."""
     sigma = np.sqrt(np.diag(P))
-    correlation = np.abs(P / np.outer(sigma, sigma)) > TIED
+    size = np.where(sigma > 0.0, sigma, 1.0)
+    tied = (np.abs(P / np.outer(size, size)) > TIED) | np.eye(len(names), dtype=bool)
     left, found = set(range(len(names))), []
     while left:
         group, grown = {min(left)}, set[int]()
         while group != grown:
-            grown, group = group, {int(j) for i in group for j in np.flatnonzero(correlation[i])}
+            grown, group = group, {int(j) for i in group for j in np.flatnonzero(tied[i])}
         left -= group
         told = [names[i] for i in sorted(group) if names[i] not in quiet]
         if len(told) > 1:
@@ -244,7 +246,7 @@ def _history(slave: ImuRecord, track: TransferTrack, what: str) -> History:
     present = np.flatnonzero(np.isfinite(track.innovation[:, columns]).all(axis=1))
     k = present[:: max(1, -(-len(present) // MOST_ROWS))]
     covariance, floor = misalignment_covariance(track.P[k])
-    final = _final_attitudes(slave, track)[k]
+    final = final_attitudes(slave, track)[k]
     return History(
         time=track.time[k],
         C_nb=track.C_nb[k],
@@ -261,7 +263,7 @@ def _history(slave: ImuRecord, track: TransferTrack, what: str) -> History:
     )
 
 
-def _final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
+def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
     """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases taken off."""
     dtheta, _ = increments(slave)
     dtheta = dtheta - track.aux[-1, BG] * interval_lengths(slave)[:, None]

@@ -77,6 +77,14 @@ class Matching:
 
 
 @dataclass(frozen=True)
+class Linear:
+    """Attitudes of master and slave at the master's rows, (M, 3, 3), better known than the rows tell."""
+
+    C_nm: Array
+    C_nb: Array
+
+
+@dataclass(frozen=True)
 class TransferTrack:
     """The slave at each row of the master, as known then.
 
@@ -131,6 +139,7 @@ def transfer_filter(
     matching: Matching,
     *,
     covariances: bool = False,
+    linear: Linear | None = None,
 ) -> TransferTrack:
     """Run the closed loop over two records on one clock.
 
@@ -146,6 +155,9 @@ def transfer_filter(
     matching : Matching
     covariances : bool
         Keep ``P`` at each row.
+    linear : Linear, optional
+        Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
+        rows (as much as 1 rad^-2 of information a row), would otherwise tell a little of the mounting and of the delay falsely.
 
     Returns
     -------
@@ -160,7 +172,7 @@ def transfer_filter(
     dtheta, dvel = increments(slave)
     steps = interval_lengths(slave)
     samples = loop.Samples(*(read_only(x) for x in (steps, slave.time, dtheta, dvel)))
-    rows = _rows(master, start.delay, matching)
+    rows = _rows(master, start.delay, matching, linear)
     state = np.concatenate([quaternion_from_dcm(start.C_nb), start.v_n, [start.lat, start.lon, start.alt], np.zeros(9)])
     aux = np.zeros(n)
     aux[6:9], aux[9:12] = start.accel_bias, start.gyro_bias
@@ -219,7 +231,7 @@ def transfer_filter(
     )
 
 
-def _rows(master: MasterRecord, delay: float, matching: Matching) -> loop.Master:
+def _rows(master: MasterRecord, delay: float, matching: Matching, linear: Linear | None) -> loop.Master:
     """The master's rows as the loop takes them; what is not matched is NaN."""
     count = len(master)
     nothing = np.full((count, 3), np.nan)
@@ -228,13 +240,14 @@ def _rows(master: MasterRecord, delay: float, matching: Matching) -> loop.Master
         velocity = master.v_n
     if master.C_nb is not None and np.isfinite(matching.attitude_sigma):
         C_nm = master.C_nb
+    smooth = (C_nm, np.full((count, 3, 3), np.nan)) if linear is None else (linear.C_nm, linear.C_nb)
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
     if master.f_b is not None and master.C_nb is not None and np.isfinite(place).all() and master.v_n is not None:
         lat, alt, v = place[:, 0], place[:, 2], master.v_n
         coriolis = np.cross(2 * earth_rate_n(lat) + transport_rate_n(lat, alt, v), v)
         acceleration = np.einsum("kij,kj->ki", master.C_nb, master.f_b) - coriolis + gravity_n(lat, alt)
-    return loop.Master(*(read_only(x) for x in (master.time - delay, velocity, place, acceleration, C_nm)))
+    return loop.Master(*(read_only(x) for x in (master.time - delay, velocity, place, acceleration, C_nm, *smooth)))
 
 
 def _settings(

@@ -50,7 +50,7 @@ class Master(NamedTuple):
     """Rows of the master, NaN where it does not say.
 
     (M,) times, known delay taken off; (M, 3) velocity, place (latitude, longitude, height) and acceleration, in n; (M, 3, 3)
-    attitude.
+    attitude; and the attitudes of master and slave that the model is linearised with, the slave's NaN where its own is to be taken.
     """
 
     time: Array
@@ -58,6 +58,8 @@ class Master(NamedTuple):
     place: Array
     acceleration: Array
     C_nm: Array
+    C_linear: Array
+    C_slave: Array
 
 
 class Loop(NamedTuple):
@@ -222,7 +224,11 @@ def feed_back(s: Any, aux: Any, C_mb: Any, places: Any, x: Any) -> None:
         aux[j] += x[j]
     at = places[_MOUNT]
     if at >= 0:
-        turn(C_mb, x[at : at + 3])
+        E, C = np.zeros((3, 3)), C_mb.copy()
+        set_matrix(quaternion_from_rotation_vector((x[at], x[at + 1], x[at + 2])), E)
+        for i in range(3):
+            for j in range(3):
+                C_mb[i, j] = E[i, 0] * C[0, j] + E[i, 1] * C[1, j] + E[i, 2] * C[2, j]
     for j in range(len(x)):
         x[j] = 0.0
 
@@ -276,7 +282,7 @@ def run(
     room, path = np.zeros((loop.longest, 7)), np.zeros((loop.longest, 10))
     C, C_t, reference, rates = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     v, a, w_eb, w_nb, arm, bent = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    C_seat = np.zeros((3, 3))
+    C_seat, along = np.zeros((3, 3)), np.zeros(3)
     refused = np.zeros(2, np.int64)
     at_tau, at_arm, at_mount, at_flex = loop.places[0], loop.places[1], loop.places[2], loop.places[3]
     done = 0
@@ -314,17 +320,23 @@ def run(
             sweep = cross((rates[0, 0], rates[0, 1], rates[0, 2]), (arm[0], arm[1], arm[2]))
             swing = cross((rates[0, 0], rates[0, 1], rates[0, 2]), sweep)
             roll = cross((rates[2, 0], rates[2, 1], rates[2, 2]), (arm[0], arm[1], arm[2]))
+            better = not np.isnan(master.C_slave[k, 0, 0])
             for j in range(3):
                 w_eb[j] = rates[0, j]
                 w_nb[j] = rates[0, j]
                 own, arms = -drop[j], 0.0
+                along[j] = own
                 for i in range(3):
                     w_eb[j] -= C[i, j] * w_ie[i]
                     w_nb[j] -= C[i, j] * (w_ie[i] + w_en[i])
+                    turned = C[j, i]
+                    if better:
+                        turned = master.C_slave[k, j, i]
+                    along[j] += turned * rates[1, i]
                     own += C[j, i] * rates[1, i]
                     arms += C[j, i] * (swing[i] + roll[i])
                 v[j] = s[4 + j] + own * ahead
-                a[j] = own - arms
+                a[j] = along[j] - arms
                 if not np.isnan(master.acceleration[k, j]):
                     a[j] = master.acceleration[k, j]
                 bent[j] = w_nb[j] * ahead
@@ -356,7 +368,7 @@ def run(
                             for m in range(3):
                                 total += master.C_nm[k, i, m] * C_seat[m, j]
                             reference[i, j] = total
-                    attitude_rows(C_t, w_nb, reference, loop.places, w.H, w.z)
+                    attitude_rows(C_t, w_nb, reference, master.C_linear[k], loop.places, w.H, w.z)
                 for i in range(3):
                     nu = w.z[i]
                     for j in range(n):

@@ -183,6 +183,7 @@ def hand_over(
         arm=assumed.lever_arm_sigma,
         mounting=assumed.mounting_sigma,
         C_nb=None if C_nm is None else C,
+        C_mb=assumed.C_mb,
     )
     start = Handover(C, v, lat, lon, alt, P, C_mb=assumed.C_mb, arm=assumed.lever_arm, delay=assumed.delay)
     return part, start
@@ -214,9 +215,11 @@ def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:
     return np.asarray(dcm_from_euler(heading, pitch, roll))
 
 
-def sigma_of_mounting(P: Array, at: slice | None) -> Array:
-    """(3,) sigmas about z, x and y: those of heading, pitch and roll at small angles."""
-    return np.zeros(3) if at is None else np.sqrt(np.diag(P)[at])[[2, 0, 1]]
+def sigma_of_mounting(P: Array, at: slice | None, C_mb: Array) -> Array:
+    """(3,) sigmas about the slave's z, x and y: those of heading, pitch and roll where these are small."""
+    if at is None:
+        return np.zeros(3)
+    return np.asarray(np.sqrt(np.diag(C_mb.T @ P[at, at] @ C_mb))[[2, 0, 1]])
 
 
 def misalignment_covariance(P: Array) -> tuple[Array, Array]:

@@ -15,7 +15,14 @@ Array = NDArray[np.float64]
 
 
 def system_of_motion(
-    motion: Moving, model: TransferModel, P0: Array, R: Array, stop: float, step: float = 0.5, start: float = 0.0
+    motion: Moving,
+    model: TransferModel,
+    P0: Array,
+    R: Array,
+    stop: float,
+    step: float = 0.5,
+    start: float = 0.0,
+    C_mb: Array | None = None,
 ) -> LinearSystem:
     """The model along a known motion, measured every `step` (s).
 
@@ -28,9 +35,11 @@ def system_of_motion(
     R : (6,) array
         Variances of velocity and attitude; infinite: not measured.
     stop, step, start : float, s
+    C_mb : (3, 3) array, optional
+        Slave to master axes; the unit matrix when left out.
     """
     t = start + step * (np.arange(round((stop - start) / step)) + 1.0)
-    return system_along(motion.states(t - 0.5 * step), motion.states(t), np.full(len(t), step), model, P0, R)
+    return system_along(motion.states(t - 0.5 * step), motion.states(t), np.full(len(t), step), model, P0, R, C_mb=C_mb)
 
 
 def system_along(
@@ -41,6 +50,7 @@ def system_along(
     P0: Array,
     R: Array,
     arm: Array | None = None,
+    C_mb: Array | None = None,
 ) -> LinearSystem:
     """The model along a motion that is known at the middle and at the end of K intervals.
 
@@ -52,13 +62,15 @@ def system_along(
         As :func:`system_of_motion`.
     arm : (3,) array, m, optional
         As assumed; none when left out.
+    C_mb : (3, 3) array, optional
+        Slave to master axes; the unit matrix when left out.
     """
     f_n = np.einsum("kij,kj->ki", middle.C_nb, middle.f_b)
     Phi, Q = model.linearise(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b)
     w_ie, w_en = earth_rate_n(at.lat), transport_rate_n(at.lat, at.alt, at.v_n)
     w_eb, w_nb = (at.w_ib_b - np.einsum("kji,kj->ki", at.C_nb, w) for w in (w_ie, w_ie + w_en))
     a_n = np.einsum("kij,kj->ki", at.C_nb, at.f_b) - np.cross(2 * w_ie + w_en, at.v_n) + gravity_n(at.lat, at.alt)
-    H = model.observe(at.C_nb, at.v_n, a_n, w_eb, w_nb, (0.0, 0.0, 0.0) if arm is None else arm)
+    H = model.observe(at.C_nb, at.v_n, a_n, w_eb, w_nb, (0.0, 0.0, 0.0) if arm is None else arm, C_mb)
     matched = np.isfinite(R)
     return LinearSystem(
         Phi=Phi,

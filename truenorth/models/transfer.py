@@ -10,15 +10,17 @@ States, errors of the slave computed minus true; which of those behind the twelv
 | BG | what is left of the gyro bias: measured minus true | rad/s |
 | tau | delay of the master beyond the known one: true minus assumed | s |
 | r | lever arm from the master to the slave, slave axes: true minus assumed | m |
-| mu | mounting of the slave on the master: ``C_mb = C_mb_assumed (I + [mu x])`` | rad |
+| mu | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | theta, theta' | flexure: the slave's seat turned against the rigid body, slave axes, and its rate | rad, rad/s |
 
-(m are the *master's* axes.) The dynamics of the twelve are those of :mod:`truenorth.models.ins` in ENU without the
-position error, whose part in minutes is below a millionth. The master is late by tau and stands at -r in the slave, so that
+(m are the *master's* axes, in which mu does not turn with what is estimated: in the slave's axes the filter would take its own
+corrections of tilt for knowledge of heading.) The dynamics of the twelve are those of :mod:`truenorth.models.ins` in ENU
+without the position error, whose part in minutes is below a millionth. The master is late by tau and stands at -r in the slave, so
+that
 
     velocity   z = v_hat - C_hat (w_hat x r) - v_master
                  = dv + a tau + C [w x] dr + phi x C (w x r) - C (eps x r)
-    attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C mu - C theta
+    attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C_master mu - C theta
 
 with `a` the *master's* acceleration: the slave's holds that of the arm itself, which would tell a delay from the master's
 smooth motion falsely. Flexure is ``theta'' = -2 beta theta' - beta^2 theta + white noise`` on each axis.
@@ -172,6 +174,7 @@ class TransferModel:
         arm: ArrayLike = 0.0,
         mounting: ArrayLike = 0.0,
         C_nb: ArrayLike | None = None,
+        C_mb: ArrayLike | None = None,
     ) -> Array:
         """(n, n) covariance at the start, of independent states.
 
@@ -182,8 +185,10 @@ class TransferModel:
         arm, mounting : one or (3,) sigmas, m and rad
             Of states that are not there, ignored.
         C_nb : (3, 3) array, optional
-            The slave's attitude was handed over from the master through the assumed mounting: ``phi = C mu`` beside what `phi`
-            says. Without it they are independent.
+            The slave's attitude was handed over from the master through the assumed mounting: ``phi = C_nm mu + C theta`` beside
+            what `phi` says. Without it they are independent.
+        C_mb : (3, 3) array, optional
+            The assumed mounting; the unit matrix when left out.
         """
         sigma = np.zeros(self.states)
         for part, value in ((DV, dv), (PHI, phi), (BA, accel_bias), (BG, gyro_bias)):
@@ -197,8 +202,8 @@ class TransferModel:
             sigma[at : at + 3] = self.flexure_beta * np.array(self.flexure_sigma)
         P = np.diag(sigma**2)
         if C_nb is not None:
-            C = np.asarray(C_nb, dtype=np.float64)
-            for which in (MOUNT, FLEX):  # a seat that is bent at the start is handed over bent
+            seat = np.asarray(C_nb, dtype=np.float64)
+            for which, C in ((MOUNT, seat if C_mb is None else seat @ np.asarray(C_mb).T), (FLEX, seat)):
                 found = self.slice_of(which)
                 if found is not None:
                     own = P[found, found].copy()
@@ -260,6 +265,7 @@ class TransferModel:
         w_eb_b: ArrayLike,
         w_nb_b: ArrayLike,
         arm: ArrayLike = (0.0, 0.0, 0.0),
+        C_mb: ArrayLike | None = None,
     ) -> Array:
         """(K, 6, n) rows of velocity and of attitude matching at K epochs.
 
@@ -272,14 +278,17 @@ class TransferModel:
             Rates of the slave against the earth and against the level frame.
         arm : (3,) array, m
             As assumed.
+        C_mb : (3, 3) array, optional
+            Slave to master axes; the unit matrix when left out.
         """
         C, v, a, w, w_nb = (np.ascontiguousarray(x, dtype=np.float64) for x in (C_nb, v_n, a_n, w_eb_b, w_nb_b))
         H = np.zeros((len(C), 6, self.states))
         z = np.zeros(3)
         places, r = self.places, np.asarray(arm, dtype=np.float64)
+        C_nm = C if C_mb is None else np.ascontiguousarray(C @ np.asarray(C_mb, dtype=np.float64).T)
         for k in range(len(C)):
             velocity_rows(C[k], v[k], a[k], w[k], r, places, v[k], H[k, :3], z)
-            attitude_rows(C[k], w_nb[k], C[k], places, H[k, 3:], z)
+            attitude_rows(C[k], w_nb[k], C[k], C_nm[k], places, H[k, 3:], z)
         return H
 
 
@@ -392,7 +401,7 @@ def velocity_rows(C: Any, v: Any, a: Any, w: Any, arm: Any, places: Any, measure
 
 
 @compiled
-def attitude_rows(C: Any, w: Any, reference: Any, places: Any, H: Any, z: Any) -> None:
+def attitude_rows(C: Any, w: Any, reference: Any, C_nm: Any, places: Any, H: Any, z: Any) -> None:
     """Attitude of the master, turned by the assumed mounting.
 
     Parameters
@@ -403,6 +412,8 @@ def attitude_rows(C: Any, w: Any, reference: Any, places: Any, H: Any, z: Any) -
         Rate of the slave against the level frame, slave axes.
     reference : (3, 3) array
         ``C_nm C_mb``: the slave's attitude as the master tells it.
+    C_nm : (3, 3) array
+        The master's attitude, to linearise with: as it is told, or better, but never corrected by what the filter finds on the way.
     places : (4,) array
     H : (3, N) array
         Zeros; filled in.
@@ -433,7 +444,7 @@ def attitude_rows(C: Any, w: Any, reference: Any, places: Any, H: Any, z: Any) -
             H[i, places[TAU]] = -(C[i, 0] * w[0] + C[i, 1] * w[1] + C[i, 2] * w[2])
         for j in range(3):
             if places[MOUNT] >= 0:
-                H[i, places[MOUNT] + j] = -C[i, j]
+                H[i, places[MOUNT] + j] = -C_nm[i, j]
             if places[FLEX] >= 0:
                 H[i, places[FLEX] + j] = -C[i, j]
 

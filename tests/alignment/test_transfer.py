@@ -1,0 +1,304 @@
+"""Transfer alignment: the closed loop against the linear filter and the truth, the real recording, bad and odd masters."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests import recordings
+from truenorth.alignment import align_transfer
+from truenorth.alignment.transfer_delay import find_delay
+from truenorth.alignment.transfer_filter import Handover, Linear, Matching, transfer_filter
+from truenorth.alignment.transfer_system import system_of_motion
+from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.errors import DataError, UsageError
+from truenorth.filters import kalman
+from truenorth.models.transfer import ARM, TAU, TransferModel
+from truenorth.position import Position
+from truenorth.records import MasterRecord
+from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_master
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import s_turn, straight
+from truenorth.specs import ImuSpec, imu_spec
+
+DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
+SPAN = 60.0
+TACTICAL = replace(imu_spec("tactical"), gyro_scale_factor=0.0, gyro_misalignment=0.0, accel_scale_factor=0.0)
+TACTICAL = replace(TACTICAL, accel_misalignment=0.0, gyro_bias_instability=0.0, accel_bias_instability=0.0)
+ARM_TRUE, MOUNT_TRUE, TAU_TRUE = (0.5, 1.0, -0.3), (0.02, -0.01, 0.015), 0.04
+MASTER = MasterSpec(
+    latency=TAU_TRUE, lever_arm=ARM_TRUE, mounting=MOUNT_TRUE, velocity_noise=0.05, attitude_noise=2 * ARCMIN
+)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """An S-turn at 60 m/s, banked: everything is told apart."""
+    legs = [*straight(10.0), *s_turn(25 * DEG, 4 * DEG), *straight(40.0)]
+    return course(Position(np.radians(45.0), 0.2, 500.0), legs, heading=0.5, speed=60.0)
+
+
+@pytest.fixture(scope="module")
+def ideal(flight):
+    return ideal_log(flight, rate=100.0, duration=SPAN)
+
+
+def _phi(result, flight):
+    """True misalignment of an answer, rad."""
+    true = flight.states(np.array(result.time)).C_nb
+    return -rotation_vector_from_dcm(result.C_nb @ true.T)
+
+
+def _start(flight, model, C_mb_true):
+    at = flight.states(np.array(0.0))
+    P = model.prior(0.1, 1e-6, 1e-2, 5 * DEG_PER_HOUR, tau=0.05, arm=1.0, mounting=3 * DEG, C_nb=at.C_nb)
+    C = at.C_nb @ C_mb_true.T
+    return Handover(C, at.v_n, float(at.lat), float(at.lon), float(at.alt), P)
+
+
+def test_without_noise_it_finds_the_truth(flight, ideal):
+    """Delay to .02 ms, lever arm to 5 mm, mounting and attitude to .02 arcmin: R stays, the data are exact."""
+    spec = replace(MASTER, velocity_noise=0.0, attitude_noise=0.0)
+    slave, master = simulate(ideal).record, simulate_master(flight, spec, duration=SPAN).record
+    C_mb = dcm_from_euler(*MOUNT_TRUE)
+    model = TransferModel(1e-7, 1e-6, mounting=True)
+    track = transfer_filter(slave, master, model, _start(flight, model, C_mb), Matching(1e-3, 1e-5))
+    aux = track.aux[-1]
+    assert aux[model.slice_of(TAU)][0] == pytest.approx(TAU_TRUE, abs=2e-5)
+    np.testing.assert_allclose(aux[model.slice_of(ARM)], ARM_TRUE, atol=5e-3)
+    np.testing.assert_allclose(rotation_vector_from_dcm(track.C_mb[-1].T @ C_mb), 0, atol=0.02 * ARCMIN)
+    true = flight.states(track.time[-1:]).C_nb
+    np.testing.assert_allclose(
+        rotation_vector_from_dcm(track.C_nb[-1:] @ np.swapaxes(true, 1, 2)), 0, atol=0.02 * ARCMIN
+    )
+
+
+def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
+    """Along the true motion, the same rows: sigmas within 2 % before the turn, .5 % from then on.
+
+    Before it heading and mounting cannot be told apart: a filter that linearises about its own corrections has there a tenth of
+    the sigma that it should have.
+    """
+    spec, C_mb = replace(MASTER, lever_arm=(0.0, 0.0, 0.0)), dcm_from_euler(*MOUNT_TRUE)
+    slave, master = simulate(ideal).record, simulate_master(flight, spec, duration=SPAN).record
+    model = TransferModel(TACTICAL.gyro_random_walk, TACTICAL.accel_random_walk, mounting=True)
+    start = replace(_start(flight, model, C_mb), delay=TAU_TRUE)
+    C_nb = flight.states(master.time - TAU_TRUE).C_nb
+    linear = Linear(C_nb @ C_mb.T, C_nb)
+    matching = Matching(0.05, 2 * ARCMIN)
+    track = transfer_filter(slave, master, model, start, matching, covariances=True, linear=linear)
+    R = np.repeat([0.05**2, (2 * ARCMIN) ** 2], 3)
+    system = system_of_motion(flight, model, start.P, R, SPAN - 0.1, step=0.1, C_mb=C_mb)
+    expected = np.squeeze(kalman(system, history="sigma", innovations=False).sigma)
+    for at, tolerance in ((5.0, 0.02), (9.0, 0.02), (20.0, 0.005), (30.0, 0.005), (59.0, 0.005)):
+        k, j = np.searchsorted(track.time, at - 1e-6), round(at / 0.1) - 1
+        np.testing.assert_allclose(track.sigma[k], expected[j], rtol=tolerance)
+
+
+def test_sigmas_are_honest(flight, ideal):
+    """NEES of attitude, gyro bias, delay, arm over 12 flights: 120 numbers, false alarms 1 in 1000 on either side."""
+    total = 0.0
+    runs = 12
+    for run in range(runs):
+        simulation = simulate(ideal, imu=TACTICAL, seed=5, run=run)
+        rng = np.random.default_rng([5, run])
+        arm, tau, mount = rng.standard_normal(3), 0.05 * rng.standard_normal(), 3 * DEG * rng.standard_normal(3)
+        heading, pitch, roll = mount[2], mount[0], mount[1]
+        spec = replace(MASTER, latency=0.0, clock_offset=tau, lever_arm=tuple(arm), mounting=(-heading, pitch, roll))
+        master = simulate_master(flight, spec, duration=SPAN, seed=5, run=run).record
+        result = align_transfer(simulation.record, master, TACTICAL, velocity_noise=0.05, attitude_noise=2 * ARCMIN)
+        t = result.transfer
+        phi = _phi(result, flight)
+        total += phi @ np.linalg.solve(result.phi_covariance, phi)
+        total += np.sum(((result.gyro_bias - simulation.errors.gyro_bias) / result.gyro_bias_sigma) ** 2)
+        total += ((t.delay - tau) / t.delay_sigma) ** 2 + np.sum(((t.lever_arm - arm) / t.lever_arm_sigma) ** 2)
+        assert result.status == "aligned"
+    numbers = 10 * runs
+    assert abs(total / numbers - 1.0) < 3.3 * np.sqrt(2 / numbers)
+
+
+@pytest.fixture(scope="module")
+def real():
+    return recordings.transfer_fog_mems()
+
+
+AUTHOR = {
+    "gyro": np.array([-0.00103577, 0.0007705, 0.00040954]) / DEG_PER_HOUR,
+    "mounting": np.degrees([-0.00154277, 0.00071891, -0.00511199]),  # slave = (I - [mu x]) master
+}
+
+
+@pytest.fixture(scope="module")
+def found(real):
+    return align_transfer(*real)
+
+
+def test_the_recording_agrees_with_its_author(found):
+    """Gyro bias x, y within 10 and z within 15 deg/h, mounting heading within .15 deg; a delay of 10 to 20 ms."""
+    assert found.status == "aligned"
+    assert np.all(np.abs(found.gyro_bias / DEG_PER_HOUR - AUTHOR["gyro"]) < [10.0, 10.0, 15.0])
+    heading, pitch, roll = np.degrees(found.transfer.mounting)
+    mu = AUTHOR["mounting"]
+    assert abs(heading + mu[2]) < 0.15
+    assert abs(pitch - mu[0]) < 0.15
+    assert abs(roll - mu[1]) < 0.15
+    assert 0.010 < found.transfer.delay < 0.020
+    assert found.transfer.delay_sigma < 0.005
+
+
+def test_what_level_driving_does_not_tell_apart_is_named(found):
+    """Tilt, accelerometer bias and mounting go together on a straight road."""
+    words = " ".join(found.transfer.open)
+    assert "accelerometer bias y and mounting about x" in words
+    assert any("not well told apart" in reason for reason in found.reasons)
+
+
+def test_velocity_alone_takes_its_course_and_finds_the_same(real, found):
+    slave, master = real
+    blind = align_transfer(slave, replace(master, C_nb=None))
+    difference = rotation_vector_from_dcm(blind.C_nb @ found.C_nb.T)
+    assert np.all(np.abs(difference) < 4 * np.sqrt(np.diag(blind.phi_covariance)))
+    assert blind.transfer.matching == "velocity"
+
+
+@pytest.mark.parametrize("offset", [0.2, 1234.5])
+def test_a_master_that_is_late_or_on_another_clock_is_recognised(real, found, offset):
+    slave, master = real
+    late = align_transfer(slave, master.shifted(offset))
+    assert late.transfer.delay == pytest.approx(offset + found.transfer.delay, abs=1e-3)
+    assert "the found delay is taken" in late.reasons[1]
+    np.testing.assert_allclose(late.C_nb, found.C_nb, atol=2e-4)
+
+
+def test_a_known_delay_is_compensated_without_a_word(real, found):
+    slave, master = real
+    told = align_transfer(slave, master.shifted(0.2), delay=0.2)
+    assert told.transfer.notes == ()
+    assert told.transfer.delay == pytest.approx(0.2 + found.transfer.delay, abs=1e-4)
+
+
+def _without(master, gone):
+    kept = ~gone
+    return MasterRecord(
+        **{name: getattr(master, name)[kept] for name in ("time", "C_nb", "v_n", "lat", "lon", "alt")},
+        source="dropping",
+    )
+
+
+def test_ten_seconds_of_silence(real, found):
+    slave, master = real
+    result = align_transfer(slave, _without(master, (master.time > 20) & (master.time < 30)))
+    assert any("silent for 10." in note for note in result.transfer.notes)
+    np.testing.assert_allclose(rotation_vector_from_dcm(result.C_nb @ found.C_nb.T), 0, atol=2 * ARCMIN)
+
+
+def test_a_jump_is_told_and_taken_up(real, found):
+    slave, master = real
+    v = master.v_n.copy()
+    v[250:, 0] += 0.5
+    result = align_transfer(slave, replace(master, v_n=v))
+    assert len(result.transfer.jumps) == 1
+    assert "velocity jumped by 0.5 m/s" in result.transfer.jumps[0]
+    np.testing.assert_allclose(rotation_vector_from_dcm(result.C_nb @ found.C_nb.T), 0, atol=2 * ARCMIN)
+
+
+def test_wild_rows_are_left_out(real, found):
+    slave, master = real
+    v = master.v_n.copy()
+    v[100::37, 0] += 3.0
+    result = align_transfer(slave, replace(master, v_n=v))
+    assert result.transfer.rejected == 11
+    np.testing.assert_allclose(rotation_vector_from_dcm(result.C_nb @ found.C_nb.T), 0, atol=ARCMIN)
+
+
+def test_wrong_axes_of_the_slave_are_a_contradiction(real):
+    slave, master = real
+    result = align_transfer(slave.rotated([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]), master)
+    assert result.status == "inconsistent"
+    assert "mounting" in result.reasons[0]
+
+
+def test_clocks_that_cannot_be_brought_together_are_refused(real):
+    slave, master = real
+    other = replace(master, C_nb=None).between(30.0, 50.0).shifted(300.0)
+    with pytest.raises(DataError, match="no shift makes their motion agree"):
+        align_transfer(slave.between(0.0, 20.0), other)
+
+
+def test_the_delay_by_motion_alone(real):
+    slave, master = real
+    for shift in (0.0, -3.21, 500.0):
+        for record in (master, replace(master, C_nb=None)):
+            delay = find_delay(slave, record.shifted(shift), np.eye(3))
+            assert delay.sure
+            assert delay.delay - shift == pytest.approx(0.015, abs=0.02)
+
+
+@pytest.mark.slow  # a kernel of its own size
+def test_flexure_states_take_up_a_seat_that_bends(flight):
+    """On a bending seat the filter without them is overconfident; with them the error is within 4 sigma."""
+    from truenorth.simulation import Flexed
+
+    bend = FlexureSpec(sigma=(6 * ARCMIN, 3 * ARCMIN, 3 * ARCMIN), correlation_time=5.0)
+    moving = Flexed(flight, bend, duration=SPAN, seed=3)
+    slave = simulate(ideal_log(moving, rate=100.0, duration=SPAN), imu=TACTICAL, seed=3).record
+    master = simulate_master(flight, replace(MASTER, attitude_noise=0.2 * ARCMIN), duration=SPAN, seed=3).record
+    noise = {"velocity_noise": 0.05, "attitude_noise": 0.2 * ARCMIN}
+    with_states, without = (align_transfer(slave, master, TACTICAL, flexure=f, **noise) for f in (bend, None))
+
+    def nees(result):
+        phi = _phi(result, moving)
+        return phi @ np.linalg.solve(result.phi_covariance, phi)
+
+    assert nees(with_states) < 18.0  # 99.95 % of three
+    assert nees(without) > 30.0 or without.status == "inconsistent"
+
+
+def test_the_answer_can_be_drawn_saved_and_told(found, tmp_path):
+    summary = json.loads(json.dumps(found.summary(), allow_nan=False))
+    assert summary["matching"] == "both"
+    assert 10 < summary["delay_ms"] < 20
+    assert summary["delay_estimated"] is True
+    assert len(found.to_frame()) == 499
+    assert found.plot() is not None
+    names = {path.name for path in found.save(tmp_path)}
+    assert {"summary.json", "history.parquet", "report.html"} <= names
+
+
+def test_the_history_converges_on_the_answer(found):
+    """What each epoch told of the final attitude is within its sigmas: no epoch beyond five."""
+    value, sigma = found.convergence
+    late = found.history.time > 20
+    assert np.all(np.abs(value - found.euler)[late] < 5 * sigma[late])
+
+
+def test_bad_requests(real):
+    slave, master = real
+    with pytest.raises(UsageError, match="needs its attitude"):
+        align_transfer(slave, replace(master, C_nb=None), matching="attitude")
+    with pytest.raises(UsageError, match="match attitude too"):
+        align_transfer(slave, master, matching="velocity", flexure=FlexureSpec(sigma=(1e-3, 1e-3, 1e-3)))
+    with pytest.raises(UsageError, match="lever_arm is"):
+        align_transfer(slave, master, lever_arm=(1.0, 2.0))
+    with pytest.raises(UsageError, match="delay_sigma is -1"):
+        align_transfer(slave, master, delay_sigma=-1.0)
+    with pytest.raises(UsageError, match="--lat"):
+        align_transfer(slave, replace(master, lat=None, lon=None, alt=None))
+    with pytest.raises(DataError, match="gap of"):
+        align_transfer(slave._with(time=np.where(slave.time > 25, slave.time + 5, slave.time)), master)
+
+
+def test_only_what_is_unknown_is_estimated(real):
+    slave, master = real
+    result = align_transfer(slave, master, delay=0.016, delay_sigma=0.0, lever_arm_sigma=0.0, mounting_sigma=0.0)
+    assert result.transfer.delay_sigma == 0.0
+    assert not result.transfer.delay_estimated
+    assert "12 states" in result.method_reason
+
+
+def test_ideal_spec_of_the_slave_is_possible(flight, ideal):
+    """A specification of zeros: the covariance must not break down."""
+    slave = simulate(ideal).record
+    master = simulate_master(flight, MASTER, duration=SPAN).record
+    assert align_transfer(slave, master, ImuSpec()).status == "aligned"
