@@ -16,6 +16,7 @@ from truenorth.alignment.in_motion_start import (
     Guess,
     backtracked,
     coarse_guess,
+    departures,
     guesses_all_round,
     seconds_at_rest,
     start_at,
@@ -231,7 +232,7 @@ def _task(
         odometer,
         gnss,
         WHEEL if wheel is None else wheel,
-        _antenna(gnss) if antenna is None else antenna,
+        usual_antenna(gnss) if antenna is None else antenna,
         stops,
     )
 
@@ -249,7 +250,7 @@ def _with_floors(gnss: GnssRecord) -> GnssRecord:
     )
 
 
-def _antenna(gnss: GnssRecord | None) -> Mounting:
+def usual_antenna(gnss: GnssRecord | None) -> Mounting:
     """Of an antenna of which nothing is said: fixes without sigmas of their own are off together for minutes."""
     if gnss is None or gnss.position_sigma is not None:
         return Mounting()
@@ -343,7 +344,6 @@ def _history(track: Track, task: _Task) -> History:
     g = float(normal_gravity(task.position.lat, task.position.alt))
     deflection = deflection_covariance(task.position.lat, g)
     count = len(track.time)
-    # Attitude now, against what the end says of it: the difference shows in the history itself; the vehicle turns meanwhile.
     aided = max((r for r in track.residuals if len(r.time)), key=lambda r: len(r.time), default=None)
     innovation, expected, nis = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
     if aided is not None:
@@ -356,7 +356,7 @@ def _history(track: Track, task: _Task) -> History:
         C_nb=track.C_nb,
         phi_covariance=P[:, PHI, PHI] + deflection,
         phi_floor=np.broadcast_to(deflection, (count, 3, 3)),
-        departure=np.zeros((count, 3)),
+        departure=departures(task.record, track),
         gyro_bias=track.gyro_bias,
         gyro_bias_sigma=sigma[:, BG],
         accel_bias=track.accel_bias,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.task import level_of
-from truenorth.attitude import dcm_from_euler, skew
+from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
 from truenorth.increments import increments
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
@@ -120,6 +120,19 @@ def backtracked(record: ImuRecord, track: Track) -> Array:
     elapsed = track.time - track.time[0]
     C_n0_n = frames(elapsed, track.position)[-1]
     return np.asarray(C_n0_n @ track.C_nb[-1] @ C_ib.T)
+
+
+def departures(record: ImuRecord, track: Track) -> Array:
+    """(K, 3) phi of the attitude told at each epoch, against what the end of the track and the gyros say of that epoch, rad."""
+    rows = np.searchsorted(record.time, track.time - 0.5 * record.interval)
+    rows[1:] += 1
+    dtheta, dvel = increments(record)
+    turned = dtheta - record.steps[:, None] * track.gyro_bias[-1]
+    C_ib = inertial_integrals(turned, dvel, record.steps, np.minimum(rows, len(record)))[0]
+    C_n0_n = frames(track.time - track.time[0], track.position)
+    C_n0_i = C_n0_n[-1] @ track.C_nb[-1] @ C_ib[-1].T
+    final = np.swapaxes(C_n0_n, 1, 2) @ C_n0_i @ C_ib
+    return rotation_vector_from_dcm(final @ np.swapaxes(track.C_nb, 1, 2))
 
 
 def seconds_at_rest(record: ImuRecord, odometer: OdometerRecord | None, gnss: GnssRecord | None) -> tuple[Array, Array]:

@@ -10,6 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truenorth.cli.align_in_motion import (
+    AntennaArm,
+    Gnss,
+    MountingAngles,
+    MountingSigma,
+    Odometer,
+    OdometerNoise,
+    Offset,
+    WheelArm,
+    align_moving,
+    print_moving,
+)
 from truenorth.cli.align_rotary import Indexer, IndexerAxes, LeverArm, align_on_indexer
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
@@ -29,6 +41,8 @@ Examples:
   truenorth align log.csv --lat 34.246 --imu my_imu.yaml --method oba
   truenorth align turntable.csv --lat 39.98 --imu tactical --positions auto
   truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv --indexer-axes z,x
+  truenorth align drive.csv --odometer odo.csv --lat 39.9 --imu navigation -o start
+  truenorth align drive.csv --gnss gnss.csv --imu industrial -o start
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
@@ -36,7 +50,7 @@ Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data canno
 
 def align(
     log: Log,
-    lat: Annotated[float, typer.Option(help="Latitude, deg, north positive.", show_default=False)],
+    lat: Annotated[float | None, typer.Option(help="Latitude, deg, north positive.", show_default=False)] = None,
     lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0,
     alt: Annotated[float, typer.Option(help="Height above the ellipsoid, m.")] = 0.0,
     position_sigma: Annotated[float, typer.Option(help="One-sigma error of that position, m.")] = 10.0,
@@ -92,6 +106,14 @@ def align(
             show_default=False,
         ),
     ] = None,
+    odometer: Odometer = None,
+    gnss: Gnss = None,
+    offset: Offset = 0.0,
+    wheel_arm: WheelArm = None,
+    antenna_arm: AntennaArm = None,
+    mounting: MountingAngles = None,
+    mounting_sigma: MountingSigma = 3.0,
+    odometer_noise: OdometerNoise = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -102,9 +124,15 @@ def align(
 ) -> None:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying."""
     from truenorth.atomic import writable_folder
+    from truenorth.errors import UsageError
     from truenorth.position import Position
 
-    position = Position.from_degrees(lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2 * position_sigma)
+    moving = odometer is not None or gnss is not None
+    if lat is None and gnss is None:
+        raise UsageError("the latitude is missing; expected --lat DEGREES, or --gnss FILE with positions")
+    sigmas = {"horizontal_sigma": position_sigma, "vertical_sigma": 2 * position_sigma}
+    place = None if lat is None else Position.from_degrees(lat, lon, alt, **sigmas)
+    position = Position(math.pi / 4) if place is None else place
     if output is not None:
         writable_folder(output)  # before the work, not after it
     with stages(quiet=as_json) as tell:
@@ -128,7 +156,26 @@ def align(
 
         known = None if calibration is None else Calibration.from_file(calibration)
         limit = math.radians(heading_limit)
-        if positions is not None:
+        if moving:
+            result = align_moving(
+                record,
+                place,
+                imu,
+                method,
+                odometer,
+                gnss,
+                at=at,
+                offset=offset,
+                wheel_arm=wheel_arm,
+                antenna_arm=antenna_arm,
+                mounting=mounting,
+                mounting_sigma=mounting_sigma,
+                odometer_noise=odometer_noise,
+                calibration=known,
+                limit=limit,
+                progress=tell,
+            )
+        elif positions is not None:
             from truenorth.cli.align_positions import align_table
 
             result = align_table(positions, method, at, record, position, imu, known, arm_sigma, limit, tell)
@@ -154,7 +201,7 @@ def align(
             from truenorth.quality import inspect
 
             tell("inspecting the log")
-            result = replace(result, inspection=inspect(record, position.lat))
+            result = replace(result, inspection=inspect(record, result.position.lat))
             tell("writing the report")
             paths = result.save(output)
     advice = None
@@ -229,6 +276,7 @@ def _print(result: Alignment, paths: list[Path]) -> None:
         from truenorth.cli.align_positions import print_table
 
         print_table(console, result)
+    print_moving(console, result)
     for path in paths:
         console.print(f"wrote {path}", soft_wrap=True)
 
