@@ -32,7 +32,7 @@ QUIETEST = 1e-7  # m/s: white motion of a base of stone
 LOWEST_BIN = 3  # slower than this is the trend's
 PEAK_WIDTH = 4  # bins on either side of a peak that belong to it
 LINE = 1e-8  # damping with which the search for a line begins
-SCORINGS, POLISHES = 25, 15  # iterations at most
+SCORINGS, TRIALS, POLISHES = 25, 6, 12  # iterations at most
 DIFFERENCE = 1e-5  # of a logarithm, for derivatives
 LONGEST = 2.0  # step of a logarithm, or of a phase in rad
 SHORTEST = 1e-4  # part of a step that is tried
@@ -94,7 +94,7 @@ def fit_motion(
     best = _climb(series, AxisMotion(max(float(np.std(series.detrended)), QUIETEST)), POLISHES)
     score = series.score(best)
     for count in range(1, most + 1):
-        chosen = min(_candidates(series, best, count), key=series.score)
+        chosen = _climb(series, min(_candidates(series, best, count), key=series.score), POLISHES)
         found = series.score(chosen)
         if found >= score:
             break
@@ -111,7 +111,7 @@ def _candidates(series: _Series, best: AxisMotion, count: int) -> list[AxisMotio
         lines += [_at_peaks(series, count, 1, LINE)]
     scored = sorted((_score(series, guess) for guess in broad), key=series.score)
     # Whittle's likelihood loses a line's phase: lines are polished from the peak itself.
-    return [_climb(series, guess, POLISHES) for guess in (*scored[:1], *lines)]
+    return [_climb(series, guess, TRIALS) for guess in (*scored[:1], *lines)]
 
 
 class _Series:

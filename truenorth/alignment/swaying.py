@@ -92,9 +92,14 @@ class _Nominal:
     """What the log is linearised about, and the system about it."""
 
     def __init__(
-        self, record: ImuRecord, C_n0_i: Array, position: Position, model: StaticModel, mount: Mount, P0: Array
+        self, record: ImuRecord, C_n0_i: Array, position: Position, model: StaticModel, mount: Mount, P_bias: Array
     ) -> None:
-        self.record, self.position, self.model, self.mount, self.P0 = record, position, model, mount, P0
+        self.record, self.position, self.model, self.mount = record, position, model, mount
+        self.P0 = np.zeros((ARM.stop, ARM.stop))
+        self.P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
+        self.P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
+        self.P0[6:STATES, 6:STATES] = P_bias
+        self.P0[ARM, ARM] = mount.arm_sigma**2 * np.eye(3)
         self.C_n0_i, self.bias, self.arm = C_n0_i, np.zeros(6), mount.arm
         self.integrals: InertialIntegrals
 
@@ -151,24 +156,11 @@ def sway_align(
     SwayAlignment
     """
     rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
-    P0 = np.zeros((ARM.stop, ARM.stop))
-    P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
-    P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
-    P0[6:STATES, 6:STATES] = P_bias
-    P0[ARM, ARM] = mount.arm_sigma**2 * np.eye(3)
-    nominal = _Nominal(record, C_n0_i, position, model, mount, P0)
-
-    for _ in range(WINDOWED_PASSES):
-        nominal.integrate(interval, rows)
-        system = nominal.system()
-        fit = windowed_fit(system)
-        if np.max(np.abs(fit.x[PHI])) < SMALL_TURN:
-            break
-        nominal.correct(fit.x)
-
+    nominal = _Nominal(record, C_n0_i, position, model, mount, P_bias)
+    system, residual = _settle(nominal, interval, rows)
     step = float(np.mean(nominal.integrals.intervals))
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
-    motion = _fit(fit.residual, step, walks)
+    motion = _fit(residual, step, walks)
     for passes in range(1, FILTER_PASSES + 1):
         full = with_motion(system, step, motion)
         estimates = kalman(full, history="full")
@@ -179,7 +171,8 @@ def sway_align(
         nominal.correct(x)
         nominal.integrate(interval, rows)
         system = nominal.system()
-        motion = _fit(system.z, step, walks, motion)
+        if passes == 1:  # about a good attitude: what was in the first residual besides the motion is gone
+            motion = _fit(system.z, step, walks, motion)
 
     gains = filter_gains(full, estimates)
     P0_bias = np.zeros((SWAYING_STATES, SWAYING_STATES))
@@ -199,6 +192,41 @@ def sway_align(
         arm=nominal.arm - x[ARM],
         arm_sigma=np.sqrt(np.diag(P)[ARM]),
     )
+
+
+def windowed_align(
+    record: ImuRecord,
+    C_n0_i: Array,
+    position: Position,
+    model: StaticModel,
+    P_bias: Array,
+    interval: float,
+    mount: Mount = UNKNOWN_ARM,
+) -> tuple[Array, InertialIntegrals]:
+    """Attitude by windowed least squares alone, re-linearised; parameters as in :func:`sway_align`.
+
+    Returns
+    -------
+    C_n0_i : (3, 3) array
+        At the start.
+    integrals : InertialIntegrals
+        With the estimated biases taken off: ``C_n0_i @ integrals.C_ib`` is the attitude at their times.
+    """
+    nominal = _Nominal(record, C_n0_i, position, model, mount, P_bias)
+    _settle(nominal, interval, np.zeros(0, dtype=np.int64))
+    return nominal.C_n0_i, nominal.integrals
+
+
+def _settle(nominal: _Nominal, interval: float, rows: ArrayLike) -> tuple[LinearSystem, Array]:
+    """Windowed fits until the attitude stands still; the last system, and what the fit leaves of its measurements."""
+    for _ in range(WINDOWED_PASSES):
+        nominal.integrate(interval, rows)
+        system = nominal.system()
+        fit = windowed_fit(system)
+        if np.max(np.abs(fit.x[PHI])) < SMALL_TURN:
+            break
+        nominal.correct(fit.x)
+    return system, fit.residual
 
 
 def _fit(

@@ -69,7 +69,7 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
     """
     mapping, left, attempts = plan.to_mapping(), list(blocks), dict.fromkeys(blocks, 0)
     while left:
-        with _one_thread_each(), _pool(workers) as pool:
+        with one_thread_each(), _pool(workers) as pool:
             under_way: dict[Future[Any], Block] = {}
             try:
                 while left or under_way:
@@ -105,7 +105,7 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
     """Set for the workers, which read it when they start."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)

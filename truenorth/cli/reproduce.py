@@ -16,6 +16,7 @@ from truenorth.cli.console import make_console
 EXAMPLES = """
 \b
 Studies:
+  rotary   Self-alignment of a rotary SINS on a swaying ship
   static   Kalman filters for static alignment, with ten and with eight states
   transfer  Transfer alignment with residual time delay and lever arm
   damping  Double-filter external damping of a marine INS over 48 h

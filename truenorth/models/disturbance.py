@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +144,13 @@ class AxisMotion:
         first = 0
         for item in self.oscillators:
             part = slice(first, first + item.states)
-            Phi[part, part], Q[part, part] = item.transition(interval), item.noise(interval)
-            P[part, part], h[part] = item.stationary, item.output
+            Phi[part, part], Q[part, part], P[part, part] = _matrices(item, interval)
+            h[part] = item.output
             first = part.stop
         return Phi, Q, P, h
+
+
+@lru_cache(maxsize=256)
+def _matrices(item: Oscillator, interval: float) -> tuple[Array, Array, Array]:
+    """Transition, process noise and stationary covariance; kept, since a search moves one oscillator at a time."""
+    return item.transition(interval), item.noise(interval), item.stationary

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, full, workers, progress) -> Study`.
 STUDIES = {
     "static": "truenorth.papers.static.study",
+    "rotary": "truenorth.papers.rotary.study",
     "transfer": "truenorth.papers.transfer.study",
     "damping": "truenorth.papers.damping.study",
     "odometer": "truenorth.papers.odometer.study",

@@ -35,6 +35,8 @@ Noise = Literal["per_sample", "random_walk"]
 CASES = ("A", "B", "C", "jonswap", "unrotated", "rotation_off")
 NUMBERS = {"A": 0, "B": 1, "C": 2, "jonswap": 3, "unrotated": 1, "rotation_off": 0}  # alike: the same ship and IMU
 AXES = ("z", "x")  # of the indexer, the outermost first
+INDEXER_RATES = tuple(np.radians([18.0, 3.0]).tolist())  # rad/s
+DURATION = 720  # s: 120 of coarse, 600 of fine alignment
 DRAWS = 300  # stream of what a case draws
 BANDWIDTH = "15 %"
 PERIODS = (5.0, 9.0)  # s, between which B draws those of the sway
@@ -85,6 +87,7 @@ def scenario_of(case: str, run: int, seed: int, noise: Noise = "per_sample") -> 
     """The scenario of a run of a case."""
     with resources.as_file(resources.files("truenorth.simulation") / "scenarios" / "rotary_ship.yaml") as file:
         mapping: dict[str, Any] = copy.deepcopy(read_mapping(file))
+    mapping["duration"] = f"{DURATION + 1} s"  # a sample beyond the last whole second
     rng = stream(seed, NUMBERS[case], run, DRAWS)
     tones = mapping["motion"]["tones"]
     if noise == "random_walk":

@@ -1,0 +1,134 @@
+"""Figures of the study: modulated biases, coarse errors by run, convergence of the filters, and errors beside sigmas."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.papers.rotary.truth import AXES, INDEXER_RATES
+from truenorth.simulation.indexer import C_bs_from_angles
+
+Array = NDArray[np.float64]
+ARCMIN = np.radians(1.0) / 60.0
+PHI_NAMES = ("phi E", "phi N", "phi U")
+PAPER_COARSE = np.array([[0.0287, -0.0419, 0.1506], [0.0740, 0.1563, 1.4611], [-0.0986, -0.2668, -0.1044]])
+
+
+def modulated(time: Array, bias: Array) -> Array:
+    """A constant bias of the IMU seen in the body, (K, 3): the paper's eqs. 8 and 9."""
+    C_bs = C_bs_from_angles(AXES, time[:, None] * np.array(INDEXER_RATES))
+    return C_bs @ bias
+
+
+def draw_modulation() -> Figure:
+    """Gyro and accelerometer biases in the body over one turn of the slower axis, and their integrals."""
+    time = np.linspace(0.0, 240.0, 2401)
+    with style():
+        figure = new_figure(10.0, 6.0)
+        axes = figure.subplots(2, 2, sharex=True)
+        for column, (size, unit, name, whole) in enumerate(
+            ((0.01, "deg/h", "gyro", "arcsec"), (100.0, "ug", "accelerometer", "mm/s"))
+        ):
+            values = modulated(time, np.full(3, size))
+            scale = 1.0 if column == 0 else 9.80665e-3  # deg/h s is an arcsec; 1 ug s is 9.8e-3 mm/s
+            still = np.full(3, size)
+            for axis, colour in zip(range(3), COLOURS, strict=False):
+                axes[0, column].plot(time, values[:, axis], color=colour, linewidth=1.0, label="xyz"[axis])
+                total = np.cumsum(values[:, axis]) * (time[1] - time[0]) * scale
+                axes[1, column].plot(time, total, color=colour, linewidth=1.0, label="xyz"[axis])
+            axes[1, column].plot(time, still[0] * scale * time, "--", color=REFERENCE, label="without rotation")
+            axes[0, column].set(title=f"{name} bias in the body", ylabel=unit)
+            axes[1, column].set(title="its integral", ylabel=whole, xlabel="time, s")
+        figure.legend(*axes[1, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
+        figure.suptitle(
+            "Rotation modulation, w1 = 18 deg/s about z, w2 = 3 deg/s about x (eqs. 8, 9)",
+            ha="left",
+            x=0.01,
+            fontsize=11,
+        )
+    return figure
+
+
+def draw_coarse(errors: Mapping[str, Array]) -> Figure:
+    """Misalignment at the end of coarse alignment by run (deg), beside the paper's mean and range."""
+    with style():
+        figure = new_figure(12.0, 4.2)
+        axes = figure.subplots(1, 3)
+        for axis, ax in enumerate(axes):
+            for (method, phi), colour in zip(errors.items(), COLOURS, strict=False):
+                count = np.arange(1, len(phi) + 1)
+                size, inside = (7, "none") if method == "dual_vector" else (3, colour)
+                ax.plot(
+                    count,
+                    np.degrees(phi[:, axis]),
+                    "o",
+                    markersize=size,
+                    color=colour,
+                    markerfacecolor=inside,
+                    label=method.replace("_", " "),
+                )
+            ax.axhspan(
+                *sorted(PAPER_COARSE[1:, axis]), color=REFERENCE, alpha=0.15, linewidth=0, label="the paper's range"
+            )
+            ax.axhline(PAPER_COARSE[0, axis], color=REFERENCE, linestyle="--", label="the paper's mean")
+            ax.set(title=f"{PHI_NAMES[axis]}, deg", xlabel="run")
+            ax.set_yscale("symlog", linthresh=0.01 if axis < 2 else 0.1)
+            ax.set_xlim(0.0, len(count) + 1.0)
+            ax.xaxis.get_major_locator().set_params(integer=True)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
+        figure.suptitle("Coarse alignment, 120 s, configuration A", ha="left", x=0.01, fontsize=11)
+    return figure
+
+
+def draw_filters(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str, str]) -> Figure:
+    """RMS over the runs of the misalignment (arcmin) against the time of fine alignment; a row a case, a column an angle."""
+    with style():
+        figure = new_figure(12.0, 2.9 * len(curves) + 0.7)
+        axes = figure.subplots(len(curves), 3, sharex=True, squeeze=False)
+        for row, (case, methods) in zip(axes, curves.items(), strict=True):
+            for axis, ax in enumerate(row):
+                for (method, phi), colour in zip(methods.items(), COLOURS, strict=False):
+                    rms = np.sqrt(np.mean(phi[:, :, axis] ** 2, axis=0)) / ARCMIN
+                    dashed = "--" if method == "imakf" else "-"
+                    ax.plot(np.arange(1, len(rms) + 1), rms, dashed, color=colour, linewidth=1.1, label=method.upper())
+                ax.axvline(250.0, color=REFERENCE, linewidth=0.8, linestyle=":")
+                ax.set_yscale("log")
+                ax.set_title(f"{PHI_NAMES[axis]}, {titles[case]}", fontsize=9)
+            row[0].set_ylabel("RMS, arcmin")
+        for ax in axes[-1]:
+            ax.set_xlabel("time of fine alignment, s")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
+        figure.suptitle(
+            "Fine alignment by the paper's filters; dotted: the 250 s within which it says they converge",
+            ha="left",
+            x=0.01,
+            fontsize=11,
+        )
+    return figure
+
+
+def draw_honesty(points: Sequence[tuple[str, float, float, float]]) -> Figure:
+    """Heading: RMS of the errors against the claimed sigma; of (case, time s, RMS, sigma) in arcmin."""
+    cases = list(dict.fromkeys(case for case, *_ in points))
+    markers = {120.0: "o", 250.0: "s", 600.0: "^"}
+    with style():
+        figure = new_figure(6.5, 6.0)
+        ax = figure.subplots()
+        low, high = min(min(p[2:]) for p in points) / 1.6, max(max(p[2:]) for p in points) * 1.6
+        line = np.array([low, high])
+        ax.plot(line, line, color=REFERENCE, label="RMS = sigma")
+        ax.fill_between(line, line * 0.85, line * 1.2, color=REFERENCE, alpha=0.15, linewidth=0)
+        for case, time, rms, sigma in points:
+            label = case.replace("_", " ") if time == max(t for c, t, *_ in points if c == case) else None
+            colour = COLOURS[cases.index(case) % len(COLOURS)]
+            ax.plot(sigma, rms, markers.get(time, "d"), color=colour, label=label, linestyle="none")
+        ax.set(
+            xscale="log", yscale="log", xlabel="sigma that the filter claims, arcmin", ylabel="RMS of heading, arcmin"
+        )
+        ax.set_title("Coloured-noise filter: circles 120 s, squares 250 s, triangles 600 s", fontsize=10)
+        ax.legend(loc="upper left")
+    return figure
