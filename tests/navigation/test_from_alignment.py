@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
+from truenorth.models.ins import BA, BG, PHI
 from truenorth.navigation import navigate
+from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.position import Position
 from truenorth.simulation import ideal_log, rest, simulate
 from truenorth.specs import imu_spec
@@ -12,13 +14,38 @@ from truenorth.specs import imu_spec
 PLACE = Position.from_degrees(40.0, 116.0, 50.0, horizontal_sigma=1e-3, vertical_sigma=1e-3)
 
 
+def test_what_an_alignment_balances_navigation_knows_to_be_balanced(tmp_path):
+    """Tilt against accelerometer bias, heading against east gyro bias: free inertial at rest sees the small differences only."""
+    spec = imu_spec("navigation")
+    record = simulate(ideal_log(rest(PLACE, 0.7), rate=20.0, duration=600.0), imu=spec, seed=3).record
+    alignment = align(record, PLACE, spec, "kalman")
+    start = start_from_alignment(alignment)
+    g, level = 9.80, 7.292115e-5 * np.cos(PLACE.lat)
+    C = start.C_nb
+    force = np.zeros((2, 15))  # of the level velocities: f x phi + C nabla
+    force[0, 1], force[1, 0] = -g, g
+    force[:, BA] = C[:2]
+    rate = np.zeros(15)  # of phi_E: what drives north
+    rate[2] = -level
+    rate[BG] = -C[0]
+    for row in (*force, rate):
+        parts = np.sqrt(row**2 @ np.diag(start.P))
+        assert np.sqrt(row @ start.P @ row) < 0.5 * parts  # noise leaves a third of it
+    assert np.all(np.linalg.eigvalsh(start.P[PHI, PHI]) > 0)
+
+    alignment.save(tmp_path)
+    again, _, _ = read_start(tmp_path)
+    for name in ("C_nb", "gyro_bias", "accel_bias", "P"):
+        np.testing.assert_allclose(getattr(again, name), getattr(start, name), rtol=1e-12, atol=1e-30)
+    np.testing.assert_allclose(again.whole.constant, start.whole.constant, rtol=1e-9)
+    assert again.whole.averaged == start.whole.averaged == pytest.approx(600.0)
+
+
 @pytest.mark.slow
 def test_free_inertial_after_an_alignment_is_as_good_as_its_sigma():
     """100 runs: 300 s of alignment, an hour of free inertial at rest; RMS over sigma of position and velocity.
 
-    The simulated earth has no deflection of the vertical, 5 arcsec of the sigma of level; it stands in the accelerometers'
-    part, balanced. RMS of 100 runs is within 20 % of its own sigma in 99.6 % of tests; the reported sigma may be larger
-    by a third, since slow biases start uncorrelated with attitude.
+    RMS of 100 runs is within 20 % of its own sigma in 99.5 % of cases, of all four in 98 %.
     """
     spec = imu_spec("navigation")
     log = ideal_log(rest(PLACE, 0.7), rate=20.0, duration=3900.0)
@@ -31,4 +58,4 @@ def test_free_inertial_after_an_alignment_is_as_good_as_its_sigma():
         sigmas.append(np.hstack([result.position_sigma[-1, :2], result.v_sigma[-1, :2]]))
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(np.square(sigmas), axis=0))
     print("RMS over sigma, position east north, velocity east north:", ratio)
-    assert np.all((ratio > 0.65) & (ratio < 1.2))
+    assert np.all((ratio > 0.8) & (ratio < 1.2))

@@ -107,16 +107,25 @@ class FineAlignment:
         C_n0_b : (3, 3) array
         covariance, floor : (3, 3) arrays, rad^2, in ``n0``
         """
-        # phi(t) = phi_end + int_t^end C_n0_b eps: the whole log's knowledge carried back (or a little on) to t.
-        turned = self._turned_between(time)
-        J = np.zeros((3, len(self.x)))
-        J[:, PHI] = np.eye(3)
-        J[:, BG] = turned
-        phi = J @ self.x
+        J = self._carried_to(time)[PHI]
+        C_n0_b = dcm_from_rotation_vector(J @ self.x) @ self.C_n0_i @ C_ib
+        return C_n0_b, self.joint_at(time)[PHI, PHI], J @ self.floor[-1] @ J.T
+
+    def joint_at(self, time: float) -> Array:
+        """(9, 9) covariance of misalignment (``n0``), gyro and accelerometer bias (body axes) at any time of the log."""
+        J = self._carried_to(time)
+        P = J @ self.P @ J.T
         apart = abs(self.integrals.time[-1] - time)
-        walk = self.system.Q[0, PHI, PHI] / self.integrals.intervals[0] * apart
-        C_n0_b = dcm_from_rotation_vector(phi) @ self.C_n0_i @ C_ib
-        return C_n0_b, J @ self.P @ J.T + walk, J @ self.floor[-1] @ J.T
+        P[PHI, PHI] += self.system.Q[0, PHI, PHI] / self.integrals.intervals[0] * apart
+        return np.asarray(P)
+
+    def _carried_to(self, time: float) -> Array:
+        """(9, n) misalignment and biases at a time from the last state: the whole log's knowledge carried back to it."""
+        J = np.zeros((9, len(self.x)))
+        J[PHI, PHI] = np.eye(3)
+        J[PHI, BG] = self._turned_between(time)  # phi(t) = phi_end + int_t^end C_n0_b eps
+        J[3:6, BG] = J[6:9, BA] = np.eye(3)
+        return J
 
     def departures(self) -> Array:
         """(K, 3) how far the attitude known at each epoch is off the final one at the same time: phi in ``n0``, rad."""

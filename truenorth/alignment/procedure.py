@@ -17,6 +17,7 @@ from truenorth.alignment.check import LogCheck, check_filter, check_means, is_bl
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
+from truenorth.alignment.handover import hand_over
 from truenorth.alignment.inference import allan_noise, infer_spec, noise_of, usual_noise
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
@@ -240,6 +241,7 @@ def answer_of(
         disturbance=fine.disturbance,
         history=history,
         pays_until=pays_until(history, answer, fine),
+        handover=hand_over(task, fine, answer),
     )
 
 

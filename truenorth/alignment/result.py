@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
+    from truenorth.alignment.handover import Handover
     from truenorth.alignment.moving import Moving
     from truenorth.alignment.table import TurntableErrors
     from truenorth.alignment.transfer_result import Transfer
@@ -123,6 +124,8 @@ class Alignment:
         Delay, lever arm and mounting against a master, of a transfer alignment.
     table : TurntableErrors or None
         Of an alignment over positions of a turntable.
+    handover : Handover or None
+        Joint covariance of attitude and biases, from which navigation goes on.
     """
 
     status: Status
@@ -151,6 +154,7 @@ class Alignment:
     moving: Moving | None = field(default=None, repr=False)
     transfer: Transfer | None = field(default=None, repr=False)
     table: TurntableErrors | None = field(default=None, repr=False)
+    handover: Handover | None = field(default=None, repr=False)
 
     @property
     def attitude(self) -> Rotation:

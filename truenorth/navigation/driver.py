@@ -15,6 +15,7 @@ from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
 from truenorth.increments import increments, interval_lengths, read_only
 from truenorth.linalg import padded
 from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, InsModel
+from truenorth.models.whole_bias import WholeBiases, taken_apart
 from truenorth.navigation import kernel
 from truenorth.navigation.aiding import COLUMNS, KINDS, Aiding
 from truenorth.records import ImuRecord
@@ -36,6 +37,8 @@ class Start:
     gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
     P : (15, 15) array
         Covariance of the errors phi, dv, dp, gyro and accelerometer bias (see :mod:`truenorth.models.ins`), ENU.
+    whole : WholeBiases or None
+        The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
     """
 
     time: float
@@ -47,6 +50,7 @@ class Start:
     gyro_bias: Array
     accel_bias: Array
     P: Array
+    whole: WholeBiases | None = None
 
 
 @dataclass(frozen=True)
@@ -267,11 +271,15 @@ def navigate_track(
     s = wander.state_at(start.C_nb, start.v_n, start.lat, start.lon, start.alt)
     if model.fixed_altitude:
         s[wander.VELOCITY][2] = 0.0
-    aux = np.zeros(n)
-    aux[BG], aux[BA] = start.gyro_bias, start.accel_bias
+    if start.whole is None:
+        aux = np.zeros(n)
+        aux[BG], aux[BA] = start.gyro_bias, start.accel_bias
+        P0 = model.prior(start.P)
+    else:
+        P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole)
     place = np.array([[start.lat, start.lon, start.alt]])
     J = convergence(np.eye(3)[None], s[None, wander.VELOCITY], place, n)[0]
-    P0 = _solve(J, model.prior(start.P))
+    P0 = _solve(J, P0)
     P = P0.copy()
     dtheta, dvel = increments(record)
     # The sample before the first is not there: its coning would be missing, a tilt of nanoradians and millimetres an hour on.

@@ -11,10 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.handover import Handover
+from truenorth.alignment.task import DEFLECTION
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.earth import normal_gravity
 from truenorth.errors import AlignmentError, DataError
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
+from truenorth.models.whole_bias import WholeBiases
 from truenorth.navigation.driver import Start
 from truenorth.position import Position
 from truenorth.specs import ImuSpec, imu_spec
@@ -30,10 +34,6 @@ SUMMARY = "summary.json"
 
 def start_from_alignment(alignment: Alignment) -> Start:
     """Where and how an alignment says the vehicle stands, at rest but for the base's own motion.
-
-    Tilt and accelerometer bias of an alignment at rest cancel each other, and so do heading and east gyro bias: without
-    their correlation navigation would seem far worse than it is. The biases' part of the misalignment's covariance (its
-    floor) is given by the static limits; where the alignment got below them (a turning IMU), the correlation is less.
 
     Raises
     ------
@@ -54,69 +54,103 @@ def start_from_alignment(alignment: Alignment) -> Start:
             alignment.gyro_bias,
             alignment.accel_bias,
             alignment.position,
+            alignment.imu,
+        )
+    joint = alignment.handover
+    if joint is None:
+        joint = _by_static_limits(
+            alignment.C_nb,
+            alignment.phi_covariance,
+            alignment.phi_floor,
+            alignment.gyro_bias_sigma,
+            alignment.accel_bias,
+            alignment.accel_bias_sigma,
+            alignment.position,
+            alignment.imu,
         )
     return _start(
         alignment.time,
         alignment.C_nb,
-        alignment.phi_covariance,
-        alignment.phi_floor,
         alignment.gyro_bias,
-        alignment.gyro_bias_sigma,
-        alignment.accel_bias,
-        alignment.accel_bias_sigma,
+        joint,
         alignment.position,
         alignment.imu,
         alignment.disturbance,
+        alignment.duration,
     )
 
 
 def _start(
     time: float,
     C_nb: Array,
+    gyro_bias: Array,
+    joint: Handover,
+    position: Position,
+    spec: ImuSpec,
+    disturbance: Array,
+    duration: float,
+) -> Start:
+    P = np.zeros((STATES, STATES))
+    joined = [*range(STATES)[PHI], *range(STATES)[BG], *range(STATES)[BA]]
+    P[np.ix_(joined, joined)] = joint.P
+    motion = np.where(np.isfinite(disturbance), disturbance, 0.0)
+    P[DV, DV] = np.diag(motion**2 + LEAST_VELOCITY_SIGMA**2)
+    P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
+    slow = np.repeat([spec.gyro_bias_instability, spec.accel_bias_instability], 3) ** 2
+    whole = WholeBiases(np.maximum(joint.prior - slow, 0.0), duration)
+    lat, lon, alt = position.lat, position.lon, position.alt
+    return Start(time, C_nb, np.zeros(3), lat, lon, alt, gyro_bias, joint.accel_bias, positive(P), whole)
+
+
+def _by_static_limits(
+    C_nb: Array,
     phi_covariance: Array,
     phi_floor: Array,
-    gyro_bias: Array,
     gyro_bias_sigma: Array,
     accel_bias: Array,
     accel_bias_sigma: Array,
     position: Position,
     spec: ImuSpec,
-    disturbance: Array,
-) -> Start:
-    from truenorth.alignment.task import DEFLECTION
+) -> Handover:
+    """Of an alignment that tells no joint covariance: one that took no biases, or turned.
 
-    lat, alt = position.lat, position.alt
-    g = float(normal_gravity(lat, alt))
+    Tilt and accelerometer bias of an alignment at rest cancel each other, and so do heading and east gyro bias: without
+    their correlation navigation would seem far worse than it is. The biases' part of the misalignment's covariance (its
+    floor) is given by the static limits; where the alignment got below them (a turning IMU), the correlation is less.
+    """
+    g = float(normal_gravity(position.lat, position.alt))
     eps = np.diag(gyro_bias_sigma**2)
     # What acts as an accelerometer bias as long as the vehicle stays level: also scale factor, misalignment, deflection.
     f2 = (g * C_nb[2]) ** 2
-    nabla = np.diag(
-        accel_bias_sigma**2 + spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2)
-    )
+    acting = spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2)
+    nabla = np.diag(accel_bias_sigma**2 + acting)
+    prior = spec_variance(spec)
+    prior[3:] += acting
     nabla += C_nb.T @ np.diag([1.0, 1.0, 0.0]) @ C_nb * (DEFLECTION * g) ** 2
-    J = static_jacobian(lat, g)
+    J = static_jacobian(position.lat, g)
     X = np.hstack([J[:, 3:] @ C_nb @ eps, J[:, :3] @ C_nb @ nabla])
     told = np.diag(J[:, 3:] @ C_nb @ eps @ C_nb.T @ J[:, 3:].T + J[:, :3] @ C_nb @ nabla @ C_nb.T @ J[:, :3].T)
     X *= np.sqrt(np.minimum(1.0, np.diag(phi_floor) / np.maximum(told, 1e-30)))[:, None]
-
-    P = np.zeros((STATES, STATES))
-    P[PHI, PHI] = phi_covariance
-    P[BG, BG], P[BA, BA] = eps, nabla
-    P[PHI, BG.start : BA.stop] = X
-    P[BG.start : BA.stop, PHI] = X.T
-    motion = np.where(np.isfinite(disturbance), disturbance, 0.0)
-    P[DV, DV] = np.diag(motion**2 + LEAST_VELOCITY_SIGMA**2)
-    P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
-    return Start(time, C_nb, np.zeros(3), lat, position.lon, alt, gyro_bias, accel_bias, positive(P))
+    P = np.block([[phi_covariance, X], [X.T, np.block([[eps, np.zeros((3, 3))], [np.zeros((3, 3)), nabla]])]])
+    return Handover(accel_bias, P, prior)
 
 
 def _moving_start(
-    time: float, C_nb: Array, v_n: Array, P: Array, gyro_bias: Array, accel_bias: Array, position: Position
+    time: float,
+    C_nb: Array,
+    v_n: Array,
+    P: Array,
+    gyro_bias: Array,
+    accel_bias: Array,
+    position: Position,
+    spec: ImuSpec,
 ) -> Start:
     """Of an alignment on the move, which knows velocity and how all errors hang together."""
-    return Start(
-        time, C_nb, v_n, position.lat, position.lon, position.alt, gyro_bias, accel_bias, positive(np.asarray(P))
+    whole = WholeBiases(
+        np.repeat([spec.gyro_bias**2 + spec.gyro_turn_on_bias**2, spec.accel_bias**2 + spec.accel_turn_on_bias**2], 3)
     )
+    lat, lon, alt = position.lat, position.lon, position.alt
+    return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
 
 
 def positive(P: Array) -> Array:
@@ -169,9 +203,15 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         if "P" in n:
             v_n, P = np.array(n["v_n"], dtype=np.float64), np.array(n["P"], dtype=np.float64)
             biases = numbers["gyro_bias"], numbers["accel_bias"]
-            start = _moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position)
+            start = _moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
             return start, spec, str(s.get("source", ""))
-        start = _start(float(s["time_s"]), **numbers, position=position, spec=spec, disturbance=disturbance)
+        gyro_bias = numbers.pop("gyro_bias")
+        if "handover" in n:
+            joint = Handover(**{key: np.array(n["handover"][key], dtype=np.float64) for key in JOINT})
+        else:
+            joint = _by_static_limits(**numbers, position=position, spec=spec)
+        time, duration = float(s["time_s"]), float(s["duration_s"])
+        start = _start(time, numbers["C_nb"], gyro_bias, joint, position, spec, disturbance, duration)
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(
             f"{path}: {error!r} is missing or not as expected; write the alignment again with this version of Truenorth"
@@ -188,6 +228,7 @@ ARRAYS = (
     "accel_bias",
     "accel_bias_sigma",
 )
+JOINT = ("accel_bias", "P", "prior")
 
 
 def navigation_block(alignment: Alignment) -> dict[str, Any]:
@@ -196,6 +237,8 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
     block["horizontal_sigma_m"] = alignment.position.horizontal_sigma
     block["vertical_sigma_m"] = alignment.position.vertical_sigma
     block["imu"] = alignment.imu.to_mapping()
+    if alignment.handover is not None:
+        block["handover"] = {name: getattr(alignment.handover, name).tolist() for name in JOINT}
     if alignment.moving is not None:
         block |= {"v_n": alignment.moving.v_n.tolist(), "P": alignment.moving.P.tolist()}
     return block

@@ -1,0 +1,57 @@
+"""What navigation goes on from: how the errors of attitude and of what acts as a bias hang together.
+
+Heading error and east gyro bias of an alignment at rest cancel each other, and so do tilt and accelerometer bias: what
+is left of them in navigation is far less than either. The fine filter knows both with their covariance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.task import DEFLECTION, Task
+from truenorth.coarse.analytic import static_jacobian
+from truenorth.inertial import earth_rotation
+from truenorth.models.static import STATES
+
+if TYPE_CHECKING:
+    from truenorth.alignment.result import Alignment
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Handover:
+    """The joint estimate of an alignment that estimated biases.
+
+    Attributes
+    ----------
+    accel_bias : (3,) array, m/s^2
+        What acts as accelerometer bias: scale factor, misalignment and gravity's error as well.
+    P : (9, 9) array
+        Covariance of phi (E, N, U), gyro bias and `accel_bias` (body axes), the deflection of the vertical included.
+    prior : (6,) array
+        Variance a priori of what acts as gyro and accelerometer bias.
+    """
+
+    accel_bias: Array
+    P: Array
+    prior: Array
+
+
+def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:
+    """The joint covariance at the epoch asked for, in navigation axes; of attitude that of the answer."""
+    P = fine.joint_at(task.epoch.elapsed)
+    turn = np.eye(len(P))
+    turn[:3, :3] = earth_rotation(task.epoch.elapsed, task.position.lat).T
+    # Gravity that is deflected tilts the answer and acts as an accelerometer bias: both hide each other.
+    deflected = np.zeros((len(P), 2))
+    deflected[:3] = static_jacobian(task.position.lat, task.gravity)[:, :2] * (DEFLECTION * task.gravity)
+    deflected[6:] = answer.C_nb[:2].T * (DEFLECTION * task.gravity)
+    P = turn @ P @ turn.T + deflected @ deflected.T
+    P[:3, :3] = answer.phi_covariance
+    return Handover(fine.bias[3:], P, np.diag(fine.system.P0)[6:STATES].copy())
