@@ -30,14 +30,17 @@ class Handover:
 
     Attributes
     ----------
+    C_nb : (3, 3) array
+        Attitude of the IMU itself, also where it turns on the body.
     accel_bias : (3,) array, m/s^2
         What acts as accelerometer bias: scale factor, misalignment and gravity's error as well.
     P : (9, 9) array
-        Covariance of phi (E, N, U), gyro bias and `accel_bias` (body axes), the deflection of the vertical included.
+        Covariance of phi (E, N, U), gyro bias and `accel_bias` (IMU axes), the deflection of the vertical included.
     prior : (6,) array
         Variance a priori of what acts as gyro and accelerometer bias.
     """
 
+    C_nb: Array
     accel_bias: Array
     P: Array
     prior: Array
@@ -54,4 +57,4 @@ def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:
     deflected[6:] = answer.C_nb[:2].T * (DEFLECTION * task.gravity)
     P = turn @ P @ turn.T + deflected @ deflected.T
     P[:3, :3] = answer.phi_covariance
-    return Handover(fine.bias[3:], P, np.diag(fine.system.P0)[6:STATES].copy())
+    return Handover(answer.C_nb, fine.bias[3:], P, np.diag(fine.system.P0)[6:STATES].copy())

@@ -70,7 +70,6 @@ def start_from_alignment(alignment: Alignment) -> Start:
         )
     return _start(
         alignment.time,
-        alignment.C_nb,
         alignment.gyro_bias,
         joint,
         alignment.position,
@@ -82,7 +81,6 @@ def start_from_alignment(alignment: Alignment) -> Start:
 
 def _start(
     time: float,
-    C_nb: Array,
     gyro_bias: Array,
     joint: Handover,
     position: Position,
@@ -99,7 +97,7 @@ def _start(
     slow = np.repeat([spec.gyro_bias_instability, spec.accel_bias_instability], 3) ** 2
     whole = WholeBiases(np.maximum(joint.prior - slow, 0.0), duration)
     lat, lon, alt = position.lat, position.lon, position.alt
-    return Start(time, C_nb, np.zeros(3), lat, lon, alt, gyro_bias, joint.accel_bias, positive(P), whole)
+    return Start(time, joint.C_nb, np.zeros(3), lat, lon, alt, gyro_bias, joint.accel_bias, positive(P), whole)
 
 
 def _by_static_limits(
@@ -132,7 +130,7 @@ def _by_static_limits(
     told = np.diag(J[:, 3:] @ C_nb @ eps @ C_nb.T @ J[:, 3:].T + J[:, :3] @ C_nb @ nabla @ C_nb.T @ J[:, :3].T)
     X *= np.sqrt(np.minimum(1.0, np.diag(phi_floor) / np.maximum(told, 1e-30)))[:, None]
     P = np.block([[phi_covariance, X], [X.T, np.block([[eps, np.zeros((3, 3))], [np.zeros((3, 3)), nabla]])]])
-    return Handover(accel_bias, P, prior)
+    return Handover(C_nb, accel_bias, P, prior)
 
 
 def _moving_start(
@@ -211,7 +209,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         else:
             joint = _by_static_limits(**numbers, position=position, spec=spec)
         time, duration = float(s["time_s"]), float(s["duration_s"])
-        start = _start(time, numbers["C_nb"], gyro_bias, joint, position, spec, disturbance, duration)
+        start = _start(time, gyro_bias, joint, position, spec, disturbance, duration)
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(
             f"{path}: {error!r} is missing or not as expected; write the alignment again with this version of Truenorth"
@@ -228,7 +226,7 @@ ARRAYS = (
     "accel_bias",
     "accel_bias_sigma",
 )
-JOINT = ("accel_bias", "P", "prior")
+JOINT = ("C_nb", "accel_bias", "P", "prior")
 
 
 def navigation_block(alignment: Alignment) -> dict[str, Any]:
