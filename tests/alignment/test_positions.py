@@ -67,6 +67,18 @@ def test_sigma_is_honest(grade, turns, dwell):
         assert np.all(np.abs(apart) < 5.0)
 
 
+def test_without_a_specification_sigma_is_honest_too():
+    """Heading of 8 runs over its sigma: the sum of squares within its 99.9 % band, .4 to 28.3 (chi-square with 8)."""
+    total = 0.0
+    for seed in range(20, 28):
+        made, C = turned([(0, math.pi)], imu_spec("navigation"), seed, 300.0)
+        answer = align_positions(made.record, PLACE)
+        assert answer.status == "aligned"
+        phi = -rotation_vector_from_dcm(answer.C_nb @ C.T)
+        total += phi[2] ** 2 / answer.phi_covariance[2, 2]
+    assert 0.4 < total < 28.3
+
+
 def test_two_positions_take_the_biases_out():
     """600 s with and without a turn by 180 deg: what the biases leave in level and heading."""
     spec = imu_spec("navigation")
@@ -173,7 +185,9 @@ class TestCommand:
         assert found["method"] == "positions"
         assert len(found["positions"]) == 2
         assert found["touched_at_s"] is None
-        assert (tmp_path / "out" / "report.html").stat().st_size > 0
+        page = (tmp_path / "out" / "report.html").read_text()
+        assert "Positions" in page
+        assert "turned 1" in page
 
     @pytest.mark.parametrize(
         ("more", "text"),

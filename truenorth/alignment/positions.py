@@ -186,7 +186,7 @@ def find_positions(motion: MotionSummary) -> list[tuple[float, float]]:
 
 
 def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:
-    """What a still position tells, and scale factors of the class of IMU with such biases."""
+    """What a still position tells, and what it hides as in the class of IMU with such biases: scale factors, slow wander."""
     gyro, accel = noise_coefficients(part)
     noise = StaticModel(float(np.max(gyro.random_walk)), float(np.max(accel.random_walk)))
     spec = infer_spec(check, noise)
@@ -195,8 +195,8 @@ def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:
     names = ("gyro_scale_factor", "gyro_misalignment", "accel_scale_factor", "accel_misalignment")
     return replace(
         spec,
-        gyro_bias_instability=float(np.max(gyro.bias_instability)),
-        accel_bias_instability=float(np.max(accel.bias_instability)),
+        gyro_bias_instability=max(float(np.max(gyro.bias_instability)), same.gyro_bias_instability),
+        accel_bias_instability=max(float(np.max(accel.bias_instability)), same.accel_bias_instability),
         **{name: getattr(same, name) for name in names},
     )
 

@@ -12,6 +12,7 @@ from truenorth.units import parse_unit
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
+    from truenorth.alignment.table import TurntableErrors
 
 VERDICTS = {
     "aligned": ("good", "Aligned"),
@@ -121,9 +122,27 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
     if np.all(np.isfinite(result.disturbance)):
         east, north, up = 1e3 * result.disturbance
         facts.append(("Base's own motion", f"{short(east)}, {short(north)}, {short(up)} mm/s RMS (east, north, up)"))
+    if result.table is not None:
+        facts += _table_facts(result.table, result.heading_known)
     if result.pays_until is not None and result.heading_known:
         verb = "stopped paying after" if result.pays_until <= result.duration else "pays until about"
         facts.append(("More time", f"{verb} {result.pays_until:.0f} s: then heading's random part is half its floor"))
+    return facts
+
+
+def _table_facts(table: TurntableErrors, heading_known: bool) -> list[tuple[str, str]]:
+    s = table.summary(heading_known)
+    stops = [
+        f"{p['start_s']:.0f} to {p['stop_s']:.0f} s" + (f", turned {p['turned_deg']:.3f}°" if number else "")
+        for number, p in enumerate(s["positions"])
+    ]
+    facts = [("Positions", f"{len(stops)}: {'; '.join(stops)}")]
+    for name in ("gyro", "accel"):
+        values = zip("xyz", s[f"{name}_scale_factor_ppm"], s[f"{name}_scale_factor_sigma_ppm"], strict=True)
+        words = ", ".join(f"{axis} {value:.0f} ± {sigma:.0f}" for axis, value, sigma in values)
+        facts.append((f"Scale factors, {'gyros' if name == 'gyro' else 'accelerometers'}", f"{words} ppm"))
+    if s["touched_at_s"] is not None:
+        facts.append(("Touched", f"at about {s['touched_at_s']:.0f} s"))
     return facts
 
 
