@@ -29,8 +29,8 @@ BANK_LEVEL = math.radians(4.0)  # of a level from the mean force of a vehicle th
 HEADINGS = 12  # of the bank, all round
 LEVEL_TIME = 4.0  # s
 ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of the velocity at the start
-STANDING = 0.15  # m/s: slower is standing, by GNSS
-STANDING_PULSES = 1.5  # pulses in a second: no more is standing
+STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
+STANDING_PULSES = 1.5  # pulses in a row of an odometer: no more is standing
 NEAR = 1.0  # s, within which a second of rest must have been seen by the sensor
 
 
@@ -149,7 +149,8 @@ def _speed_seen(odometer: OdometerRecord | None, gnss: GnssRecord | None):  # ty
     """Tells of times whether the sensor saw motion near them, or did not look."""
     if odometer is not None:
         time, speed = odometer.time - 0.5 * odometer.steps, np.abs(odometer.speed)
-        limit = 0.02 if odometer.pulse_size is None else STANDING_PULSES * odometer.pulse_size / odometer.interval
+        pulse = 0.0 if odometer.pulse_size is None else STANDING_PULSES * odometer.pulse_size / odometer.interval
+        limit = max(STANDING, pulse)
     else:
         assert gnss is not None
         time = gnss.time

@@ -1,0 +1,126 @@
+"""Alignment on the move on real recordings."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests import recordings
+from truenorth import align, align_in_motion, navigate
+from truenorth.alignment.in_motion_start import backtracked
+from truenorth.alignment.moving import fifteen
+from truenorth.coarse.odometer import gnss_track
+from truenorth.navigation import Mounting
+from truenorth.navigation.driver import Start
+
+FOG = {
+    "name": "FOG",
+    "gyro": {"bias": "0.05 deg/h", "random_walk": "0.005 deg/sqrt(h)"},
+    "accel": {"bias": "200 ug", "random_walk": "50 ug/sqrt(Hz)"},
+}
+# Its wheel speed is coarse, 4 Hz; how the IMU lies in the car is left open by 15 deg.
+CAR_WHEEL = Mounting(scale_sigma=0.05, angle_sigma=math.radians(15.0), lever_arm_sigma=1.0, noise=0.4, slip=0.2)
+
+
+def signed(angle):
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def test_fog_aligned_with_gnss_while_the_engine_idles():
+    """Against the aligner for a base that stays; latitude from GNSS."""
+    imu, position = recordings.fog_gps_xian()
+    moving = align_in_motion(imu, FOG, gnss=recordings.fog_gps_xian_gnss())
+    at_rest = align(imu, position, FOG)
+    assert moving.status == at_rest.status == "aligned"
+    assert moving.moving.heading_from == "the earth's rate"
+    sigma = np.hypot(moving.euler_sigma[0], at_rest.euler_sigma[0])
+    assert abs(signed(moving.heading - at_rest.heading)) < 2.5 * sigma < math.radians(4.0)
+    assert abs(moving.pitch - at_rest.pitch) < math.radians(0.02)
+    assert abs(moving.roll - at_rest.roll) < math.radians(0.02)
+
+
+def test_cart_gets_its_heading_from_motion():
+    """Its IMU looks backwards: the course is 180 deg from the y axis, along the whole way."""
+    imu, _ = recordings.stim300_cart_chicago()
+    gnss = recordings.stim300_cart_chicago_gnss()
+    antenna = Mounting(lever_arm=np.array([0.0, 0.0, 2.0]))
+    answer = align_in_motion(imu, "industrial", gnss=gnss, antenna=antenna)
+    assert answer.status == "aligned", answer.reasons
+    assert answer.moving.heading_from == "motion"
+    v = gnss.v_n[:, :2]
+    fast = (np.hypot(*v.T) > 0.6) & (gnss.time < answer.time)
+    track = answer.moving.track
+    heading = np.interp(gnss.time[fast], track.time, np.unwrap(answer.history.euler[:, 0]))
+    off = np.degrees(signed(heading + np.pi - np.arctan2(v[fast, 0], v[fast, 1])))
+    assert fast.sum() > 40
+    assert abs(np.median(off)) < 10.0
+    # Before it moves nothing but the earth's rate could tell, and these gyros do not see it.
+    still = align_in_motion(imu.between(None, imu.time[0] + 80.0), "industrial", gnss=gnss, antenna=antenna)
+    assert still.status in ("level_only", "not_converged", "inconsistent")
+    assert still.summary()["heading_deg"] is None
+
+
+@pytest.fixture(scope="module")
+def car():
+    imu, odometer, gnss = recordings.car_mems_odo_gnss()
+    return imu, odometer, gnss, align_in_motion(imu, "consumer", odometer=odometer, gnss=gnss, wheel=CAR_WHEEL)
+
+
+def test_car_heading_with_a_tilted_imu(car):
+    """Vehicle's heading, its IMU turned in the car by 8 deg about the vertical, against GNSS course above 4 m/s."""
+    _, _, gnss, answer = car
+    assert answer.status == "aligned", answer.reasons
+    track, wheel = answer.moving.track, answer.moving.wheel
+    v, _ = gnss_track(gnss, track.time)
+    fast = np.hypot(v[:, 0], v[:, 1]) > 4.0
+    forward = track.C_nb @ wheel.C_mb[1]
+    off = np.degrees(signed(np.arctan2(forward[fast, 0], forward[fast, 1]) - np.arctan2(v[fast, 0], v[fast, 1])))
+    assert np.median(np.abs(off)) < 3.0
+    assert abs(np.median(off)) < 2.0
+    yaw = answer.moving.summary()["mounting_deg"][0]
+    assert abs(yaw - 8.9) < 3.0  # its author's
+
+
+def test_car_dead_reckons_by_the_odometer(car):
+    """150 s without GNSS, from the start that alignment and smoothing find: within 2 % of the distance."""
+    imu, odometer, gnss, answer = car
+    moving = answer.moving
+    sigma = np.concatenate([np.radians([1.0, 1.0, 5.0]), [0.1] * 3, [3.0] * 3, [2e-4] * 3, [0.05] * 3])
+    start = Start(
+        float(imu.time[0] - imu.interval),
+        backtracked(imu, moving.track),
+        np.zeros(3),
+        float(gnss.lat[0]),
+        float(gnss.lon[0]),
+        float(gnss.alt[0]),
+        answer.gyro_bias,
+        answer.accel_bias,
+        np.diag(sigma**2),
+    )
+    wheel = Mounting(C_mb=moving.wheel.C_mb, lever_arm=moving.wheel.lever_arm, scale_sigma=0.02, noise=0.4, slip=0.2)
+    receiver = Mounting(bias_sigma=2.0, bias_time=60.0)
+    common = {"imu": "consumer", "odometer": odometer, "wheel": wheel, "check_clocks": False}
+    smoothed = navigate(imu, start, gnss=gnss, antenna=receiver, smooth=True, **common).track
+    first = replace(
+        start,
+        C_nb=smoothed.C_nb[0],
+        gyro_bias=smoothed.gyro_bias[0],
+        accel_bias=smoothed.accel_bias[0],
+        P=fifteen(smoothed)[0],
+    )
+    result = navigate(imu, first, **common)
+    _, place = gnss_track(gnss, result.track.time)
+    off = 6371e3 * (result.track.position[-1, :2] - place[-1, :2]) * [1.0, math.cos(place[-1, 0])]
+    assert moving.distance > 900.0
+    assert np.hypot(*off) < 0.02 * moving.distance
+
+
+def test_car_without_gnss_claims_no_heading(car):
+    from truenorth.position import Position
+
+    imu, odometer, _, _ = car
+    place = Position.from_degrees(59.35, 18.07, 30.0)
+    answer = align_in_motion(imu, "consumer", odometer=odometer, wheel=CAR_WHEEL, position=place)
+    assert answer.status == "level_only"
+    assert answer.summary()["heading_deg"] is None
