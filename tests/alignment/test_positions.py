@@ -147,6 +147,20 @@ def test_a_table_that_never_rests_is_refused():
         align_positions(record, PLACE, "tactical")
 
 
+def test_a_log_of_two_seconds_is_refused():
+    with pytest.raises(AlignmentError, match="no position of 5 s"):
+        align_positions(simulate(rest(PLACE), rate=20.0, duration=2.0).record, PLACE, "tactical")
+
+
+def test_a_base_that_drives_off_is_no_table():
+    record = turned([(0, math.pi)], imu_spec("navigation"), 4, 60.0, duration=180.0)[0].record
+    accel = record.accel.copy()
+    accel[(record.time > 150.0) & (record.time < 160.0), 1] += 0.5 * record.interval
+    answer = align_positions(ImuRecord(record.time, record.gyro, accel, record.kind), PLACE, "navigation")
+    assert answer.status == "inconsistent"
+    assert any("moves" in reason for reason in answer.reasons)
+
+
 def test_options_that_make_no_sense():
     record = simulate(rest(PLACE), rate=20.0, duration=30.0).record
     with pytest.raises(UsageError, match="arm_sigma"):

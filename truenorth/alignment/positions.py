@@ -168,7 +168,9 @@ def align_positions(
         history=_history(task, fine),
         table=_errors(found, touch, x, fine.P),
     )
-    status, reasons = judge(answer, Circumstances(heading_limit, check, None, fine.settled, None))
+    status, reasons = judge(
+        answer, Circumstances(heading_limit, check, _leaves(task.motion, stretches), fine.settled, None)
+    )
     if touch is not None:
         advice = f"; align the part after it (--from {touch.time + 5:.0f}), or the part before it"
         status, reasons = "inconsistent", (touch.words(task.gravity) + advice, *reasons)
@@ -177,12 +179,20 @@ def align_positions(
 
 def find_positions(motion: MotionSummary) -> list[tuple[float, float]]:
     """Start and stop (s, on the record's clock) of each stretch of 5 s and more in which the table does not turn."""
+    if motion.time.size < SHORTEST_POSITION:
+        return []
     noise = 5.0 * float(np.max(motion.angle_noise))  # of a rate over one second
     rests = np.linalg.norm(motion.rate, axis=1) < SLEW_RATE + noise
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rests, [False]]).astype(np.int8)))
     step = float(motion.time[1] - motion.time[0])
     stretches = [(float(motion.time[a]) - step, float(motion.time[b - 1])) for a, b in edges.reshape(-1, 2)]
     return [s for s in stretches if s[1] - s[0] >= SHORTEST_POSITION]
+
+
+def _leaves(motion: MotionSummary, stretches: list[tuple[float, float]]) -> float | None:
+    """When the base first goes somewhere within a position, s on the record's clock; None if it stays."""
+    starts = [r.start for r in motion.regimes if r.kind == "moving"]
+    return next((t for t in starts if any(a < t + 1.0 < b for a, b in stretches)), None)
 
 
 def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:

@@ -150,7 +150,9 @@ def align(
             stop=stop,
         )
         if indexer is None:  # which turns its IMU on its head, and fast
-            _refuse_implausible(record, position.lat, any_attitude, units_given=units is not None)
+            _refuse_implausible(
+                record, position.lat, any_attitude or positions is not None, units_given=units is not None
+            )
         from truenorth.alignment import align as align_record
         from truenorth.calibration import Calibration
 
