@@ -1,5 +1,7 @@
 """The closed loop: its mechanisation, its covariance against Monte Carlo, its measurements, its smoother."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -234,6 +236,31 @@ def test_smoother_is_better_than_the_filter_and_as_honest():
     assert low < np.sum(values) < high
 
 
+def test_measurements_in_any_order_at_any_time():
+    """Rows in disorder give the bits of rows in order; late ones, told how late, those of the same rows in time."""
+    seconds = 60.0
+    motion = flight(45.0, seconds)
+    record = simulate(motion, rate=50.0, duration=seconds, imu=SPEC, seed=7).record
+    s = motion.states(0.0)
+    start = Start(0.0, s.C_nb, s.v_n, s.lat, s.lon, s.alt, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))
+    model = InsModel.from_spec(SPEC)
+    fixes = gnss(motion, seconds, np.random.default_rng(4), (0.0, 0.0, 0.0))
+    between = replace(fixes, time=fixes.time + 0.0137)  # amid a sample
+    order = np.random.default_rng(5).permutation(len(fixes.time))
+    mixed = replace(between, time=between.time[order], measured=between.measured[order], sigma=between.sigma[order])
+    a, b = (navigate_track(record, start, model, [aiding]) for aiding in (between, mixed))
+    for name in ("C_nb", "v_n", "position", "sensors", "P"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    # From two sensors, one of which hands in seconds later than the other: the filter meets them by the time they hold at.
+    first, second = (
+        replace(between, time=between.time[k::2], measured=between.measured[k::2], sigma=between.sigma[k::2])
+        for k in range(2)
+    )
+    c = navigate_track(record, start, model, [second, first])
+    np.testing.assert_allclose(c.position, a.position, rtol=1e-12)
+    np.testing.assert_allclose(c.P, a.P, rtol=1e-6, atol=1e-20)
+
+
 def test_a_lever_arm_a_lag_and_an_outlier():
     """Lever arm and lag left to the filter are found within 4 sigma; fixes 100 m off are rejected, the sound ones kept."""
     from truenorth.navigation.aiding import state
@@ -337,3 +364,34 @@ def test_covariance_of_the_loop_is_that_of_many_runs():
     ratio = np.mean(np.square(last), axis=0) / np.diag(track.P[-1])[:STATES]
     low, high = chi2.ppf([1e-4, 1 - 1e-4], runs) / runs
     assert np.all((low < ratio) & (ratio < high))
+
+
+PROGRAM = """
+import numpy as np
+from truenorth.navigation import Start, kernel, navigate
+from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord
+from truenorth.specs import imu_spec
+t, seconds = 0.02 * np.arange(1, 1001), np.arange(1.0, 20.0)
+still = np.tile([0.0, 0.0, 9.8], (len(t), 1))
+start = Start(0.0, np.eye(3), np.zeros(3), 0.6, 0.1, 0.0, np.zeros(3), np.zeros(3), 1e-4 * np.eye(15))
+place = [np.full(19, x) for x in (0.6, 0.1, 0.0)]
+aids = {
+    "gnss": GnssRecord(seconds, *place), "baro": HeightRecord(seconds, np.zeros(19)),
+    "odometer": OdometerRecord(seconds, np.zeros(19), "speed"),
+}
+for kind, scale in (("rates", 1.0), ("increments", 0.02)):
+    record = ImuRecord(t, np.zeros((1000, 3)), still * scale, kind)
+    for options in ({}, {"zupt": "auto"}, {"smooth": True, "altitude": "free"}, aids):
+        navigate(record, start, imu=imu_spec("navigation"), check_clocks=False, **options)
+stats = kernel.run.stats
+print(len(kernel.run.signatures), sum(stats.cache_misses.values()), sum(stats.cache_hits.values()))
+"""
+
+
+def test_a_second_process_compiles_nothing():
+    """One specialisation a padded size of the filter's states, whatever the sensors; from the disk the second time."""
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True)
+    signatures, misses, hits = map(int, done.stdout.split())
+    assert misses == 0
+    assert hits == signatures <= 2
