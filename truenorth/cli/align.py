@@ -23,6 +23,18 @@ from truenorth.cli.align_in_motion import (
     print_moving,
 )
 from truenorth.cli.align_rotary import Indexer, IndexerAxes, LeverArm, align_on_indexer
+from truenorth.cli.align_transfer import (
+    ArmSigma,
+    Delay,
+    Flexure,
+    Master,
+    MasterColumns,
+    MasterUnits,
+    Matching,
+    align_to_master,
+    print_transfer,
+    read_master_log,
+)
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
 
@@ -39,6 +51,7 @@ Examples:
   truenorth align bag/ --lat 48.1 --axes FLU --from 10 --to 310 --json
   truenorth align old.csv --lat -33.9 --units deg/s,g --rate 100
   truenorth align log.csv --lat 34.246 --imu my_imu.yaml --method oba
+  truenorth align slave.csv --master master.csv --imu tactical --lever-arm 0.5,1.2,0 --delay '30 ms'
   truenorth align turntable.csv --lat 39.98 --imu tactical --positions auto
   truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv --indexer-axes z,x
   truenorth align drive.csv --odometer odo.csv --lat 39.9 --imu navigation -o start
@@ -98,6 +111,13 @@ def align(
     indexer: Indexer = None,
     indexer_axes: IndexerAxes = "z,x",
     lever_arm: LeverArm = None,
+    master: Master = None,
+    master_columns: MasterColumns = None,
+    master_units: MasterUnits = None,
+    matching: Matching = "auto",
+    delay: Delay = None,
+    lever_arm_sigma: ArmSigma = 1.0,
+    flexure: Flexure = None,
     advise: Annotated[
         float | None,
         typer.Option(
@@ -128,8 +148,10 @@ def align(
     from truenorth.position import Position
 
     moving = odometer is not None or gnss is not None
-    if lat is None and gnss is None:
-        raise UsageError("the latitude is missing; expected --lat DEGREES, or --gnss FILE with positions")
+    if lat is None and gnss is None and master is None:
+        raise UsageError(
+            "the latitude is missing; expected --lat DEGREES, or --gnss FILE or --master FILE with positions"
+        )
     sigmas = {"horizontal_sigma": position_sigma, "vertical_sigma": 2 * position_sigma}
     place = None if lat is None else Position.from_degrees(lat, lon, alt, **sigmas)
     position = Position(math.pi / 4) if place is None else place
@@ -149,6 +171,12 @@ def align(
             start=start,
             stop=stop,
         )
+        solution = None
+        if master is not None:
+            tell(f"reading {master.name}")
+            solution = read_master_log(master, master_columns, master_units)
+            if solution.lat is not None and solution.lon is not None:
+                position = Position(float(solution.lat[0]), float(solution.lon[0]))
         if indexer is None:  # which turns its IMU on its head, and fast
             _refuse_implausible(
                 record, position.lat, any_attitude or positions is not None, units_given=units is not None
@@ -158,7 +186,24 @@ def align(
 
         known = None if calibration is None else Calibration.from_file(calibration)
         limit = math.radians(heading_limit)
-        if moving:
+        if solution is not None:
+            result = align_to_master(
+                record,
+                solution,
+                imu,
+                place,
+                matching=matching,
+                lever_arm=lever_arm,
+                lever_arm_sigma=lever_arm_sigma,
+                delay=delay,
+                mounting=mounting,
+                mounting_sigma=mounting_sigma,
+                flexure=flexure,
+                calibration=known,
+                limit=limit,
+                progress=tell,
+            )
+        elif moving:
             result = align_moving(
                 record,
                 place,
@@ -272,6 +317,8 @@ def _print(result: Alignment, paths: list[Path]) -> None:
             for axis, value, sigma, ok in zip("xyz", values, sigmas, known, strict=True)
         ]
         console.print(f"{name}: {', '.join(axes_shown)}", soft_wrap=True)
+    if result.transfer is not None:
+        print_transfer(console, result.transfer)
     console.print(f"attitude at {result.time:.3f} s, method {result.method}: {result.method_reason}", soft_wrap=True)
     console.print(f"IMU: {result.imu_source}", soft_wrap=True)
     if result.table is not None:

@@ -53,7 +53,9 @@ AntennaArm = Annotated[
 MountingAngles = Annotated[
     str | None,
     typer.Option(
-        help="Heading,pitch,roll of the IMU against the vehicle, deg.", rich_help_panel=PANEL, show_default=False
+        help="Heading,pitch,roll of the IMU against the vehicle (or the master), deg.",
+        rich_help_panel=PANEL,
+        show_default=False,
     ),
 ]
 MountingSigma = Annotated[

@@ -32,7 +32,7 @@ LeverArm = Annotated[
     str | None,
     typer.Option(
         "--lever-arm",
-        help="Right, forward, up from the body's centre of rotation to the IMU, m; estimated without it.",
+        help="Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it.",
         show_default=False,
         rich_help_panel=PANEL,
     ),
