@@ -219,6 +219,16 @@ def test_wrong_axes_of_the_slave_are_a_contradiction(real):
     assert "mounting" in result.reasons[0]
 
 
+@pytest.mark.parametrize(
+    "options", [{"imu": "tactical"}, {"imu": "navigation"}, {"imu": "tactical", "matching": "velocity"}]
+)
+def test_a_specification_that_is_far_too_good_is_a_contradiction(real, options):
+    """Gyro biases of 200 deg/h where 1 deg/h is promised: the answer would be half a degree off."""
+    result = align_transfer(*real, **options)
+    assert result.status == "inconsistent"
+    assert "larger than its specification" in result.reasons[0]
+
+
 def test_clocks_that_cannot_be_brought_together_are_refused(real):
     slave, master = real
     other = replace(master, C_nb=None).between(30.0, 50.0).shifted(300.0)

@@ -37,6 +37,7 @@ DISTRUST = 0.2  # share of rejected rows above which master and slave contradict
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
 TIED = 0.95  # correlation of two states beyond which one is not told without the other
+LOPSIDED, STEADY, FEWEST = 6.0, 0.9, 20  # sigmas of a mean of innovations, their correlation from row to row, rows
 OUTLIER = 5.0  # sigmas by which a delay, a lever arm or a mounting may miss what was assumed
 
 WORDS = {
@@ -79,7 +80,7 @@ def assemble_transfer(
     lat, lon, alt = (float(x) for x in track.position[-1])
     transfer = _transfer(slave, master, model, assumed, start, track, noise, what, notes)
     sigma = track.sigma[-1]
-    status, reasons = _judge(track, transfer, start, euler_sigma(track.C_nb[-1], phi_covariance), heading_limit)
+    status, reasons = _judge(track, transfer, start, where, euler_sigma(track.C_nb[-1], phi_covariance), heading_limit)
     return Alignment(
         status=status,
         reasons=reasons,
@@ -278,7 +279,7 @@ def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
 
 
 def _judge(
-    track: TransferTrack, transfer: Transfer, start: Handover, sigma: Array, limit: float
+    track: TransferTrack, transfer: Transfer, start: Handover, where: str, sigma: Array, limit: float
 ) -> tuple[Status, tuple[str, ...]]:
     """Status and reasons."""
     told = [*transfer.notes, *transfer.jumps]
@@ -302,6 +303,13 @@ def _judge(
                 f"{scale * prior:.3g} {unit}: check the slave's axes and --{name.replace(' ', '-')}",
                 *told,
             )
+    lopsided = _lopsided(track)
+    if lopsided:
+        return "inconsistent", (
+            f"{lopsided} differ from the prediction to one side all the time: the slave's errors are larger than its specification "
+            f"({where}) allows, or the master's drift; give the right --imu",
+            *told,
+        )
     if sigma[0] <= limit:
         return "aligned", (
             f"heading is known to {_angle(float(sigma[0]))}, level to {_angle(float(max(sigma[1:])))} (one sigma)",
@@ -319,6 +327,21 @@ def _judge(
             *told,
         )
     return "not_converged", (f"level is known to {_angle(float(max(sigma[1:])))} only; {why}", *told)
+
+
+def _lopsided(track: TransferTrack) -> str:
+    """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row."""
+    nu = (track.innovation / track.innovation_sigma)[len(track.time) // 4 :]
+    for kind, name in enumerate(("velocities", "attitudes")):
+        rows = nu[:, 3 * kind : 3 * kind + 3]
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if len(rows) < FEWEST:
+            continue
+        follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)
+        mean = np.abs(rows.mean(axis=0)) * math.sqrt(len(rows))
+        if np.any((mean > LOPSIDED) & (follows > STEADY)):
+            return f"the master's {name}"
+    return ""
 
 
 def _between(before: Array, after: Array) -> Array:
