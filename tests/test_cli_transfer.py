@@ -1,0 +1,53 @@
+"""`truenorth align --master` from the shell: the real recording, its options and its messages."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from tests import recordings
+from truenorth.cli import app
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    slave, master = recordings.transfer_fog_mems()
+    folder = tmp_path_factory.mktemp("transfer")
+    slave.to_frame().to_csv(folder / "slave.csv")
+    master.to_frame().to_csv(folder / "master.csv")
+    return str(folder / "slave.csv"), str(folder / "master.csv")
+
+
+def test_a_slave_against_its_master(logs):
+    slave, master = logs
+    result = CliRunner().invoke(app, ["align", slave, "--master", master, "--delay", "10 ms,20 ms", "--json"])
+    assert result.exit_code == 0, result.output
+    summary = json.loads(result.stdout)
+    assert summary["status"] == "aligned"
+    assert 10 < summary["delay_ms"] < 20
+    assert abs(summary["mounting_deg"][0] - 0.293) < 0.15
+
+
+def test_what_a_person_reads(logs):
+    slave, master = logs
+    result = CliRunner().invoke(
+        app, ["align", slave, "--master", master, "--matching", "both", "--lever-arm-sigma", "0"]
+    )
+    assert result.exit_code == 0, result.output
+    assert "mounting, deg: heading 0.3" in result.stdout
+    assert "right 0 (as given)" in result.stdout
+    assert "not well told apart" in result.stdout
+
+
+def test_bad_options(logs):
+    slave, master = logs
+
+    def message(*options):
+        result = CliRunner().invoke(app, ["align", slave, *options])
+        assert result.exit_code != 0
+        return f"{result.output} {result.exception}"
+
+    assert "--lat" in message()
+    assert "expected 3 or 4 numbers" in message("--master", master, "--mounting", "1,2")
+    assert "such as '3 arcmin,5 s'" in message("--master", master, "--flexure", "3 arcmin")
+    assert "choose one of" in message("--master", master, "--matching", "position")
