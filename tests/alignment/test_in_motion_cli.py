@@ -1,0 +1,60 @@
+"""`truenorth align` on the move, from the shell."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from truenorth.cli import app
+from truenorth.errors import UsageError
+from truenorth.formats import write_imu, write_record
+from truenorth.simulation.scenario import read_scenario
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Four minutes on the ring, as files."""
+    folder = tmp_path_factory.mktemp("drive")
+    ring = read_scenario({**read_scenario("odometer_ring").to_mapping(), "duration": "240 s"})
+    write_imu(ring.simulate(seed=4).record, folder / "imu.csv")
+    write_record(ring.simulate_aiding(seed=4)["odometer"].record, folder / "odo.csv")
+    return folder
+
+
+def call(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_align_and_go_on(files, tmp_path):
+    log, odometer = files / "imu.csv", files / "odo.csv"
+    common = ["--odometer", odometer, "--lat", 39.9, "--alt", 50, "--imu", "navigation"]
+    result = call("align", log, *common, "--to", 200, "-o", tmp_path / "start", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["status"] == "aligned"
+    assert told["heading_from"] == "the earth's rate"
+    assert told["odometer_scale_sigma"] < 1e-3
+    assert told["heading_sigma_deg"] < 1.0
+    track = call(
+        "navigate", log, "--start", tmp_path / "start", "--odometer", odometer, "--estimate", "scale", "--json"
+    )
+    assert track.exit_code == 0, track.output
+    printed = call("align", log, *common)
+    assert "heading of the vehicle" in printed.stdout
+    assert "odometer: scale" in printed.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--lat", "39.9"], "--imu navigation"),
+        (["--imu", "navigation"], "latitude is missing"),
+        (["--imu", "navigation", "--lat", "39.9", "--at", "50"], "cut the log with --to"),
+        (["--imu", "navigation", "--lat", "39.9", "--method", "oba"], "gyrocompass"),
+        (["--imu", "navigation", "--lat", "39.9", "--mounting-sigma", "0"], "--mounting-sigma"),
+    ],
+)
+def test_wrong_usage(files, arguments, words):
+    result = call("align", files / "imu.csv", "--odometer", files / "odo.csv", *arguments)
+    assert isinstance(result.exception, UsageError)
+    assert words in str(result.exception)
