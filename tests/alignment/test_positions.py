@@ -169,13 +169,14 @@ def test_options_that_make_no_sense():
         align_positions(record, PLACE, heading_limit=0.0)
 
 
-class TestCommand:
-    @pytest.fixture(scope="module")
-    def log(self, tmp_path_factory):
-        path = tmp_path_factory.mktemp("table") / "table.csv"
-        write_imu(turned([(0, math.pi)], imu_spec("navigation"), 2, 140.0, duration=300.0)[0].record, path)
-        return path
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("table") / "table.csv"
+    write_imu(turned([(0, math.pi)], imu_spec("navigation"), 2, 140.0, duration=300.0)[0].record, path)
+    return path
 
+
+class TestCommand:
     def run(self, capsys, monkeypatch, *arguments):
         monkeypatch.setattr(sys, "argv", ["truenorth", "align", *map(str, arguments)])
         code = 0
