@@ -1,0 +1,190 @@
+"""Which manoeuvre brings a slave's heading soonest to a wanted sigma: covariances along each, without any noise drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.transfer_start import Assumed, bias_sigmas, model_from_spec
+from truenorth.alignment.transfer_system import system_of_motion
+from truenorth.errors import UsageError
+from truenorth.filters import kalman
+from truenorth.models.transfer import PHI
+from truenorth.position import Position
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import accelerate, s_turn, straight, turn, wing_rock
+from truenorth.simulation.sensing import Moving
+from truenorth.specs import ImuSpec, imu_spec
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+BEFORE = 20.0  # s straight on, before each manoeuvre
+STEP = 0.5  # s of the covariance analysis
+RATE, ANGLE, SIDE = math.radians(3.0), math.radians(90.0), math.radians(20.0)  # of turns; of each side of an S
+GAIN, ACCELERATION = 0.25, 2.0  # change of speed, as a part of it, and m/s^2
+ROCK, PERIOD, ROCKING = math.radians(20.0), 4.0, 30.0  # amplitude, s, s
+
+
+@dataclass(frozen=True)
+class ManoeuvreAdvice:
+    """Heading's one-sigma over time in each manoeuvre, and which is first below the wanted one.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    heading_sigma : mapping of manoeuvre to (K,) array, rad
+    wanted : float, rad
+    reached : mapping of manoeuvre to s
+        Infinite: not in the time considered.
+    """
+
+    time: Array
+    heading_sigma: dict[str, Array]
+    wanted: float
+    reached: dict[str, float]
+
+    @property
+    def best(self) -> str | None:
+        """The manoeuvre that is first below the wanted sigma; None: none is."""
+        name = min(self.reached, key=lambda n: self.reached[n])
+        return name if math.isfinite(self.reached[name]) else None
+
+    def __str__(self) -> str:
+        wanted = f"{60 * math.degrees(self.wanted):.3g} arcmin"
+        if self.best is None:
+            name = min(self.heading_sigma, key=lambda n: float(self.heading_sigma[n][-1]))
+            least = 60 * math.degrees(float(self.heading_sigma[name][-1]))
+            return (
+                f"none of the manoeuvres brings heading to {wanted} in {self.time[-1]:.0f} s; {name} is nearest with {least:.3g} "
+                "arcmin"
+            )
+        others = ", ".join(
+            f"{name} {f'{t:.0f} s' if math.isfinite(t) else 'never'}"
+            for name, t in self.reached.items()
+            if name != self.best
+        )
+        return f"{self.best} brings heading to {wanted} after {self.reached[self.best]:.0f} s ({others})"
+
+    def plot(self) -> Figure:
+        """Heading's sigma over time in each manoeuvre, and the wanted one."""
+        from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+
+        with style():
+            figure = new_figure(8.0, 4.5)
+            ax = figure.subplots()
+            for (name, sigma), colour in zip(self.heading_sigma.items(), COLOURS * 2):
+                ax.plot(self.time, 60 * np.degrees(sigma), color=colour, label=name)
+            ax.axhline(60 * math.degrees(self.wanted), color=REFERENCE, linestyle="--", label="wanted")
+            ax.axvline(BEFORE, color=REFERENCE, linestyle=":", linewidth=1.0)
+            ax.set(yscale="log", xlabel="time, s", ylabel="heading, one sigma, arcmin")
+            ax.set_title(f"Heading by transfer alignment; each manoeuvre begins at {BEFORE:.0f} s")
+            ax.margins(x=0.0)
+            figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=4)
+        return figure
+
+
+def advise_manoeuvre(
+    imu: ImuSpec | str,
+    position: Position,
+    speed: float,
+    wanted: float,
+    *,
+    attitude_noise: float = math.inf,
+    velocity_noise: float = 0.1,
+    rate: float = 10.0,
+    heading_sigma: float = math.radians(1.0),
+    level_sigma: float = math.radians(0.5),
+    delay_sigma: float = 0.05,
+    lever_arm_sigma: float = 1.0,
+    longest: float = 120.0,
+    manoeuvres: Sequence[str] = (),
+) -> ManoeuvreAdvice:
+    """Say which of the standard manoeuvres tells heading soonest.
+
+    Parameters
+    ----------
+    imu : ImuSpec, or a preset's or a file's name
+        Of the slave.
+    position : Position
+    speed : float, m/s
+    wanted : float, rad
+        One-sigma of heading.
+    attitude_noise, velocity_noise : float, rad and m/s
+        Of the master's rows; infinite: not matched.
+    rate : float, Hz
+        Of the master's rows.
+    heading_sigma, level_sigma, delay_sigma, lever_arm_sigma : float, rad, rad, s, m
+        What is known at the start.
+    longest : float, s
+    manoeuvres : sequence of str
+        Those considered; all when left out.
+
+    Returns
+    -------
+    ManoeuvreAdvice
+
+    Raises
+    ------
+    UsageError
+        A speed, a wanted sigma or a time that is not positive, or an unknown manoeuvre.
+    """
+    for name, value in (("speed", speed), ("wanted", wanted), ("longest", longest), ("rate", rate)):
+        if not 0.0 < value < math.inf:
+            raise UsageError(f"{name} is {value}; expected a positive number")
+    spec, flights = imu_spec(imu), standard_manoeuvres(position, speed)
+    unknown = [name for name in manoeuvres if name not in flights]
+    if unknown:
+        raise UsageError(f"manoeuvre {unknown[0]!r} is not known; choose of {', '.join(flights)}")
+    mounting = math.isfinite(attitude_noise)
+    assumed = Assumed(np.zeros(3), lever_arm_sigma, 0.0, delay_sigma, np.eye(3), heading_sigma)
+    model = model_from_spec(spec, assumed, mounting, None, 0.0)
+    gyro, accel = bias_sigmas(spec)
+    angles = np.array([level_sigma, level_sigma, heading_sigma])
+    P0 = model.prior(
+        velocity_noise if math.isfinite(velocity_noise) else 1.0,
+        1e-5 if mounting else angles,
+        np.maximum(accel, 1e-6),
+        np.maximum(gyro, 1e-9),
+        tau=delay_sigma,
+        arm=lever_arm_sigma,
+        mounting=angles,
+        C_nb=np.eye(3) if mounting else None,
+    )
+    R = np.repeat([velocity_noise**2, attitude_noise**2], 3) / (rate * STEP)
+    sigmas, reached = {}, {}
+    time: Array = STEP * np.arange(1.0, round(longest / STEP) + 0.5)
+    for name, flight in flights.items():
+        if manoeuvres and name not in manoeuvres:
+            continue
+        system = system_of_motion(flight, model, P0, R, longest, STEP)
+        sigma = np.squeeze(kalman(system, history="sigma", innovations=False).sigma)[:, PHI.stop - 1]
+        below = np.flatnonzero(sigma <= wanted)
+        sigmas[name], reached[name] = sigma, float(time[below[0]]) if below.size else math.inf
+    return ManoeuvreAdvice(time, sigmas, wanted, reached)
+
+
+def standard_manoeuvres(position: Position, speed: float) -> dict[str, Moving]:
+    """The standard manoeuvres as motions, each begun after 20 s straight on to the north."""
+    more = (1.0 + GAIN) * speed
+    legs = {
+        "straight": [],
+        "flat turn": turn(ANGLE, RATE, "flat"),
+        "banked turn": turn(ANGLE, RATE, "coordinated"),
+        "S-turn": s_turn(SIDE, RATE),
+        "acceleration": [*accelerate(more, ACCELERATION, speed), *accelerate(speed, ACCELERATION, more)],
+        "wing rock": [],
+    }
+    flights: dict[str, Moving] = {}
+    for name, parts in legs.items():
+        motion = course(position, [*straight(BEFORE), *parts, *straight(1.0)], speed=speed)
+        rocks = name == "wing rock"
+        flights[name] = wing_rock(motion, BEFORE, BEFORE + ROCKING, ROCK, PERIOD) if rocks else motion
+    return flights
