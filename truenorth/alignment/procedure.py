@@ -41,6 +41,7 @@ Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying"]
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
+STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be told
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
@@ -125,9 +126,10 @@ def align(
         found = _align_inertial(task, spec, chosen)
     why = f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
-    status, reasons = judge(
-        answer, Circumstances(heading_limit, found.check, _moves_from(task.motion), found.settled, found.drift)
-    )
+    moves = _moves_from(task.motion)
+    if chosen == "swaying" and _all_along(task.motion) and float(np.max(answer.disturbance[:2])) < STAYS:
+        moves = None  # lever arm and bounded motion explain all of it
+    status, reasons = judge(answer, Circumstances(heading_limit, found.check, moves, found.settled, found.drift))
     return answer.with_verdict(status, reasons)
 
 
@@ -160,7 +162,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
         "swaying": "the base sways: mean rates mean nothing, the inertial frame follows every motion",
     }
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
-    if overall != "swaying" or task.record.duration < SHORTEST_SWAYING:
+    if task.record.duration < SHORTEST_SWAYING or not (overall in words or _all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
 
@@ -243,6 +245,11 @@ def answer_of(
         pays_until=pays_until(history, answer, fine),
         handover=hand_over(task, fine, answer),
     )
+
+
+def _all_along(motion: MotionSummary) -> bool:
+    """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does."""
+    return len(motion.regimes) == 1
 
 
 def _moves_from(motion: MotionSummary) -> float | None:
