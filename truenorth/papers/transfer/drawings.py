@@ -15,7 +15,7 @@ from truenorth.units import parse
 
 Array = NDArray[np.float64]
 SINGLE = 10  # runs drawn one by one
-LINEAR = 5.0  # arcmin: beyond, the scale is logarithmic where the limits are wider
+LINEAR = 10.0  # arcmin: beyond, the scale is logarithmic where the limits are wider
 DEG_PER_HOUR = parse("1 deg/h", "angular_rate")
 
 
@@ -47,6 +47,7 @@ def _draw(values: Array, sigmas: Array, names: Sequence[str], unit: str, limits:
             ax.axvspan(BEGIN, STOP, color=REFERENCE, alpha=0.08, linewidth=0.0, label="turn")
             if limits[i] > LINEAR:
                 ax.set_yscale("symlog", linthresh=LINEAR)
+                ax.set_yticks([-100.0, -10.0, 0.0, 10.0, 100.0], ["-100", "-10", "0", "10", "100"])
             ax.set_ylim(-limits[i], limits[i])
             ax.set_ylabel(f"{names[i]}, {unit}")
             ax.margins(x=0.0)
