@@ -283,6 +283,17 @@ def test_the_history_converges_on_the_answer(found):
     assert np.all(np.abs(value - found.euler)[late] < 5 * sigma[late])
 
 
+def test_navigation_goes_on_with_the_velocity_it_had(real, found):
+    """Not from rest: the start's velocity is the master's within .2 m/s, and its attitude covariance the answer's."""
+    from truenorth.navigation.start import start_from_alignment
+
+    start = start_from_alignment(found)
+    np.testing.assert_allclose(start.v_n, real[1].v_n[-1], atol=0.2)
+    assert np.linalg.norm(start.v_n) > 10.0
+    np.testing.assert_allclose(np.diag(start.P)[:3], np.diag(found.phi_covariance), rtol=1e-6)
+    np.testing.assert_allclose(np.diag(start.P)[9:12], found.gyro_bias_sigma**2, rtol=1e-6)
+
+
 def test_bad_requests(real):
     slave, master = real
     with pytest.raises(UsageError, match="needs its attitude"):

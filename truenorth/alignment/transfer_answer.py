@@ -141,10 +141,22 @@ def _transfer(
         attitude_noise=noise[1] if np.isfinite(noise[1]) else math.nan,
         used=int(np.sum(np.any((verdict == loop.USED) | (verdict == loop.REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == loop.REJECTED, axis=1))),
+        v_n=track.v_n[-1],
+        P=_fifteen(track.last_P, Position(0.0)),
         jumps=_jumps(track),
         open=_open(slave, model, assumed, start, track, noise),
         notes=(*notes, *silences),
     )
+
+
+def _fifteen(P: Array, place: Position) -> Array:
+    """(15, 15) covariance as navigation takes it, the place as uncertain as `place` says by default."""
+    order = np.r_[3:6, 0:3, 9:12, 6:9]  # phi, dv, gyro and accelerometer bias
+    at = np.r_[0:6, 9:15]
+    result = np.zeros((15, 15))
+    result[np.ix_(at, at)] = P[np.ix_(order, order)]
+    result[range(6, 9), range(6, 9)] = np.square([place.horizontal_sigma, place.horizontal_sigma, place.vertical_sigma])
+    return result
 
 
 def _signed(angles: Array) -> Array:

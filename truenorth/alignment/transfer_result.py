@@ -31,6 +31,10 @@ class Transfer:
         One-sigma white noise of the master's rows, as fitted or given; NaN where not matched.
     used, rejected : int
         Rows of the master.
+    v_n : (3,) array, m/s
+        Of the slave at the alignment's epoch.
+    P : (15, 15) array
+        Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.models.ins`): what navigation begins with.
     jumps : tuple of str
         Where the master jumped, in words.
     open : tuple of str
@@ -53,6 +57,8 @@ class Transfer:
     attitude_noise: float
     used: int
     rejected: int
+    v_n: Array
+    P: Array
     jumps: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -80,6 +86,7 @@ class Transfer:
 
         return {
             "matching": self.matching,
+            "velocity_m_s": self.v_n.tolist(),
             "delay_ms": 1e3 * self.delay,
             "delay_sigma_ms": 1e3 * self.delay_sigma,
             "delay_estimated": bool(self.delay_estimated),

@@ -45,12 +45,13 @@ def start_from_alignment(alignment: Alignment) -> Start:
             f"{alignment.source}: the alignment is {alignment.status!r}, its heading may not be used; navigation needs one: "
             "align longer, with a better IMU, or from motion"
         )
-    if alignment.moving is not None:
+    moving = alignment.moving or alignment.transfer
+    if moving is not None:
         return _moving_start(
             alignment.time,
             alignment.C_nb,
-            alignment.moving.v_n,
-            alignment.moving.P,
+            moving.v_n,
+            moving.P,
             alignment.gyro_bias,
             alignment.accel_bias,
             alignment.position,
@@ -237,6 +238,7 @@ def navigation_block(alignment: Alignment) -> dict[str, Any]:
     block["imu"] = alignment.imu.to_mapping()
     if alignment.handover is not None:
         block["handover"] = {name: getattr(alignment.handover, name).tolist() for name in JOINT}
-    if alignment.moving is not None:
-        block |= {"v_n": alignment.moving.v_n.tolist(), "P": alignment.moving.P.tolist()}
+    moving = alignment.moving or alignment.transfer
+    if moving is not None:
+        block |= {"v_n": moving.v_n.tolist(), "P": moving.P.tolist()}
     return block
