@@ -74,3 +74,10 @@ def test_convergence_is_from_when_it_stays():
     rows = [Row(0, "a", 0, t, "phi_u", v) for t, v in values.items()]
     rows += [Row(0, "a", 1, t, "phi_u", 9.0) for t in values]
     assert list(time_to_converge(frame(rows), "phi_u", 3.0)["time_s"]) == [40.0, math.inf]
+
+
+def test_a_time_without_an_answer_is_not_converged():
+    rows = [Row(0, "a", run, t, "outcome", status="aligned") for run in range(3) for t in (10.0, 20.0, 30.0)]
+    rows += [Row(0, "a", 0, t, "phi_u", 1.0) for t in (10.0, 30.0)]  # refused at 20 s
+    rows += [Row(0, "a", 1, t, "phi_u", 1.0) for t in (10.0, 20.0)]  # refused at the end
+    assert list(time_to_converge(frame(rows), "phi_u", 3.0)["time_s"]) == [30.0, math.inf, math.inf]

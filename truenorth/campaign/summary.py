@@ -80,6 +80,8 @@ def outcomes(table: pd.DataFrame, names: Mapping[int, str] | None = None) -> pd.
 def time_to_converge(table: pd.DataFrame, quantity: str, limit: float) -> pd.DataFrame:
     """For each case, method and run the first planned time from which on the error stays within a limit.
 
+    A time without an answer (a run that failed, a heading that was refused) is not within it.
+
     Parameters
     ----------
     table : DataFrame
@@ -94,14 +96,15 @@ def time_to_converge(table: pd.DataFrame, quantity: str, limit: float) -> pd.Dat
     """
     import pandas as pd
 
-    rows = table[table["quantity"] == quantity]
+    keys = ["case", "method", "run", "time_s"]
+    asked = table[keys].drop_duplicates()
+    rows = asked.merge(table.loc[table["quantity"] == quantity, [*keys, "value"]], how="left", on=keys)
     result = []
     for (case, method, run), group in rows.groupby(["case", "method", "run"], observed=True, sort=False):
         ordered = group.sort_values("time_s")
-        inside = np.abs(ordered["value"].to_numpy(float)) <= limit
-        outside = np.flatnonzero(~inside)
-        first = outside[-1] + 1 if outside.size else 0
         times = ordered["time_s"].to_numpy(float)
+        outside = np.flatnonzero(~(np.abs(ordered["value"].to_numpy(float)) <= limit))  # no answer is not inside
+        first = outside[-1] + 1 if outside.size else 0
         result.append((case, method, run, times[first] if first < times.size else math.inf))
     return pd.DataFrame(result, columns=["case", "method", "run", "time_s"])
 
