@@ -529,3 +529,17 @@ def test_truth_as_a_record_and_as_a_file(tmp_path):
     place = ecef_from_geodetic(at.lat, at.lon, at.alt) - ecef_from_geodetic(true.lat, true.lon, true.alt)
     assert np.abs(place).max() < 1e-5
     assert np.abs(rotation_vector_from_dcm(at.C_nb @ np.swapaxes(true.C_nb, 1, 2))).max() < 5e-4
+
+
+@pytest.mark.parametrize("output", ["distance", "pulses", "speed"])
+def test_an_odometer_outage_leaves_the_other_rows_as_they_were(output):
+    from truenorth.simulation import rest
+
+    motion = rest(Position.from_degrees(40.0, 10.0))
+    whole = simulate_odometer(motion, OdometerSpec(output=output, noise=0.3), duration=10.0)
+    lacking = simulate_odometer(motion, OdometerSpec(output=output, noise=0.3, outages=((2.0, 5.0),)), duration=10.0)
+    there = (whole.sampled < 2.0) | (whole.sampled >= 5.0)
+    assert 0 < np.count_nonzero(~there) < len(there)
+    np.testing.assert_array_equal(lacking.record.time, whole.record.time[there])
+    np.testing.assert_array_equal(lacking.record.values, whole.record.values[there])
+    np.testing.assert_array_equal(lacking.errors["noise"], whole.errors["noise"][there])

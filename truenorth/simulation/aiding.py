@@ -34,6 +34,7 @@ STREAMS = {
     "odometer_slips": 103,
     "odometer_lost": 104,
     "odometer_noise": 105,
+    "odometer_outages": 106,
     "velocity_bias": 110,
     "velocity_scale": 111,
     "velocity_misalignment": 112,

@@ -2,7 +2,8 @@
 
 The wheel stands at a lever arm from the IMU and rolls along the vehicle's forward axis, which mounting angles turn from the IMU's.
 Its speed is that axis times the velocity of the wheel's point over the ground; the distance of an interval is the integral of it by
-quadrature, exact to rounding as the IMU's increments are.
+quadrature, exact to rounding as the IMU's increments are. The wheel turns on while its messages are lost in an outage:
+the distance of the rows that are missing is missing, and not in the row that follows.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from truenorth.errors import UsageError
 from truenorth.records import OdometerRecord
 from truenorth.simulation.aiding import (
     Aided,
-    AidingSpec,
     Draws,
+    DroppingSpec,
     check_windows,
+    kept,
     random_windows,
     sample_times,
     velocity_b,
@@ -33,7 +35,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class OdometerSpec(AidingSpec):
+class OdometerSpec(DroppingSpec):
     """An odometer and its errors.
 
     Attributes
@@ -127,12 +129,14 @@ def simulate_odometer(
         return velocity_b(at, spec.lever_arm) @ forward
 
     noise = spec.noise * draws("noise").standard_normal(len(edges) - 1)
-    errors = {"scale": scale, "mounting": mounting, "slips": slips, "noise": noise}
-    stamps = edges[1:] + spec.latency
+    there = kept(spec, edges[1:], draws)
+    sampled = edges[1:][there]
+    stamps = sampled + spec.latency
+    errors = {"scale": scale, "mounting": mounting, "slips": slips, "noise": noise[there]}
     if spec.output == "speed":
         values = speed(motion.states(edges[1:])) * (1.0 + scale) * _slipping(edges[1:], slips) + noise
         values = values if spec.signed else np.abs(values)
-        return Aided(OdometerRecord(stamps, values, "speed", None, spec.signed, "simulation"), edges[1:], errors)
+        return Aided(OdometerRecord(stamps, values[there], "speed", None, spec.signed, "simulation"), sampled, errors)
 
     bounds = np.array([bound for slip in slips for bound in slip[:2] if edges[0] < bound < edges[-1]])
     finer = np.union1d(edges, bounds)
@@ -142,14 +146,16 @@ def simulate_odometer(
     distance = (1.0 + scale) * np.add.reduceat(parts, np.searchsorted(finer, edges[:-1])) + noise * np.diff(edges)
     distance = distance if spec.signed else np.abs(distance)
     if spec.output == "distance":
-        return Aided(OdometerRecord(stamps, distance, "distance", None, spec.signed, "simulation"), edges[1:], errors)
+        return Aided(
+            OdometerRecord(stamps, distance[there], "distance", None, spec.signed, "simulation"), sampled, errors
+        )
 
     phase = draws("phase").random()
     pulses = np.diff(np.floor(np.cumsum(distance) / spec.pulse_size + phase), prepend=0.0)
     lost = draws("lost").binomial(np.abs(pulses).astype(np.int64), spec.lost)
     pulses -= np.sign(pulses) * lost
-    record = OdometerRecord(stamps, pulses, "pulses", spec.pulse_size, spec.signed, "simulation")
-    return Aided(record, edges[1:], errors | {"phase": phase, "lost": lost})
+    record = OdometerRecord(stamps, pulses[there], "pulses", spec.pulse_size, spec.signed, "simulation")
+    return Aided(record, sampled, errors | {"phase": phase, "lost": lost[there]})
 
 
 def _slipping(times: Array, slips: tuple[tuple[float, float, float], ...]) -> Array:
