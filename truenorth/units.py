@@ -137,6 +137,11 @@ _POWER = re.compile(r"\^?([-+]?\d(?:\.\d+)?)(?!\d)|\^\(([-+]?\d)/([1-9])\)")
 _ROOT = re.compile(r"sqrt(?=\()|√")
 
 
+def significant(value: float, digits: int = 3) -> str:
+    """A number for people: rounded to some digits, without an exponent up to a million (``1000``, not ``1e+03``)."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 def parse_unit(text: str) -> tuple[float, Dimension]:
     """Factor to SI and dimension of a unit, such as ``deg/sqrt(h)``.
 

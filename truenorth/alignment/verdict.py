@@ -11,6 +11,7 @@ from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, Alignment, Status
 from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.units import significant
 
 Array = NDArray[np.float64]
 
@@ -73,11 +74,11 @@ def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, 
         if bias / EARTH_RATE < limit and np.cos(answer.position.lat) < NEAR_POLE:
             return "not_observable", (
                 f"at latitude {np.degrees(answer.position.lat):.3f} deg the earth turns by {horizontal / DEG_PER_HOUR:.3f} deg/h "
-                f"about the horizontal; gyro biases of {bias / DEG_PER_HOUR:.3g} deg/h hide true north there",
+                f"about the horizontal; gyro biases of {significant(bias / DEG_PER_HOUR)} deg/h hide true north there",
                 good_level,
             )
         return "level_only", (
-            f"gyro bias can be {bias / DEG_PER_HOUR:.3g} deg/h ({answer.imu_source}); a heading within "
+            f"gyro bias can be {significant(bias / DEG_PER_HOUR)} deg/h ({answer.imu_source}); a heading within "
             f"{np.degrees(limit):g} deg at latitude {np.degrees(answer.position.lat):.1f} deg needs "
             f"{horizontal * np.tan(min(limit, 1.0)) / DEG_PER_HOUR:.2g} deg/h or better: heading is refused",
             good_level,
@@ -105,8 +106,8 @@ def _contradictions(answer: Alignment, around: Circumstances) -> list[str]:
     for name, residual, noise in zip(names, check.rate_residual, check.rate_noise, strict=True):
         if abs(residual) > OUTLIER * np.hypot(bias, noise):
             found.append(
-                f"the gyros' mean rate along {name} misses the earth's by {residual / DEG_PER_HOUR:.3g} deg/h, where the "
-                f"specification ({answer.imu_source}) allows {bias / DEG_PER_HOUR:.3g} deg/h: check --lat, the "
+                f"the gyros' mean rate along {name} misses the earth's by {significant(residual / DEG_PER_HOUR)} deg/h, where the "
+                f"specification ({answer.imu_source}) allows {significant(bias / DEG_PER_HOUR)} deg/h: check --lat, the "
                 "units, and the specification"
             )
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
@@ -119,7 +120,7 @@ def _contradictions(answer: Alignment, around: Circumstances) -> list[str]:
     if abs(check.force_residual) > OUTLIER * np.hypot(accel, check.force_noise):
         found.append(
             f"the mean specific force misses gravity by {check.force_residual / MICRO_G:.0f} ug, where the specification "
-            f"({answer.imu_source}) allows {accel / MICRO_G:.3g} ug: check --alt, the units, and the specification"
+            f"({answer.imu_source}) allows {significant(accel / MICRO_G)} ug: check --alt, the units, and the specification"
         )
     if around.drift is not None and around.drift.found:
         found.append(str(around.drift))

@@ -29,8 +29,8 @@ def charts(result: Alignment) -> list[tuple[str, str, Any]]:
             "Convergence",
             "The attitude at the answer's epoch, as each earlier time would have told it, the base's own motion taken out. "
             "Light band: one sigma. Dark band: its floor, which waiting does not improve. Axes are scaled to the last three "
-            "quarters of the log.",
-            _convergence(h.time, angles),
+            "quarters of the log." + ("" if result.heading_known else " The heading is refused, and not drawn."),
+            _convergence(h.time, angles, result.heading_known),
         ),
         (
             "How the uncertainty falls",
@@ -94,8 +94,7 @@ def band_trace(figure: Any, row: int, t: Array, middle: Array, half: Array, colo
             y=np.concatenate([high, low[::-1]]),
             fill="toself",
             fillcolor=rgba,
-            mode="lines",
-            line={"width": 0},
+            mode="none",
             hoverinfo="skip",
         ),
         row=row,
@@ -134,11 +133,11 @@ def bound(figure: Any, row: int, t: Array, y: Array, dash: str) -> None:
     figure.data[-1].update(hoverinfo="skip", hovertemplate=None, line={"width": 1.0})
 
 
-def _convergence(t: Array, angles: list[Course]) -> Any:
-    figure = new_chart(220 * len(angles), [f"{course.name}, deg" for course in angles])
-    for row, course in enumerate(angles, start=1):
+def _convergence(t: Array, angles: list[Course], heading_known: bool) -> Any:
+    shown = list(zip(COLOURS, angles, strict=False))[0 if heading_known else 1 :]
+    figure = new_chart(220 * len(shown), [f"{course.name}, deg" for _, course in shown])
+    for row, (colour, course) in enumerate(shown, start=1):
         value, sigma, floor = (np.degrees(x) for x in (course.value, course.sigma, course.floor))
-        colour = COLOURS[row - 1]
         band_trace(figure, row, t, value, sigma, colour)
         band_trace(figure, row, t, value, floor, colour)
         line(figure, row, t, value, colour, course.name)
@@ -147,15 +146,21 @@ def _convergence(t: Array, angles: list[Course]) -> Any:
 
 
 def _sigmas(t: Array, angles: list[Course]) -> Any:
-    figure = new_chart(380, ["one sigma, arcmin"])
+    figure = new_chart(380, ["one sigma, arcmin"], over="time since the first epoch, s")
+    t, angles = t[1:] - t[0], [_later(course) for course in angles]  # zero has no logarithm
     for colour, course in zip(COLOURS, angles):
         line(figure, 1, t, 60 * np.degrees(course.sigma), colour, course.name)
         line(figure, 1, t, 60 * np.degrees(course.floor), colour, f"{course.name}, floor", "dot")
     lowest = 0.5 * 60 * np.degrees(min(course.floor[-1] for course in angles))
     highest = 2.0 * 60 * np.degrees(max(course.sigma.max() for course in angles))
     figure.update_yaxes(type="log", dtick=1, range=[np.log10(lowest), np.log10(highest)])
+    figure.update_xaxes(type="log")
     figure.update_layout(showlegend=True, legend={"orientation": "h", "y": 1.14})
     return figure
+
+
+def _later(course: Course) -> Course:
+    return Course(course.name, course.value[1:], course.sigma[1:], course.floor[1:])
 
 
 def _biases(t: Array, bias: Array, sigma: Array, unit: str) -> Any:
