@@ -50,7 +50,7 @@ def plot_navigation(result: Navigation) -> Figure:
             velocity.lines[-1].set_label(name)
         velocity.set_title("Velocity, ±1σ")
         velocity.set_ylabel("m/s")
-        velocity.legend(ncols=3, loc="upper right")
+        velocity.legend(ncols=3, loc="best")
         turned = np.degrees(np.unwrap(result.euler[:, 0]))
         band(heading, t, turned, np.degrees(result.euler_sigma[:, 0]), color=COLOURS[0])
         heading.set_title("Heading, ±1σ")
@@ -60,7 +60,7 @@ def plot_navigation(result: Navigation) -> Figure:
             level.lines[-1].set_label(name)
         level.set_title("Pitch and roll, ±1σ")
         level.set_ylabel("deg")
-        level.legend(ncols=2, loc="upper right")
+        level.legend(ncols=2, loc="best")
         _sigmas(position, t, result.position_sigma, "One sigma of position", "m")
         _sigmas(speeds, t, result.v_sigma, "One sigma of velocity", "m/s")
         _innovations(innovations, result)
@@ -69,6 +69,8 @@ def plot_navigation(result: Navigation) -> Figure:
             ax.tick_params(labelbottom=ax in (velocity, innovations))
         for ax in (velocity, innovations):
             ax.set_xlabel("time, s")
+        figure.align_ylabels([height, velocity])
+        figure.align_ylabels([heading, level, position, speeds, innovations])
         smoothed = ", smoothed" if result.smoothed else ""
         figure.suptitle(f"{result.source}: {result.status}{smoothed}", x=0.01, ha="left")
     return figure
@@ -100,7 +102,7 @@ def _track(ax: Axes, result: Navigation) -> None:
     scale, unit = track_unit(result)
     rows = evenly(len(result.time))
     for points in ellipses(result):
-        ax.fill(*(points / scale).T, color=COLOURS[0], alpha=0.12, linewidth=0.0)
+        ax.plot(*(points / scale).T, color=COLOURS[0], alpha=0.4, linewidth=0.8)
     ax.plot(*(result.displacement[rows] / scale).T, color=COLOURS[0])
     ax.plot(*(result.displacement[0] / scale), marker="o", color=COLOURS[2], linestyle="", label="start")
     ax.plot(*(result.displacement[-1] / scale), marker="s", color=COLOURS[1], linestyle="", label="end")
@@ -119,7 +121,8 @@ def _sigmas(ax: Axes, t: Array, sigma: Array, title: str, unit: str) -> None:
     ax.set_yscale("log")
     ax.set_title(title)
     ax.set_ylabel(unit)
-    ax.legend(ncols=3, loc="upper right")
+    ax.margins(y=0.25)
+    ax.legend(ncols=3, loc="best")
 
 
 def _innovations(ax: Axes, result: Navigation) -> None:
@@ -143,4 +146,4 @@ def _innovations(ax: Axes, result: Navigation) -> None:
     if result.residuals:
         ax.legend(ncols=4, loc="lower left", frameon=True, fontsize=7.5)
     else:
-        ax.text(0.5, 0.8, "no aiding: free inertial", transform=ax.transAxes, ha="center")
+        ax.text(0.5, 0.5, "no aiding: free inertial", transform=ax.transAxes, ha="center", va="center")
