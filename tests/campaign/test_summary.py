@@ -30,18 +30,24 @@ def test_statistics_of_three_runs():
 def test_bands_hold_what_they_promise():
     """Honest sigmas and NEES of 400 campaigns of 50 runs: 95 % of the ratios inside; a false alarm in a thousand."""
     rng = np.random.default_rng(3)
-    inside = {"ratio": 0, "nees": 0, "rms": 0}
+    inside = {"ratio": 0, "level": 0, "nees": 0, "rms": 0}
     for _ in range(400):
         x = rng.standard_normal((50, 3))
-        rows = [Row(0, "a", k, 1.0, "phi_u", 5 * v[0], 5.0) for k, v in enumerate(x)]
-        rows += [Row(0, "a", k, 1.0, "nees", float(v @ v) / 3) for k, v in enumerate(x)]
+        # Every third run has its heading refused: its level is judged, and its normalised square has two components.
+        rows = [Row(0, "a", k, 1.0, "phi_u", 5 * v[2], 5.0) for k, v in enumerate(x) if k % 3]
+        rows += [Row(0, "a", k, 1.0, "level", 5 * math.hypot(*v[:2]), 5 * math.sqrt(2.0)) for k, v in enumerate(x)]
+        for k, v in enumerate(x):
+            known = v if k % 3 else v[:2]
+            rows.append(Row(0, "a", k, 1.0, "nees", float(known @ known) / len(known)))
         table = summarise(frame(rows)).set_index("quantity")
-        ratio, nees = table.loc["phi_u"], table.loc["nees"]
+        ratio, level, nees = table.loc["phi_u"], table.loc["level"], table.loc["nees"]
+        inside["level"] += level["ratio_low"] < level["rms_over_sigma"] < level["ratio_high"]
         inside["ratio"] += ratio["ratio_low"] < ratio["rms_over_sigma"] < ratio["ratio_high"]
         inside["nees"] += nees["ratio_low"] < nees["mean"] < nees["ratio_high"]
         inside["rms"] += ratio["rms_low"] < 5.0 < ratio["rms_high"]
     spread = 3.3 * math.sqrt(400 * 0.95 * 0.05)
     assert abs(inside["ratio"] - 380) < spread
+    assert abs(inside["level"] - 380) < spread
     assert abs(inside["nees"] - 380) < spread
     assert inside["rms"] > 400 * 0.95 - spread - 20  # percentile intervals of 50 runs fall a few per cent short
 

@@ -37,6 +37,7 @@ from truenorth.navigation.stops import updates_at
 from truenorth.position import Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.specs import ImuSpec, imu_spec
+from truenorth.units import significant
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "gyrocompass", "motion"]
@@ -170,7 +171,7 @@ def align_in_motion(
     able = bias < level_rate * math.sin(GYROCOMPASS)
     if method == "auto":
         method = "gyrocompass" if able else "motion"
-        why = f"gyro biases of {math.degrees(bias) * 3600:.3g} deg/h " + (
+        why = f"gyro biases of {significant(math.degrees(bias) * 3600)} deg/h " + (
             "let the earth's rate tell heading" if able else "hide the earth's rate: motion has to tell heading"
         )
     else:

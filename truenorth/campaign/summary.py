@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.consistency import chi_square_quantile
+from truenorth.analysis.consistency import chi_square_band
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 RESAMPLES = 1000
 LEVEL = 0.95
 KEYS = ["case", "method", "time_s", "quantity"]
-VECTOR_SIZE = 3  # attitude errors in the normalised square of a row `nees`, which is its mean over them
 
 
 def summarise(table: pd.DataFrame, names: Mapping[int, str] | None = None, level: float = LEVEL) -> pd.DataFrame:
@@ -42,19 +41,26 @@ def summarise(table: pd.DataFrame, names: Mapping[int, str] | None = None, level
     DataFrame
         ``runs`` (with a value), ``failed``; ``rms`` with its bootstrap interval ``rms_low, rms_high``; ``mean, median, p95, max``
         (the last three of the magnitude); ``sigma`` (root mean square of what was claimed), ``rms_over_sigma`` (of the errors
-        each over its own sigma) and its band ``ratio_low, ratio_high`` for honest sigmas. For `nees`, ``mean`` and its band.
+        each over its own sigma) and its band ``ratio_low, ratio_high`` for honest sigmas. For `nees`, ``mean`` over runs and their
+        components (two where the heading was refused) and its band. The band of `level`, of two tilts, is for equal sigmas of both.
     """
     import pandas as pd
 
     outcomes = table[table["quantity"] == "outcome"]
     failed = (outcomes["status"] == "failed").groupby([outcomes[k] for k in KEYS[:3]], observed=True).sum()
+    headings = table.loc[table["quantity"] == "phi_u", [*KEYS[:3], "run"]]
+    with_heading = set(headings.itertuples(index=False, name=None))
     rows = []
     for key, group in _groups(table[table["quantity"] != "outcome"]):
         values, sigmas = group["value"].to_numpy(float), group["sigma"].to_numpy(float)
         rows.append(
             dict(zip(KEYS, key, strict=True))
             | {"unit": str(group["unit"].iloc[0]), "runs": len(values), "failed": int(failed.get(key[:3], 0))}
-            | _statistics(values, sigmas, key[3] == "nees", level)
+            | (
+                _of_nees(values, np.array([3 if (*key[:3], run) in with_heading else 2 for run in group["run"]]), level)
+                if key[3] == "nees"
+                else _statistics(values, sigmas, 2 if key[3] == "level" else 1, level)
+            )
         )
     result = pd.DataFrame(rows)
     if names is not None and len(result):
@@ -125,9 +131,32 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[tuple[Any, ...], pd.DataFrame]
         yield tuple(key) if isinstance(key, tuple) else (key,), group
 
 
-def _statistics(values: Array, sigmas: Array, nees: bool, level: float) -> dict[str, float]:
-    n, magnitude = values.size, np.abs(values)
-    tails = np.array([0.5 - 0.5 * level, 0.5 + 0.5 * level])
+def _of_nees(values: Array, sizes: NDArray[np.int64], level: float) -> dict[str, float]:
+    """Statistics of normalised squares, each the mean over as many components as its size says."""
+    result = _magnitudes(values, level)
+    total = int(sizes.sum())
+    low, high = chi_square_band(total, level=level)
+    mean = float(values @ sizes) / total
+    return result | {"mean": mean, "ratio_low": float(low) / total, "ratio_high": float(high) / total}
+
+
+def _statistics(values: Array, sigmas: Array, components: int, level: float) -> dict[str, float]:
+    """Statistics of errors that are the length of so many independent components of equal sigma."""
+    result = _magnitudes(values, level)
+    if not np.all(sigmas > 0):
+        return result
+    total = components * values.size
+    low, high = chi_square_band(total, level=level)
+    return result | {
+        "sigma": float(np.sqrt(np.mean(sigmas**2))),
+        "rms_over_sigma": float(np.sqrt(np.mean((values / sigmas) ** 2))),
+        "ratio_low": math.sqrt(float(low) / total),
+        "ratio_high": math.sqrt(float(high) / total),
+    }
+
+
+def _magnitudes(values: Array, level: float) -> dict[str, float]:
+    magnitude = np.abs(values)
     result = {
         "rms": float(np.sqrt(np.mean(values**2))),
         "mean": float(np.mean(values)),
@@ -136,15 +165,4 @@ def _statistics(values: Array, sigmas: Array, nees: bool, level: float) -> dict[
         "max": float(np.max(magnitude)),
     }
     result["rms_low"], result["rms_high"] = bootstrap_rms(values, level)
-    if nees:
-        band = chi_square_quantile(tails, VECTOR_SIZE * n) / (VECTOR_SIZE * n)
-        return result | {"ratio_low": float(band[0]), "ratio_high": float(band[1])}
-    if not np.all(sigmas > 0):
-        return result
-    band = np.sqrt(chi_square_quantile(tails, n) / n)
-    return result | {
-        "sigma": float(np.sqrt(np.mean(sigmas**2))),
-        "rms_over_sigma": float(np.sqrt(np.mean((values / sigmas) ** 2))),
-        "ratio_low": float(band[0]),
-        "ratio_high": float(band[1]),
-    }
+    return result

@@ -186,10 +186,8 @@ def _track(result: Navigation) -> Any:
             go.Scatter(
                 x=single(points[:, 0] / scale),
                 y=single(points[:, 1] / scale),
-                fill="toself",
-                fillcolor="rgba(0,114,178,0.12)",
                 mode="lines",
-                line={"width": 0},
+                line={"width": 1, "color": "rgba(0,114,178,0.5)"},
                 hoverinfo="skip",
                 showlegend=False,
             )
