@@ -14,6 +14,7 @@ from truenorth.models.stationary import StationaryModel
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
 from truenorth.specs import ImuSpec, imu_spec
 from truenorth.strapdown import increments
+from truenorth.units import significant
 
 DEG_PER_HOUR = np.radians(1.0) / 3600.0
 
@@ -72,7 +73,7 @@ def test_a_specification_from_the_allan_deviation_refuses_heading_with_figures()
     answer = align(record.between(None, 600.0), position, spec)
     assert answer.status == "level_only"
     assert answer.summary()["heading_deg"] is None
-    bias = f"{np.hypot(spec.gyro_bias, spec.gyro_bias_instability) / DEG_PER_HOUR:.3g}"
+    bias = significant(np.hypot(spec.gyro_bias, spec.gyro_bias_instability) / DEG_PER_HOUR)
     assert f"gyro bias can be {bias} deg/h (specification 'adis16405 by Allan')" in answer.reasons[0]
     assert "needs 0.8" in answer.reasons[0]  # w_ie cos(51 deg) tan(5 deg) = .83 deg/h
     assert np.all(np.isfinite(answer.euler_sigma[1:]))
