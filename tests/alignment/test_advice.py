@@ -108,6 +108,19 @@ def test_the_command(capsys, monkeypatch, tmp_path):
     assert {path.name for path in (tmp_path / "advice").iterdir()} == {"advice.json", "advice.png"}
 
 
+def test_the_command_for_manoeuvres(capsys, monkeypatch, tmp_path):
+    where = ("--lat", 34, "--imu", "tactical")
+    code, out = run(capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--speed", 200, "--json", "-o", tmp_path)
+    told = json.loads(out.out)["manoeuvres"]
+    assert code == 0
+    assert told["straight"]["reached_s"] is None  # heading is not observed without an acceleration
+    assert 20.0 < told["flat turn"]["reached_s"] < 40.0  # the turn begins at 20 s
+    assert {path.name for path in tmp_path.iterdir()} == {"advice.json", "advice.png"}
+    code, out = run(capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--attitude-noise", 3)
+    assert code == 2
+    assert "expected --speed with it" in out.err
+
+
 def test_advice_after_an_alignment(capsys, monkeypatch, tmp_path):
     from truenorth.formats import write_imu
 

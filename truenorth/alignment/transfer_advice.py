@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,25 @@ class ManoeuvreAdvice:
         """The manoeuvre that is first below the wanted sigma; None: none is."""
         name = min(self.reached, key=lambda n: self.reached[n])
         return name if math.isfinite(self.reached[name]) else None
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The answer."""
+        return (str(self),)
+
+    def summary(self) -> dict[str, Any]:
+        """The answer as plain numbers: deg and s, None where it is out of reach."""
+        return {
+            "wanted_heading_sigma_deg": math.degrees(self.wanted),
+            "best": self.best,
+            "manoeuvres": {
+                name: {
+                    "reached_s": t if math.isfinite(t) else None,
+                    "heading_sigma_at_the_end_deg": math.degrees(float(self.heading_sigma[name][-1])),
+                }
+                for name, t in self.reached.items()
+            },
+        }
 
     def __str__(self) -> str:
         wanted = f"{60 * math.degrees(self.wanted):.3g} arcmin"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from truenorth.alignment import Alignment
     from truenorth.alignment.advice import Advice
+    from truenorth.alignment.transfer_advice import ManoeuvreAdvice
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -23,6 +24,7 @@ EXAMPLES = """
 Examples:
   truenorth advise --lat 45 --imu navigation --heading 0.05
   truenorth advise --lat 45 --imu my_imu.yaml --heading 0.02 --longest 7200 -o advice
+  truenorth advise --lat 34 --imu tactical --heading 0.2 --speed 200
 \b
 Exit codes: 0 within reach; 2 wrong usage; 4 out of reach.
 """
@@ -38,30 +40,57 @@ def advise(
     ],
     heading: Annotated[float, typer.Option(help="Wanted one-sigma of heading, deg.", show_default=False)],
     disturbance: Annotated[float, typer.Option(help="RMS velocity of the base, mean over one second, m/s.")] = 1e-4,
-    longest: Annotated[float, typer.Option(help="Longest recording that is considered, s.")] = 3600.0,
+    longest: Annotated[
+        float | None,
+        typer.Option(
+            help="Longest recording that is considered, s; 3600, of manoeuvres 120, without it.", show_default=False
+        ),
+    ] = None,
     rate: Annotated[float, typer.Option(help="Sampling rate of the IMU, Hz.")] = 100.0,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="Of a vehicle whose master INS aligns this IMU, m/s: which manoeuvre?",
+            show_default=False,
+            rich_help_panel="Transfer alignment",
+        ),
+    ] = None,
+    attitude_noise: Annotated[
+        float | None,
+        typer.Option(
+            help="Of the master's attitude, arcmin, where that is matched beside its velocity.",
+            show_default=False,
+            rich_help_panel="Transfer alignment",
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for advice.json and advice.png.", show_default=False)
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
-    """Say how long, and in which positions of a turntable, an IMU needs for a wanted heading."""
+    """Say how long, and in which positions or by which manoeuvre, an IMU needs for a wanted heading."""
     from truenorth.alignment.advice import advise as advise_for
+    from truenorth.alignment.transfer_advice import advise_manoeuvre
     from truenorth.atomic import writable_folder
+    from truenorth.errors import UsageError
     from truenorth.position import Position
 
+    if attitude_noise is not None and speed is None:
+        raise UsageError("--attitude-noise is of a master INS; expected --speed with it")
+    place, wanted = Position.from_degrees(lat, 0.0), math.radians(heading)
     if output is not None:
         writable_folder(output)  # before the work, not after it
     with stages(quiet=as_json) as tell:
         tell("covariances of each scheme")
-        advice = advise_for(
-            imu,
-            Position.from_degrees(lat, 0.0),
-            math.radians(heading),
-            disturbance=disturbance,
-            longest=longest,
-            rate=rate,
-        )
+        advice: Advice | ManoeuvreAdvice
+        if speed is None:
+            advice = advise_for(
+                imu, place, wanted, disturbance=disturbance, longest=3600.0 if longest is None else longest, rate=rate
+            )
+        else:
+            noise = math.inf if attitude_noise is None else math.radians(attitude_noise / 60.0)
+            longest = 120.0 if longest is None else longest
+            advice = advise_manoeuvre(imu, place, speed, wanted, attitude_noise=noise, longest=longest)
     paths = [] if output is None else _save(advice, output)
     if as_json:
         print(json.dumps(advice.summary(), allow_nan=False))
@@ -84,7 +113,7 @@ def advice_after(result: Alignment, heading: float) -> Advice:
     return advise_for(result.imu, result.position, math.radians(heading), disturbance=disturbance)
 
 
-def print_advice(console: Console, advice: Advice) -> None:
+def print_advice(console: Console, advice: Advice | ManoeuvreAdvice) -> None:
     """The answer, then scheme by scheme."""
     first, *others = advice.words
     console.print(f"advice: {first}", soft_wrap=True)
@@ -92,7 +121,7 @@ def print_advice(console: Console, advice: Advice) -> None:
         console.print(f"  {line}", soft_wrap=True)
 
 
-def _save(advice: Advice, folder: Path) -> list[Path]:
+def _save(advice: Advice | ManoeuvreAdvice, folder: Path) -> list[Path]:
     from truenorth.atomic import atomic_path
 
     paths = [folder / "advice.json", folder / "advice.png"]

@@ -16,10 +16,10 @@ from truenorth.cli.console import make_console
 EXAMPLES = """
 \b
 Studies:
-  rotary   Self-alignment of a rotary SINS on a swaying ship
-  static   Kalman filters for static alignment, with ten and with eight states
+  rotary    Self-alignment of a rotary SINS on a swaying ship
   transfer  Transfer alignment with residual time delay and lever arm
-  damping  Double-filter external damping of a marine INS over 48 h
+  damping   Double-filter external damping of a marine INS over 48 h
+  static    Kalman filters for static alignment, with ten and with eight states
   odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
 \b
 Examples:
