@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-import time
 
 import pytest
 
 HEAVY = ("numba", "numpy", "scipy", "pandas", "pyarrow", "pydantic", "matplotlib", "plotly", "jinja2", "dask", "yaml")
 OF_TYPER = ("pydantic",)  # typer itself loads it once it reads the options of a command
-BUDGET = 0.4  # s of wall clock, interpreter start included
+BUDGET = 0.4  # s of processor time, interpreter start included
 
 HELP = "import sys; sys.argv = ['truenorth', {arguments}]\nfrom truenorth.cli import main\ntry: main()\nexcept SystemExit: pass"
 STARTS = {
@@ -35,12 +35,16 @@ def test_nothing_heavy_is_loaded(what):
 
 @pytest.mark.parametrize("what", ["the package", "its help"])
 def test_it_starts_within_its_budget(what):
-    """The best of five: a busy machine delays a start, it never hastens one."""
+    """The best of five, by the processor's time: what else a machine does is not counted."""
+
+    def spent() -> float:
+        times = os.times()
+        return times.children_user + times.children_system
 
     def once() -> float:
-        begin = time.perf_counter()
+        begin = spent()
         run(STARTS[what])
-        return time.perf_counter() - begin
+        return spent() - begin
 
     assert min(once() for _ in range(5)) < BUDGET
 
