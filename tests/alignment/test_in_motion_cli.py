@@ -42,13 +42,15 @@ def test_align_and_go_on(files, tmp_path):
     printed = call("align", log, *common)
     assert "heading of the vehicle" in printed.stdout
     assert "odometer: scale" in printed.stdout
+    unplaced = call("align", log, "--odometer", odometer, "--imu", "navigation", "--json")
+    assert unplaced.exit_code == 0, unplaced.output
+    assert "the latitude was not given: found from the log" in unplaced.stdout
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["--lat", "39.9"], "--imu navigation"),
-        (["--imu", "navigation"], "latitude is missing"),
         (["--imu", "navigation", "--lat", "39.9", "--at", "50"], "cut the log with --to"),
         (["--imu", "navigation", "--lat", "39.9", "--method", "oba"], "gyrocompass"),
         (["--imu", "navigation", "--lat", "39.9", "--mounting-sigma", "0"], "--mounting-sigma"),

@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeGuard, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias import spec_variance
+from truenorth.alignment.in_motion_latitude import find_latitude
 from truenorth.alignment.in_motion_start import (
     Guess,
     backtracked,
@@ -27,14 +28,14 @@ from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
 from truenorth.alignment.task import deflection_covariance
 from truenorth.calibration import Calibration
 from truenorth.earth import EARTH_RATE, normal_gravity
-from truenorth.errors import AlignmentError, UsageError
-from truenorth.models.ins import BA, BG, PHI, InsModel
+from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.models.ins import BA, BG, DP, PHI, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Track, navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
 from truenorth.navigation.stops import updates_at
-from truenorth.position import Position
+from truenorth.position import METRES_PER_RADIAN, Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.specs import ImuSpec, imu_spec
 from truenorth.units import significant
@@ -50,6 +51,7 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
 PASSES = 2
+SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
 
@@ -93,6 +95,10 @@ class _Task:
             invariant=self.odometer is not None,
         )
 
+    def by_the_earth(self) -> Guess:
+        """Coarse alignment."""
+        return coarse_guess(self.record, self.position, self.odometer, self.gnss, self.wheel, self.antenna)
+
 
 def align_in_motion(
     record: ImuRecord,
@@ -126,7 +132,8 @@ def align_in_motion(
     odometer, gnss : records, one at least
         On the IMU's clock.
     position : Position, optional
-        At the start; not needed with GNSS positions.
+        At the start; not needed with GNSS positions. Without either the latitude is found from the log by gyros that see the
+        earth turn, and said among the reasons.
     wheel, antenna : Mounting, optional
         How they sit. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m) of the wheel are estimated.
     zupt : bool
@@ -152,7 +159,7 @@ def align_in_motion(
     Raises
     ------
     UsageError
-        Neither odometer nor GNSS; no position; an option out of range.
+        Neither odometer nor GNSS; an option out of range.
     DataError
         Aiding logs that do not overlap; a gap that cannot be bridged.
     AlignmentError
@@ -169,6 +176,10 @@ def align_in_motion(
     bias = float(np.sqrt(spec_variance(task.spec)[0]))
     level_rate = EARTH_RATE * math.cos(task.position.lat)
     able = bias < level_rate * math.sin(GYROCOMPASS)
+    unknown = position is None and not _has_fixes(gnss)
+    if unknown and able:
+        tell("latitude")
+        task = replace(task, position=find_latitude(lambda lat: _cost_at(task, lat)))
     if method == "auto":
         method = "gyrocompass" if able else "motion"
         why = f"gyro biases of {significant(math.degrees(bias) * 3600)} deg/h " + (
@@ -179,7 +190,7 @@ def align_in_motion(
     tell("coarse alignment")
     spread = 0.0
     if method == "gyrocompass":
-        guess = coarse_guess(task.record, task.position, task.odometer, task.gnss, task.wheel, task.antenna)
+        guess = task.by_the_earth()
         tell("first pass")
         track = task.run(guess, gated=False)
     else:
@@ -190,7 +201,28 @@ def align_in_motion(
         tell(f"pass {number + 1}")
         guess = replace(guess, C_nb=backtracked(task.record, track))
         track = task.run(guess, gated=True)
-    return _answer(task, track, method, why, spread, heading_limit)
+    answer = _answer(task, track, method, why, spread, heading_limit)
+    return answer.with_verdict(answer.status, (*answer.reasons, _of_latitude(answer, able))) if unknown else answer
+
+
+def _cost_at(task: _Task, lat: float) -> float:
+    """Minus twice the log-likelihood of the log at a latitude."""
+    task = replace(task, position=Position(lat, horizontal_sigma=0.0))
+    try:
+        return _cost(task.run(task.by_the_earth(), gated=False))
+    except DataError:  # so far off that the filter breaks down
+        return math.inf
+
+
+def _of_latitude(answer: Alignment, able: bool) -> str:
+    """What stands for a latitude that nobody gave."""
+    lat = math.degrees(answer.position.lat)
+    if able and answer.moving is not None:
+        sigma = math.degrees(float(answer.moving.track.sigma[-1, DP][1])) / METRES_PER_RADIAN
+        return (
+            f"the latitude was not given: found from the log, {lat:.2f} deg, to {significant(sigma, 2)} deg (one sigma)"
+        )
+    return f"the latitude was not given: {lat:.0f} deg assumed, which gyros as poor as these do not feel"
 
 
 def _task(
@@ -219,7 +251,7 @@ def _task(
     odometer = None if odometer is None else odometer.shifted(offset)
     gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
     if position is None:
-        position = _first_fix(record, gnss)
+        position = _first_fix(record, gnss) if _has_fixes(gnss) else Position(SOMEWHERE)
     spec = imu_spec(imu).with_random_walks(record.interval)
     stops: list[Aiding] = list(gaps)
     if zupt:
@@ -258,12 +290,12 @@ def usual_antenna(gnss: GnssRecord | None) -> Mounting:
     return Mounting(bias_sigma=RECEIVER_BIAS, bias_time=RECEIVER_TIME)
 
 
-def _first_fix(record: ImuRecord, gnss: GnssRecord | None) -> Position:
+def _has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
+    return gnss is not None and bool(gnss.has_position.any())
+
+
+def _first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
     """Where a log begins, by GNSS."""
-    if gnss is None or not gnss.has_position.any():
-        raise UsageError(
-            "the latitude is not known: the earth's rate and gravity depend on it; expected position= (--lat), or GNSS positions"
-        )
     fixes = np.flatnonzero(gnss.has_position)
     nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
     alt = float(gnss.alt[nearest])
@@ -279,18 +311,20 @@ def _best_of_bank(task: _Task, guesses: Sequence[Guess], tell: Callable[[str], N
         tell(f"heading {number + 1} of {len(guesses)}")
         track = task.run(guess, gated=False, until=until)
         tracks.append(track)
-        costs.append(
-            sum(
-                float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma)))
-                for r in track.residuals
-            )
-        )
+        costs.append(_cost(track))
     cost = np.array(costs)
     weight = np.exp(-0.5 * (cost - cost.min()))
     weight /= weight.sum()
     best = int(np.argmin(cost))
     off = [_turn_between(track.C_nb[-1], tracks[best].C_nb[-1]) for track in tracks]
     return best, tracks[best], float(np.sqrt(np.sum(weight * np.square(off))))
+
+
+def _cost(track: Track) -> float:
+    """Minus twice the log-likelihood of a pass, but for a constant."""
+    return sum(
+        float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma))) for r in track.residuals
+    )
 
 
 def _turn_between(C: Array, D: Array) -> float:

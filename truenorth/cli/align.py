@@ -148,7 +148,7 @@ def align(
     from truenorth.position import Position
 
     moving = odometer is not None or gnss is not None
-    if lat is None and gnss is None and master is None:
+    if lat is None and not moving and master is None:
         raise UsageError(
             "the latitude is missing; expected --lat DEGREES, or --gnss FILE or --master FILE with positions"
         )
