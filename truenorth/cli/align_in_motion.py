@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truenorth.cli.reading import numbers_of
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -99,7 +101,6 @@ def align_moving(
 
     from truenorth.alignment import align_in_motion
     from truenorth.alignment.in_motion import WHEEL
-    from truenorth.cli.navigate import _numbers
     from truenorth.errors import UsageError
     from truenorth.formats import read_gnss, read_odometer
     from truenorth.navigation.sensors import mounting_angles
@@ -115,17 +116,17 @@ def align_moving(
         raise UsageError(f"--mounting-sigma {mounting_sigma:g}: expected degrees above zero")
     wheel = replace(WHEEL, angle_sigma=math.radians(mounting_sigma), noise=odometer_noise)
     if mounting is not None:
-        turned = [math.radians(x) for x in _numbers(mounting, "--mounting", 3, "heading,pitch,roll in degrees")]
+        turned = [math.radians(x) for x in numbers_of(mounting, "--mounting", 3, "heading,pitch,roll in degrees")]
         wheel = replace(wheel, C_mb=mounting_angles(*turned))
     if wheel_arm is not None:
-        arm = np.array(_numbers(wheel_arm, "--wheel-arm", 3, "right,forward,up in metres"))
+        arm = np.array(numbers_of(wheel_arm, "--wheel-arm", 3, "right,forward,up in metres"))
         wheel = replace(wheel, lever_arm=arm, lever_arm_sigma=0.0)
     receiver = None if gnss is None else read_gnss(gnss)
     antenna = None
     if antenna_arm is not None:
         from truenorth.alignment.in_motion import usual_antenna
 
-        arm = np.array(_numbers(antenna_arm, "--antenna-arm", 3, "right,forward,up in metres"))
+        arm = np.array(numbers_of(antenna_arm, "--antenna-arm", 3, "right,forward,up in metres"))
         antenna = replace(usual_antenna(receiver), lever_arm=arm)
     return align_in_motion(
         record,

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truenorth.cli.reading import numbers_of
+
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
     from truenorth.calibration import Calibration
@@ -68,20 +70,8 @@ def align_on_indexer(
         position,
         imu or "navigation",
         axes=tuple(axes.replace(" ", "").lower().replace(",", "")),
-        lever_arm=None if lever_arm is None else _numbers(lever_arm),
+        lever_arm=None if lever_arm is None else numbers_of(lever_arm, "--lever-arm", 3, "right,forward,up in metres"),
         at=at,
         heading_limit=limit,
         progress=progress,
     )
-
-
-def _numbers(text: str) -> list[float]:
-    from truenorth.errors import UsageError
-
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != 3:
-        raise UsageError(f"--lever-arm {text!r}: expected three numbers in metres, such as 10,30,10")
-    return values

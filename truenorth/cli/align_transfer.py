@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truenorth.cli.reading import numbers_of
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -106,13 +108,17 @@ def align_to_master(
     from truenorth.alignment.transfer import DELAY_SIGMA, align_transfer
 
     late, late_sigma = _delay(delay, DELAY_SIGMA)
-    angles = [0.0, 0.0, 0.0] if mounting is None else _numbers(mounting, "--mounting", "heading,pitch,roll, deg")
+    angles = (
+        [0.0, 0.0, 0.0] if mounting is None else numbers_of(mounting, "--mounting", 3, "heading,pitch,roll in degrees")
+    )
     return align_transfer(
         record,
         master,
         imu,
         matching=matching,  # type: ignore[arg-type]  # checked there, with the choices in the message
-        lever_arm=(0.0, 0.0, 0.0) if lever_arm is None else _numbers(lever_arm, "--lever-arm", "right,forward,up, m"),
+        lever_arm=(0.0, 0.0, 0.0)
+        if lever_arm is None
+        else numbers_of(lever_arm, "--lever-arm", 3, "right,forward,up in metres"),
         lever_arm_sigma=lever_arm_sigma,
         delay=late,
         delay_sigma=late_sigma,
@@ -165,15 +171,3 @@ def _flexure(text: str) -> FlexureSpec:
     if not comma:
         raise UsageError(f"--flexure {text!r}: expected an angle and a time, such as '3 arcmin,5 s'")
     return FlexureSpec(sigma=(parse(first, "angle"),) * 3, correlation_time=parse(second, "time"))
-
-
-def _numbers(text: str, option: str, meaning: str) -> list[float]:
-    from truenorth.errors import UsageError
-
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 3 or not all(math.isfinite(x) for x in numbers):
-        raise UsageError(f"{option} {text!r}: expected 3 numbers with commas between them: {meaning}")
-    return numbers

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from truenorth.cli.console import make_console, stages
-from truenorth.cli.reading import Axes, Columns, Format, Kind, Log, Rate, To, Topic, Units, read_log
+from truenorth.cli.reading import Axes, Columns, Format, Kind, Log, Rate, To, Topic, Units, numbers_of, read_log
 
 if TYPE_CHECKING:
     from truenorth.damping.options import Damper
@@ -217,18 +217,6 @@ def _read_aiding(gnss: Path | None, odometer: Path | None, velocity: Path | None
     return found
 
 
-def _numbers(text: str, option: str, count: int, meaning: str) -> list[float]:
-    from truenorth.errors import UsageError
-
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(math.isfinite(x) for x in numbers):
-        raise UsageError(f"{option} {text!r}: expected {count} numbers with commas between them: {meaning}")
-    return numbers
-
-
 def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str]) -> Mounting:
     import numpy as np
 
@@ -236,10 +224,10 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
     from truenorth.navigation.sensors import mounting_angles
 
     sigma = {part: SIGMAS[part] for part in parts if part in SIGMAS}
-    lever = np.zeros(3) if arm is None else np.array(_numbers(arm, option, 3, "right,forward,up in metres"))
+    lever = np.zeros(3) if arm is None else np.array(numbers_of(arm, option, 3, "right,forward,up in metres"))
     turned = [0.0, 0.0, 0.0]
     if angles is not None:
-        turned = [math.radians(x) for x in _numbers(angles, "--mounting", 3, "heading,pitch,roll in degrees")]
+        turned = [math.radians(x) for x in numbers_of(angles, "--mounting", 3, "heading,pitch,roll in degrees")]
     return Mounting(
         lever_arm=lever,
         lever_arm_sigma=sigma.get("lever_arm", 0.0),

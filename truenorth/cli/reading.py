@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -88,3 +89,22 @@ def read_log(
     if start is not None or stop is not None:
         record = record.between(start, stop)
     return record
+
+
+def numbers_of(text: str, option: str, count: int, meaning: str) -> list[float]:
+    """The numbers of an option that takes several, with commas between them.
+
+    Raises
+    ------
+    UsageError
+        Other than `count` finite numbers.
+    """
+    from truenorth.errors import UsageError
+
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(math.isfinite(x) for x in numbers):
+        raise UsageError(f"{option} {text!r}: expected {count} numbers with commas between them: {meaning}")
+    return numbers
