@@ -179,7 +179,10 @@ def align(
                 position = Position(float(solution.lat[0]), float(solution.lon[0]))
         if indexer is None:  # which turns its IMU on its head, and fast
             _refuse_implausible(
-                record, position.lat, any_attitude or positions is not None, units_given=units is not None
+                record,
+                None if moving and place is None else position.lat,
+                any_attitude or positions is not None,
+                units_given=units is not None,
             )
         from truenorth.alignment import align as align_record
         from truenorth.calibration import Calibration
@@ -267,7 +270,7 @@ def align(
         raise typer.Exit(4)
 
 
-def _refuse_implausible(record: ImuRecord, lat: float, any_attitude: bool, units_given: bool) -> None:
+def _refuse_implausible(record: ImuRecord, lat: float | None, any_attitude: bool, units_given: bool) -> None:
     """Stop at mistakes of units and axes that leave no other reading; mention those that do."""
     from truenorth.errors import DataError
     from truenorth.quality.plausibility import check_plausibility
