@@ -226,6 +226,36 @@ def test_wrong_input_is_found_and_said(drive, tmp_path):
         navigate(record, tmp_path)
 
 
+def test_files_with_late_rows_navigate_as_sorted_ones(drive, tmp_path):
+    """Neighbours of a GNSS log and of an odometer's counter exchanged: the same bits, and it is said."""
+    from truenorth.formats import read_gnss, read_odometer, write_record
+
+    motion, record, start = drive
+    time = np.arange(0.5, 179.0, 0.5)
+    write_record(fixes(motion, time, with_velocity=True), tmp_path / "gnss.csv")
+    total = np.cumsum(np.linalg.norm(motion.states(time).v_n, axis=1)) * 0.5
+    rows = [f"{t},{x}" for t, x in zip(time, total)]
+    (tmp_path / "odo.csv").write_text("\n".join(["time,distance_total", *rows]) + "\n")
+    results = []
+    for _ in range(2):
+        gnss, odometer = read_gnss(tmp_path / "gnss.csv"), read_odometer(tmp_path / "odo.csv")
+        results.append(navigate(record, start, imu=SPEC, gnss=gnss, odometer=odometer))
+        for name in ("gnss.csv", "odo.csv"):
+            header, *lines = (tmp_path / name).read_text().splitlines()
+            lines[20:320:3], lines[21:321:3] = lines[21:321:3], lines[20:320:3]
+            (tmp_path / name).write_text("\n".join([header, *lines]) + "\n")
+    right, found = results
+    np.testing.assert_array_equal(found.position, right.position)
+    np.testing.assert_array_equal(found.C_nb, right.C_nb)
+    np.testing.assert_array_equal(found.track.P, right.track.P)
+    assert found.summary()["late_rows"] == {name: {"rows": 100, "longest_s": 0.5} for name in ("gnss", "odometer")}
+    assert right.summary()["late_rows"] == {}
+    assert [r for r in found.reasons if r not in right.reasons] == [
+        f"{name}: 100 rows stood after rows of later times, by up to 0.5 s: put in order"
+        for name in ("gnss.csv", "odo.csv")
+    ]
+
+
 def test_a_reference_in_wrong_axes_is_inconsistent(drive):
     """North, east, down handed in as east, north, up, with no position to tell by."""
     motion, record, start = drive

@@ -202,7 +202,9 @@ def align_in_motion(
         guess = replace(guess, C_nb=backtracked(task.record, track))
         track = task.run(guess, gated=True)
     answer = _answer(task, track, method, why, spread, heading_limit)
-    return answer.with_verdict(answer.status, (*answer.reasons, _of_latitude(answer, able))) if unknown else answer
+    more = [_of_latitude(answer, able)] if unknown else []
+    more += [note for log in (odometer, gnss) if log is not None for note in log.notes]
+    return answer.with_verdict(answer.status, (*answer.reasons, *more))
 
 
 def _cost_at(task: _Task, lat: float) -> float:

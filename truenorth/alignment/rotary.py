@@ -127,7 +127,8 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), the base may sway: its own motion is fitted to the log",
     )
     around = Circumstances(heading_limit, _nothing_to_check(), None, fine.settled, detect_drift(fine))
-    return answer.with_verdict(*judge(answer, around))
+    status, reasons = judge(answer, around)
+    return answer.with_verdict(status, reasons if encoder is None else (*reasons, *encoder.notes))
 
 
 def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:

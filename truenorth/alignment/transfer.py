@@ -139,6 +139,7 @@ def align_transfer(
         lever_arm_sigma = 0.0  # attitude does not see it
     assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     assumed, notes = common_clock(slave, master, assumed)
+    notes = (*notes, *master.notes)
     bend = None
     if flexure is not None:
         turn, pitch, roll = flexure.sigma

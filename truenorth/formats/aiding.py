@@ -1,6 +1,7 @@
 """Readers of aiding logs: odometer, velocity log, GNSS receiver, master INS, trajectory, height, encoder.
 
-CSV (comma, semicolon, tab or blanks), Parquet, npz and mat files of named columns. A YAML file beside the log (``LOG.yaml``
+CSV (comma, semicolon, tab or blanks), Parquet, npz and mat files of named columns. Rows that are late by no more than
+`LONGEST_LATE` are put in order and counted. A YAML file beside the log (``LOG.yaml``
 for ``LOG.csv``) may hold the same options as the call; those of the call win.
 """
 
@@ -18,8 +19,8 @@ from numpy.typing import NDArray
 from truenorth.errors import DataError, UsageError
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
+from truenorth.formats.order import ordered
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, columns_of, find
-from truenorth.formats.table import check_order
 from truenorth.records import EncoderRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
 Array = NDArray[np.float64]
@@ -128,14 +129,19 @@ def read_odometer(
     name = chosen if found.has(chosen) else f"{chosen}_unsigned"
     found.require(name)
     time, values = found.values["time"], found.values[name]
-    check_order(time, found.labels["time"], found.source, found.place)
     kind: Any = chosen.removesuffix("_total")
     if chosen.endswith("_total"):
         time, values = time[1:], np.diff(values)
     is_signed = others.get("signed")
     size = _pulse_size(found, others.get("pulse_size")) if kind == "pulses" else None
     return OdometerRecord(
-        time, values, kind, size, name == chosen if is_signed is None else is_signed, source=found.source
+        time,
+        values,
+        kind,
+        size,
+        name == chosen if is_signed is None else is_signed,
+        source=found.source,
+        late=found.late,
     )
 
 
@@ -293,7 +299,7 @@ def read_trajectory(
 def open_log(
     path: FilePath, format: str | None, quantities: Sequence[Quantity], given: Mapping[str, Any]
 ) -> tuple[Found, Mapping[str, Any]]:
-    """What a log has of some quantities, and the options that only its kind has.
+    """What a log has of some quantities, in order of time, and the options that only its kind has.
 
     Raises
     ------
@@ -308,7 +314,7 @@ def open_log(
         others = {key: value for key, value in values.items() if key in known_keys}
         options = Options(values.get("columns", {}), values.get("units", {}), others)
         example = ",".join(q.name for q in quantities[:4])
-        return find(columns_of(path, chosen, example), quantities, options), others
+        return ordered(find(columns_of(path, chosen, example), quantities, options)), others
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -322,10 +328,8 @@ def known(sigma: Array | None) -> Array | None:
 
 
 def made(found: Found, kind: type[Any], **values: Any) -> Any:
-    """A record of a kind; time is checked first, so that its faults are named by their place in the file."""
-    time = found.values["time"]
-    check_order(time, found.labels["time"], found.source, found.place)
-    return kind(time=time, source=found.source, **values)
+    """A record of a kind."""
+    return kind(time=found.values["time"], source=found.source, late=found.late, **values)
 
 
 def whole(found: Found, *names: str) -> Array | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from truenorth.errors import DataError
+from truenorth.formats.order import put_in_order
 from truenorth.records import GnssRecord
 
 NMEA_SUFFIXES = (".nmea", ".nma")
@@ -36,9 +37,10 @@ def read_nmea(path: Path) -> GnssRecord:
     Raises
     ------
     DataError
-        A wrong checksum, a field that is no number, no sentence of these kinds: with the line.
+        A wrong checksum, a field that is no number, an epoch too late, no sentence of these kinds: with the line.
     """
     rows: dict[float, dict[str, float]] = {}
+    lines: dict[float, int] = {}
     time, day, clock = math.nan, 0.0, math.nan
     for number, kind, cells in _sentences(path):
         where = f"{path.name}: line {number}, {kind}"
@@ -52,9 +54,12 @@ def read_nmea(path: Path) -> GnssRecord:
         now = _clock(cells[1], where)
         if now < clock - DAY / 2:
             day += DAY
+        elif now > clock + DAY / 2:  # of the day before, late
+            day -= DAY
         clock = now
         time = day + now
         row = rows.setdefault(time, {})
+        lines.setdefault(time, number)
         if kind == "GGA":
             row |= _place(cells, 2, where)
             row["quality"] = _number(cells[6], where, "quality")
@@ -68,19 +73,23 @@ def read_nmea(path: Path) -> GnssRecord:
             _velocity(row, _number(cells[7], where, "speed"), _number(cells[8], where, "course"))
     if len(rows) < 2:
         raise DataError(f"{path.name}: {len(rows)} epoch(s) of GGA or RMC sentences; at least 2 are needed")
-    return _record(rows, path.name)
+    return _record(rows, list(lines.values()), path.name)
 
 
-def _record(rows: dict[float, dict[str, float]], source: str) -> GnssRecord:
+def _record(rows: dict[float, dict[str, float]], lines: list[int], source: str) -> GnssRecord:
+    time = np.array(list(rows))
+    order, late = put_in_order(time, "time", source, lambda row: f"line {lines[row]}")
+    order = np.arange(len(rows)) if order is None else order
+
     def column(name: str) -> Any:
-        return np.array([row.get(name, math.nan) for row in rows.values()])
+        return np.array([row.get(name, math.nan) for row in rows.values()])[order]
 
     v_n = np.column_stack([column("VE"), column("VN"), np.full(len(rows), math.nan)])
     hdop = column("hdop")
     dop = np.column_stack([np.where(hdop > 0, hdop, math.nan), np.full(len(rows), math.nan)])
     quality = column("quality")
     return GnssRecord(
-        time=np.array(list(rows)),
+        time=time[order],
         lat=column("lat"),
         lon=column("lon"),
         alt=column("alt"),
@@ -88,6 +97,7 @@ def _record(rows: dict[float, dict[str, float]], source: str) -> GnssRecord:
         dop=dop if np.isfinite(dop).any() else None,
         quality=quality if np.isfinite(quality).any() else None,
         source=source,
+        late=late,
     )
 
 

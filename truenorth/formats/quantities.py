@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.errors import DataError, UsageError
 from truenorth.formats.table import check_finite
+from truenorth.records import IN_ORDER, Late
 from truenorth.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.yaml_file import unknown_key
 
@@ -111,6 +112,8 @@ class Found:
         Where a row stands in the file, in words.
     asked : set of str
         Our names of those that the caller named.
+    late : Late
+        Rows that were put in order.
     """
 
     source: str
@@ -118,6 +121,7 @@ class Found:
     values: Mapping[str, Array]
     place: Callable[[int], str]
     asked: frozenset[str]
+    late: Late = IN_ORDER
 
     def has(self, *names: str) -> bool:
         """Whether all of these columns are there."""

@@ -132,6 +132,8 @@ def navigate(
         The alignment has no usable heading.
     """
     tell = progress or (lambda stage: None)
+    logs: dict[str, Record | None] = {"gnss": gnss, "odometer": odometer, "velocity": velocity, "baro": baro}
+    given = {name: aid for name, aid in logs.items() if aid is not None}
     begin, spec, imu_source = _start_of(start, imu)
     if calibration is not None:
         record = calibration.apply(record)
@@ -166,6 +168,7 @@ def navigate(
     status, reasons = check_residuals(track)
     if why:
         reasons.append(why)
+    reasons += [note for aid in given.values() for note in aid.notes]
     if check_clocks and aiding:
         tell("checking clocks and lever arms")
         reasons += _clock_warnings(run, sources, mounting, height, baro_loop)
@@ -179,6 +182,7 @@ def navigate(
         stops=sum(len(r.time) for r in track.residuals if r.name == "zero velocity"),
         imu_source=imu_source,
         source=record.source,
+        late={name: aid.late for name, aid in given.items() if aid.late.rows},
     )
     if damping is None:
         return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -16,6 +17,7 @@ from truenorth.attitude import euler_from_dcm, to_rotation
 from truenorth.earth import radii
 from truenorth.models.ins import BA, BG, DP, DV, PHI
 from truenorth.navigation.driver import Residuals, Track
+from truenorth.records import Late
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,6 +54,8 @@ class Navigation:
         Seconds at rest that were used.
     imu_source : str
     source : str
+    late : mapping of str to Late
+        Of each aiding log with rows that stood out of order: how many were put in order.
     damping : Damping or None
         How its oscillations were damped, and what the velocity log did.
     """
@@ -65,6 +69,7 @@ class Navigation:
     stops: int
     imu_source: str
     source: str
+    late: Mapping[str, Late] = field(default_factory=dict)
     damping: Damping | None = None
 
     @property
@@ -220,6 +225,7 @@ class Navigation:
             "altitude": self.altitude,
             "smoothed": self.smoothed,
             "gaps": [{"time_s": time, "length_s": length} for time, length in self.gaps],
+            "late_rows": {name: {"rows": n, "longest_s": longest} for name, (n, longest) in self.late.items()},
             "stops_s": self.stops,
             "aiding": {
                 r.name: {

@@ -1,6 +1,6 @@
 """Records: measurements in SI units and our axes, checked when they are made."""
 
-from truenorth.records.base import GAP_FACTOR, Record
+from truenorth.records.base import GAP_FACTOR, IN_ORDER, Late, Record
 from truenorth.records.encoder import EncoderRecord
 from truenorth.records.gnss import GnssRecord, HeightRecord
 from truenorth.records.imu import COLUMNS, ImuRecord
@@ -11,10 +11,12 @@ from truenorth.records.velocity import VelocityRecord
 __all__ = [
     "COLUMNS",
     "GAP_FACTOR",
+    "IN_ORDER",
     "EncoderRecord",
     "GnssRecord",
     "HeightRecord",
     "ImuRecord",
+    "Late",
     "MasterRecord",
     "OdometerRecord",
     "Record",

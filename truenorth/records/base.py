@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,23 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 GAP_FACTOR = 1.5  # a step of more than 1.5 nominal intervals has lost at least one sample
+
+
+class Late(NamedTuple):
+    """Rows that stood in a log after rows of later times, and were put in order when it was read.
+
+    Attributes
+    ----------
+    rows : int
+    longest : float, s
+        By which the latest of them stood behind.
+    """
+
+    rows: int = 0
+    longest: float = 0.0
+
+
+IN_ORDER = Late()
 
 
 class Record:
@@ -31,6 +48,7 @@ class Record:
 
     time: Array
     source: str
+    late: Late = IN_ORDER
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """Arrays of the record, each with the names of its columns: one means (N,), three (N, 3), nine (N, 3, 3)."""
@@ -111,6 +129,15 @@ class Record:
 
     def _with(self, **changes: Any) -> Self:
         return replace(self, **changes)  # type: ignore[type-var]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was put right when the log was read, in words."""
+        if not self.late.rows:
+            return ()
+        rows, longest = self.late
+        were = "1 row stood" if rows == 1 else f"{rows} rows stood"
+        return (f"{self.source}: {were} after rows of later times, by up to {longest:.3g} s: put in order",)
 
     def columns(self) -> dict[str, Array]:
         """The documented columns of tables and files by name, in their units (SI but for angles, which are in deg)."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError
-from truenorth.records.base import Record, check_positive, check_range
+from truenorth.records.base import IN_ORDER, Late, Record, check_positive, check_range
 
 Array = NDArray[np.float64]
 RADIANS = "latitude and longitude are in radians here: were degrees handed in?"
@@ -37,6 +37,8 @@ class GnssRecord(Record):
     quality : (N,) array or None
         Indicator of NMEA 0183: 0 no fix, 1 single, 2 differential, 4 RTK fixed, 5 RTK float, 6 dead reckoning.
     source : str
+    late : Late
+        Rows that a reader put in order.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class GnssRecord(Record):
     dop: Array | None = None
     quality: Array | None = None
     source: str = field(default="GNSS record", compare=False)
+    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """Columns by array."""
@@ -106,6 +109,8 @@ class HeightRecord(Record):
     sigma : (N,) array or None, m
         One-sigma errors, NaN where not known.
     source : str
+    late : Late
+        Rows that a reader put in order.
 
     Raises
     ------
@@ -120,6 +125,7 @@ class HeightRecord(Record):
     alt: Array
     sigma: Array | None = None
     source: str = field(default="height record", compare=False)
+    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """Columns by array."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.errors import DataError
-from truenorth.records.base import GAP_FACTOR, Record, check_together
+from truenorth.records.base import GAP_FACTOR, IN_ORDER, Late, Record, check_together
 from truenorth.records.gnss import check_place, in_degrees
 from truenorth.records.interpolation import interpolated
 
@@ -125,6 +125,8 @@ class Trajectory(Poses):
         East, north, up.
     lat, lon, alt : (N,) arrays, rad and m
     source : str
+    late : Late
+        Rows that a reader put in order.
 
     Raises
     ------
@@ -139,6 +141,7 @@ class Trajectory(Poses):
     lon: Array
     alt: Array
     source: str = field(default="trajectory", compare=False)
+    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """Columns by array."""
@@ -163,6 +166,8 @@ class MasterRecord(Poses):
     f_b : (N, 3) array or None, m/s^2
         Specific force of the master's own accelerometers, in its axes.
     source : str
+    late : Late
+        Rows that a reader put in order.
 
     Raises
     ------
@@ -181,6 +186,7 @@ class MasterRecord(Poses):
     w_ib_b: Array | None = None
     f_b: Array | None = None
     source: str = field(default="master record", compare=False)
+    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """Columns by array."""
