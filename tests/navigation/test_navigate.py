@@ -209,6 +209,12 @@ def test_wrong_input_is_found_and_said(drive, tmp_path):
     ned = replace(good, v_n=good.v_n[:, [1, 0, 2]] * [1, 1, -1])
     with pytest.raises(DataError, match="north, east, down"):
         navigate(record, start, imu=SPEC, gnss=ned)
+    exchanged = replace(good, lat=good.lon, lon=good.lat, v_n=None)
+    with pytest.raises(DataError, match=r"gnss\.csv: row 3, columns lat and lon: 11\..*exchanged they fit"):
+        navigate(record, start, imu=SPEC, gnss=exchanged)
+    high = HeightRecord(time, np.full(len(time), 900.0), source="baro.csv")
+    with pytest.raises(DataError, match=r"baro\.csv: row 3, column alt: 900\.0 m, 400 m from"):
+        navigate(record, start, imu=SPEC, baro=high)
     with pytest.raises(UsageError, match="centimetres"):
         Mounting(lever_arm=np.array([120.0, 50.0, 80.0]))
     with pytest.raises(UsageError, match="expected one of fixed, free, baro, gnss"):

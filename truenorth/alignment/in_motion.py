@@ -35,6 +35,7 @@ from truenorth.navigation.driver import Track, navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
 from truenorth.navigation.stops import updates_at
+from truenorth.navigation.whereabouts import check_fixes
 from truenorth.position import METRES_PER_RADIAN, Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.specs import ImuSpec, imu_spec
@@ -254,6 +255,8 @@ def _task(
     gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
     if position is None:
         position = _first_fix(record, gnss) if _has_fixes(gnss) else Position(SOMEWHERE)
+    elif gnss is not None:
+        check_fixes(gnss, position, float(record.time[0]))
     spec = imu_spec(imu).with_random_walks(record.interval)
     stops: list[Aiding] = list(gaps)
     if zupt:

@@ -20,6 +20,7 @@ from truenorth.errors import DataError, UsageError
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
 from truenorth.formats.order import ordered
+from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, columns_of, find
 from truenorth.records import EncoderRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
@@ -360,6 +361,8 @@ def _poses(found: Found) -> dict[str, Any]:
         C_nb = dcm_from_euler(*angles.T)
     place = whole(found, "lat", "lon", "alt")
     lat, lon, alt = (None, None, None) if place is None else place.T
+    if place is not None:
+        check_degrees(found)
     return {"C_nb": C_nb, "v_n": whole(found, "VE", "VN", "VU"), "lat": lat, "lon": lon, "alt": alt}
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truenorth.errors import UsageError
 from truenorth.formats.aiding import NAVIGATION, PLACE, FilePath, Pairs, known, made, open_log, sigmas
 from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
+from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Quantity
 from truenorth.position import Position
 from truenorth.records import GnssRecord
@@ -99,6 +100,7 @@ def read_gnss(
 def _geodetic(found: Found) -> dict[str, Any]:
     if not found.has("lat", "lon"):
         return {}
+    check_degrees(found)
     absent = np.full(len(found.values["time"]), np.nan)
     return {"lat": found.values["lat"], "lon": found.values["lon"], "alt": found.values.get("alt", absent)}
 

@@ -108,6 +108,8 @@ class Found:
         Our names to the log's.
     values : mapping
         Our names to (N,) arrays in SI; NaN where a cell is empty.
+    factors : mapping
+        Our names to what the log's numbers were multiplied with.
     place : callable
         Where a row stands in the file, in words.
     asked : set of str
@@ -119,6 +121,7 @@ class Found:
     source: str
     labels: Mapping[str, str]
     values: Mapping[str, Array]
+    factors: Mapping[str, float]
     place: Callable[[int], str]
     asked: frozenset[str]
     late: Late = IN_ORDER
@@ -232,8 +235,9 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
         )
     table = columns.read(list(dict.fromkeys(labels.values())))
     index = {name: i for i, name in enumerate(dict.fromkeys(labels.values()))}
-    values = {ours: table[:, index[labels[ours]]] * claims[ours][0][1] for ours in labels}
-    found = Found(source, labels, values, columns.place, frozenset(options.columns))
+    factors = {ours: claim[0][1] for ours, claim in claims.items()}
+    values = {ours: table[:, index[labels[ours]]] * factors[ours] for ours in labels}
+    found = Found(source, labels, values, factors, columns.place, frozenset(options.columns))
     found.require("time")
     return found
 

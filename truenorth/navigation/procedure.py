@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError, UsageError
-from truenorth.models.ins import InsModel
+from truenorth.models.ins import DP, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, mean_nis
 from truenorth.navigation.sensors import Mounting, from_gnss, from_height, from_odometer, from_velocity
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
+from truenorth.navigation.whereabouts import check_fixes, check_heights
+from truenorth.position import Position
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, VelocityRecord
 from truenorth.specs import ImuSpec, imu_spec
 
@@ -149,6 +151,7 @@ def navigate(
     mounting = {name: m or Mounting() for name, m in mountings.items()}
     aiding = _aiding(sources, mounting, height, baro_loop)
     _check_overlap(record, aiding)
+    _check_places(sources, begin, height)
     interval = (FINE if record.duration <= LONG else COARSE) if interval is None else interval
     output = max(1.0, record.duration / 20_000.0) if output is None else output
     if not (interval > 0.0 and output > 0.0):
@@ -292,6 +295,16 @@ def _aiding(sources: Sources, mounting: dict[str, Mounting], altitude: str, loop
     if sources.baro is not None and altitude == "baro":
         found += from_height(sources.baro, mounting["baro"], loop)
     return found
+
+
+def _check_places(sources: Sources, begin: Start, altitude: str) -> None:
+    """Refuse fixes and heights that lie far from where the alignment stands."""
+    sigma = np.sqrt(np.diag(begin.P)[DP])
+    place = Position(begin.lat, begin.lon, begin.alt, float(sigma[:2].max()), float(sigma[2]))
+    if sources.gnss is not None:
+        check_fixes(sources.gnss, place, begin.time, heights=altitude in ("gnss", "free"))
+    if sources.baro is not None and altitude == "baro":
+        check_heights(sources.baro, place, begin.time)
 
 
 def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:

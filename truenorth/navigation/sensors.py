@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.attitude import dcm_from_euler
-from truenorth.errors import DataError, UsageError
+from truenorth.errors import UsageError
 from truenorth.models.ins import Extra
 from truenorth.navigation.aiding import FALSE_REJECTION, Aiding, Role, state
+from truenorth.navigation.gnss_frames import check_frames
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
 
 Array = NDArray[np.float64]
@@ -118,9 +119,9 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
     Raises
     ------
     DataError
-        Velocities that look like north, east, down.
+        Velocities that contradict the positions, and how they would fit (see :func:`check_frames`).
     """
-    refuse_ned(record)
+    check_frames(record)
     time = record.time - mounting.latency
     sound = np.ones(len(record), dtype=bool) if record.quality is None else ~np.isin(record.quality, (0, 6))
     found = []
@@ -165,38 +166,6 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
             )
         )
     return found
-
-
-def refuse_ned(record: GnssRecord) -> None:
-    """Compare velocities with the change of position.
-
-    Raises
-    ------
-    DataError
-        They fit north, east, down, and not east, north, up.
-    """
-    from truenorth.earth import radii
-
-    both = np.flatnonzero(record.has_position & record.has_velocity)
-    if len(both) < 5 or record.v_n is None:
-        return
-    time, lat, lon, v = record.time[both], record.lat[both], record.lon[both], record.v_n[both]
-    R_M, R_N = radii(lat[:-1])
-    T = np.diff(time)
-    moved = np.stack([np.diff(lon) * R_N * np.cos(lat[:-1]), np.diff(lat) * R_M], axis=1)
-    mean = 0.5 * (v[1:, :2] + v[:-1, :2]) * T[:, None]
-    close = T < 5.0
-    if close.sum() < 5:
-        return
-    length = np.sqrt(np.mean(np.sum(moved[close] ** 2, axis=1)))
-    given, swapped = (
-        float(np.sqrt(np.mean(np.sum((moved[close] - m[close]) ** 2, axis=1)))) for m in (mean, mean[:, ::-1])
-    )
-    if given > 0.5 * length and swapped < 0.3 * given:
-        raise DataError(
-            f"{record.source}: velocities contradict the positions ({given:.3g} m a step, {swapped:.3g} m with east and north "
-            "exchanged): they seem to be north, east, down; expected east, north, up: exchange the columns (and the sign of up)"
-        )
 
 
 def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:

@@ -14,7 +14,6 @@ from truenorth.errors import DataError
 from truenorth.records.base import IN_ORDER, Late, Record, check_positive, check_range
 
 Array = NDArray[np.float64]
-RADIANS = "latitude and longitude are in radians here: were degrees handed in?"
 HEIGHTS = (-12_000.0, 1_000_000.0)  # m
 
 
@@ -145,8 +144,17 @@ def check_place(record: Record) -> None:
     DataError
         With source, row and column.
     """
-    check_range(record, "lat", -math.pi / 2, math.pi / 2, RADIANS)
-    check_range(record, "lon", -2 * math.pi, 2 * math.pi, RADIANS)
+    lat, lon = getattr(record, "lat", None), getattr(record, "lon", None)
+    advice = "latitude and longitude are in radians here: were degrees handed in?"
+    if (
+        lat is not None
+        and lon is not None
+        and not (np.abs(lat) > math.pi).any()
+        and not (np.abs(lon) > math.pi / 2).any()
+    ):
+        advice = "radians; the longitudes would pass for latitudes: were they exchanged?"
+    check_range(record, "lat", -math.pi / 2, math.pi / 2, advice)
+    check_range(record, "lon", -2 * math.pi, 2 * math.pi, advice)
     check_range(record, "alt", *HEIGHTS, "check the unit, metres are expected")
 
 

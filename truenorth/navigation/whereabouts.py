@@ -1,0 +1,116 @@
+"""Whether a log of places and the place that the alignment was told are of one journey; and if not, what went wrong."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.earth import ecef_from_geodetic
+from truenorth.errors import DataError
+from truenorth.position import Position
+from truenorth.records import GnssRecord, HeightRecord
+
+Array = NDArray[np.float64]
+
+FIXES = 5  # of the log's beginning that are looked at, by their median: one outlier says nothing
+SIGMAS = 6.0
+FASTEST, STEEPEST = 400.0, 30.0  # m/s, of a vehicle between the alignment's epoch and the fix
+LEAST_FAR, LEAST_HIGH = 200.0, 50.0  # m
+CLOSER = 0.01  # of the distance is left where a mistake is undone
+
+
+def check_fixes(record: GnssRecord, place: Position, time: float, *, heights: bool = True) -> None:
+    """Refuse GNSS fixes that no vehicle can have reached from the place where the log begins.
+
+    Parameters
+    ----------
+    record : GnssRecord
+    place : Position
+        Of the IMU at `time`, with its sigmas.
+    time : float, s
+    heights : bool
+        Compare heights too.
+
+    Raises
+    ------
+    DataError
+        With row and columns, both places, how far they lie apart, and what it looks like: columns exchanged, radians read as
+        degrees, a sign, an alignment without its longitude or height.
+    """
+    rows = np.flatnonzero(record.has_position & (record.time >= time))[:FIXES]
+    if rows.size == 0:
+        return
+    lat, lon, alt = record.lat[rows], record.lon[rows], record.alt[rows]
+    passed = record.time[rows] - time
+    far = _distance(lat, lon, place)
+    if np.median(far - FASTEST * passed) > LEAST_FAR + SIGMAS * place.horizontal_sigma:
+        k = int(np.argsort(far)[len(far) // 2])
+        raise DataError(
+            f"{record.source}: row {rows[k] + 1}, columns lat and lon: {_degrees(lat[k], lon[k])}, {_apart(far[k])} from "
+            f"{_degrees(place.lat, place.lon)}, where the alignment stands to {place.horizontal_sigma:g} m; expected the track to "
+            f"begin there: {_mistake(float(lat[k]), float(lon[k]), place, float(far[k]))}"
+        )
+    if heights:
+        _check_heights(record.source, rows, alt, passed, place)
+
+
+def check_heights(record: HeightRecord, place: Position, time: float) -> None:
+    """Refuse heights of a barometer that lie far from where the log begins.
+
+    Raises
+    ------
+    DataError
+        As for :func:`check_fixes`.
+    """
+    rows = np.flatnonzero(record.time >= time)[:FIXES]
+    _check_heights(record.source, rows, record.alt[rows], record.time[rows] - time, place)
+
+
+def _check_heights(source: str, rows: NDArray[np.intp], alt: Array, passed: Array, place: Position) -> None:
+    off = np.abs(alt - place.alt)
+    known = np.isfinite(off)
+    if not known.any() or not np.median((off - STEEPEST * passed)[known]) > LEAST_HIGH + SIGMAS * place.vertical_sigma:
+        return
+    k = int(np.argsort(off)[known.sum() // 2])  # NaN is sorted behind
+    if abs(alt[k] + place.alt) < CLOSER * off[k] + LEAST_HIGH:
+        advice = "the heights seem to be counted downwards: name the column depth, or turn its sign"
+    else:
+        advice = f"align with --alt {alt[k]:.0f}, or with a --position-sigma that says how rough that is"
+    raise DataError(
+        f"{source}: row {rows[k] + 1}, column alt: {alt[k]:.1f} m, {off[k]:.0f} m from {place.alt:.1f} m, where the alignment "
+        f"stands to {place.vertical_sigma:g} m; expected the track to begin there: {advice}"
+    )
+
+
+def _distance(lat: Array, lon: Array, place: Position) -> Array:
+    """Straight through the earth, m."""
+    apart = ecef_from_geodetic(lat, lon, 0.0 * lat) - ecef_from_geodetic(place.lat, place.lon, 0.0)
+    return np.asarray(np.linalg.norm(apart, axis=-1), dtype=np.float64)
+
+
+def _mistake(lat: float, lon: float, place: Position, far: float) -> str:
+    """What brings the places together."""
+    turn = math.degrees(1.0)
+    for lat_meant, lon_meant, words in (
+        (lon, lat, "exchanged they fit: name the columns, lat is lon and lon is lat"),
+        (lat * turn, lon * turn, "read as radians they fit: say so with units position=rad"),
+        (lat, -lon, "with the longitude's other sign they fit: east is positive"),
+        (-lat, lon, "with the latitude's other sign they fit: north is positive"),
+    ):
+        if abs(lat_meant) <= math.pi / 2 and _distance(np.array(lat_meant), np.array(lon_meant), place) < CLOSER * far:
+            return words
+    left_out = "was --lon left out? " if place.lon == 0.0 else ""
+    return (
+        f"{left_out}align with --lat {math.degrees(lat):.5f} --lon {math.degrees(lon):.5f}, or with a --position-sigma that says "
+        "how rough its place is"
+    )
+
+
+def _degrees(lat: float, lon: float) -> str:
+    return f"{math.degrees(lat):.5f}, {math.degrees(lon):.5f} deg"
+
+
+def _apart(metres: float) -> str:
+    return f"{metres:.0f} m" if metres < 1e4 else f"{metres / 1e3:.0f} km"
