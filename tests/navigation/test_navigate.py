@@ -210,7 +210,7 @@ def test_wrong_input_is_found_and_said(drive, tmp_path):
     with pytest.raises(DataError, match="north, east, down"):
         navigate(record, start, imu=SPEC, gnss=ned)
     exchanged = replace(good, lat=good.lon, lon=good.lat, v_n=None)
-    with pytest.raises(DataError, match=r"gnss\.csv: row 3, columns lat and lon: 11\..*exchanged they fit"):
+    with pytest.raises(DataError, match=r"gnss\.csv: row \d, columns lat and lon: 11\..*exchanged they fit"):
         navigate(record, start, imu=SPEC, gnss=exchanged)
     high = HeightRecord(time, np.full(len(time), 900.0), source="baro.csv")
     with pytest.raises(DataError, match=r"baro\.csv: row 3, column alt: 900\.0 m, 400 m from"):
