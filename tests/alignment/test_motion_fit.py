@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+import scipy.linalg
 
-from truenorth.alignment.motion_fit import Walks, _Series, autocovariance, fit_motion
+from truenorth.alignment.motion_fit import fit_motion
+from truenorth.alignment.motion_likelihood import Series, Walks, motion_of, parameters
 from truenorth.alignment.windowed import sequential_fit, windowed_fit
 from truenorth.filters import LinearSystem
 from truenorth.models.disturbance import AxisMotion, Oscillator
@@ -37,24 +39,49 @@ def drawn(motion, count, seed):
     return y
 
 
-@pytest.mark.parametrize("item", [Oscillator(1, 0.02, 0.8, 0.1), Oscillator(2, 0.02, 0.8, 0.1)], ids=["1", "2"])
-def test_autocovariance_is_that_of_the_states(item):
-    Phi = item.transition(1.0)
-    expected = [item.output @ np.linalg.matrix_power(Phi, k) @ item.stationary @ item.output for k in range(40)]
-    np.testing.assert_allclose(autocovariance(item, np.arange(40.0)), expected, atol=1e-12 * item.sigma**2)
-
-
 @pytest.mark.parametrize("item", [Oscillator(1, 0.02, 0.8, 0.1), Oscillator(1, 0.02, 0.8, 1e-9)], ids=["broad", "line"])
 def test_expected_periodogram_is_the_mean_of_many(item):
     """Mean of 800 periodograms: within 4 sigma (14 %) wherever the expectation is not a leak of 1e-6."""
     motion = AxisMotion(1e-3, (item,))
-    many = [_Series(np.zeros(64), 1.0, WALKS)]
+    many = [Series(np.zeros(64), 1.0, WALKS)]
     found = np.mean(
         [np.abs(np.fft.rfft(many[0].taper_weights * drawn(motion, 64, seed))) ** 2 for seed in range(800)], axis=0
     )
-    expected = many[0].expected(motion)
+    orders, logs = parameters(motion)
+    expected = many[0].expected(orders, logs[None])[0]
     ratio = (found / expected)[1:-1]
     assert np.all(np.abs(ratio - 1) < 4 / math.sqrt(800) * 1.05), ratio
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_exact_likelihood_is_the_dense_gaussian_s(name):
+    """Of the contrasts free of the trend, whose covariance is Toeplitz but for the walks."""
+    motion, K = MOTIONS[name], 60
+    y = drawn(motion, K, 5)
+    series = Series(y, 1.0, WALKS)
+    Phi, Q = WALKS.blocks(1.0)
+    V = scipy.linalg.toeplitz(motion.autocovariance(1.0, K)) + motion.white**2 * np.eye(K)
+    P = np.zeros((2, 2))
+    for k in range(1, K):
+        P = Phi @ P @ Phi.T + Q
+        V[k, k:] += P[0, 0] + P[0, 1] * np.arange(K - k)  # the walk of acceleration goes on
+        V[k + 1 :, k] = V[k, k + 1 :]
+    free = scipy.linalg.null_space(series.columns[:, 1:].T)  # orthonormal: the determinant of B'B makes the difference
+    left = free.T @ y
+    U = free.T @ V @ free
+    B = series.columns[:, 1:]
+    expected = np.linalg.slogdet(U)[1] + left @ np.linalg.solve(U, left) + np.linalg.slogdet(B.T @ B)[1]
+    orders, logs = parameters(motion)
+    assert series.exact(orders, logs[None])[0] == pytest.approx(expected, rel=1e-7)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_parameters_are_the_motion(name):
+    motion = MOTIONS[name]
+    again = motion_of(*parameters(motion))
+    assert again.white == pytest.approx(motion.white)
+    np.testing.assert_array_equal(again.table[0], motion.table[0])
+    np.testing.assert_allclose(again.table[1], motion.table[1])
 
 
 @pytest.mark.parametrize("name", MOTIONS)
@@ -64,7 +91,7 @@ def test_as_likely_as_the_truth(name, count):
     motion = MOTIONS[name]
     for seed in (0, 1):
         y = drawn(motion, count, seed)
-        series = _Series(y, 1.0, WALKS)
+        series = Series(y, 1.0, WALKS)
         found = fit_motion(y, 1.0, WALKS)
         assert series.score(found) < series.score(motion) + 2.0
         if name == "white":

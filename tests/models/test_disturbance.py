@@ -26,22 +26,31 @@ def dynamics(item):
 
 @pytest.mark.parametrize("item", OSCILLATORS, ids=str)
 def test_transition_is_the_exponential(item):
-    np.testing.assert_allclose(item.transition(1.0), expm(dynamics(item)), rtol=1e-9, atol=1e-12)
+    Phi = AxisMotion(1.0, (item,)).blocks(1.0)[0]
+    np.testing.assert_allclose(Phi, expm(dynamics(item)), rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("item", OSCILLATORS, ids=str)
 def test_it_stays_as_it_is(item):
     """Phi P Phi' + Q = P, with Q from its own integral; the output has the sigma asked for."""
-    Phi, P = item.transition(1.0), item.stationary
-    np.testing.assert_allclose(Phi @ P @ Phi.T + item.noise(1.0), P, rtol=1e-8, atol=1e-9 * np.abs(P).max())
-    assert math.sqrt(item.output @ P @ item.output) == pytest.approx(item.sigma, rel=1e-12)
+    Phi, Q, P, h = AxisMotion(1.0, (item,)).blocks(1.0)
+    np.testing.assert_allclose(Phi @ P @ Phi.T + Q, P, rtol=1e-8, atol=1e-9 * np.abs(P).max())
+    assert math.sqrt(h @ P @ h) == pytest.approx(item.sigma, rel=1e-12)
+
+
+@pytest.mark.parametrize("item", OSCILLATORS, ids=str)
+def test_autocovariance_is_that_of_the_states(item):
+    motion = AxisMotion(1.0, (item,))
+    Phi, _, P, h = motion.blocks(1.0)
+    expected = [h @ np.linalg.matrix_power(Phi, k) @ P @ h for k in range(600)]
+    np.testing.assert_allclose(motion.autocovariance(1.0, 600), expected, atol=1e-11 * item.sigma**2)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_base_does_not_leave(order):
     """What a velocity integrates to stays bounded: its spectrum at frequency zero is nothing beside that at the peak."""
     item = Oscillator(order, 0.03, 1.0, 0.05)
-    A, h = dynamics(item), item.output
+    A, h = dynamics(item), AxisMotion(1.0, (item,)).blocks(1.0)[3]
 
     def gain(w):
         drive = np.zeros(len(A))

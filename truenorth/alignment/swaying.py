@@ -21,7 +21,8 @@ from truenorth.alignment.fine import (
     VELOCITY_PRIOR,
     FineAlignment,
 )
-from truenorth.alignment.motion_fit import Walks, fit_motion
+from truenorth.alignment.motion_fit import fit_motion
+from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import windowed_fit
 from truenorth.attitude import dcm_from_rotation_vector
 from truenorth.earth import normal_gravity

@@ -10,6 +10,7 @@ the Kalman filter); D. A. Harville, Bayesian inference for variance components u
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -18,61 +19,6 @@ from numpy.typing import NDArray
 from truenorth.compiled import compiled
 
 Array = NDArray[np.float64]
-
-
-@compiled
-def _whiten(
-    Phi: Any, rows: Any, cols: Any, Q: Any, h: Any, r: float, P: Any, Y: Any, X: Any, A: Any, gram: Any
-) -> float:
-    """Sum of ``log F``; `gram` gets the products of the whitened columns of `Y`; `P`, `X`, `A` are work space."""
-    n, columns = len(h), Y.shape[1]
-    a, e = np.zeros(n), np.zeros(columns)
-    log_F = 0.0
-    for k in range(len(Y)):
-        if k > 0:
-            # P = Phi P Phi' + Q and X = Phi X by the elements of Phi that are not zero.
-            for i in range(n):
-                for j in range(n):
-                    A[i, j] = 0.0
-            for m in range(len(rows)):
-                i, j = rows[m], cols[m]
-                f = Phi[i, j]
-                for c in range(n):
-                    A[i, c] += f * P[j, c]
-            for i in range(n):
-                for j in range(n):
-                    P[i, j] = Q[i, j]
-            for m in range(len(rows)):
-                i, j = rows[m], cols[m]
-                f = Phi[i, j]
-                for c in range(n):
-                    P[i, c] += f * A[c, j]
-            for c in range(columns):
-                for i in range(n):
-                    a[i] = 0.0
-                for m in range(len(rows)):
-                    a[rows[m]] += Phi[rows[m], cols[m]] * X[c, cols[m]]
-                for i in range(n):
-                    X[c, i] = a[i]
-        F = r
-        for i in range(n):
-            a[i] = 0.0
-            for j in range(n):
-                a[i] += P[i, j] * h[j]
-            F += h[i] * a[i]
-        log_F += np.log(F)
-        for c in range(columns):
-            e[c] = Y[k, c]
-            for i in range(n):
-                e[c] -= h[i] * X[c, i]
-            for i in range(n):
-                X[c, i] += a[i] / F * e[c]
-            for d in range(c + 1):
-                gram[c, d] += e[c] * e[d] / F
-        for i in range(n):
-            for j in range(n):
-                P[i, j] -= a[i] * a[j] / F
-    return log_F
 
 
 def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array) -> float:
@@ -92,13 +38,90 @@ def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array) -> f
     float
         Infinite where the model is degenerate.
     """
+    return float(restricted(Phi, Q, P0.copy(), h, r, np.ascontiguousarray(Y)))
+
+
+@compiled
+def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any) -> float:
+    """:func:`deviance` for kernels; `P` stands at the first epoch on entry, and is work space."""
+    gram = np.zeros((Y.shape[1], Y.shape[1]))
+    value = _whiten(Phi, Q, P, h, r, Y, gram) + _left(gram)
+    return value if math.isfinite(value) else math.inf
+
+
+@compiled
+def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, gram: Any) -> float:
+    """Sum of ``log F``; `gram` gets the products of the whitened columns of `Y`."""
+    n, columns = len(h), Y.shape[1]
     rows, cols = np.nonzero(Phi)
-    columns, n = Y.shape[1], len(h)
-    gram = np.zeros((columns, columns))
-    log_F = _whiten(Phi, rows, cols, Q, h, r, P0.copy(), Y, np.zeros((columns, n)), np.zeros((n, n)), gram)
-    normal, cross = gram[1:, 1:], gram[1:, 0]
-    normal = normal + np.tril(normal, -1).T
-    sign, log_normal = np.linalg.slogdet(normal)
-    if not (np.isfinite(log_F) and sign > 0):
-        return float("inf")
-    return float(log_F + log_normal + gram[0, 0] - cross @ np.linalg.solve(normal, cross))
+    A, X, X_next = np.zeros((n, n)), np.zeros((n, columns)), np.zeros((n, columns))
+    a, e = np.zeros(n), np.zeros(columns)
+    log_F = 0.0
+    for k in range(len(Y)):
+        if k > 0:
+            # P = Phi P Phi' + Q and X = Phi X by the elements of Phi that are not zero; of P the upper half.
+            A[:] = 0.0
+            X_next[:] = 0.0
+            for m in range(len(rows)):
+                i, j = rows[m], cols[m]
+                f = Phi[i, j]
+                for c in range(n):
+                    A[i, c] += f * P[j, c]
+                for c in range(columns):
+                    X_next[i, c] += f * X[j, c]
+            P[:] = Q
+            for m in range(len(rows)):
+                i, j = rows[m], cols[m]
+                f = Phi[i, j]
+                for c in range(i + 1):
+                    P[c, i] += f * A[c, j]
+            for i in range(n):
+                for j in range(i):
+                    P[i, j] = P[j, i]
+            X, X_next = X_next, X
+        F = r
+        for i in range(n):
+            a[i] = 0.0
+        for j in range(n):
+            if h[j] != 0.0:
+                for i in range(n):
+                    a[i] += h[j] * P[j, i]
+        for i in range(n):
+            F += h[i] * a[i]
+        log_F += math.log(F)
+        for c in range(columns):
+            e[c] = Y[k, c]
+        for i in range(n):
+            if h[i] != 0.0:
+                for c in range(columns):
+                    e[c] -= h[i] * X[i, c]
+        for i in range(n):
+            gain = a[i] / F
+            for c in range(columns):
+                X[i, c] += gain * e[c]
+            for j in range(n):
+                P[i, j] -= gain * a[j]
+        for c in range(columns):
+            scaled = e[c] / F
+            for d in range(columns):
+                gram[c, d] += scaled * e[d]
+    return log_F
+
+
+@compiled
+def _left(gram: Any) -> float:
+    """``log|N|``, N the normal matrix of all columns but the first, and the square that they leave of the first."""
+    p = len(gram) - 1
+    L = np.zeros((p + 1, p + 1))  # Cholesky of N, and the first column as the last row
+    log_N, left = 0.0, gram[0, 0]
+    for i in range(p + 1):
+        for j in range(min(i + 1, p)):
+            value = gram[1 + i if i < p else 0, 1 + j]
+            for m in range(j):
+                value -= L[i, m] * L[j, m]
+            L[i, j] = math.sqrt(value) if i == j else value / L[j, j]
+        if i < p:
+            log_N += 2.0 * math.log(L[i, i])
+    for j in range(p):
+        left -= L[p, j] ** 2
+    return log_N + left

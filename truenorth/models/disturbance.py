@@ -17,10 +17,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truenorth.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -51,67 +53,6 @@ class Oscillator:
         """Displacement and velocity, of each stage."""
         return 2 * self.order
 
-    @cached_property
-    def stationary(self) -> Array:
-        """(n, n) covariance of the states at any time."""
-        w, damp = self.frequency, 2.0 * self.damping * self.frequency
-        first = np.array([1.0 / w**2, 1.0])  # of a stage with unit variance of velocity
-        if self.order == 1:
-            return np.diag(self.sigma**2 * first)
-        # The Lyapunov equation of the two stages, by hand: with stage 1 of unit velocity (x1, v1), stage 2 (x2, v2),
-        # E[v1 x2] = -E[x1 v2] = p, E[x1 x2] = r, E[v1 v2] = s; A P + P A' + noise = 0 gives p = 0 = s - w^2 r + ...
-        s = 1.0 / (2.0 * damp)  # d/dt E[v1 v2] = -2 damp s - w^2 (E[x1 v2] + E[v1 x2]) + E[v1^2] = 0
-        v2 = s / damp  # d/dt E[v2^2] = -2 damp v2 + 2 s = 0
-        P = np.zeros((4, 4))
-        P[[0, 1, 2, 3], [0, 1, 2, 3]] = first[0], first[1], v2 / w**2, v2
-        P[1, 3] = P[3, 1] = s
-        P[0, 2] = P[2, 0] = s / w**2  # d/dt E[x1 v2] = s - w^2 r = 0
-        return self.sigma**2 / v2 * P
-
-    def transition(self, interval: float) -> Array:
-        """(n, n) over an interval, s."""
-        one = self._stage(np.asarray(interval))
-        if self.order == 1:
-            return one
-        Phi = np.zeros((4, 4))
-        Phi[:2, :2] = Phi[2:, 2:] = one
-        Phi[2:, :2] = self._coupled(np.asarray(interval))
-        return Phi
-
-    def noise(self, interval: float) -> Array:
-        """(n, n) covariance that an interval adds, ``int exp(A s) n exp(A' s) ds``: what keeps the states stationary."""
-        density = 4.0 * self.damping * self.frequency * self.stationary[1, 1]  # of n
-        s = 0.5 * interval * (1.0 + NODES)
-        reached = self._stage(s)[:, :, 1]
-        if self.order == 2:
-            reached = np.concatenate([reached, self._coupled(s)[:, :, 1]], axis=1)
-        Q: Array = (0.5 * interval * density * WEIGHTS * reached.T) @ reached
-        return 0.5 * (Q + Q.T)
-
-    def _stage(self, t: Array) -> Array:
-        """``exp(A t)`` of one stage, (..., 2, 2)."""
-        w, decay = self.frequency, self.damping * self.frequency
-        turn = w * math.sqrt(1.0 - self.damping**2)
-        fade = np.exp(-decay * t)
-        c, s = fade * np.cos(turn * t), fade * np.sin(turn * t) / turn
-        out = np.empty((*t.shape, 2, 2))
-        out[..., 0, 0], out[..., 0, 1] = c + decay * s, s
-        out[..., 1, 0], out[..., 1, 1] = -(w**2) * s, c - decay * s
-        return out
-
-    def _coupled(self, t: Array) -> Array:
-        """``int_0^t exp(A (t - s)) B exp(A s) ds``, (..., 2, 2), where B takes x1' to x2''."""
-        s = 0.5 * t[..., None] * (1.0 + NODES)
-        after, before = self._stage(t[..., None] - s)[..., 1], self._stage(s)[..., 1, :]
-        return np.einsum("...k,...ki,...kj->...ij", 0.5 * t[..., None] * WEIGHTS, after, before)
-
-    @property
-    def output(self) -> Array:
-        """(n,) row that takes the states to the velocity put out."""
-        row = np.zeros(self.states)
-        row[-1] = 1.0
-        return row
-
 
 @dataclass(frozen=True)
 class AxisMotion:
@@ -137,20 +78,116 @@ class AxisMotion:
         """One sigma of the mean velocity of an interval, m/s."""
         return math.sqrt(self.white**2 + sum(item.sigma**2 for item in self.oscillators))
 
+    @property
+    def table(self) -> tuple[NDArray[np.int64], Array]:
+        """Orders (m,), and sigma, frequency and damping (m, 3) of the oscillators: the form that kernels take."""
+        orders = np.array([item.order for item in self.oscillators], dtype=np.int64)
+        values = np.array([(item.sigma, item.frequency, item.damping) for item in self.oscillators])
+        return orders, values.reshape(-1, 3)
+
     def blocks(self, interval: float) -> tuple[Array, Array, Array, Array]:
         """Transition, process noise, stationary covariance (n, n), and output row (n,), of all oscillators."""
         n = self.states
         Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-        first = 0
-        for item in self.oscillators:
-            part = slice(first, first + item.states)
-            Phi[part, part], Q[part, part], P[part, part] = _matrices(item, interval)
-            h[part] = item.output
-            first = part.stop
+        fill_blocks(*self.table, interval, Phi, Q, P, h)
         return Phi, Q, P, h
 
+    def autocovariance(self, interval: float, count: int) -> Array:
+        """Of the oscillators' velocity at lags 0, 1 .. intervals, (count,), (m/s)^2; what is white is not in it."""
+        acf = np.zeros(count)
+        add_autocovariance(*self.table, interval, acf)
+        return acf
 
-@lru_cache(maxsize=256)
-def _matrices(item: Oscillator, interval: float) -> tuple[Array, Array, Array]:
-    """Transition, process noise and stationary covariance; kept, since a search moves one oscillator at a time."""
-    return item.transition(interval), item.noise(interval), item.stationary
+
+@compiled
+def fill_blocks(orders: Any, values: Any, interval: float, Phi: Any, Q: Any, P: Any, h: Any) -> int:
+    """Write the blocks of all oscillators along the diagonals; the number of their states.
+
+    Parameters
+    ----------
+    orders, values
+        As in :attr:`AxisMotion.table`.
+    interval : float, s
+    Phi, Q, P : (n, n) arrays, n no less than the states
+        Zero on entry.
+    h : (n,) array
+    """
+    first = 0
+    for m in range(len(orders)):
+        _fill(orders[m], values[m, 0], values[m, 1], values[m, 2], interval, first, Phi, Q, P)
+        first += 2 * orders[m]
+        h[first - 1] = 1.0
+    return first
+
+
+@compiled
+def _fill(
+    order: int, sigma: float, w: float, zeta: float, interval: float, first: int, Phi: Any, Q: Any, P: Any
+) -> None:
+    damp = 2.0 * zeta * w
+    stages = _stages(w, zeta, interval)
+    for a in range(order):
+        for i in range(2):
+            for j in range(2):
+                Phi[first + 2 * a + i, first + 2 * a + j] = stages[0][2 * i + j]
+                if a == 1:
+                    Phi[first + 2 + i, first + j] = stages[1][2 * i + j]
+    # The Lyapunov equation by hand. A stage driven by white noise: E[x'^2] = w^2 E[x^2], nothing between them. Behind it, as
+    # multiples of E[x2'^2]: E[x1'^2] = 2 damp^2, E[x1' x2'] = damp = w^2 E[x1 x2], E[x1 x2'] = 0 = E[x1' x2].
+    variance = sigma**2
+    white = 2.0 * damp * variance  # density of the noise that drives the first stage
+    last = first + 2 * (order - 1)
+    P[last, last], P[last + 1, last + 1] = variance / w**2, variance
+    if order == 2:
+        white *= 2.0 * damp**2
+        P[first, first], P[first + 1, first + 1] = 2.0 * damp**2 * variance / w**2, 2.0 * damp**2 * variance
+        P[first, last] = P[last, first] = damp * variance / w**2
+        P[first + 1, last + 1] = P[last + 1, first + 1] = damp * variance
+    # What an interval adds: int exp(A s) n exp(A' s) ds.
+    for k in range(len(NODES)):
+        weight = 0.5 * interval * white * WEIGHTS[k]
+        reached = _stages(w, zeta, 0.5 * interval * (1.0 + NODES[k]))
+        for i in range(2 * order):
+            for j in range(2 * order):
+                Q[first + i, first + j] += weight * reached[i // 2][2 * (i % 2) + 1] * reached[j // 2][2 * (j % 2) + 1]
+
+
+@compiled
+def _stages(w: float, zeta: float, t: float) -> Any:
+    """``exp(A t)`` of one stage, and ``int_0^t exp(A (t - s)) B exp(A s) ds``, where B takes x1' to x2''; by rows.
+
+    B is minus the derivative of A by twice the decay, so that the integral is minus that of ``exp(A t)``.
+    """
+    decay = zeta * w
+    turn = w * math.sqrt(1.0 - zeta**2)
+    fade = math.exp(-decay * t)
+    c, s = fade * math.cos(turn * t), fade * math.sin(turn * t) / turn
+    dc, ds = -t * c + decay * t * s, -t * s - decay / turn**2 * (t * c - s)  # by the decay
+    return (
+        (c + decay * s, s, -(w**2) * s, c - decay * s),
+        (-0.5 * (dc + s + decay * ds), -0.5 * ds, 0.5 * w**2 * ds, -0.5 * (dc - s - decay * ds)),
+    )
+
+
+@compiled
+def add_autocovariance(orders: Any, values: Any, interval: float, acf: Any) -> None:
+    """Add the autocovariances of the oscillators' velocities at lags 0, 1 .. intervals to `acf`.
+
+    With decay d and turn b, and u = d / b: ``exp(-d t) (cos bt - u sin bt)`` of the first order,
+    ``exp(-d t) ((1 + d t (1 - u^2)) cos bt + (u^3 - 2 d t u) sin bt)`` of the second: its value and first three derivatives
+    at zero are those of the states' covariance.
+    """
+    for m in range(len(orders)):
+        variance, w, zeta = values[m, 0] ** 2, values[m, 1], values[m, 2]
+        decay, turn = zeta * w, w * math.sqrt(1.0 - zeta**2)
+        u = decay / turn
+        fade = math.exp(-decay * interval)
+        c_step, s_step = fade * math.cos(turn * interval), fade * math.sin(turn * interval)
+        c, s = 1.0, 0.0
+        for k in range(len(acf)):
+            dt = decay * interval * k
+            if orders[m] == 1:
+                acf[k] += variance * (c - u * s)
+            else:
+                acf[k] += variance * ((1.0 + dt * (1.0 - u**2)) * c + (u**3 - 2.0 * dt * u) * s)
+            c, s = c * c_step - s * s_step, c * s_step + s * c_step
