@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from truenorth.filters.scalar import deviance
 
 K = 40
-PHI = np.array([[0.9, 0.3, 0.0], [-0.3, 0.9, 0.0], [0.0, 0.0, 1.0]])
-Q = np.diag([0.2, 0.1, 0.05])
-P0 = np.diag([1.0, 2.0, 0.0])
-H = np.array([1.0, 0.0, 1.0])
+PHI = np.array([[0.9, 0.3, 0.0, 0.0], [-0.3, 0.9, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+Q = np.diag([0.2, 0.1, 0.05, 0.01])
+P0 = np.zeros((4, 4))
+P0[:2, :2] = scipy.linalg.solve_discrete_lyapunov(PHI[:2, :2], Q[:2, :2])
+H = np.array([1.0, 0.0, 1.0, 0.0])
 
 
 def dense(y, B, r):
@@ -33,12 +35,12 @@ def dense(y, B, r):
 def test_against_the_dense_gaussian(r):
     y = np.random.default_rng(3).standard_normal(K)
     B = np.polynomial.legendre.legvander(np.linspace(-1, 1, K), 2)
-    assert deviance(PHI, Q, P0, H, r, np.column_stack([y, B])) == pytest.approx(dense(y, B, r), rel=1e-10)
+    assert deviance(PHI, Q, P0, H, r, np.column_stack([y, B]), 2) == pytest.approx(dense(y, B, r), rel=1e-10)
 
 
 def test_what_is_linear_is_free():
     """Anything added along the columns changes nothing."""
     y = np.random.default_rng(4).standard_normal(K)
     B = np.polynomial.legendre.legvander(np.linspace(-1, 1, K), 2)
-    one, two = (deviance(PHI, Q, P0, H, 0.1, np.column_stack([x, B])) for x in (y, y + B @ [3.0, -2.0, 5.0]))
+    one, two = (deviance(PHI, Q, P0, H, 0.1, np.column_stack([x, B]), 2) for x in (y, y + B @ [3.0, -2.0, 5.0]))
     assert two == pytest.approx(one, rel=1e-9)

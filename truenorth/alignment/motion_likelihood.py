@@ -130,4 +130,4 @@ def _deviances(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q:
         first = fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, Phi, Q, P, h)
         Phi[first:, first:], Q[first:, first:] = walk_Phi, walk_Q
         h[first] = 1.0
-        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y)
+        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first)

@@ -123,7 +123,7 @@ class Indexed:
             w, dw, f = (_turned_back(R, x) for x in (w, dw, f))
             dw = dw + acceleration * e - rate * np.cross(e, w)
             w = w + rate * e
-            C = np.einsum("...ij,...jk->...ik", C, R)
+            C = C @ R
         return MotionStates(body.time, C, body.v_n, body.lat, body.lon, body.alt, w, f, dw)
 
 
@@ -146,7 +146,7 @@ def C_bs_from_angles(axes: Sequence[str], angles: ArrayLike) -> Array:
 def _chain(directions: Sequence[Array], angles: Array) -> Array:
     C = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for i, direction in enumerate(directions):
-        C = np.einsum("...ij,...jk->...ik", C, _rotation(direction, angles[..., i]))
+        C = C @ _rotation(direction, angles[..., i])
     return C
 
 
