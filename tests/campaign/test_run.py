@@ -1,5 +1,6 @@
 """Campaigns: the same numbers wherever they are worked out; nothing lost, nothing twice, whatever kills them."""
 
+import json
 import os
 import random
 import signal
@@ -110,10 +111,84 @@ def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path):
     assert ends["status"][1] == "aligned"
 
 
+@pytest.mark.parametrize("others", [[], [REST]], ids=["alone", "beside a good one"])
+def test_a_scenario_that_cannot_be_is_rows_and_does_not_spoil_the_report(tmp_path, others):
+    """What is wrong with the motion shows when it is built, after the plan has been read."""
+    impossible = REST | {"motion": {"kind": "legs", "legs": [{"kind": "turn", "angle": "9 deg", "rate": "-1 deg/s"}]}}
+    plan = {"scenarios": [impossible, *others], "runs": 2, "times": ["20 s"], "methods": ["oba"]}
+    result = run_campaign(PLAN | plan, tmp_path)
+    names = {path.name for path in result.save()}
+    assert names >= {"summary.csv", "report.html", "convergence.png", "distribution.png"}
+    ends = outcomes(result.table)
+    assert list(ends["status"]) == ["failed"] * 2 + ["aligned"] * 2 * len(others)
+    assert "turn of 9 deg at -1 deg/s" in ends["reason"][0]
+    panels = result.plot()["convergence"].axes
+    assert [text.get_text() for text in panels[0].texts] == ["no answer"]
+    for panel in panels[1:]:
+        (bound,) = [line for line in panel.lines if "Cramer-Rao" in str(line.get_label())]
+        np.testing.assert_array_equal(bound.get_xdata(), [20.0, 40.0])
+        assert not panel.texts
+
+
+def test_what_goes_wrong_while_an_answer_is_judged_is_a_row(tmp_path, monkeypatch):
+    def broken(answer, simulated):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr("truenorth.campaign.aligning._errors", broken)
+    ends = outcomes(run_campaign(PLAN | {"methods": ["oba"], "runs": 2}, tmp_path).table)
+    assert list(zip(ends["status"], ends["reason"], strict=True)) == [("failed", "LinAlgError: Singular matrix")]
+
+
 def test_a_second_process_is_refused(tmp_path):
     plan = read_plan(PLAN)
     with opened(tmp_path, plan), pytest.raises(UsageError, match="another process works on this folder"):
         run_campaign(plan, tmp_path)
+
+
+class Windows:
+    """Stands for msvcrt: a byte of a file can be locked once, from where the file stands."""
+
+    LK_NBLCK = 2
+
+    def __init__(self):
+        self.locked = set()
+
+    def locking(self, file, mode, size):
+        byte = (os.fstat(file).st_ino, os.lseek(file, 0, os.SEEK_CUR))
+        if (mode, size) != (self.LK_NBLCK, 1) or byte in self.locked:
+            raise PermissionError(13, "Permission denied")
+        self.locked.add(byte)
+
+
+def test_a_second_process_is_refused_on_windows_too(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fcntl", None)  # there is none on Windows
+    monkeypatch.setitem(sys.modules, "msvcrt", Windows())
+    test_a_second_process_is_refused(tmp_path)
+
+
+def _begun_with(folder, **other):
+    manifest = folder / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | other))
+
+
+@pytest.mark.parametrize("name", ["truenorth", "numpy", "scipy", "numba", "platform"])
+def test_runs_of_two_versions_are_not_mixed(tmp_path, name):
+    plan = PLAN | {"methods": ["oba"], "runs": 2}
+    before = run_campaign(plan, tmp_path).table
+    _begun_with(tmp_path, **{name: "0.0"})
+    with pytest.raises(UsageError, match=rf"was begun with {name} 0\.0 \(here .*--no-resume"):
+        run_campaign(plan | {"runs": 4}, tmp_path)
+    pd.testing.assert_frame_equal(run_campaign(plan, tmp_path).table, before)  # nothing is missing: nothing is mixed
+
+
+def test_begun_anew_a_folder_keeps_no_old_run(tmp_path):
+    run_campaign(PLAN | {"methods": ["oba"], "runs": 4, "seed": 3}, tmp_path)
+    _begun_with(tmp_path, numpy="0.0")
+    plan = PLAN | {"methods": ["oba"], "runs": 2}
+    anew = run_campaign(plan, tmp_path, resume=False)
+    assert len(list((tmp_path / "runs").iterdir())) == 1
+    pd.testing.assert_frame_equal(anew.table, run_campaign(plan, tmp_path).table, check_exact=True)
+    assert json.loads((tmp_path / "manifest.json").read_text())["numpy"] == np.__version__
 
 
 def test_another_plan_is_refused(undisturbed):
@@ -231,6 +306,7 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.count("data:image/png;base64") == len(figures)
     assert "http" not in page.split("<pre")[0]
+    assert "NEES and NIS at the end of the log" in page
     again = read_campaign(tmp_path / "out")
     assert set(again.convergence["converged"]) <= {0.0, 0.25, 0.5, 0.75, 1.0}
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
@@ -240,6 +316,8 @@ def test_the_bound_is_not_beaten_and_nearly_reached(tmp_path):
     """100 still runs, a filter that is told the truth: RMS over the Cramer-Rao bound within its 99.9 % band of 1."""
     plan = PLAN | {"runs": 100, "block": 50, "methods": ["kalman"]}
     table = run_campaign(plan, tmp_path, workers=2).summary.set_index("quantity")
+    assert 0.5 < table.loc["nis", "mean"] < table.loc["nis", "ratio_high"]  # below 1: it allows for a base that sways
     for quantity in ("phi_e", "phi_n", "phi_u"):
-        ratio = table.loc[quantity, "rms"] / table.loc[quantity, "bound"]
+        ratio = table.loc[quantity, "rms_over_bound"]
+        assert ratio == table.loc[quantity, "rms"] / table.loc[quantity, "bound"]
         assert 1 - 3.3 / np.sqrt(200) < ratio < 1 + 3.3 / np.sqrt(200)

@@ -30,7 +30,7 @@ def test_statistics_of_three_runs():
 def test_bands_hold_what_they_promise():
     """Honest sigmas and NEES of 400 campaigns of 50 runs: 95 % of the ratios inside; a false alarm in a thousand."""
     rng = np.random.default_rng(3)
-    inside = {"ratio": 0, "level": 0, "nees": 0, "rms": 0}
+    inside = {"ratio": 0, "level": 0, "nees": 0, "nis": 0, "rms": 0}
     for _ in range(400):
         x = rng.standard_normal((50, 3))
         # Every third run has its heading refused: its level is judged, and its normalised square has two components.
@@ -39,7 +39,12 @@ def test_bands_hold_what_they_promise():
         for k, v in enumerate(x):
             known = v if k % 3 else v[:2]
             rows.append(Row(0, "a", k, 1.0, "nees", float(known @ known) / len(known)))
+        for k in range(20):  # as many innovations as the run is long
+            squares = rng.standard_normal(10 + 3 * k) ** 2
+            rows.append(Row(0, "a", k, 1.0, "nis", float(squares.mean()), math.sqrt(2 / squares.size)))
         table = summarise(frame(rows)).set_index("quantity")
+        nis = table.loc["nis"]
+        inside["nis"] += nis["ratio_low"] < nis["mean"] < nis["ratio_high"]
         ratio, level, nees = table.loc["phi_u"], table.loc["level"], table.loc["nees"]
         inside["level"] += level["ratio_low"] < level["rms_over_sigma"] < level["ratio_high"]
         inside["ratio"] += ratio["ratio_low"] < ratio["rms_over_sigma"] < ratio["ratio_high"]
@@ -49,7 +54,14 @@ def test_bands_hold_what_they_promise():
     assert abs(inside["ratio"] - 380) < spread
     assert abs(inside["level"] - 380) < spread
     assert abs(inside["nees"] - 380) < spread
+    assert abs(inside["nis"] - 380) < spread
     assert inside["rms"] > 400 * 0.95 - spread - 20  # percentile intervals of 50 runs fall a few per cent short
+
+
+def test_nothing_but_failures_is_a_table_without_rows():
+    table = summarise(frame([Row(0, "a", 0, 1.0, "outcome", status="failed", reason="x")]), names={0: "case"})
+    assert len(table) == 0
+    assert list(table.columns[:5]) == ["case", "name", "method", "time_s", "quantity"]
 
 
 def test_the_bootstrap_repeats():

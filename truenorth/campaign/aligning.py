@@ -68,20 +68,23 @@ def _aligned(
         start = simulated.motion.states(np.array(case.built.start))
         place = Position(float(start.lat), float(start.lon), float(start.alt))
         answer = align(record, place, spec, method.method, heading_limit=plan.heading_limit)
+        errors = [
+            Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
+            for quantity, value, sigma, unit in _errors(answer, simulated)
+        ]
     except Exception as error:
         return [_failure(case, method.name, run, time, error)]
     outcome = Row(
         case.number, method.name, run, time, "outcome", status=answer.status, reason="; ".join(answer.reasons)
     )
-    errors = (
-        Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
-        for quantity, value, sigma, unit in _errors(answer, simulated)
-    )
     return [outcome, *errors]
 
 
 def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, float, float, str]]:
-    """Quantity, error, sigma and unit of what an alignment found."""
+    """Quantity, error, sigma and unit of what an alignment found.
+
+    The squares, normalised by what the method says, are means over components: 1 where it says the truth.
+    """
     true = simulated.motion.states(np.array(answer.time))
     phi = -rotation_vector_from_dcm(answer.C_nb @ true.C_nb.T)  # C_hat = (I - [phi x]) C
     sigma = np.sqrt(np.diag(answer.phi_covariance))
@@ -92,6 +95,9 @@ def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, flo
     yield "level", level, math.hypot(sigma[0], sigma[1]) / ARCMIN, "arcmin"
     block = answer.phi_covariance[:usable, :usable]
     yield "nees", float(phi[:usable] @ np.linalg.solve(block, phi[:usable])) / usable, math.nan, "1"
+    if answer.history is not None:
+        count = int(np.isfinite(answer.history.innovation).sum())
+        yield "nis", float(np.nansum(answer.history.nis)) / count, math.sqrt(2.0 / count), "1"
     for what, found, spread, drawn, unit, scale in (
         ("gyro_bias", answer.gyro_bias, answer.gyro_bias_sigma, simulated.errors.gyro_bias, "deg/h", DEG_PER_HOUR),
         ("accel_bias", answer.accel_bias, answer.accel_bias_sigma, simulated.errors.accel_bias, "ug", MICRO_G),

@@ -36,13 +36,18 @@ def bounds(plan: Plan) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        case, time_s, quantity (phi_e, phi_n, phi_u), bound (arcmin); NaN where the filter has no answer.
+        case, time_s, quantity (phi_e, phi_n, phi_u), bound (arcmin); NaN where the filter has no answer, and for a scenario that
+        cannot be simulated.
     """
     rows = []
     for case in plan.cases:
-        ideal = case.built.ideal(plan.seed, 0, case.scenario_number)
+        try:
+            ideal = case.built.ideal(plan.seed, 0, case.scenario_number)
+        except TruenorthError:  # a motion that cannot be: its runs say so
+            ideal = None
         for time in (*plan.times, case.built.duration):
-            for quantity, bound in zip(("phi_e", "phi_n", "phi_u"), _bound(case, ideal, time), strict=True):
+            found = np.full(3, np.nan) if ideal is None else _bound(case, ideal, time)
+            for quantity, bound in zip(("phi_e", "phi_n", "phi_u"), found, strict=True):
                 rows.append((case.number, time, quantity, bound))
     return pd.DataFrame(rows, columns=["case", "time_s", "quantity", "bound"])
 

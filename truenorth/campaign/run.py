@@ -43,13 +43,15 @@ class Campaign:
     def summary(self) -> pd.DataFrame:
         """Statistics over runs of each quantity; see :func:`truenorth.campaign.summarise`.
 
-        Beside the attitude errors stands the Cramer-Rao ``bound`` of the case, see :mod:`truenorth.campaign.bound`.
+        Beside the attitude errors stands the Cramer-Rao ``bound`` of the case, see :mod:`truenorth.campaign.bound`, and how many
+        times as large the RMS is, ``rms_over_bound``.
         """
         from truenorth.campaign.bound import bounds
         from truenorth.campaign.summary import summarise
 
         table = summarise(self.table, names=self.case_names)
-        return table.merge(bounds(self.plan), how="left", on=["case", "time_s", "quantity"])
+        table = table.merge(bounds(self.plan), how="left", on=["case", "time_s", "quantity"])
+        return table.assign(rms_over_bound=table["rms"] / table["bound"])
 
     @cached_property
     def comparison(self) -> pd.DataFrame:
@@ -103,6 +105,7 @@ def run_campaign(
     *,
     workers: int = 1,
     scheduler: str | None = None,
+    resume: bool = True,
     progress: Progress | None = None,
 ) -> Campaign:
     """Work on a plan; what a folder already holds of it is not done again.
@@ -116,6 +119,8 @@ def run_campaign(
         ``if __name__ == "__main__":``.)
     scheduler : str, optional
         Address of a Dask scheduler, ``tcp://host:port``; its workers are used instead.
+    resume : bool
+        Go on with the runs that the folder holds; without it they are removed and all are done.
     progress : callable, optional
         Called with the runs done and the runs in all, cases counted apart.
 
@@ -126,7 +131,8 @@ def run_campaign(
     Raises
     ------
     UsageError
-        A folder of another plan or under work by another process, no cluster, a disk that is full: what is done stays.
+        A folder of another plan, of other versions or under work by another process, no cluster, a disk that is full: what is
+        done stays.
     DataError
         A plan with a mistake.
     """
@@ -135,7 +141,7 @@ def run_campaign(
     plan = read_plan(plan)
     tell = progress or (lambda done, total: None)
     total = plan.runs * len(plan.cases)
-    with opened(folder, plan) as store:
+    with opened(folder, plan, resume=resume) as store:
         blocks = store.missing(len(plan.cases), plan.runs, plan.block)
         done = total - sum(block.last - block.first + 1 for block in blocks)
         tell(done, total)

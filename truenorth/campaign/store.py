@@ -11,7 +11,7 @@ import json
 import os
 import platform
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -56,12 +56,14 @@ class Store:
     def done(self) -> set[tuple[int, int]]:
         """Pairs of case and run whose shard stands."""
         pairs: set[tuple[int, int]] = set()
-        for path in self.runs.glob("case*.parquet"):
-            match = _SHARD.fullmatch(path.name)
-            if match:
-                case, first, last = map(int, match.groups())
-                pairs.update((case, run) for run in range(first, last + 1))
+        for path in self.shards():
+            case, first, last = map(int, _SHARD.fullmatch(path.name).groups())  # type: ignore[union-attr]
+            pairs.update((case, run) for run in range(first, last + 1))
         return pairs
+
+    def shards(self) -> list[Path]:
+        """The files of runs that are done."""
+        return [path for path in self.runs.glob("case*.parquet") if _SHARD.fullmatch(path.name)]
 
     def missing(self, cases: int, runs: int, block: int) -> list[Block]:
         """What is left to do, in blocks of neighbouring runs."""
@@ -93,13 +95,21 @@ class Store:
 
 
 @contextmanager
-def opened(folder: str | os.PathLike[str], plan: Plan) -> Iterator[Store]:
+def opened(folder: str | os.PathLike[str], plan: Plan, *, resume: bool = True) -> Iterator[Store]:
     """The store of a plan, locked for this process.
+
+    Parameters
+    ----------
+    folder : path
+    plan : Plan
+    resume : bool
+        Keep the runs that are there; without it they are removed, whosever plan they are of.
 
     Raises
     ------
     UsageError
-        Another process works on the folder, or it holds another plan, or one made with another version.
+        Another process works on the folder; it holds another plan; or runs are missing, and those that are there were made with
+        other versions or on another platform.
     """
     target = writable_folder(folder)
     with _locked(target / ".lock"):
@@ -107,26 +117,51 @@ def opened(folder: str | os.PathLike[str], plan: Plan) -> Iterator[Store]:
         writable_folder(store.runs)
         for stray in store.runs.glob(".*.part.parquet"):  # of a process that was killed
             stray.unlink(missing_ok=True)
-        _claim(target, plan)
+        if not resume:
+            for shard in store.shards():
+                shard.unlink()
+            (target / "manifest.json").unlink(missing_ok=True)
+        _claim(store, plan)
         yield store
 
 
-def _claim(folder: Path, plan: Plan) -> None:
-    """Check that the folder is this plan's, or make it so."""
+def versions() -> dict[str, str]:
+    """What the numbers come from beside the plan: with all of it alike they are the same to the bit."""
     import numba
+    import scipy
+
+    return {
+        "truenorth": __version__,
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def other_versions(wanted: Mapping[str, str]) -> str:
+    """In words what is not here as it is wanted, such as ``numpy 2.4.5 (here 2.4.6)``; empty where all is."""
+    here = versions()
+    return ", ".join(f"{name} {value} (here {here[name]})" for name, value in wanted.items() if here[name] != value)
+
+
+def _claim(store: Store, plan: Plan) -> None:
+    """Check that the folder is this plan's, or make it so."""
     import yaml
 
-    manifest = folder / "manifest.json"
+    folder, manifest = store.folder, store.folder / "manifest.json"
     if manifest.is_file():
         held = json.loads(manifest.read_text(encoding="utf-8"))
         if held.get("plan_sha256") != plan.fingerprint:
             raise UsageError(
-                f"{folder}: holds the runs of another plan (see its plan.yaml); name another folder with -o"
+                f"{folder}: holds the runs of another plan (see its plan.yaml); name another folder with -o, or begin anew "
+                "with --no-resume"
             )
-        if held.get("truenorth") != __version__:
+        other = other_versions({name: held[name] for name in versions() if name in held})
+        if other and store.missing(len(plan.cases), plan.runs, plan.block):
             raise UsageError(
-                f"{folder}: was begun with truenorth {held.get('truenorth')}, this is {__version__}; finish it with that "
-                "version, or name another folder with -o"
+                f"{folder}: was begun with {other}, and runs of both would not be alike to the bit; finish it with what it was "
+                "begun with, name another folder with -o, or begin anew with --no-resume"
             )
     text = yaml.safe_dump(plan.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
     with atomic_path(folder / "plan.yaml") as temporary:
@@ -135,11 +170,8 @@ def _claim(folder: Path, plan: Plan) -> None:
         facts = {
             "plan_sha256": plan.fingerprint,
             "seed": plan.seed,
-            "truenorth": __version__,
-            "numpy": np.__version__,
-            "numba": numba.__version__,
+            **versions(),
             "python": platform.python_version(),
-            "platform": f"{platform.system()} {platform.machine()}",
         }
         with atomic_path(manifest) as temporary:
             temporary.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
@@ -148,19 +180,31 @@ def _claim(folder: Path, plan: Plan) -> None:
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
     """Hold a lock that the system takes back when the process ends, however it ends."""
-    try:
-        import fcntl
-    except ImportError:  # Windows: no advisory locks; two processes on one folder are then the user's to avoid
-        yield
-        return
-    with path.open("w") as file:
+    lock = _system_lock()
+    # Not "w": on Windows emptying a file that another process has locked would fail with a message of its own.
+    with path.open("a") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(file.fileno())
         except OSError:
             raise UsageError(
                 f"{path.parent}: another process works on this folder; wait for it, or name another with -o"
             ) from None
         yield
+
+
+def _system_lock() -> Callable[[int], None]:
+    """Locks an open file, or raises OSError at once: flock where there is one, a lock of the first byte on Windows."""
+    try:
+        import fcntl
+    except ImportError:
+        import msvcrt
+
+        def lock_first_byte(file: int) -> None:
+            os.lseek(file, 0, os.SEEK_SET)  # msvcrt locks from where the file stands
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+
+        return lock_first_byte
+    return lambda file: fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def read_table(folder: str | os.PathLike[str], runs: int | None = None) -> pd.DataFrame:

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 RESAMPLES = 1000
 LEVEL = 0.95
 KEYS = ["case", "method", "time_s", "quantity"]
+STATISTICS = ["unit", "runs", "failed", "rms", "mean", "median", "p95", "max", "rms_low", "rms_high"]
+STATISTICS += ["sigma", "rms_over_sigma", "ratio_low", "ratio_high"]
 
 
 def summarise(table: pd.DataFrame, names: Mapping[int, str] | None = None, level: float = LEVEL) -> pd.DataFrame:
@@ -42,7 +44,8 @@ def summarise(table: pd.DataFrame, names: Mapping[int, str] | None = None, level
         ``runs`` (with a value), ``failed``; ``rms`` with its bootstrap interval ``rms_low, rms_high``; ``mean, median, p95, max``
         (the last three of the magnitude); ``sigma`` (root mean square of what was claimed), ``rms_over_sigma`` (of the errors
         each over its own sigma) and its band ``ratio_low, ratio_high`` for honest sigmas. For `nees`, ``mean`` over runs and their
-        components (two where the heading was refused) and its band. The band of `level`, of two tilts, is for equal sigmas of both.
+        components (two where the heading was refused) and its band; for `nis`, over all innovations, as if they were independent.
+        The band of `level`, of two tilts, is for equal sigmas of both.
     """
     import pandas as pd
 
@@ -57,13 +60,13 @@ def summarise(table: pd.DataFrame, names: Mapping[int, str] | None = None, level
             dict(zip(KEYS, key, strict=True))
             | {"unit": str(group["unit"].iloc[0]), "runs": len(values), "failed": int(failed.get(key[:3], 0))}
             | (
-                _of_nees(values, np.array([3 if (*key[:3], run) in with_heading else 2 for run in group["run"]]), level)
-                if key[3] == "nees"
+                _of_squares(values, _sizes(key, group, with_heading), level)
+                if key[3] in ("nees", "nis")
                 else _statistics(values, sigmas, 2 if key[3] == "level" else 1, level)
             )
         )
-    result = pd.DataFrame(rows)
-    if names is not None and len(result):
+    result = pd.DataFrame(rows, columns=[*KEYS, *STATISTICS])
+    if names is not None:
         result.insert(1, "name", result["case"].map(dict(names)))
     return result
 
@@ -131,7 +134,14 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[tuple[Any, ...], pd.DataFrame]
         yield tuple(key) if isinstance(key, tuple) else (key,), group
 
 
-def _of_nees(values: Array, sizes: NDArray[np.int64], level: float) -> dict[str, float]:
+def _sizes(key: tuple[Any, ...], group: pd.DataFrame, with_heading: set[tuple[Any, ...]]) -> Array:
+    """Of how many components each normalised square is the mean."""
+    if key[3] == "nis":  # its sigma is the scatter of the mean of so many
+        return np.rint(2.0 / group["sigma"].to_numpy(float) ** 2)
+    return np.array([3.0 if (*key[:3], run) in with_heading else 2.0 for run in group["run"]])
+
+
+def _of_squares(values: Array, sizes: Array, level: float) -> dict[str, float]:
     """Statistics of normalised squares, each the mean over as many components as its size says."""
     result = _magnitudes(values, level)
     total = int(sizes.sum())

@@ -48,6 +48,12 @@ def campaign(
     scheduler: Annotated[
         str | None, typer.Option(help="Dask scheduler, tcp://host:port, in place of processes.", show_default=False)
     ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume/--no-resume", help="Go on with the runs that the folder holds, or remove them and begin anew."
+        ),
+    ] = True,
 ) -> None:
     """Simulate and align the runs of a plan, and report how large the errors are and whether sigma is honest."""
     from truenorth.campaign import read_plan, run_campaign
@@ -59,7 +65,7 @@ def campaign(
         workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else workers or os.cpu_count() or 1
     )
     with _bar() as progress:
-        result = run_campaign(chosen, output, workers=used, scheduler=scheduler, progress=progress)
+        result = run_campaign(chosen, output, workers=used, scheduler=scheduler, resume=resume, progress=progress)
     console = make_console()
     table = result.summary
     last = table[table["time_s"] == table.groupby("case")["time_s"].transform("max")]

@@ -61,19 +61,36 @@ def plot_convergence(campaign: Campaign) -> Figure:
             rows_of = _rows(campaign.table, case, method, "phi_u")
             if len(rows_of):
                 _fan(ax, rows_of, method, colour)
+        _bound(ax, campaign.summary, case)
+        if not ax.lines:
+            _no_answer(ax)
         ax.set(yscale="log", title=name, xlabel="length of the log, s")
     for ax in axes[:, 0]:
         ax.set_ylabel("|heading error|, arcmin")
     for ax in axes.flat[len(cases) :]:
         ax.set_visible(False)
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=4)
+    drawn = {label: line for ax in axes.flat for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(drawn.values()), list(drawn), loc="outside lower left", ncols=4)
     _title(
         figure,
         campaign,
         f"median with {FANS[1][0]}-{FANS[1][1]} % and {FANS[0][0]}-{FANS[0][1]} % of runs; dashed: claimed sigma",
     )
     return figure
+
+
+def _bound(ax: Axes, summary: pd.DataFrame, case: int) -> None:
+    """The Cramer-Rao bound of heading, for the figure's other lines to be held against."""
+    rows = summary[(summary["case"] == case) & (summary["quantity"] == "phi_u") & summary["bound"].notna()]
+    rows = rows.drop_duplicates("time_s").sort_values("time_s")
+    if len(rows):
+        ax.plot(rows["time_s"], rows["bound"], ":", color="black", linewidth=1.2, label="Cramer-Rao bound of one sigma")
+
+
+def _no_answer(ax: Axes) -> None:
+    """Say so in an empty panel, whose scale would mean nothing."""
+    ax.text(0.5, 0.5, "no answer", ha="center", va="center", transform=ax.transAxes)
+    ax.tick_params(axis="x", labelbottom=False)
 
 
 def _fan(ax: Axes, rows: pd.DataFrame, method: str, colour: str) -> None:
@@ -95,8 +112,10 @@ def plot_distribution(campaign: Campaign) -> Figure:
     axes = figure.subplots(2, len(cases), squeeze=False, sharex=True)
     for row, (quantity, label) in enumerate((("phi_u", "heading"), ("phi_n", "north tilt"))):
         for ax, (case, name) in zip(axes[row], cases, strict=True):
-            for at, method in enumerate(methods):
-                rows = _last(_rows(campaign.table, case, method, quantity))
+            found = [_last(_rows(campaign.table, case, method, quantity)) for method in methods]
+            if not any(map(len, found)):
+                ax.set_yticks([])
+            for at, rows in enumerate(found):
                 _violin(
                     ax, at, rows["value"].to_numpy(float), rows["sigma"].to_numpy(float), COLOURS[at % len(COLOURS)]
                 )
@@ -116,7 +135,8 @@ def plot_distribution(campaign: Campaign) -> Figure:
 
 def _violin(ax: Axes, at: int, values: Array, sigmas: Array, colour: str) -> None:
     if values.size == 0:
-        ax.text(at, 0.0, "no answer", ha="center", va="center", fontsize=8, rotation=90)
+        across = ax.get_xaxis_transform()  # x of the data, y of the panel
+        ax.text(at, 0.5, "no answer", ha="center", va="center", fontsize=8, rotation=90, transform=across)
         return
     if values.size > 3 and np.ptp(values) > 0:
         for body in ax.violinplot(values, [at], widths=0.85, showextrema=False)["bodies"]:  # type: ignore[attr-defined]
@@ -166,7 +186,7 @@ def plot_overview(campaign: Campaign) -> Figure:
 
 
 def plot_requirement(campaign: Campaign, path: str) -> Figure:
-    """What heading error a value of a parameter leads to: RMS with its interval, and the claimed sigma."""
+    """What heading error a value of a parameter leads to: RMS with its interval, the claimed sigma, and what is wanted."""
     plan = campaign.plan
     values = np.array([_number(value) for value in plan.grid[path]], dtype=np.float64)
     figure = new_figure(7.5, 5.0)
@@ -186,9 +206,13 @@ def plot_requirement(campaign: Campaign, path: str) -> Figure:
             np.array([_cell(last, case, method, column) for case in cases])
             for column in ("rms", "rms_low", "rms_high", "sigma")
         )
+        if not np.isfinite(rms).any():
+            continue
         bars = np.maximum([rms - low, high - rms], 0.0)
         ax.errorbar(values, rms, bars, fmt="o-", color=colour, capsize=3, label=f"{name}, {method}")
         ax.plot(values, sigma, "--", color=colour, linewidth=1.0)
+    wanted = np.degrees(plan.converged)
+    ax.axhline(60 * wanted, color=REFERENCE, linestyle=":", linewidth=1.2, label=f"wanted: {wanted:g} deg")
     ax.set_xscale("log")
     ax.set_xticks(values, [f"{value:g}" for value in values])
     ax.minorticks_off()

@@ -35,6 +35,7 @@ COLUMNS = {
     "median": "median",
     "p95": "95th percentile",
     "bound": "Cramer-Rao bound",
+    "rms_over_bound": "RMS/bound",
     "sigma": "claimed sigma",
     "rms_over_sigma": "RMS/sigma",
     "band": "95 % band",
@@ -99,6 +100,7 @@ def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame], figures: 
         headings=list(COLUMNS.values()),
         heading=_accuracy(tables["summary.csv"], "phi_u"),
         level=_accuracy(tables["summary.csv"], "level"),
+        consistency=_consistency(tables["summary.csv"]),
         comparison=[_compared(row) for row in comparison.to_dict("records")],
         outcomes=outcomes.to_dict("records"),
         convergence=tables["convergence.csv"].to_dict("records") if plan.times else [],
@@ -121,6 +123,25 @@ def _accuracy(summary: pd.DataFrame, quantity: str) -> list[list[str]]:
         ratio = row.get("rms_over_sigma")
         row["band"] = f"{row['ratio_low']:.2f} - {row['ratio_high']:.2f}" if ratio == ratio else ""
         rows.append([_text(row.get(column)) for column in COLUMNS])
+    return rows
+
+
+def _consistency(summary: pd.DataFrame) -> list[list[str]]:
+    """Mean NEES and NIS with their bands at the end of the log; a dash where a method has no innovations."""
+    chosen = summary[summary["quantity"].isin(["nees", "nis"])]
+    last = chosen[chosen["time_s"] == chosen.groupby("case")["time_s"].transform("max")]
+    rows = []
+    for (name, method), pair in last.groupby(["name", "method"], observed=True, sort=False):
+        found = {row["quantity"]: row for row in pair.to_dict("records")}
+        cells = [str(name), str(method), str(found["nees"]["runs"])]
+        for quantity in ("nees", "nis"):
+            row = found.get(quantity)
+            cells += (
+                ["–", ""]
+                if row is None
+                else [f"{row['mean']:.3g}", f"{row['ratio_low']:.2f} - {row['ratio_high']:.2f}"]
+            )
+        rows.append(cells)
     return rows
 
 
