@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -30,44 +31,7 @@ SHIP = Sway(
     lever_arm=(10.0, 30.0, 10.0),
 )
 WALKS = ImuSpec(gyro_bias=5e-8, gyro_random_walk=3e-7, accel_bias=5e-4, accel_random_walk=1e-4, name="walks")
-SENSOR = {
-    "bias": "1 deg/h",
-    "turn_on_bias": "1 deg/h",
-    "random_walk": "0.1 deg/sqrt(h)",
-    "sample_noise": "10 deg/h",
-    "bias_instability": "1 deg/h",
-    "rate_random_walk": "1 deg/h/sqrt(h)",
-    "scale_factor": "100 ppm",
-    "scale_factor_asymmetry": "10 ppm",
-    "misalignment": "1 arcmin",
-    "bias_temperature": "0.1 deg/h/K",
-    "scale_factor_temperature": "1 ppm/K",
-    "bandwidth": "40 Hz",
-    "filter_order": 2,
-    "latency": "3 ms",
-    "quantisation": "0.1 arcsec",
-    "range": "300 deg/s",
-}
-ACCEL = {
-    "bias": "1 mg",
-    "turn_on_bias": "1 mg",
-    "random_walk": "50 ug/sqrt(Hz)",
-    "sample_noise": "100 ug",
-    "bias_instability": "50 ug",
-    "rate_random_walk": "10 ug/sqrt(h)",
-    "bias_temperature": "10 ug/K",
-    "quantisation": "0.0001 m/s",
-    "range": "10 g",
-    "positions": [["3 cm", "0 m", "0 m"], ["0 m", "3 cm", "0 m"], ["0 m", "0 m", "3 cm"]],
-}
-EVERYTHING = imu_spec(
-    {
-        "name": "everything",
-        "gyro": SENSOR | {"g_sensitivity": "1 deg/h/g"},
-        "accel": SENSOR | ACCEL,
-        "temperature": {"start": "-10 K", "rate": "1 K/min", "time_constant": "10 min"},
-    }
-)
+EVERYTHING = imu_spec(Path(__file__).parents[1] / "examples" / "imu_every_term.yaml")
 
 
 def best(call: Callable[[], object]) -> float:

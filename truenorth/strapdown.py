@@ -218,7 +218,7 @@ def mechanise(
     )
     out = np.empty((outputs, 10))
     data = (read_only(a) for a in (steps, dtheta, dvel, k))
-    _mechanise(*data, k_before, altitude == "fixed", every, memory.updates, kernel, out)
+    mechanise_increments(*data, k_before, altitude == "fixed", every, memory.updates, kernel, out)
 
     done = updates * samples
     after = NavigationState(
@@ -243,7 +243,7 @@ def mechanise(
 
 
 @compiled
-def _mechanise(
+def mechanise_increments(
     steps: Any,
     dtheta: Any,
     dvel: Any,
@@ -255,6 +255,30 @@ def _mechanise(
     state: Any,
     out: Any,
 ) -> None:
+    """The compiled loop of :func:`mechanise`: updates of attitude, velocity and position in place; nothing is checked.
+
+    Parameters
+    ----------
+    steps : (N,) array, s
+        Lengths of the samples' intervals; those of a last update that is not whole are left over.
+    dtheta, dvel : (N, 3) arrays, rad and m/s
+        Increments along the body's axes, biases taken off.
+    k : (n-1,) array
+        Weights of the cross products of an update's n samples (:func:`truenorth.coning.coefficients`).
+    k_before : float
+        Weight of the product with the sample before the update.
+    fixed_altitude : bool
+        Height and vertical velocity are held.
+    every : int
+        Updates for each row of `out`.
+    since_output : int
+        Updates since the last one, from an earlier call.
+    state : (19,) array
+        Quaternion ``q_nb`` (scalar first), velocity east, north, up (m/s), latitude, longitude (rad), height (m), acceleration
+        (m/s^2), last `dtheta` and `dvel`; overwritten with those at the end.
+    out : (M, 10) array
+        The first ten of these after every so many updates; written.
+    """
     samples = len(k) + 1
     q = (state[0], state[1], state[2], state[3])
     vE, vN, vU = state[4], state[5], state[6]

@@ -360,7 +360,7 @@ for kind in ("rates", "increments"):
 strapdown.integrate_attitude(rows)
 strapdown.integrate_attitude(rows.tolist(), algorithm="2")
 strapdown.inertial_integrals(rows, record.accel, np.ones(9), [0, 9])
-kernels = (strapdown._mechanise, inertial_integration._integrate_attitude, inertial_integration._inertial_integrals)
+kernels = (strapdown.mechanise_increments, inertial_integration._integrate_attitude, inertial_integration._inertial_integrals)
 print([len(k.signatures) for k in kernels], [sum(k.stats.cache_misses.values()) for k in kernels])
 """
 

@@ -2,19 +2,20 @@
 
 import threading
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.bench_simulation import EVERYTHING
 from truenorth.errors import DataError, UsageError
 from truenorth.position import Position
 from truenorth.simulation import given_errors, ideal_log, rest, simulate, simulate_runs
 from truenorth.simulation.imu_errors import apply_errors
 from truenorth.simulation.streams import STREAMS
-from truenorth.specs import ImuSpec
+from truenorth.specs import ImuSpec, imu_spec
 
 PLACE = Position.from_degrees(40.0, 118.0)
+EVERYTHING = imu_spec(Path(__file__).parents[2] / "examples" / "imu_every_term.yaml")
 DEG_PER_HOUR = np.pi / 180 / 3600
 UG = 9.80665e-6
 
@@ -32,6 +33,11 @@ def test_streams_are_all_different_and_stay_what_they_are():
     assert len(set(STREAMS.values())) == len(STREAMS)
     first = ("gyro_bias", "accel_bias", "gyro_random_walk", "accel_random_walk")
     assert [STREAMS[name] for name in first] == [0, 1, 2, 3]
+
+
+def test_the_example_has_every_term():
+    same = {item.name for item in fields(ImuSpec) if getattr(EVERYTHING, item.name) == getattr(ImuSpec(), item.name)}
+    assert same <= {"correlation_time"}, same
 
 
 @pytest.mark.parametrize("kind", ["increments", "rates"])

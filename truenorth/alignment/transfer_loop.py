@@ -21,7 +21,7 @@ from truenorth.linalg import load, propagate_covariance
 from truenorth.models.ins import STATES as INS_STATES
 from truenorth.models.transfer import attitude_rows, transfer_dynamics, transfer_transition, velocity_rows
 from truenorth.navigation.kernel import joint_nis, set_matrix
-from truenorth.strapdown import _mechanise
+from truenorth.strapdown import mechanise_increments
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -158,7 +158,7 @@ def carry(
     for i in range(3):
         for j in range(3):
             mean[i, j] = half * C[i, j]
-    _mechanise(
+    mechanise_increments(
         room[:count, 0], room[:count, 1:4], room[:count, 4:7], path[:0, 0], K_BEFORE, False, 1, 0, s, path[:count]
     )
     for k in range(count):

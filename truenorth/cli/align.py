@@ -22,6 +22,7 @@ from truenorth.cli.align_in_motion import (
     align_moving,
     print_moving,
 )
+from truenorth.cli.align_options import check_options
 from truenorth.cli.align_rotary import Indexer, IndexerAxes, LeverArm, align_on_indexer
 from truenorth.cli.align_transfer import (
     ArmSigma,
@@ -62,6 +63,7 @@ Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data canno
 
 
 def align(
+    context: typer.Context,
     log: Log,
     lat: Annotated[float | None, typer.Option(help="Latitude, deg, north positive.", show_default=False)] = None,
     lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0,
@@ -147,6 +149,7 @@ def align(
     from truenorth.errors import UsageError
     from truenorth.position import Position
 
+    check_options(context)
     moving = odometer is not None or gnss is not None
     if lat is None and not moving and master is None:
         raise UsageError(
@@ -214,7 +217,6 @@ def align(
                 method,
                 odometer,
                 gnss,
-                at=at,
                 offset=offset,
                 wheel_arm=wheel_arm,
                 antenna_arm=antenna_arm,
@@ -228,7 +230,7 @@ def align(
         elif positions is not None:
             from truenorth.cli.align_positions import align_table
 
-            result = align_table(positions, method, at, record, position, imu, known, arm_sigma, limit, tell)
+            result = align_table(positions, record, position, imu, known, arm_sigma, limit, tell)
         elif indexer is not None:
             result = align_on_indexer(
                 record, position, imu, indexer, indexer_axes, lever_arm, known, at=at, limit=limit, progress=tell

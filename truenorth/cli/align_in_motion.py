@@ -77,7 +77,6 @@ def align_moving(
     odometer: Path | None,
     gnss: Path | None,
     *,
-    at: float | None,
     offset: float,
     wheel_arm: str | None,
     antenna_arm: str | None,
@@ -93,7 +92,7 @@ def align_moving(
     Raises
     ------
     UsageError
-        No specification of the IMU; an epoch was asked for; a mounting sigma that is not positive.
+        No specification of the IMU; a mounting sigma that is not positive.
     """
     from dataclasses import replace
 
@@ -110,8 +109,6 @@ def align_moving(
             "on the move a log cannot be asked for its IMU's errors; expected --imu navigation, tactical, industrial, consumer "
             "or a YAML file"
         )
-    if at is not None:
-        raise UsageError("--at with --odometer or --gnss: the attitude holds at the log's end; cut the log with --to")
     if not mounting_sigma > 0.0:
         raise UsageError(f"--mounting-sigma {mounting_sigma:g}: expected degrees above zero")
     wheel = replace(WHEEL, angle_sigma=math.radians(mounting_sigma), noise=odometer_noise)

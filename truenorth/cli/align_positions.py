@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 def align_table(
     positions: str,
-    method: str,
-    at: float | None,
     record: ImuRecord,
     position: Position,
     imu: str | None,
@@ -28,17 +26,9 @@ def align_table(
     heading_limit: float,
     tell: Callable[[str], None],
 ) -> Alignment:
-    """Align over the positions of a turntable, or say what does not go with them."""
+    """Align over the positions of a turntable."""
     if positions != "auto":
         raise UsageError(f"--positions {positions!r}; expected auto: turns and positions are found in the log")
-    if method != "auto":
-        raise UsageError(
-            f"--method {method} does not go with --positions, which has a method of its own: leave one out"
-        )
-    if at is not None:
-        raise UsageError(
-            "--at does not go with --positions, which answers at the last sample: end the log there (--to)"
-        )
     from truenorth.alignment import align_positions
 
     return align_positions(

@@ -1,0 +1,65 @@
+"""Which options of `truenorth align` go together: one procedure at a time, and what belongs to another one is not passed over."""
+
+from __future__ import annotations
+
+import typer
+
+from truenorth.errors import UsageError
+
+PROCEDURES = {
+    "--positions": "a turntable",
+    "--indexer": "an IMU on an indexer",
+    "--master": "a master INS",
+    "--odometer": "a vehicle on the move",
+    "--gnss": "a vehicle on the move",
+}
+BELONGS = {
+    "--arm-sigma": ("--positions",),
+    "--indexer-axes": ("--indexer",),
+    "--lever-arm": ("--indexer", "--master"),
+    "--lever-arm-sigma": ("--master",),
+    "--master-columns": ("--master",),
+    "--master-units": ("--master",),
+    "--matching": ("--master",),
+    "--delay": ("--master",),
+    "--flexure": ("--master",),
+    "--offset": ("--odometer", "--gnss"),
+    "--wheel-arm": ("--odometer",),
+    "--odometer-noise": ("--odometer",),
+    "--antenna-arm": ("--gnss",),
+    "--mounting": ("--odometer", "--gnss", "--master"),
+    "--mounting-sigma": ("--odometer", "--gnss", "--master"),
+}
+CLASHES = {
+    "--method": ("--positions", "--indexer", "--master"),
+    "--at": ("--positions", "--master", "--odometer", "--gnss"),
+}
+INSTEAD = {
+    "--method": "leave it out: the procedure has a method of its own",
+    "--at": "the attitude holds at the log's end: cut the log with --to",
+}
+
+
+def check_options(context: typer.Context) -> None:
+    """Refuse options of two procedures, of another procedure, and those that a procedure would not look at.
+
+    Raises
+    ------
+    UsageError
+        It names both options, and what to do.
+    """
+    given = [p.opts[0] for p in context.command.params if p.name and context.params[p.name] != p.default]
+    chosen = [option for option in given if option in PROCEDURES]
+    for option in chosen[1:]:
+        if PROCEDURES[option] != PROCEDURES[chosen[0]]:
+            raise UsageError(
+                f"{chosen[0]} ({PROCEDURES[chosen[0]]}) and {option} ({PROCEDURES[option]}) are two procedures; expected one: "
+                "align with each, in two calls"
+            )
+    for option, homes in BELONGS.items():
+        if option in given and not set(homes) & set(chosen):
+            raise UsageError(f"{option} belongs to {' or '.join(homes)}; expected it along with that, or not at all")
+    for option, others in CLASHES.items():
+        clash = [other for other in chosen if other in others]
+        if option in given and clash:
+            raise UsageError(f"{option} does not go with {clash[0]}; {INSTEAD[option]}")
