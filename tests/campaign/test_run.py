@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from tests.campaign.test_plan import PLAN, REST
 from truenorth.campaign import outcomes, read_campaign, read_plan, read_table, run_campaign
 from truenorth.campaign.execution import work
-from truenorth.campaign.store import Block, Store, opened
+from truenorth.campaign.store import Block, Store, opened, versions
 from truenorth.cli import app
 from truenorth.errors import DataError, UsageError
 
@@ -54,10 +54,50 @@ def test_processes_give_the_bits_of_one_process(undisturbed, tmp_path):
     pd.testing.assert_frame_equal(run_campaign(PLAN, tmp_path, workers=2).table, undisturbed.table, check_exact=True)
 
 
-def test_a_dask_cluster_gives_the_same_bits(undisturbed, tmp_path):
+@pytest.fixture(scope="module")
+def cluster():
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        table = run_campaign(PLAN, tmp_path, scheduler=cluster.scheduler_address).table
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as started:
+        yield started
+
+
+def test_a_dask_cluster_gives_the_same_bits(undisturbed, tmp_path, cluster):
+    table = run_campaign(PLAN, tmp_path, scheduler=cluster.scheduler_address).table
+    pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
+
+
+def test_a_lost_worker_of_a_cluster_loses_nothing(undisturbed, tmp_path, cluster):
+    lost = []
+
+    def kill_one(done, total):
+        if done and not lost:
+            lost.append(next(iter(cluster.workers.values())).pid)
+            os.kill(lost[0], signal.SIGKILL)
+
+    plan = PLAN | {"block": 1}
+    table = run_campaign(plan, tmp_path, scheduler=cluster.scheduler_address, progress=kill_one).table
+    assert lost
+    pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
+
+
+def test_workers_with_other_versions_are_refused(tmp_path, cluster, monkeypatch):
+    monkeypatch.setattr("truenorth.campaign.execution.versions", lambda: versions() | {"numpy": "0.0"})
+    with pytest.raises(UsageError, match=r"a worker of the cluster, on .* should have numpy 0\.0 \(here "):
+        run_campaign(PLAN, tmp_path, scheduler=cluster.scheduler_address)
+    assert not list((tmp_path / "runs").iterdir())
+
+
+def test_a_scheduler_that_goes_away_leaves_what_was_done(undisturbed, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+
+        def close(done, total):
+            if done:
+                cluster.close()
+
+        with pytest.raises(UsageError, match="the scheduler went away"):
+            run_campaign(PLAN | {"block": 1}, tmp_path, scheduler=cluster.scheduler_address, progress=close)
+    table = run_campaign(PLAN | {"block": 1}, tmp_path).table
     pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -11,7 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 from truenorth.campaign.plan import Plan, read_plan
-from truenorth.campaign.store import Block
+from truenorth.campaign.store import Block, other_versions, versions
 from truenorth.errors import UsageError
 
 AHEAD = 2  # blocks under way for each worker: memory stays bounded, and no worker waits
@@ -122,13 +123,16 @@ def one_thread_each() -> Iterator[None]:
 def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[tuple[Block, Any]]:
     """Blocks with their tables as they are done, by the workers of a Dask cluster, which have truenorth installed.
 
+    A worker that dies is the scheduler's to replace; what it was at is done again.
+
     Raises
     ------
     UsageError
-        Dask is not installed, or no scheduler answers.
+        Dask is not installed; no scheduler answers, or it goes away; workers die again and again, or have other versions.
     """
     try:
-        from distributed import Client, as_completed
+        from distributed import Client, KilledWorker, as_completed
+        from distributed.comm import CommClosedError
     except ImportError:
         raise UsageError("a cluster needs Dask: pip install 'truenorth[cluster]'") from None
     try:
@@ -138,20 +142,48 @@ def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[
     with client:
         plan_there = client.scatter(plan.to_mapping(), broadcast=True)
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
-        left = list(blocks)
+        left, here = list(blocks), versions()
 
         def submit(block: Block) -> Any:
-            return client.submit(
-                work, plan_there, block, key=f"{plan.fingerprint[:12]}-{block.shard}", pure=False, retries=ATTEMPTS
-            )
+            key = f"{plan.fingerprint[:12]}-{block.shard}"
+            return client.submit(work_alike, plan_there, block, here, key=key, pure=False, retries=ATTEMPTS)
 
         under_way = {submit(block): block for block in left[:ahead]}
         left = left[ahead:]
         results = as_completed(list(under_way), loop=client.loop, with_results=True)
-        for future, result in results:
-            block = under_way.pop(future)
-            if left:
-                following = submit(left[0])
-                under_way[following] = left.pop(0)
-                results.add(following)
-            yield block, result
+        try:
+            for future, result in results:
+                if future.cancelled():  # what is told in place of a table
+                    raise CommClosedError("the connection is lost")
+                block = under_way.pop(future)
+                if left:
+                    following = submit(left[0])
+                    under_way[following] = left.pop(0)
+                    results.add(following)
+                yield block, result
+        except KilledWorker as error:
+            raise UsageError(
+                f"--scheduler {scheduler}: workers were killed again and again ({error}); is there enough memory? A smaller "
+                "block needs less"
+            ) from None
+        except CommClosedError as error:
+            raise UsageError(
+                f"--scheduler {scheduler}: the scheduler went away ({error}); what was done stays: start again with one that runs"
+            ) from None
+
+
+def work_alike(plan: dict[str, Any], block: Block, wanted: dict[str, str]) -> Any:
+    """What runs in a worker of another machine: :func:`work`, where all that decides the bits is as wanted.
+
+    Raises
+    ------
+    UsageError
+        It is not.
+    """
+    other = other_versions(wanted)
+    if other:
+        raise UsageError(
+            f"a worker of the cluster, on {platform.node()}, should have {other}: its numbers would not be those of this machine "
+            "to the bit; install the same versions there, or start the campaign on a machine like it"
+        )
+    return work(plan, block)
