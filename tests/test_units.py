@@ -65,6 +65,7 @@ SPELLINGS = [
     ("2 h", "time", 7200.0),
     ("100 Hz", "frequency", 100.0),
     ("100 1/s", "frequency", 100.0),
+    ("0.3 1", "ratio", 0.3),
     ("2 km", "length", 2000.0),
     ("5 cm", "length", 0.05),
     ("20 °C", "temperature", 20.0),

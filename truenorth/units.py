@@ -229,7 +229,7 @@ def parse_quantity(text: str) -> tuple[float, Dimension]:
     number, unit = match.groups()
     if not unit:
         raise UsageError(f"{text!r} has no unit; add one, such as '{number} deg/h'")
-    if unit[0] in "+-*/.,^" or (unit[0].isdigit() and not unit.startswith("1/")):
+    if unit[0] in "+-*/.,^" or (unit[0].isdigit() and unit != "1" and not unit.startswith("1/")):
         raise UsageError(f"{text!r} is not one number (with a decimal point, no arithmetic) and one unit")
     factor, dimension = parse_unit(unit)
     value = float(number) * factor

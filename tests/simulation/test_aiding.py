@@ -1,15 +1,18 @@
 """Simulated aiding sensors: without errors the truth itself; each error is what was asked for, and can be taken off again."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
+from truenorth import schema
 from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.earth import ecef_axes, ecef_from_geodetic
 from truenorth.errors import DataError, UsageError
 from truenorth.position import Position
 from truenorth.simulation import (
+    EncoderSpec,
     Flexed,
     FlexureSpec,
     GnssSpec,
@@ -471,6 +474,45 @@ def test_specifications_go_into_files_and_come_back(sensor):
     kind = SENSORS[sensor][1]
     assert kind.from_mapping(LOADED[sensor].to_mapping()) == LOADED[sensor]
     assert kind().to_mapping() == {}
+
+
+QUANTITIES = [
+    "Angle",
+    "AngularRate",
+    "Length",
+    "Speed",
+    "Acceleration",
+    "AccelerationDensity",
+    "Time",
+    "Frequency",
+    "Ratio",
+]
+KINDS = [*(kind for _, kind, *_ in SENSORS.values()), FlexureSpec, EncoderSpec]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("number", [1 / 3, 1e-7 / 7, 0.07])
+def test_any_value_comes_back_from_a_file_to_the_bit(kind, number):
+    """Also where the unit of the file would round it; each term alone, as `simulate` writes the resolved scenario."""
+    for item in fields(kind):
+        if "dimensions" not in item.metadata:
+            continue
+        row = (number,) * len(item.metadata["dimensions"])
+        given = row if len(row) > 1 else number
+        if item.name in ("outages", "slips"):
+            given = ((number, 1.0 + number, *row[2:]),)
+        elif item.metadata["many"]:
+            given = (row,)
+        other = {"output": "pulses"} if item.name == "lost" else {}
+        spec = kind(**{item.name: given}, **other)
+        assert kind.from_mapping(spec.to_mapping()) == spec, item.name
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("number", [1 / 3, 1e-7 / 7, 0.07])
+def test_any_quantity_of_a_scenario_comes_back_to_the_bit(name, number):
+    adapter = TypeAdapter(getattr(schema, name))
+    assert adapter.validate_python(adapter.dump_python(number)) == number
 
 
 def test_a_specification_with_its_units():

@@ -45,7 +45,7 @@ class GnssSpec(OutlyingSpec):
     velocity_noise: float = value("speed", "m/s")
     velocity_drift: float = value("speed", "m/s")
     correlation_time: float = value("time", "s", 100.0, sign="positive")
-    vertical: float = value("ratio", "1", 1.5, sign="positive")
+    vertical: float = value("ratio", "%", 1.5, sign="positive")
     outlier_size: float = value("length", "m", 30.0)
     lever_arm: tuple[float, float, float] = value("length length length", "m m m", (0.0, 0.0, 0.0), sign="any")
 
