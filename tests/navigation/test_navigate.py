@@ -111,7 +111,7 @@ def test_a_wrong_lever_arm_is_told(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.1, arm=(1.5, 2.5, 1.0))
     wrong = navigate(record, start, imu=SPEC, gnss=gnss)
-    assert any("lever arm" in reason for reason in wrong.reasons)
+    assert any("lever arm of --gnss seems to be right +1.5" in reason for reason in wrong.reasons)
     right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([1.5, 2.5, 1.0])))
     assert not any("lever arm" in reason for reason in right.reasons)
 

@@ -90,3 +90,28 @@ def test_row_is_the_derivative_of_the_prediction(kind):
 
 def _extra_states(kind):
     return {"position": 7, "velocity": 4, "body velocity": 10, "height": 1, "rotation": 0}[kind]
+
+
+@pytest.mark.parametrize("w", [(0.0, 0.0, 0.3), (0.05, -0.1, 0.2)])
+def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
+    """In a steady turn a log's velocity stays as it is, whatever its latency; the error is of its second order."""
+    from scipy.spatial.transform import Rotation
+
+    from truenorth.models.odometer import body_velocity_row
+
+    v_b, w, arm, lag = np.array([0.3, 20.0, 0.1]), np.array(w), np.array([0.5, -1.0, 0.2]), 0.1
+    C = dcm_from_euler(0.4, 0.1, -0.2)
+    push = np.array([0.2, 1.0, 0.0])  # change of velocity in the turning axes
+    C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
+
+    def row(C, v_b, lag):
+        s, H, z = np.zeros(24), np.zeros((3, 32)), np.zeros(3)
+        s[4:7], s[12:15] = C @ v_b, C @ (push + np.cross(w, v_b))
+        nothing = (0.0, 0.0, 0.0)
+        body_velocity_row(s, C, tuple(w), C_mb, tuple(arm), 0.02, nothing, lag, -1, -1, -1, -1, 31, np.zeros(3), H, z)
+        return z, H[:, 31]
+
+    late, change = row(C, v_b, lag)
+    before = row(C @ Rotation.from_rotvec(-lag * w).as_matrix(), v_b - lag * push, 0.0)[0]
+    np.testing.assert_allclose(late, before, atol=1e-12)
+    np.testing.assert_allclose(change, 1.02 * C_mb @ push, atol=1e-12)

@@ -5,6 +5,7 @@ by a lever arm l. What it shows, with the scale factor k, the mounting angles mu
 x]) C_mb assumed``; that about the forward axis cannot be seen from forward motion and is no state), a constant error and a lag:
 
     y = (1 + k) C_mb u + bias - tau dy/dt,   u = C' v + w x l
+    dy/dt = (1 + k) C_mb (C' a - w x C' v): the axes turn as well, in a steady turn nothing changes
     z = y_hat - y = (1 + k) C_mb (C' dv - C' v x phi + eps x l - w x dl) - y/(1+k) dk - y x dmu - dbias + dy/dt dtau
 
 A wheel does not slide sideways nor leave the road: components 0 of y are measurements too (non-holonomic constraint).
@@ -66,21 +67,25 @@ def body_velocity_row(
         Filled in.
     """
     gain = 1.0 + scale
-    v = (s[4], s[5], s[6])
+    v = _into_body(C, (s[4], s[5], s[6]))
+    change = _into_body(C, (s[12], s[13], s[14]))  # of the velocity as its axes do not turn
+    swing = cross(w_b, v)  # and as they do: in a steady turn nothing changes sideways
     u = cross(w_b, arm)
     y = (0.0, 0.0, 0.0)
     for k in range(3):
-        along = C[0, k] * v[0] + C[1, k] * v[1] + C[2, k] * v[2] + u[k]
+        along = v[k] + lag * swing[k] + u[k]
         y = (y[0] + C_mb[0, k] * along, y[1] + C_mb[1, k] * along, y[2] + C_mb[2, k] * along)
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
-        tilt, turn, sweep, mount = cross(v, e), cross(e, arm), cross(w_b, e), cross(y, e)
+        push, tilt = _into_body(C, e), _into_body(C, cross((s[4], s[5], s[6]), e))
+        push_late, tilt_late = cross(w_b, push), cross(w_b, tilt)
+        turn, turn_late, sweep, mount = cross(e, arm), cross(e, v), cross(w_b, e), cross(y, e)
         for i in range(3):
             for k in range(3):
                 M = gain * C_mb[i, k]
-                H[i, _DV + j] += M * C[j, k]
-                H[i, _PHI + j] -= M * (C[0, k] * tilt[0] + C[1, k] * tilt[1] + C[2, k] * tilt[2])
-                H[i, _BG + j] += M * turn[k]
+                H[i, _DV + j] += M * (push[k] + lag * push_late[k])
+                H[i, _PHI + j] -= M * (tilt[k] + lag * tilt_late[k])
+                H[i, _BG + j] += M * (turn[k] + lag * turn_late[k])
                 if at_arm >= 0:
                     H[i, at_arm + j] -= M * sweep[k]
             if at_mount >= 0 and j != 1:
@@ -90,9 +95,19 @@ def body_velocity_row(
         if at_bias >= 0:
             H[j, at_bias + j] = -1.0
     for i in range(3):
-        change = 0.0
-        for j in range(3):
-            change += H[i, _DV + j] * s[12 + j]
-        if at_lag >= 0:
-            H[i, at_lag] = change
-        z[i] = gain * y[i] + bias[i] - lag * change - measured[i]
+        z[i] = gain * y[i] + bias[i] - measured[i]
+        for k in range(3):
+            M = gain * C_mb[i, k]
+            z[i] -= lag * M * change[k]
+            if at_lag >= 0:
+                H[i, at_lag] += M * (change[k] - swing[k])
+
+
+@compiled
+def _into_body(C: Any, v: Any) -> Any:
+    """``C^T v``, for a matrix and a tuple."""
+    return (
+        C[0, 0] * v[0] + C[1, 0] * v[1] + C[2, 0] * v[2],
+        C[0, 1] * v[0] + C[1, 1] * v[1] + C[2, 1] * v[2],
+        C[0, 2] * v[0] + C[1, 2] * v[1] + C[2, 2] * v[2],
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -16,6 +16,7 @@ from truenorth.models.ins import DP, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, mean_nis
+from truenorth.navigation.second_look import second_look
 from truenorth.navigation.sensors import Mounting, from_gnss, from_height, from_odometer, from_velocity
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
@@ -37,11 +38,6 @@ FINE, COARSE = 0.2, 1.0
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
 MOST_REJECTED = 0.2  # of a sensor's measurements
 NIS_LIMIT = 3.0  # mean NIS over its rows, beyond which model and data contradict each other
-LAG_SIGMA = 0.3  # s, prior of the search for a clock offset
-CLEAR = 6.0  # sigmas from which an offset is told
-LEAST_LAG = 0.01  # s
-LEAST_ARM = 0.5  # m
-ARM_SIGMA = 3.0  # m
 
 
 @dataclass(frozen=True)
@@ -109,7 +105,7 @@ def navigate(
     offset : float, s
         Added to the times of all aiding logs, to bring them onto the IMU's clock.
     check_clocks : bool
-        Look for a clock offset and a wrong lever arm in a second pass; told as a warning.
+        Look for a clock offset, a wrong lever arm, scale or mounting in a second pass; told as warnings.
     interval : float, s, optional
         Of the filter; .2 s, and 1 s for logs beyond an hour.
     output : float, s, optional
@@ -173,8 +169,8 @@ def navigate(
         reasons.append(why)
     reasons += [note for aid in given.values() for note in aid.notes]
     if check_clocks and aiding:
-        tell("checking clocks and lever arms")
-        reasons += _clock_warnings(run, sources, mounting, height, baro_loop)
+        tell("checking clocks and mountings")
+        reasons += second_look(lambda loose: run(_aiding(sources, loose, height, baro_loop)), mounting)
     result = Navigation(
         status="navigated" if status else "inconsistent",
         reasons=tuple(reasons),
@@ -284,7 +280,7 @@ def _altitude(wanted: str | None, sources: Sources) -> tuple[Altitude, str]:
     )
 
 
-def _aiding(sources: Sources, mounting: dict[str, Mounting], altitude: str, loop: float) -> list[Aiding]:
+def _aiding(sources: Sources, mounting: Mapping[str, Mounting], altitude: str, loop: float) -> list[Aiding]:
     found: list[Aiding] = []
     if sources.gnss is not None:
         found += from_gnss(sources.gnss, mounting["gnss"], heights=altitude in ("gnss", "free"))
@@ -359,49 +355,3 @@ def _swapped(r: Residuals, track: Track) -> str:
     given = np.sqrt(np.mean((measured - v) ** 2))
     exchanged = np.sqrt(np.mean((measured[:, ::-1] - v) ** 2))
     return "; east and north exchanged, they fit: were north, east, down handed in?" if exchanged < 0.3 * given else ""
-
-
-def _clock_warnings(
-    run: Callable[..., Track], sources: Sources, mounting: dict[str, Mounting], altitude: str, loop: float
-) -> list[str]:
-    """Navigate once more with latencies and the lever arm left open: what the data say of them."""
-    loose = {
-        name: replace(
-            m,
-            latency_sigma=LAG_SIGMA,
-            lever_arm_sigma=ARM_SIGMA if name == "gnss" else m.lever_arm_sigma,
-            gate=0.0,
-        )
-        for name, m in mounting.items()
-        if name != "baro"
-    } | {"baro": mounting["baro"]}
-    try:
-        track = run(_aiding(sources, loose, altitude, loop))
-    except DataError:
-        return []
-    words = []
-    for name, key, option in (
-        ("GNSS", "gnss", "--gnss"),
-        ("odometer", "odometer", "--odometer"),
-        ("velocity log", "velocity", "--velocity"),
-    ):
-        for role, least, unit in (("lag", LEAST_LAG, "s"), ("lever arm", LEAST_ARM, "m")):
-            where = track.model.slice_of(f"{name} {role}")
-            if where is None or (role == "lever arm" and key != "gnss"):
-                continue
-            known = mounting[key].latency_sigma if role == "lag" else mounting[key].lever_arm_sigma
-            value, sigma = track.sensors[-1, where], track.sigma[-1, where]
-            clear = (np.abs(value) > CLEAR * sigma) & (np.abs(value) > least)
-            if known > 0.0 or not clear.any():
-                continue
-            if role == "lag":
-                words.append(
-                    f"warning: the clock of {option} seems {abs(value[0]):.3f} ± {sigma[0]:.3f} {unit} "
-                    f"{'late' if value[0] > 0 else 'early'}: try --offset {-value[0]:.3f}, or let it be estimated"
-                )
-            else:
-                told = ", ".join(
-                    f"{a} {v:+.2f} ± {s:.2f} m" for a, v, s in zip(("right", "forward", "up"), value, sigma)
-                )
-                words.append(f"warning: the lever arm of {option} seems off by {told}: check it, metres are expected")
-    return words

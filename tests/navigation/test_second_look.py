@@ -1,0 +1,130 @@
+"""What the data say of clocks, arms, scales and mountings that were taken for known: told with figures and the option."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.navigation.test_navigate import SPEC, drive, fixes
+from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.errors import DataError
+from truenorth.navigation import Mounting, navigate
+from truenorth.navigation.second_look import second_look
+from truenorth.records import OdometerRecord
+
+__all__ = ["drive"]  # the fixture of a car that turns twice
+
+
+def warnings(result):
+    return [reason.removeprefix("warning: ") for reason in result.reasons if reason.startswith("warning")]
+
+
+def wheel_log(motion, arm=(0.0, 0.0, 0.0), noise=0.02):
+    """Speed ten times a second of a wheel at an arm, along the vehicle."""
+    time = np.arange(0.55, 179.0, 0.1)
+    s = motion.states(time)
+    v_b = np.einsum("kji,kj->ki", s.C_nb, s.v_n)
+    earth = np.einsum("kji,kj->ki", s.C_nb, 7.292115e-5 * np.stack([0 * s.lat, np.cos(s.lat), np.sin(s.lat)], axis=1))
+    v = v_b + np.cross(s.w_ib_b - earth, arm)
+    return OdometerRecord(
+        time, v[:, 1] + noise * np.random.default_rng(4).standard_normal(len(time)), "speed", source="odo.csv"
+    )
+
+
+def test_an_antenna_of_a_metre_given_in_centimetres(drive):
+    """.2, .3 and .5 m given as 20, 30, 50: the fixes are rejected, and the second look says why and what the arm is."""
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.3, arm=(0.2, 0.3, 0.5))
+    result = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([20.0, 30.0, 50.0])))
+    assert result.status == "inconsistent"
+    (words,) = warnings(result)
+    assert words.startswith("the lever arm of --gnss seems to be right +0.")
+    assert "not 20,30,50: were centimetres handed in? --lever-arm is in metres" in words
+    right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([0.2, 0.3, 0.5])))
+    assert warnings(right) == []
+
+
+def test_a_wheel_given_in_centimetres_and_a_clock_are_told_apart(drive):
+    """The car does not slide at its centre: a wheel half a metre to its left, given as 50 m."""
+    motion, record, start = drive
+    odometer = wheel_log(motion, (-0.5, 0.0, 0.0))
+
+    def told(log, arm):
+        return warnings(
+            navigate(record, start, imu=SPEC, odometer=log, wheel=Mounting(lever_arm=np.array(arm)), altitude="fixed")
+        )
+
+    assert told(odometer, (-0.5, 0.0, 0.0)) == []
+    (words,) = told(odometer, (-50.0, 0.0, 0.0))
+    assert "lever arm of --odometer" in words
+    assert "were centimetres handed in? --wheel-arm is in metres" in words
+    (words,) = told(odometer.shifted(0.25), (-0.5, 0.0, 0.0))
+    assert words.startswith("the clock of --odometer seems 0.25")
+    assert "late: try --offset -0.25" in words
+
+
+def test_scale_and_mounting_that_are_not_estimated(drive):
+    motion, record, start = drive
+    log = wheel_log(motion)
+    fast = OdometerRecord(log.time, 1.03 * log.values, "speed", source="odo.csv")
+    (words,) = warnings(navigate(record, start, imu=SPEC, odometer=fast, altitude="fixed"))
+    assert words.startswith("--odometer seems to count +")
+    assert words.endswith("%: try --estimate scale")
+    value, sigma = (float(x) for x in words.split("count +")[1].split(" %")[0].split(" ± "))
+    assert abs(value - 3.0) < 4 * sigma < 1.0
+    assert (
+        warnings(navigate(record, start, imu=SPEC, odometer=fast, wheel=Mounting(scale_sigma=0.05), altitude="fixed"))
+        == []
+    )
+    turned = Mounting(C_mb=dcm_from_rotation_vector(np.array([0.0, 0.0, 0.04])))
+    (words,) = warnings(navigate(record, start, imu=SPEC, odometer=log, wheel=turned, altitude="fixed"))
+    assert "turned against the vehicle of --odometer" in words
+    assert "--estimate mounting" in words
+
+
+@pytest.mark.parametrize(
+    ("arm", "sigma", "words"),
+    [
+        (
+            (0.0, 12.0, 0.0),
+            (0.1, 2.9, 0.1),
+            ["is 12 m long, and the data do not show whether it is", "metres are expected"],
+        ),
+        ((0.0, 12.0, 0.0), (2.9, 0.2, 2.9), []),  # shown: a ship has such arms
+        ((0.0, 9.0, 0.0), (2.9, 2.9, 2.9), []),
+    ],
+)
+def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
+    found = SimpleNamespace(
+        model=SimpleNamespace(slice_of=lambda name: slice(0, 3) if name == "GNSS lever arm" else None),
+        sensors=np.zeros((1, 3)),
+        sigma=np.array([sigma]),
+    )
+    mounting = {
+        "gnss": Mounting(lever_arm=np.array(arm)),
+        "odometer": Mounting(),
+        "velocity": Mounting(),
+        "baro": Mounting(),
+    }
+    told = second_look(lambda loose: found, mounting)
+    assert len(told) == bool(words)
+    assert all(word in told[0] for word in words)
+    known = mounting | {"gnss": replace(mounting["gnss"], lever_arm_sigma=1.0)}
+    assert second_look(lambda loose: found, known) == []
+
+
+def test_what_is_open_is_open_and_a_filter_that_breaks_down_says_nothing():
+    asked = {}
+
+    def run(loose):
+        asked.update(loose)
+        raise DataError("broken down")
+
+    mounting = {name: Mounting(scale_sigma=0.2) for name in ("gnss", "odometer", "velocity", "baro")}
+    assert second_look(run, mounting) == []
+    assert asked["baro"] == mounting["baro"]
+    assert asked["odometer"].scale_sigma == 0.2
+    assert asked["odometer"].gate == 0.0
+    assert asked["odometer"].angle_sigma > 0.0
+    assert asked["gnss"].lever_arm_sigma > 0.0
