@@ -91,8 +91,9 @@ def _message(model: type[BaseModel], content: Any, problem: Any, where: str) -> 
         keys = ", ".join(_fields(getattr(field, "annotation", None)))
         return f"{where}: {path}: {problem['input']!r}; expected a mapping of the keys {keys}"
     text = problem["msg"].removeprefix("Value error, ")
-    if text.startswith("Input should be "):
-        text = f"{problem['input']!r}; expected {text.removeprefix('Input should be ').removeprefix('a valid ')}"
+    for prefix in ("Input should be a valid ", "Input should be ", "String should have "):
+        if text.startswith(prefix):
+            text = f"{problem['input']!r}; expected {text.removeprefix(prefix)}"
     return f"{where}: {path}: {text}" if path else f"{where}: {text}"
 
 

@@ -529,8 +529,8 @@ def test_a_specification_with_its_units():
     [
         (OdometerSpec, {"scal": "1 %"}, ["odo: key 'scal'", "'scale'"]),
         (OdometerSpec, {"scale": "1 m"}, ["odo: scale", "ratio"]),
-        (OdometerSpec, {"rate": "-1 Hz"}, ["rate is -1.0", "positive"]),
-        (OdometerSpec, {"noise": "-1 m/s"}, ["noise is -1.0", "zero or more"]),
+        (OdometerSpec, {"rate": "-1 Hz"}, ["odo: rate: '-1 Hz'; expected a positive value"]),
+        (OdometerSpec, {"noise": "-1 m/s"}, ["odo: noise: '-1 m/s'; expected zero or more"]),
         (OdometerSpec, {"mounting": "1 deg"}, ["odo: mounting", "2 quantities"]),
         (OdometerSpec, {"slips": [["1 s", "2 s"]]}, ["odo: slips[1]", "3 quantities"]),
         (OdometerSpec, {"slips": [["2 s", "1 s", "1 %"]]}, ["slips, number 1", "an end after its start"]),
@@ -540,7 +540,8 @@ def test_a_specification_with_its_units():
         (VelocityLogSpec, {"frame": "navigation", "axes": "forward"}, ["body axes"]),
         (GnssSpec, {"outlier_rate": "120 %"}, ["outlier_rate is 1.2"]),
         (MasterSpec, {"with_attitude": False, "with_velocity": False}, ["without attitude and velocity"]),
-        (FlexureSpec, {"correlation_time": "0 s"}, ["correlation_time", "positive"]),
+        (FlexureSpec, {"correlation_time": "0 s"}, ["odo: correlation_time: '0 s'; expected a positive value"]),
+        (FlexureSpec, {"sigma": ["1 deg", "-1 deg", "0 deg"]}, ["odo: sigma: '-1 deg'; expected zero or more"]),
         (HeightSpec, ["lag"], ["odo: expected keys"]),
     ],
 )

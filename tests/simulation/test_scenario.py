@@ -100,6 +100,8 @@ def test_a_route_comes_from_a_file_beside_the_scenario(tmp_path):
         ),
         ({"motion": 3}, r"motion"),
         ({"position": "here"}, r"position: 'here'; expected a mapping of the keys lat, lon, alt"),
+        ({"name": ""}, r"name: ''; expected at least 1 character"),
+        ({"gnss": {"position_noise": "-1 m"}}, r"gnss: position_noise: '-1 m'; expected zero or more"),
         ({"seed": -1}, r"seed: -1; expected greater than or equal to 0"),
         ({"imu": {"gyro": {"bias": "-3 deg/h"}}}, r"imu: .*gyro.bias: '-3 deg/h' is negative"),
         ({"imu": "navigatoin"}, r"imu: .*did you mean 'navigation'"),
@@ -120,6 +122,10 @@ def test_a_mistake_is_told_by_the_path_of_its_key(change, words):
         read_scenario(BASE | change)
 
 
+CLIMB = {"kind": "climb", "slope": "2 deg", "duration": "3 s"}
+ROCK = {"kind": "wing_rock", "duration": "3 s", "amplitude": "5 deg", "period": "4 s"}
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -127,13 +133,31 @@ def test_a_mistake_is_told_by_the_path_of_its_key(change, words):
         ({"position": {"lat": "95 deg"}}, "position: latitude 95 deg"),
         (
             {"motion": {"kind": "legs", "legs": [{"kind": "turn", "angle": "9 deg", "rate": "-1 deg/s"}]}},
-            "motion: turn of",
+            r"motion: legs\[1\]: turn of 9 deg at -1 deg/s; expected .* a positive rate",
         ),
+        (
+            {
+                "motion": {
+                    "kind": "legs",
+                    "legs": [
+                        CLIMB,
+                        CLIMB,
+                        {"kind": "straight", "duration": "-1 s"},
+                    ],  # a climb is three legs of a course
+                }
+            },
+            r"motion: legs\[3\]: duration -1 s",
+        ),
+        (
+            {"motion": {"kind": "legs", "legs": [CLIMB | {"rate": "0 deg/s"}]}},
+            r"motion: legs\[1\]: climb .* at 0 deg/s",
+        ),
+        ({"motion": {"kind": "legs", "legs": [CLIMB, ROCK]}}, r"motion: legs\[2\]: window"),
         ({"motion": {"kind": "route", "points": [{"lat": "1 deg", "lon": "1 deg"}]}}, "motion: route of 1"),
         ({"motion": {"kind": "route", "file": "none.csv"}}, "motion: none.csv: cannot be read"),
         (
             {"disturbances": [{"kind": "vibration", "random": [{"frequency": "9 Hz", "density": "1 g^2/Hz"}]}]},
-            "disturbances: vibration spectrum",
+            r"disturbances\[1\]: vibration spectrum",
         ),
     ],
 )

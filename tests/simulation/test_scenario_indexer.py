@@ -41,6 +41,7 @@ def test_a_late_encoder_of_its_own_rate():
     true = scenario.indexer.build(20.0).angles(log.record.time - 0.05)
     np.testing.assert_allclose(log.record.angles, true + log.errors["offset"], atol=1e-12)
     assert log.record.interval == pytest.approx(0.1)
+    assert scenario == read_scenario(BASE | {"indexer": content | {"scheme": 8}})  # as YAML reads a bare 8
     # After a dwell of 1 s and a slew of 2.5 s the outer axis stands at 180 deg, the inner one still at 0.
     np.testing.assert_allclose(scenario.indexer.build(20.0).angles(4.0), [np.pi, 0.0], atol=1e-12)
 
@@ -49,7 +50,10 @@ def test_a_late_encoder_of_its_own_rate():
     ("change", "words"),
     [
         ({"indexer": STEPS | {"dwell": "1 m"}}, "indexer.dwell: '1 m'"),
-        ({"indexer": STEPS | {"encoder": {"noise": "-1 arcsec"}}}, "indexer.encoder: EncoderSpec: noise"),
+        (
+            {"indexer": STEPS | {"encoder": {"noise": "-1 arcsec"}}},
+            "indexer.encoder: noise: '-1 arcsec'; expected zero or more",
+        ),
         ({"indexer": STEPS | {"encoder": {"nose": "1 arcsec"}}}, "did you mean 'noise'"),
         ({"indexer": STEPS | {"encoder": {"noise": "1 m"}}}, "indexer.encoder: noise: '1 m'"),
         ({"errors": {"gyro": {"bias": ["1 deg/h", "1 deg", "1 deg/h"]}}}, "errors: gyro.bias[2]: '1 deg'"),

@@ -206,13 +206,16 @@ def course(
     Raises
     ------
     UsageError
-        A leg that is shorter than its two onsets, goes backwards, or turns at a stand; it is named by its number.
+        A leg that has no length, goes backwards or is a wall; it is named by its number.
     """
     g = float(normal_gravity(position.lat, position.alt))
     tracks, speeds, slopes, banks = [], [], [], []
     at, V, gamma = 0.0, speed, slope
     for number, leg in enumerate(legs, 1):
-        _check(leg, number, V)
+        try:
+            check_leg(leg, V)
+        except UsageError as error:
+            raise UsageError(f"leg {number}: {error}") from None
         onset = min(leg.onset, 0.5 * leg.duration)
         after = V if leg.speed is None else leg.speed
         if leg.turn:
@@ -281,16 +284,21 @@ def with_lever_arm(course: Course, arm: tuple[float, float, float]) -> Course:
     return replace(course, lever_arm=arm)
 
 
-def _check(leg: Leg, number: int, speed: float) -> None:
-    where = f"leg {number}"
+def check_leg(leg: Leg, speed: float) -> None:
+    """Refuse a leg, begun at a speed (m/s), that cannot be.
+
+    Raises
+    ------
+    UsageError
+    """
     if not (leg.duration > 0 and leg.onset > 0):
-        raise UsageError(f"{where}: duration {leg.duration:g} s, onset {leg.onset:g} s; expected both positive")
+        raise UsageError(f"duration {leg.duration:g} s, onset {leg.onset:g} s; expected both positive")
     if speed < 0 or (leg.speed is not None and leg.speed < 0):
-        raise UsageError(f"{where}: a speed below zero; expected zero or more")
+        raise UsageError("a speed below zero; expected zero or more")
     if leg.bank not in ("flat", "coordinated") and not isinstance(leg.bank, int | float):
-        raise UsageError(f"{where}: bank {leg.bank!r}; expected 'flat', 'coordinated' or an angle")
+        raise UsageError(f"bank {leg.bank!r}; expected 'flat', 'coordinated' or an angle")
     if leg.slope is not None and abs(leg.slope) >= 0.5 * math.pi:
-        raise UsageError(f"{where}: slope {math.degrees(leg.slope):g} deg; expected less than 90 deg")
+        raise UsageError(f"slope {math.degrees(leg.slope):g} deg; expected less than 90 deg")
 
 
 def _velocity(heading: Any, slope: Any, V: Array, dV: Array) -> tuple[Array, Array]:

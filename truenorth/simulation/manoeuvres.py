@@ -65,7 +65,15 @@ def accelerate(speed: float, acceleration: float, before: float, onset: float = 
 
 
 def climb(slope: float, duration: float, rate: float = math.radians(2.0), onset: float = 1.0) -> list[Leg]:
-    """A climb (or descent) of `slope` (rad) for a time (s), nose up and down again at `rate` (rad/s)."""
+    """A climb (or descent) of `slope` (rad) for a time (s), nose up and down again at `rate` (rad/s).
+
+    Raises
+    ------
+    UsageError
+        A rate that is not positive.
+    """
+    if not rate > 0:
+        raise UsageError(f"climb with the nose at {math.degrees(rate):g} deg/s; expected a positive rate")
     change = abs(slope) / rate + onset
     return [Leg(change, slope=slope, onset=onset), Leg(duration), Leg(change, slope=0.0, onset=onset)]
 

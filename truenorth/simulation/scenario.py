@@ -148,10 +148,12 @@ class Scenario(Strict):
             place = Position(0.0) if self.position is None else Position(**self.position.__dict__)
             where = "motion"
             motion = self.motion.build(place, self.lever_arm, generators[0], self._folder)
-            where = "disturbances"
-            return disturbed(motion, self.disturbances, generators[1:])
         except UsageError as error:
             raise DataError(f"{self._source}: {where}: {error}") from None
+        try:
+            return disturbed(motion, self.disturbances, generators[1:])
+        except UsageError as error:
+            raise DataError(f"{self._source}: {error}") from None
 
     def imu_motion(self, body: Motion, seed: int | None = None, run: int = 0, number: int = 0) -> Moving:
         """The motion of the IMU on a body: where its seat bends and it turns, as it does.

@@ -7,13 +7,15 @@ what the file leaves to chance, `folder` is where the file's own relative paths 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from truenorth.errors import UsageError
 from truenorth.position import Position
 from truenorth.schema import (
     Acceleration,
@@ -28,7 +30,7 @@ from truenorth.schema import (
     Time,
 )
 from truenorth.simulation import manoeuvres
-from truenorth.simulation.course import Leg, course, ring
+from truenorth.simulation.course import Leg, check_leg, course, ring
 from truenorth.simulation.motion import Motion
 from truenorth.simulation.route import Driving, WayPoint, route
 from truenorth.simulation.sea import COMPONENTS, Hull, WaveSpectrum, narrow_band, sea_motion
@@ -300,16 +302,21 @@ class LegsMotion(Strict):
     def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
         """The motion."""
         legs: list[Leg] = []
-        rocks: list[tuple[float, WingRock]] = []
+        rocks: list[tuple[int, float, WingRock]] = []
         speed = self.speed
-        for item in self.legs:
+        for number, item in enumerate(self.legs, 1):
             if isinstance(item, WingRock):
-                rocks.append((manoeuvres.length(legs), item))
-            legs += item.legs(speed)
+                rocks.append((number, manoeuvres.length(legs), item))
+            with _numbered("legs", number):
+                own = item.legs(speed)
+                for leg in own:
+                    check_leg(leg, speed)
+            legs += own
             speed = next((leg.speed for leg in reversed(legs) if leg.speed is not None), self.speed)
         motion: Motion = course(position, legs, heading=self.heading, speed=self.speed, lever_arm=arm)
-        for start, rock in rocks:
-            motion = manoeuvres.wing_rock(motion, start, start + rock.duration, rock.amplitude, rock.period)
+        for number, start, rock in rocks:
+            with _numbered("legs", number):
+                motion = manoeuvres.wing_rock(motion, start, start + rock.duration, rock.amplitude, rock.period)
         return motion
 
 
@@ -468,6 +475,16 @@ Disturbance = Annotated[SwayDisturbance | SeaDisturbance | Vibration, Field(disc
 
 def disturbed(motion: Motion, disturbances: Sequence[Any], generators: Sequence[Rng]) -> Motion:
     """A motion with all disturbances, each drawn from a generator of its own."""
-    for item, rng in zip(disturbances, generators, strict=True):
-        motion = item.build(motion, rng)
+    for number, (item, rng) in enumerate(zip(disturbances, generators, strict=True), 1):
+        with _numbered("disturbances", number):
+            motion = item.build(motion, rng)
     return motion
+
+
+@contextmanager
+def _numbered(key: str, number: int) -> Iterator[None]:
+    """Lead the message of a UsageError by the place of the entry in its list, counted from one as all our messages do."""
+    try:
+        yield
+    except UsageError as error:
+        raise UsageError(f"{key}[{number}]: {error}") from None

@@ -67,7 +67,7 @@ class IndexerModel(Strict):
     """
 
     axes: tuple[Annotated[SpinAxis | SwingAxis, Field(discriminator="kind")], ...] = ()
-    scheme: str | None = None
+    scheme: str | None = Field(None, coerce_numbers_to_str=True)  # a bare 8 in YAML is a number
     directions: tuple[Direction, ...] = ("z", "x")
     dwell: Time = 60.0
     rate: AngularRate = 0.17453292519943295

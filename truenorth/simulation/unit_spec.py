@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
@@ -101,22 +101,33 @@ def _check(kind: str, name: str, found: Any, marks: Mapping[str, Any]) -> None:
         if not good or not all(math.isfinite(x) for x in numbers):
             wanted = "a finite number" if size == 1 else f"{size} finite numbers"
             raise UsageError(f"{kind}: {name} is {row!r}; expected {wanted}, SI")
-        if (sign == "positive" and min(numbers) <= 0.0) or (sign == "zero or more" and min(numbers) < 0.0):
-            raise UsageError(
-                f"{kind}: {name} is {row!r}; expected {'a positive value' if sign == 'positive' else sign}"
-            )
+        if _wrong_sign(numbers, sign):
+            raise UsageError(f"{kind}: {name} is {row!r}; expected {_WANTED[sign]}")
+
+
+_WANTED = {"positive": "a positive value", "zero or more": "zero or more"}
+
+
+def _wrong_sign(numbers: Sequence[float], sign: str) -> bool:
+    return (sign == "positive" and min(numbers) <= 0.0) or (sign == "zero or more" and min(numbers) < 0.0)
 
 
 def _parsed(text: Any, marks: Mapping[str, Any], where: str) -> Any:
     dimensions = marks["dimensions"]
 
+    def one(item: Any, dimension: str, at: str) -> float:
+        number = quantity(item, dimension, at)
+        if _wrong_sign((number,), marks["sign"]):
+            raise DataError(f"{at}: {item!r}; expected {_WANTED[marks['sign']]}")
+        return number
+
     def row(items: Any, at: str) -> Any:
         if len(dimensions) == 1:
-            return quantity(items, dimensions[0], at)
+            return one(items, dimensions[0], at)
         if not isinstance(items, list | tuple) or len(items) != len(dimensions):
             example = ", ".join(DIMENSIONS[name][1] for name in dimensions)
             raise DataError(f"{at}: {items!r}; expected {len(dimensions)} quantities, such as [{example}]")
-        return tuple(quantity(item, name, at) for item, name in zip(items, dimensions, strict=True))
+        return tuple(one(item, name, at) for item, name in zip(items, dimensions, strict=True))
 
     if not marks["many"]:
         return row(text, where)
