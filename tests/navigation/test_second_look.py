@@ -11,7 +11,7 @@ from truenorth.attitude import dcm_from_rotation_vector
 from truenorth.errors import DataError
 from truenorth.navigation import Mounting, navigate
 from truenorth.navigation.second_look import second_look
-from truenorth.records import OdometerRecord
+from truenorth.records import OdometerRecord, VelocityRecord
 
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
@@ -98,6 +98,7 @@ def test_scale_and_mounting_that_are_not_estimated(drive):
 def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
     found = SimpleNamespace(
         model=SimpleNamespace(slice_of=lambda name: slice(0, 3) if name == "GNSS lever arm" else None),
+        residuals=(),
         sensors=np.zeros((1, 3)),
         sigma=np.array([sigma]),
     )
@@ -112,6 +113,17 @@ def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
     assert all(word in told[0] for word in words)
     known = mounting | {"gnss": replace(mounting["gnss"], lever_arm_sigma=1.0)}
     assert second_look(lambda loose: found, known) == []
+
+
+def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
+    """Vertical velocity counted downwards on a road too flat to tell by: no clock or arm is blamed for it."""
+    motion, record, start = drive
+    time = np.arange(0.5, 179.0, 0.5)
+    v = motion.states(time).v_n + np.array([0.0, 0.0, 0.6])
+    log = VelocityRecord(time, v, "navigation", source="ref.csv")
+    result = navigate(record, start, imu=SPEC, velocity=log, gnss=fixes(motion, time, 0.05))
+    assert result.status == "inconsistent"
+    assert warnings(result) == []
 
 
 def test_what_is_open_is_open_and_a_filter_that_breaks_down_says_nothing():

@@ -88,8 +88,8 @@ def test_a_barometer_of_another_zero():
         (lambda r: {"v_n": r.v_n[:, [1, 0, 2]] * [1, 1, -1]}, ["north, east, down", "exchange the columns VE and VN"]),
         (lambda r: {"lat": r.lon, "lon": r.lat}, ["latitude and longitude exchanged"]),
         (lambda r: {"lat": np.radians(r.lat), "lon": np.radians(r.lon)}, ["radians that were read as degrees"]),
-        (lambda r: {"v_n": r.v_n * [1, 1, -1]}, ["vertical velocities", "counted downwards", "VD"]),
-        (lambda r: {"alt": -r.alt}, ["vertical velocities", "depth"]),
+        (lambda r: {"v_n": r.v_n * [1, 1, -1]}, ["heights contradict", "counted downwards", "VD"]),
+        (lambda r: {"alt": -r.alt}, ["heights contradict", "depth"]),
     ],
 )
 def test_velocities_that_are_not_the_change_of_position(change, words):

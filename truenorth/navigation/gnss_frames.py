@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 LONGEST_STEP = 5.0  # s, over which the mean of two velocities is that of the way
 LEAST_STEPS = 5
-LEAST_CLIMBS = 20  # steps: heights are noisier than places
+LEAST_CLIMBS = 20  # steps
 UNLIKE, ALIKE = 0.5, 0.3  # of the way: velocities that contradict it leave more of it, the right ones less
 
 
@@ -37,7 +37,7 @@ def check_frames(record: GnssRecord) -> None:
         return
     way = (0.5 * (v[1:] + v[:-1]) * T[:, None])[close]
     _check_horizontal(record.source, record.lat[both], record.lon[both], way[:, :2], close)
-    _check_vertical(record.source, np.diff(record.alt[both])[close], way[:, 2])
+    _check_vertical(record.source, record.alt[both], np.diff(time) * 0.5 * (v[1:, 2] + v[:-1, 2]), close)
 
 
 def _check_horizontal(source: str, lat: Array, lon: Array, way: Array, close: NDArray[np.bool_]) -> None:
@@ -63,16 +63,22 @@ def _check_horizontal(source: str, lat: Array, lon: Array, way: Array, close: ND
         )
 
 
-def _check_vertical(source: str, moved: Array, way: Array) -> None:
-    known = np.isfinite(moved) & np.isfinite(way)
-    if known.sum() < LEAST_CLIMBS:
+def _check_vertical(source: str, alt: Array, climbed: Array, close: NDArray[np.bool_]) -> None:
+    """Heights against the sum of the climbs, over the longest stretch without a gap: from row to row they are all noise."""
+    known = close & np.isfinite(np.diff(alt)) & np.isfinite(climbed)
+    edges = np.concatenate([[-1], np.flatnonzero(~known), [len(known)]])
+    first = int(edges[np.argmax(np.diff(edges))]) + 1
+    last = first + int(np.diff(edges).max()) - 1
+    if last - first < LEAST_CLIMBS:
         return
-    moved, way = moved[known], way[known]
-    given, turned = _rms(moved - way), _rms(moved + way)
-    if given > UNLIKE * _rms(way) and turned < UNLIKE * given:
+    height = alt[first : last + 1] - np.mean(alt[first : last + 1])
+    climb = np.concatenate([[0.0], np.cumsum(climbed[first:last])])
+    climb -= np.mean(climb)
+    given, turned = _rms(height - climb), _rms(height + climb)
+    if turned < UNLIKE * min(given, _rms(climb)):
         raise DataError(
-            f"{source}: vertical velocities contradict the heights by {given:.3g} m a step, with the other sign by {turned:.3g} m: "
-            "one of the two seems to be counted downwards; expected both upwards: name the column VD, or depth"
+            f"{source}: heights contradict the sum of the vertical velocities by {given:.3g} m, with the other sign by "
+            f"{turned:.3g} m: one of the two seems to be counted downwards; expected both upwards: name the column VD, or depth"
         )
 
 

@@ -20,9 +20,10 @@ from truenorth.navigation.second_look import second_look
 from truenorth.navigation.sensors import Mounting, from_gnss, from_height, from_odometer, from_velocity
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
+from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
 from truenorth.position import Position
-from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, VelocityRecord
+from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, Trajectory, VelocityRecord
 from truenorth.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ R = TypeVar("R", bound=Record)
 
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
 FINE, COARSE = 0.2, 1.0
+AXES_TIME = 1800.0  # s: of the log that tells axes of velocities
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
 MOST_REJECTED = 0.2  # of a sensor's measurements
 NIS_LIMIT = 3.0  # mean NIS over its rows, beyond which model and data contradict each other
@@ -162,6 +164,7 @@ def navigate(
         used = [*sensors, *stops, *disturbances]
         return navigate_track(record, begin, with_states(plain, used), used, interval=interval, every=every, **options)
 
+    _check_axes(record, begin, plain, sources, mounting)
     tell("navigating")
     track = run(aiding, smooth=smooth)
     status, reasons = check_residuals(track)
@@ -303,6 +306,22 @@ def _check_places(sources: Sources, begin: Start, altitude: str) -> None:
         check_heights(sources.baro, place, begin.time)
 
 
+def _check_axes(
+    record: ImuRecord, begin: Start, model: InsModel, sources: Sources, mounting: Mapping[str, Mounting]
+) -> None:
+    """Refuse velocities in other axes, by the IMU's own changes of velocity over the log's first part."""
+    logs = {"gnss": sources.gnss, "odometer": sources.odometer, "velocity": sources.velocity}
+    given = {name: log for name, log in logs.items() if log is not None}
+    if not given:
+        return
+    part = record.between(None, record.time[0] + AXES_TIME)
+    free = navigate_track(part, begin, model, interval=FINE, every=1, covariance=False)
+    lat, lon, alt = free.position.T
+    own = Trajectory(free.time, free.C_nb, free.v_n, lat, lon, alt, source=record.source)
+    for name, log in given.items():
+        check_axes(log, own, mounting[name].latency, mounting[name].C_mb)
+
+
 def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
     for sensor in aiding:
         inside = (sensor.time > record.time[0] - record.interval) & (sensor.time <= record.time[-1])
@@ -325,7 +344,7 @@ def check_residuals(track: Track) -> tuple[bool, list[str]]:
             sound = False
             reasons.append(
                 f"{r.name}: {r.rejected} of {len(r.time)} measurements rejected: they contradict the track (half of them "
-                f"by more than {_scatter(r)}); check axes, units, clock, lever arm and sigmas{_swapped(r, track)}"
+                f"by more than {_scatter(r)}); check axes, units, clock, lever arm and sigmas"
             )
         elif r.rejected:
             reasons.append(f"{r.name}: {r.rejected} of {len(r.time)} measurements rejected as outliers")
@@ -344,14 +363,3 @@ def _scatter(r: Residuals) -> str:
     unit = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}.get(r.name, "m/s")
     size = np.sqrt(np.nansum(r.innovation**2, axis=1))
     return f"{float(np.median(size)):.3g} {unit}"
-
-
-def _swapped(r: Residuals, track: Track) -> str:
-    """A hint where velocities fit the track with east and north exchanged."""
-    if "velocity" not in r.name or not np.isfinite(r.innovation[:, :2]).all():
-        return ""
-    v = np.stack([np.interp(r.time, track.time, track.v_n[:, i]) for i in range(2)], axis=1)
-    measured = v - r.innovation[:, :2]
-    given = np.sqrt(np.mean((measured - v) ** 2))
-    exchanged = np.sqrt(np.mean((measured[:, ::-1] - v) ** 2))
-    return "; east and north exchanged, they fit: were north, east, down handed in?" if exchanged < 0.3 * given else ""

@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError
-from truenorth.navigation.aiding import Role
+from truenorth.navigation.aiding import FALSE_REJECTION, Role
 from truenorth.navigation.driver import Track
 from truenorth.navigation.sensors import Mounting
 
 Array = NDArray[np.float64]
 
+SMALL = 10.0  # times its prior: a scale or angle beyond is none that a small-angle model finds
 CLEAR = 6.0  # sigmas from which a contradiction is told
 LONG_ARM = 10.0  # m: longer than on most vehicles, to be told where the data do not show it
+MOST_CONTRADICTED = 0.2  # of a sensor's measurements
 KNOWN_ARM = 0.2  # of an arm, the sigma up to which the data show it
 SMALLER = {"centimetres": 1e-2, "millimetres": 1e-3}
 AXES = ("right", "forward", "up")
@@ -39,6 +41,7 @@ OPEN: dict[Role, _Open] = {
     "scale": _Open("scale_sigma", 0.05, 0.01),
     "mounting": _Open("angle_sigma", math.radians(3.0), math.radians(0.5)),
 }
+SMALL_ANGLES: tuple[Role, ...] = ("scale", "mounting")
 SENSORS: dict[str, tuple[str, str, tuple[Role, ...]]] = {
     "gnss": ("GNSS", "--lever-arm", ("lag", "lever arm")),
     "odometer": ("odometer", "--wheel-arm", ("lag", "lever arm", "scale", "mounting")),
@@ -60,9 +63,17 @@ def second_look(run: Callable[[Mapping[str, Mounting]], Track], mounting: Mappin
         track = run({name: _loosened(name, m) for name, m in mounting.items()})
     except DataError:  # the measurements fit no track at all, which the first pass has told
         return []
+    if _contradicted(track) > MOST_CONTRADICTED:  # figures of a model that does not hold are not worth telling
+        return []
     words = []
     for key, (name, option, roles) in SENSORS.items():
         given = mounting[key]
+        if any(_beyond(track, name, role) for role in SMALL_ANGLES):
+            words.append(
+                f"warning: --{key} fits no small scale error and mounting angle: check its axes and unit, the IMU's axes (--axes), "
+                "and --mounting"
+            )
+            continue
         for role in roles:
             where = track.model.slice_of(f"{name} {role}")
             if where is None or getattr(given, OPEN[role].sigma) > 0.0:
@@ -78,6 +89,23 @@ def second_look(run: Callable[[Mapping[str, Mounting]], Track], mounting: Mappin
                         "is: metres are expected"
                     )
     return words
+
+
+def _contradicted(track: Track) -> float:
+    """Largest share of a sensor's measurements whose innovations no sound one has."""
+    from scipy.special import chdtri
+
+    shares = [0.0]
+    for r in track.residuals:
+        there = r.rows > 0
+        if there.any():
+            shares.append(float(np.mean(r.nis[there] > chdtri(r.rows[there], FALSE_REJECTION))))
+    return max(shares)
+
+
+def _beyond(track: Track, name: str, role: Role) -> bool:
+    where = track.model.slice_of(f"{name} {role}")
+    return where is not None and bool(np.any(np.abs(track.sensors[-1, where]) > SMALL * OPEN[role].prior))
 
 
 def _loosened(name: str, mounting: Mounting) -> Mounting:
