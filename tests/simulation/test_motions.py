@@ -115,6 +115,16 @@ def test_two_days_at_sea_do_not_drift():
     assert abs(float(at.lon) - PLACE.lon - 48 * 3600 * 10.0 / parallel) * parallel < 1e-6
 
 
+def test_a_long_log_is_not_integrated_anew_for_every_block():
+    """Blocks in order, as the simulator takes them; their order does not change the bits."""
+    ahead, back = (course(PLACE, [Leg(100.0, speed=10.0)], heading=0.4) for _ in range(2))
+    starts = np.arange(0.0, 86400.0, 1024.0)
+    forwards = [ahead.states(start + np.linspace(0, 1023, 4)).lat for start in starts]
+    backwards = [back.states(start + np.linspace(0, 1023, 4)).lat for start in starts[::-1]]
+    np.testing.assert_array_equal(forwards, backwards[::-1])
+    assert sorted(ahead._tables) == [1, 2, 4, 8, 16, 32, 64, 128]
+
+
 @pytest.mark.parametrize("name", FAMILIES)
 def test_velocity_and_rate_are_derivatives(name):
     """Central differences of position and attitude, at times away from the corners and on them."""

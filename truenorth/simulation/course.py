@@ -23,7 +23,7 @@ from truenorth.simulation.profile import Profile, Ramp, lead_in, profile
 
 Array = NDArray[np.float64]
 KNOT = 2.0  # s between knots of the position
-TABLE = 1024.0  # s: the table of positions grows by whole multiples of this
+TABLE = 1024.0  # s: the shortest table of positions; the others are 2, 4, 8 ... times as long
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,9 @@ class Course(Motion):
     def _place(self, t: Array) -> tuple[Array, Array, Array]:
         if np.size(t) and np.min(t) < 0:
             raise UsageError(f"time {np.min(t):g} s is before the course begins; expected 0 s or more")
-        size = max(1, math.ceil((np.max(t) if np.size(t) else 0.0) / TABLE))
+        # Which table is a matter of the times asked for alone, or their order would change the bits; twice as long each time, or a
+        # long log, taken block by block, would integrate from the start for every block.
+        size = 1 << (max(1, math.ceil((np.max(t) if np.size(t) else 0.0) / TABLE)) - 1).bit_length()
         if size not in self._tables:
             self._tables[size] = self._integrated(size * TABLE)
         lat, lon, alt = self._tables[size]
