@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from truenorth.attitude import euler_from_dcm
@@ -119,6 +120,7 @@ def _aiding_dots(
         factor = 1e-3 if "km" in track.get_xlabel() else 1.0
         track.plot(east * factor, north * factor, **dots)
         track.legend()
+        _legible(track)
         height.plot(time, record.alt, **dots)
     elif isinstance(record, HeightRecord):
         height.plot(time, record.alt, **dots)
@@ -133,16 +135,23 @@ def _aiding_dots(
 def _attitude(heading_axes: Axes, tilt_axes: Axes, time: Array, truth: MotionStates) -> None:
     heading, pitch, roll = (np.degrees(x) for x in euler_from_dcm(truth.C_nb))
     heading = np.mod(heading, 360.0)
-    jumps = np.flatnonzero(np.abs(np.diff(heading)) > 180.0)
-    shown = np.insert(heading, jumps + 1, np.nan)  # no line across the page from 360 to 0
-    heading_axes.plot(np.insert(time, jumps + 1, time[jumps]), shown, color=COLOURS[0])
+    _turning(heading_axes, time, heading, color=COLOURS[0])
     if np.ptp(heading) > 180.0:
         heading_axes.set(ylim=(0, 360), yticks=(0, 90, 180, 270, 360))
     heading_axes.set(title="Heading of the IMU, true", ylabel="deg")
     trace(tilt_axes, time, pitch, color=COLOURS[0], label="pitch")
-    trace(tilt_axes, time, roll, color=COLOURS[1], label="roll")
+    _turning(tilt_axes, time, roll, color=COLOURS[1], label="roll")
     tilt_axes.set(title="Pitch and roll of the IMU, true", ylabel="deg")
     _legend(tilt_axes, 2)
+
+
+def _turning(ax: Axes, time: Array, angle: Array, **options: Any) -> None:
+    """An angle (deg) that goes round: no line across the page where it comes in again on the other side."""
+    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0)
+    if jumps.size:
+        ax.plot(np.insert(time, jumps + 1, time[jumps]), np.insert(angle, jumps + 1, np.nan), **options)
+    else:
+        trace(ax, time, angle, **options)
 
 
 def _signals(ax: Axes, time: Array, values: Array, title: str, unit: str) -> None:
@@ -159,3 +168,12 @@ def _signals(ax: Axes, time: Array, values: Array, title: str, unit: str) -> Non
 def _legend(ax: Axes, columns: int) -> None:
     """On the title's line, where no trace can run through it."""
     ax.legend(ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+    _legible(ax)
+
+
+def _legible(ax: Axes) -> None:
+    """Dots as faint and small as those of a log would not be seen in a legend."""
+    legend = ax.get_legend()
+    for handle in legend.legend_handles if legend is not None else ():
+        if isinstance(handle, Line2D) and handle.get_marker() == ".":
+            handle.set(markersize=9, alpha=1.0)
