@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.physics.test_strapdown_coning import residual
+from tests.simulation.test_route import TOWN
 from truenorth.attitude import euler_from_dcm, rotation_vector_from_dcm
 from truenorth.errors import UsageError
 from truenorth.position import Position
@@ -11,6 +12,7 @@ from truenorth.simulation import Disturbed, Motion, Sway, Tone, rest, simulate
 from truenorth.simulation.course import Leg, course, ring
 from truenorth.simulation.manoeuvres import accelerate, climb, s_turn, straight, turn, wing_rock
 from truenorth.simulation.profile import Ramp, profile, pulse
+from truenorth.simulation.route import Driving, route
 from truenorth.simulation.sea import Hull, WaveSpectrum, narrow_band, sea_motion
 from truenorth.simulation.turntable import Hold, positions, turntable
 from truenorth.strapdown import NavigationState, mechanise
@@ -40,6 +42,7 @@ FAMILIES = {
     "ring": ring(PLACE, radius=140.0, speed=15.0, wait=10.0, lever_arm=(0.5, 1.0, 0.3)),
     "flight": flight(),
     "drive": course(PLACE, [Leg(20), Leg(20, speed=15), Leg(60, turn=3.0), Leg(20, slope=0.05), Leg(15, speed=0)]),
+    "route": route(TOWN, Driving(radius=12.0), wait=20.0, lever_arm=(0.3, 0.8, 0.5)),
     "sea": Sway(PLACE, 0.5, lever_arm=(5.0, 10.0, 8.0), **sea_motion(WaveSpectrum(3, 9), Hull(), rng(), direction=1.0)),
     "ship under way": Disturbed(
         course(PLACE, [Leg(300), Leg(120, turn=1.5)], heading=0.7, speed=8.0),
