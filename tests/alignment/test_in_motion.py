@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from truenorth import OdometerRecord, UsageError, align_in_motion, imu_spec, navigate
+from truenorth.alignment.in_motion_start import backtracked, departures, path_to_the_end
 from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.models.ins import BG, DP
@@ -58,6 +59,19 @@ def test_ring_from_any_heading(ring):
     assert np.sqrt(np.mean(errors[:, 2] ** 2)) < 2.0
     assert np.sqrt(np.mean(errors[:, :2] ** 2)) < 0.05
     assert 0.38 < np.sqrt(np.mean((errors[:, 2] / sigmas[:, 2]) ** 2)) < 1.74
+
+
+def test_what_is_learnt_of_the_place_turns_nothing(ring):
+    """The vehicle went as its velocity says, wherever the track's first half was believed to be."""
+    sim, odometer = logs(ring, 0)
+    answer = align_in_motion(sim.record, RING.imu_spec, odometer=odometer, position=PLACE)
+    track = answer.moving.track
+    path = path_to_the_end(track)
+    np.testing.assert_allclose(path[:, :2] * METRES_PER_RADIAN, track.position[:, :2] * METRES_PER_RADIAN, atol=15.0)
+    elsewhere = track.position + np.where(track.time[:, None] < 300.0, [0.0, math.radians(0.3), 0.0], 0.0)
+    moved = replace(track, position=elsewhere)
+    np.testing.assert_array_equal(departures(sim.record, moved), departures(sim.record, track))
+    np.testing.assert_array_equal(backtracked(sim.record, moved), backtracked(sim.record, track))
 
 
 def test_coarse_alignment_by_the_odometer(ring):

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.task import level_of
 from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
+from truenorth.earth import radii
 from truenorth.increments import increments
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
 from truenorth.navigation.driver import Start, Track
@@ -117,9 +119,20 @@ def backtracked(record: ImuRecord, track: Track) -> Array:
     dtheta, dvel = increments(record)
     turned = dtheta[:rows] - record.steps[:rows, None] * track.gyro_bias[-1]
     C_ib = inertial_integrals(turned, dvel[:rows], record.steps[:rows], [rows])[0][0]
-    elapsed = track.time - track.time[0]
-    C_n0_n = frames(elapsed, track.position)[-1]
+    C_n0_n = frames(track.time - track.time[0], path_to_the_end(track))[-1]
     return np.asarray(C_n0_n @ track.C_nb[-1] @ C_ib.T)
+
+
+def path_to_the_end(track: Track) -> Array:
+    """(K, 3) latitude, longitude (rad) and height (m), led back from the end of a track by its velocity.
+
+    Where the place was unknown at first, the positions told move by what is learnt of it, and the vehicle did not.
+    """
+    lat, lon, alt = track.position[-1]
+    R_M, R_N = radii(lat)
+    metres = np.array([(R_N + alt) * math.cos(lat), R_M + alt, 1.0])
+    moved = cumulative_trapezoid(track.v_n / metres, track.time, axis=0, initial=0.0)[:, [1, 0, 2]]
+    return np.asarray(np.array([lat, lon, alt]) + moved - moved[-1])
 
 
 def departures(record: ImuRecord, track: Track) -> Array:
@@ -129,7 +142,7 @@ def departures(record: ImuRecord, track: Track) -> Array:
     dtheta, dvel = increments(record)
     turned = dtheta - record.steps[:, None] * track.gyro_bias[-1]
     C_ib = inertial_integrals(turned, dvel, record.steps, np.minimum(rows, len(record)))[0]
-    C_n0_n = frames(track.time - track.time[0], track.position)
+    C_n0_n = frames(track.time - track.time[0], path_to_the_end(track))
     C_n0_i = C_n0_n[-1] @ track.C_nb[-1] @ C_ib[-1].T
     final = np.swapaxes(C_n0_n, 1, 2) @ C_n0_i @ C_ib
     return rotation_vector_from_dcm(final @ np.swapaxes(track.C_nb, 1, 2))
