@@ -52,7 +52,7 @@ def fit_motion(
     interval : float, s
     walks : Walks
     start : AxisMotion, optional
-        A good guess: its oscillators are kept, and only polished.
+        A good guess, which competes with what a search from nothing finds.
     most : int
         Oscillators.
 
@@ -61,8 +61,12 @@ def fit_motion(
     AxisMotion
     """
     series = Series(residual, interval, walks)
-    if start is not None:
-        return _climb(series, start, POLISHES)
+    best = _search(series, most)
+    return best if start is None else min(best, _climb(series, start, POLISHES), key=series.score)
+
+
+def _search(series: Series, most: int) -> AxisMotion:
+    """One oscillator after the other, as long as the criterion falls."""
     best = _climb(series, AxisMotion(max(float(np.std(series.detrended)), QUIETEST)), POLISHES)
     score = series.score(best)
     for count in range(1, most + 1):
