@@ -19,7 +19,6 @@ from truenorth.alignment.in_motion_start import (
     coarse_guess,
     departures,
     guesses_all_round,
-    seconds_at_rest,
     start_at,
 )
 from truenorth.alignment.in_motion_verdict import judge_moving
@@ -34,7 +33,7 @@ from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Track, navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
-from truenorth.navigation.stops import updates_at
+from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.position import METRES_PER_RADIAN, Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord

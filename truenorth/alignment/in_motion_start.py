@@ -18,7 +18,6 @@ from truenorth.increments import increments
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
 from truenorth.navigation.driver import Start, Track
 from truenorth.navigation.sensors import Mounting
-from truenorth.navigation.stops import stops_in
 from truenorth.position import Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.specs import ImuSpec
@@ -31,9 +30,6 @@ BANK_LEVEL = math.radians(4.0)  # of a level from the mean force of a vehicle th
 HEADINGS = 12  # of the bank, all round
 LEVEL_TIME = 4.0  # s
 ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of the velocity at the start
-STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
-STANDING_PULSES = 1.5  # pulses in a row of an odometer: no more is standing
-NEAR = 1.0  # s, within which a second of rest must have been seen by the sensor
 
 
 @dataclass(frozen=True)
@@ -146,38 +142,3 @@ def departures(record: ImuRecord, track: Track) -> Array:
     C_n0_i = C_n0_n[-1] @ track.C_nb[-1] @ C_ib[-1].T
     final = np.swapaxes(C_n0_n, 1, 2) @ C_n0_i @ C_ib
     return rotation_vector_from_dcm(final @ np.swapaxes(track.C_nb, 1, 2))
-
-
-def seconds_at_rest(record: ImuRecord, odometer: OdometerRecord | None, gnss: GnssRecord | None) -> tuple[Array, Array]:
-    """Middles of the seconds in which the IMU sees no motion and the other sensor no speed: still, and disturbed, s.
-
-    Steady driving on a good road looks like rest to an IMU alone; a wheel that stands may slide. Both must agree.
-    """
-    still, disturbed = stops_in(record)
-    moving = _speed_seen(odometer, gnss)
-    return still[~moving(still)], disturbed[~moving(disturbed)]
-
-
-def _speed_seen(odometer: OdometerRecord | None, gnss: GnssRecord | None):  # type: ignore[no-untyped-def]
-    """Tells of times whether the sensor saw motion near them, or did not look."""
-    if odometer is not None:
-        time, speed = odometer.time - 0.5 * odometer.steps, np.abs(odometer.speed)
-        pulse = 0.0 if odometer.pulse_size is None else STANDING_PULSES * odometer.pulse_size / odometer.interval
-        limit = max(STANDING, pulse)
-    else:
-        assert gnss is not None
-        time = gnss.time
-        speed = np.full(len(time), np.inf)
-        if gnss.v_n is not None:
-            speed = np.where(gnss.has_velocity, np.linalg.norm(np.nan_to_num(gnss.v_n[:, :2]), axis=1), np.inf)
-        limit = STANDING
-    moved = time[speed > limit]
-
-    def moving(at: Array) -> NDArray[np.bool_]:
-        if at.size == 0:
-            return np.zeros(0, dtype=bool)
-        near = np.searchsorted(time, at + NEAR) - np.searchsorted(time, at - NEAR) > 0
-        motion = np.searchsorted(moved, at + NEAR) - np.searchsorted(moved, at - NEAR) > 0
-        return np.asarray(~near | motion)
-
-    return moving

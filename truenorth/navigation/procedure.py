@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.errors import DataError, UsageError
-from truenorth.models.ins import DP, InsModel
+from truenorth.models.ins import BA, BG, DP, PHI, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, mean_nis
@@ -36,7 +36,9 @@ R = TypeVar("R", bound=Record)
 
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
 FINE, COARSE = 0.2, 1.0
-AXES_TIME = 1800.0  # s: of the log that tells axes of velocities
+# Of the log, what tells axes of velocities: at most this long, and until an INS without aiding has tilted or drifted so far.
+AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
+SHORTEST_AXES = 20.0  # s
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
 MOST_REJECTED = 0.2  # of a sensor's measurements
 NIS_LIMIT = 3.0  # mean NIS over its rows, beyond which model and data contradict each other
@@ -155,7 +157,8 @@ def navigate(
     if not (interval > 0.0 and output > 0.0):
         raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
     tell("looking for stops" if zupt is not None else "navigating")
-    stops = [] if zupt is None else zero_updates(record, zupt, interval)
+    seen = sources.odometer, sources.gnss, sources.velocity
+    stops = [] if zupt is None else zero_updates(record, zupt, interval, *seen)
     every = max(1, round(output / interval))
     noise = spec.with_random_walks(record.interval)
     plain = InsModel.from_spec(noise, scale_factors=scale_factors, fixed_altitude=height == "fixed")
@@ -314,7 +317,11 @@ def _check_axes(
     given = {name: log for name, log in logs.items() if log is not None}
     if not given:
         return
-    part = record.between(None, record.time[0] + AXES_TIME)
+    sigma = np.sqrt(np.diag(begin.P))
+    trusted = min(AXES_TIME, AXES_TILT / sigma[BG].max(), math.sqrt(2.0 * AXES_DRIFT / sigma[BA].max()))
+    if trusted < SHORTEST_AXES or sigma[PHI][:2].max() > AXES_TILT:
+        return
+    part = record.between(None, record.time[0] + trusted)
     free = navigate_track(part, begin, model, interval=FINE, every=1, covariance=False)
     lat, lon, alt = free.position.T
     own = Trajectory(free.time, free.C_nb, free.v_n, lat, lon, alt, source=record.source)

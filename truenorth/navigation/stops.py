@@ -11,12 +11,15 @@ from truenorth.errors import UsageError
 from truenorth.increments import increments
 from truenorth.navigation.aiding import Aiding
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
-from truenorth.records import ImuRecord
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 
 Array = NDArray[np.float64]
 
 STILL_VELOCITY = 0.01  # m/s, one sigma of a base on which nothing is seen to move
 DISTURBED_VELOCITY = 0.03  # m/s, of one that people, wind or an engine shake
+STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
+STANDING_PULSES = 1.5  # pulses in a row of an odometer: no more is standing
+NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
 STILL_RATE = 1e-6  # rad/s, of its rotation, beside what the gyros show of themselves
 
 
@@ -40,6 +43,48 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     return middle[motion.kind == STILL], middle[(motion.kind == DISTURBED) & before]
 
 
+def seconds_at_rest(
+    record: ImuRecord,
+    odometer: OdometerRecord | None = None,
+    gnss: GnssRecord | None = None,
+    velocity: VelocityRecord | None = None,
+) -> tuple[Array, Array]:
+    """Middles of the seconds in which the IMU sees no motion and no other sensor a speed: still, and disturbed, s.
+
+    Steady driving on a good road looks like rest to an IMU alone; a wheel that stands may slide. All that look must agree, and
+    where there are sensors of speed one must have looked.
+    """
+    seconds = stops_in(record)
+    speeds = [_speed_of(log) for log in (odometer, gnss, velocity) if log is not None]
+    speeds = [(time, moves) for time, moves in speeds if time.size]
+    if not speeds:
+        return seconds
+    agreed = []
+    for at in seconds:
+        looked = sum(_near(at, time) for time, _ in speeds)
+        moved = sum(_near(at, time[moves]) for time, moves in speeds)
+        agreed.append(at[(looked > 0) & (moved == 0)])
+    return agreed[0], agreed[1]
+
+
+def _near(at: Array, times: Array) -> NDArray[np.intp]:
+    """How many of these times lie near each of those."""
+    return np.searchsorted(times, at + NEAR) - np.searchsorted(times, at - NEAR)
+
+
+def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array, NDArray[np.bool_]]:
+    """When a sensor told a speed, and whether it was motion."""
+    if isinstance(log, OdometerRecord):
+        pulse = 0.0 if log.pulse_size is None else STANDING_PULSES * log.pulse_size / log.interval
+        return log.time - 0.5 * log.steps, np.abs(log.speed) > max(STANDING, pulse)
+    velocity = log.v_n if isinstance(log, GnssRecord) else log.velocity
+    if velocity is None:
+        return np.empty(0), np.empty(0, dtype=bool)
+    level = velocity[:, :2]
+    told = np.isfinite(level).any(axis=1)
+    return log.time[told], np.linalg.norm(np.nan_to_num(level[told]), axis=1) > STANDING
+
+
 def rate_scatter(record: ImuRecord, interval: float, seconds: Array) -> float:
     """RMS scatter of the mean rate over an interval, rad/s, in the seconds around these times: noise, quantum, vibration."""
     angle = np.cumsum(increments(record)[0], axis=0)
@@ -48,7 +93,14 @@ def rate_scatter(record: ImuRecord, interval: float, seconds: Array) -> float:
     return float(np.sqrt(0.5 * np.mean(np.diff(means, axis=2) ** 2)))
 
 
-def zero_updates(record: ImuRecord, stops: str | Sequence[tuple[float, float]], interval: float) -> list[Aiding]:
+def zero_updates(
+    record: ImuRecord,
+    stops: str | Sequence[tuple[float, float]],
+    interval: float,
+    odometer: OdometerRecord | None = None,
+    gnss: GnssRecord | None = None,
+    velocity: VelocityRecord | None = None,
+) -> list[Aiding]:
     """Zero velocities, and zero rotations of seconds without any motion.
 
     Parameters
@@ -58,6 +110,8 @@ def zero_updates(record: ImuRecord, stops: str | Sequence[tuple[float, float]], 
         Found from the IMU, or given, s on the record's clock.
     interval : float, s
         Of the filter: a mean rate is taken over it.
+    odometer, gnss, velocity : records, optional
+        Sensors of speed that have a say in what is found.
 
     Raises
     ------
@@ -67,7 +121,7 @@ def zero_updates(record: ImuRecord, stops: str | Sequence[tuple[float, float]], 
     if isinstance(stops, str):
         if stops != "auto":
             raise UsageError(f"zupt={stops!r}; expected 'auto' or pairs of seconds (start, stop)")
-        still, disturbed = stops_in(record)
+        still, disturbed = seconds_at_rest(record, odometer, gnss, velocity)
     else:
         seconds = []
         for start, stop in stops:

@@ -1,0 +1,78 @@
+"""Stops: all sensors that look must agree; and a vehicle that stands keeps its height."""
+
+import numpy as np
+import pytest
+
+from truenorth.navigation import Start, navigate
+from truenorth.navigation.stops import seconds_at_rest
+from truenorth.position import Position
+from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
+from truenorth.simulation import rest, simulate
+from truenorth.specs import imu_spec
+
+PLACE = Position.from_degrees(48.0, 11.0, 500.0)
+SPEC = imu_spec("industrial")
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """Five minutes of an IMU that nothing shakes: at rest, or as well on a smooth road at constant speed."""
+    return simulate(rest(PLACE, 0.6), rate=50.0, duration=300.0, imu=SPEC, seed=2).record
+
+
+T = np.arange(0.5, 300.0, 0.5)
+ABSENT = np.full(len(T), np.nan)
+
+
+def gnss(v_n):
+    return GnssRecord(T, 0 * T + PLACE.lat, 0 * T + PLACE.lon, 0 * T, v_n)
+
+
+def test_a_second_is_a_stop_where_all_that_look_agree(standing):
+    drives = np.where((T > 100.0) & (T < 200.0), 14.0, 0.0)
+    north = np.stack([0 * T, drives, 0 * T], axis=1)
+    alone = seconds_at_rest(standing)[0]
+    assert len(alone) > 290
+    for logs in (
+        {"odometer": OdometerRecord(T, drives, "speed")},
+        {"odometer": OdometerRecord(T, np.round(0.5 * drives / 0.04), "pulses", 0.04)},
+        {"gnss": gnss(north)},
+        {"velocity": VelocityRecord(T, np.where([False, True, False], north, np.nan))},
+        {"odometer": OdometerRecord(T, 0 * T, "speed"), "gnss": gnss(north)},  # a wheel that slides
+    ):
+        found = seconds_at_rest(standing, **logs)[0]
+        assert len(found) > 190, logs
+        assert not np.any((found > 100.0) & (found < 200.0)), logs
+    # Where a receiver has no fix nobody but the IMU looks; one that tells no velocity has no say.
+    silent = gnss(np.where(((T > 100.0) & (T < 200.0))[:, None], np.nan, 0.0 * north))
+    found = seconds_at_rest(standing, gnss=silent)[0]
+    assert len(found) > 190
+    assert not np.any((found > 102.0) & (found < 198.0))
+    np.testing.assert_array_equal(seconds_at_rest(standing, gnss=gnss(None))[0], alone)
+
+
+def test_height_does_not_wander_while_the_vehicle_stands(standing):
+    """A zero velocity a second of .01 m/s lets the height's sigma grow by its random walk, and the height by no more."""
+    sigma = np.repeat([5e-3, 0.1, 1.0, SPEC.gyro_bias, SPEC.accel_bias], 3)
+    C = rest(PLACE, 0.6).states(0.0).C_nb
+    v_n = np.array([0.05, -0.05, 0.05])
+    start = Start(0.0, C, v_n, PLACE.lat, PLACE.lon, PLACE.alt, np.zeros(3), np.zeros(3), np.diag(sigma**2))
+    result = navigate(standing, start, imu=SPEC, altitude="free", zupt="auto")
+    settled = result.time > 10.0
+    height, time = result.position[settled, 2], result.time[settled]
+    walk = 0.01 * np.sqrt(time - time[0] + 1.0)
+    assert np.all(np.abs(height - height[0]) < 4.0 * walk)
+    assert np.abs(result.v_n[settled, 2]).max() < 0.02
+    grown = np.sqrt(result.position_sigma[-1, 2] ** 2 - result.position_sigma[settled, 2][0] ** 2)
+    assert 0.5 * walk[-1] < grown < 1.5 * walk[-1]
+
+
+def test_an_ins_that_falls_for_minutes_is_no_fault_of_the_aiding(standing):
+    """A start of poor biases, with an odometer: what the log's axes are is told by the first seconds or not at all."""
+    sigma = np.repeat([5e-3, 0.1, 1.0, 5e-3, 0.5], 3)
+    C = rest(PLACE, 0.6).states(0.0).C_nb
+    start = Start(
+        0.0, C, np.zeros(3), PLACE.lat, PLACE.lon, PLACE.alt, np.zeros(3), np.array([0.0, 0.0, 0.5]), np.diag(sigma**2)
+    )
+    result = navigate(standing, start, imu=SPEC, odometer=OdometerRecord(T, 0 * T, "speed"), check_clocks=False)
+    assert result.position[-1, 2] == pytest.approx(PLACE.alt, abs=10.0)
