@@ -1,8 +1,13 @@
 """Plans: what they expand to, and what is refused with which words."""
 
+from typing import get_args
+
 import pytest
 
+from truenorth.alignment.procedure import Method
 from truenorth.campaign import read_plan
+from truenorth.campaign.plan import MethodPlan
+from truenorth.campaign.tuning import Search
 from truenorth.errors import DataError, UsageError
 
 REST = {
@@ -25,6 +30,12 @@ def test_a_plan_is_scenarios_times_the_grid():
     assert plan.cases[1].name == "rest, bias 0.01 deg/h, heading 90 deg"
     assert plan.cases[1].built.motion.heading == pytest.approx(1.5707963267948966)
     assert plan.cases[3].built.imu_spec.gyro_bias == 10 * plan.cases[0].built.imu_spec.gyro_bias
+
+
+def test_every_method_of_align_can_be_planned():
+    plan = read_plan(PLAN | {"methods": list(get_args(Method))})
+    assert "swaying" in [method.method for method in plan.methods]
+    assert Search.model_fields["method"].annotation == MethodPlan.model_fields["method"].annotation == Method
 
 
 def test_the_resolved_plan_is_the_same_plan():

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from tests.campaign.test_plan import PLAN, REST
 from truenorth.campaign import outcomes, read_campaign, read_plan, read_table, run_campaign
+from truenorth.campaign.bound import bounds
 from truenorth.campaign.execution import work
 from truenorth.campaign.store import Block, Store, opened, versions
 from truenorth.cli import app
@@ -350,6 +351,15 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     again = read_campaign(tmp_path / "out")
     assert set(again.convergence["converged"]) <= {0.0, 0.25, 0.5, 0.75, 1.0}
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
+
+
+def test_a_base_that_sways_has_no_bound():
+    """A filter that takes sway for white noise bounds nothing."""
+    tones = {"roll": [{"amplitude": "1 deg", "period": "6 s"}]}
+    sway = REST | {"motion": {"kind": "sway", "tones": tones}, "lever_arm": ["0 m", "0 m", "3 m"]}
+    plan = read_plan(PLAN | {"scenarios": [sway, REST], "runs": 1})
+    table = bounds(plan)
+    assert table.groupby("case")["bound"].count().tolist() == [0, 3]
 
 
 def test_the_bound_is_not_beaten_and_nearly_reached(tmp_path):

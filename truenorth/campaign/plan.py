@@ -20,10 +20,11 @@ from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field, PrivateAttr, field_validator
 
+from truenorth.alignment.procedure import Method
 from truenorth.errors import DataError, TruenorthError
 from truenorth.schema import Angle, Strict, Time, validated
 from truenorth.simulation.scenario import Scenario, read_scenario
@@ -44,7 +45,7 @@ class MethodPlan(Strict):
     """
 
     name: str = Field(min_length=1)
-    method: Literal["auto", "analytic", "inertial", "oba", "kalman"]
+    method: Method
     imu: str | dict[str, Any] = "simulated"
 
 

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
+from truenorth.alignment.procedure import Method
 from truenorth.campaign.aligning import align_runs
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.rows import table_of
@@ -59,7 +60,7 @@ class Search(Strict):
 
     name: str = Field(min_length=1)
     scenario: str | dict[str, Any]
-    method: Literal["auto", "inertial", "oba", "kalman"] = "kalman"
+    method: Method = "kalman"
     search: dict[str, tuple[str, str]] = Field(min_length=1)
     quantity: Literal["phi_u", "phi_e", "phi_n", "level"] = "phi_u"
     runs: int = Field(20, ge=2)
