@@ -20,6 +20,7 @@ from truenorth.campaign.bound import bounds
 from truenorth.campaign.execution import work
 from truenorth.campaign.store import Block, Store, opened, versions
 from truenorth.cli import app
+from truenorth.cli.campaign import pace
 from truenorth.errors import DataError, UsageError
 
 
@@ -324,6 +325,12 @@ def dying_work(plan, block):
         return work(plan, block)
     os.kill(os.getpid(), signal.SIGKILL)
     return None
+
+
+def test_the_pace_counts_what_was_done_since_the_start():
+    assert pace(20, 1480, 4.0) == "5 runs/s, 0:04:56 left"
+    assert pace(500, 0, 3.0) == "167 runs/s, 0:00:00 left"
+    assert pace(0, 1500, 2.0) == ""
 
 
 def test_the_command_writes_tables_figures_and_a_page(tmp_path):

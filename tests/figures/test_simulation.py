@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from truenorth.figures.simulation import plot_simulation
 from truenorth.simulation.scenario import read_scenario, shipped
 
 
 def page(name, duration):
     scenario = read_scenario(name).model_copy(update={"duration": duration})
-    return plot_simulation(scenario.simulate(), name, scenario.simulate_aiding())
+    return scenario.simulate().plot(name, scenario.simulate_aiding())
 
 
 @pytest.mark.parametrize("name", shipped())

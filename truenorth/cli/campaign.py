@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from typing import Annotated
 
@@ -85,24 +88,33 @@ def _bar() -> Iterator[Callable[[int, int], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-    columns = (
-        TextColumn("runs"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-    )
+    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[pace]}"))
     with Progress(*columns, console=make_console(stderr=True)) as progress:
-        task = progress.add_task("runs", total=None, rate="")
+        task = progress.add_task("runs", total=None, pace="")
+        start: list[tuple[float, int]] = []  # when, and with how many that were there
 
         def tell(done: int, total: int) -> None:
-            progress.update(task, completed=done, total=total)
-            speed = progress.tasks[0].speed
-            progress.update(task, rate=f"{speed:.1f} runs/s" if speed else "")
+            now = time.monotonic()
+            if not start:
+                start.append((now, done))
+            since, before = start[0]
+            words = pace(done - before, total - done, now - since)
+            progress.update(task, completed=done, total=total, pace=words)
 
         yield tell
+
+
+def pace(done: int, left: int, seconds: float) -> str:
+    """Runs a second and time left, in words, from what was done since the start.
+
+    Blocks of runs end together: any shorter stretch would promise too much.
+    """
+    if not (done and seconds > 0):
+        return ""
+    rate = done / seconds
+    return f"{rate:.3g} runs/s, {timedelta(seconds=math.ceil(left / rate))} left"
 
 
 campaign.__doc__ = f"{campaign.__doc__}\n{EXAMPLES}"

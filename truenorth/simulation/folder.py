@@ -78,11 +78,9 @@ def save_run(
         facts = json.dumps(_facts(scenario, simulation, aiding, seed, run), indent=2, allow_nan=False)
         summary.write_text(f"{facts}\n", encoding="utf-8")
         if plot:
-            from truenorth.figures.simulation import plot_simulation
-
             paths.append(target / "figure.png")
             title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
-            plot_simulation(simulation, title, aiding).savefig(files.enter_context(atomic_path(paths[-1])))
+            simulation.plot(title, aiding).savefig(files.enter_context(atomic_path(paths[-1])))
     return paths
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
@@ -19,6 +19,11 @@ from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.sensing import Moving
 from truenorth.simulation.true_errors import TrueErrors
 from truenorth.specs import ImuSpec
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from truenorth.simulation.aiding import Aided
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,19 @@ class Simulation:
     def truth(self) -> MotionStates:
         """The true motion of the IMU at the sample times."""
         return self.motion.states(self.record.time)
+
+    def plot(self, title: str = "", aiding: Mapping[str, Aided[Any]] | None = None) -> Figure:
+        """Track, speed and height, attitude and sensor signals on one page; see :func:`plot_simulation`.
+
+        Parameters
+        ----------
+        title : str
+        aiding : mapping of name to Aided, optional
+            Logs of aiding sensors, drawn as dots.
+        """
+        from truenorth.figures.simulation import plot_simulation
+
+        return plot_simulation(self, title, aiding)
 
 
 def simulate(
