@@ -74,6 +74,7 @@ def test_json_alone(folder):
         (["--start", "{start}", "--gnss", "{moved}"], 4, ""),
         (["--start", "{start}", "--gnss", "{gnss}", "--lever-arm", "120,40,200"], 2, "centimetres"),
         (["--start", "{start}", "--gnss", "{gnss}", "--lever-arm", "1,2"], 2, "expected 3 numbers"),
+        (["--start", "{start}", "--gnss", "{gnss}", "--gnss-drift", "2,0"], 2, "above zero, such as 2,60"),
         (["--start", "{start}", "--altitude", "up"], 2, "expected one of fixed"),
         (["--start", "{start}", "--estimate", "speed"], 2, "'speed' is not known"),
         (["--start", "{start}", "--zupt", "now"], 2, "expected auto"),

@@ -126,6 +126,30 @@ def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
     assert warnings(result) == []
 
 
+def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
+    """A drift of 1.5 m over 60 s: the sigma is too small, until it is said; by chance it is told of white fixes once in 3e4."""
+    motion, record, start = drive
+    time = np.arange(1.0, 179.0)
+    white = fixes(motion, time, 1.0)
+    rng, drift = np.random.default_rng(8), np.zeros((len(time), 3))
+    for k in range(1, len(time)):
+        drift[k] = np.exp(-1 / 60) * drift[k - 1] + 1.5 * np.sqrt(1 - np.exp(-2 / 60)) * rng.standard_normal(3)
+    wandering = replace(
+        white,
+        lat=white.lat + drift[:, 1] / 6.37e6,
+        lon=white.lon + drift[:, 0] / 4.27e6,
+        alt=white.alt + drift[:, 2],
+    )
+    assert not any("hang together" in words for words in warnings(navigate(record, start, imu=SPEC, gnss=white)))
+    told = [words for words in warnings(navigate(record, start, imu=SPEC, gnss=wandering)) if "hang together" in words]
+    assert len(told) == 1
+    assert "--gnss-drift" in told[0]
+    antenna = Mounting(bias_sigma=1.5, bias_time=60.0)
+    assert not any(
+        "hang together" in w for w in warnings(navigate(record, start, imu=SPEC, gnss=wandering, antenna=antenna))
+    )
+
+
 def test_what_is_open_is_open_and_a_filter_that_breaks_down_says_nothing():
     asked = {}
 

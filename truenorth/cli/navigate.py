@@ -81,6 +81,13 @@ def navigate(
     ] = None,
     offset: Annotated[float, typer.Option(help="Added to the times of all aiding logs, s.")] = 0.0,
     latency: Annotated[float, typer.Option(help="GNSS measurements are older than their stamps by this, s.")] = 0.0,
+    gnss_drift: Annotated[
+        str | None,
+        typer.Option(
+            help="Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it.",
+            show_default=False,
+        ),
+    ] = None,
     imu: Annotated[
         str | None, typer.Option(help="Specification; the alignment's own without it.", show_default=False)
     ] = None,
@@ -139,6 +146,7 @@ def navigate(
     parts = _parts(estimate)
     antenna = _mounting(lever_arm, "--lever-arm", None, parts & {"lever_arm", "latency"})
     wheel = _mounting(wheel_arm, "--wheel-arm", mounting, parts - {"latency"})
+    antenna = _drifting(antenna, gnss_drift)
     stops = _stops(zupt)
     damper = _damper(
         damping,
@@ -236,6 +244,19 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
         scale_sigma=sigma.get("scale", 0.0),
         latency_sigma=sigma.get("latency", 0.0),
     )
+
+
+def _drifting(antenna: Mounting, drift: str | None) -> Mounting:
+    from dataclasses import replace
+
+    from truenorth.errors import UsageError
+
+    if drift is None:
+        return antenna
+    sigma, time = numbers_of(drift, "--gnss-drift", 2, "one sigma in metres, time in seconds")
+    if not (sigma > 0.0 and time > 0.0):
+        raise UsageError(f"--gnss-drift {drift}: expected metres and seconds above zero, such as 2,60")
+    return replace(antenna, bias_sigma=sigma, bias_time=time)
 
 
 def _damper(method: str | None, **figures: Any) -> Damper | None:

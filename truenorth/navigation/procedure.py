@@ -16,7 +16,7 @@ from truenorth.models.ins import BA, BG, DP, PHI, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, mean_nis
-from truenorth.navigation.second_look import second_look
+from truenorth.navigation.second_look import second_look, slow_errors
 from truenorth.navigation.sensors import Mounting, from_gnss, from_height, from_odometer, from_velocity
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
@@ -173,6 +173,11 @@ def navigate(
     status, reasons = check_residuals(track)
     if why:
         reasons.append(why)
+    if baro is not None and height != "baro":
+        reasons.append(
+            f"the barometer is not used: height is {height!r}; for its heights altitude 'baro' (--altitude baro)"
+        )
+    reasons += slow_errors(track, mounting["gnss"])
     reasons += [note for aid in given.values() for note in aid.notes]
     if check_clocks and aiding:
         tell("checking clocks and mountings")
@@ -361,7 +366,7 @@ def check_residuals(track: Track) -> tuple[bool, list[str]]:
                 f"{r.name}: innovations are {math.sqrt(nis):.1f} times as large as their sigma says: sigma is not to be trusted"
             )
         if r.outside:
-            reasons.append(f"{r.name}: {r.outside} measurements lie outside the IMU's log")
+            reasons.append(f"{r.name}: {r.outside} measurements lie before the start or after the end of the IMU's log")
     return sound, reasons
 
 
