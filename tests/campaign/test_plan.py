@@ -32,6 +32,15 @@ def test_a_plan_is_scenarios_times_the_grid():
     assert plan.cases[3].built.imu_spec.gyro_bias == 10 * plan.cases[0].built.imu_spec.gyro_bias
 
 
+def test_a_grid_reaches_into_lists():
+    legs = [{"kind": "straight", "duration": "9 s"}, {"kind": "turn", "angle": "90 deg", "rate": "3 deg/s"}]
+    grid = {"motion.legs[2].rate": ["3 deg/s", "6 deg/s"], "lever_arm[1]": ["0 m", "2 m"]}
+    plan = read_plan(PLAN | {"scenarios": [REST | {"motion": {"kind": "legs", "legs": legs}}], "grid": grid})
+    assert [case.built.lever_arm[0] for case in plan.cases] == [0.0, 2.0, 0.0, 2.0]
+    assert plan.cases[2].built.motion.legs[1].rate == 2 * plan.cases[0].built.motion.legs[1].rate
+    assert plan.cases[3].name == "rest, rate 6 deg/s, lever_arm[1] 2 m"
+
+
 def test_every_method_of_align_can_be_planned():
     plan = read_plan(PLAN | {"methods": list(get_args(Method))})
     assert "swaying" in [method.method for method in plan.methods]
@@ -57,6 +66,14 @@ def test_the_resolved_plan_is_the_same_plan():
         ({"scenarios": ["quai"]}, "did you mean 'quay'"),
         ({"grid": {"imu.gyro.bias": []}}, "imu.gyro.bias has no values"),
         ({"grid": {"imu.gyroo.bias": ["1 deg/h"]}}, "'imu.gyroo.bias' leads nowhere"),
+        (
+            {"grid": {"lever_arm[4]": ["1 m"]}},
+            r"'lever_arm\[4\]' leads nowhere .* there is no entry \[4\] in a list of 3",
+        ),
+        ({"grid": {"lever_arm[0]": ["1 m"]}}, r"there is no entry \[0\]"),
+        ({"grid": {"motion[1]": ["1 m"]}}, r"there is no entry \[1\] in that mapping"),
+        ({"grid": {"lever_arm.x": ["1 m"]}}, r"there is no 'x' in a list of 3"),
+        ({"grid": {"imu..bias": ["1 m"]}}, r"'imu\.\.bias' is no path; expected keys such as motion"),
         ({"grid": {"imu.gyro.bias": ["1 deg"]}}, "rest, bias 1 deg: scenario: imu: .*gyro.bias: '1 deg'"),
         ({"times": ["50 s"]}, "times: 50 s; expected a time within the 40 s of rest"),
     ],

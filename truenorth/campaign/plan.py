@@ -16,6 +16,7 @@ import hashlib
 import itertools
 import json
 import math
+import re
 from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
@@ -30,6 +31,10 @@ from truenorth.schema import Angle, Strict, Time, validated
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.specs import PRESETS
 from truenorth.yaml_file import read_mapping
+
+# A path into a scenario, motion.legs[2].rate: entries of a list count from one, as in our messages.
+_PATH = re.compile(r"[^.\[\]]+(\[\d+\])*(\.[^.\[\]]+(\[\d+\])*)*")
+_KEY = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 
 class MethodPlan(Strict):
@@ -92,7 +97,7 @@ class Plan(Strict):
         Runs that are worked on and written together.
     scenarios : list of name, file or mapping
     grid : mapping of path to list
-        Dotted paths into the scenario.
+        Dotted paths into the scenario; ``[n]`` is the n-th entry of a list, counted from one.
     methods : list of name or mapping
     times : list of s
         Also align the log up to each of these; the whole of it always.
@@ -173,14 +178,21 @@ class Plan(Strict):
 
     def _put(self, scenario: dict[str, Any], path: str, value: Any) -> None:
         at: Any = scenario
-        *above, last = path.split(".")
+        if not _PATH.fullmatch(path):
+            raise DataError(f"{self._source}: grid: {path!r} is no path; expected keys such as motion.legs[2].rate")
+        *above, last = [key or int(place) - 1 for key, place in _KEY.findall(path)]
         for key in above:
-            at = at.get(key) if isinstance(at, Mapping) else None
-            if not isinstance(at, dict):
+            at = at.get(key) if isinstance(at, dict) else at[key] if _has_entry(at, key) else None
+            if not isinstance(at, dict | list):
                 raise DataError(
-                    f"{self._source}: grid: {path!r} leads nowhere in scenario {scenario['name']!r}: it has no {key!r} with keys "
-                    "below it"
+                    f"{self._source}: grid: {path!r} leads nowhere in scenario {scenario['name']!r}: it has no "
+                    f"{_words(key)} with keys below it"
                 )
+        if not (isinstance(last, str) if isinstance(at, dict) else _has_entry(at, last)):
+            raise DataError(
+                f"{self._source}: grid: {path!r} leads nowhere in scenario {scenario['name']!r}: there is no {_words(last)} in "
+                f"{'that mapping' if isinstance(at, dict) else f'a list of {len(at)}'}"
+            )
         at[last] = value
 
     def with_runs(self, runs: int) -> Plan:
@@ -200,6 +212,14 @@ class Plan(Strict):
         """Of all that decides the numbers; the number of runs, the block and the words do not."""
         content = {k: v for k, v in self.to_mapping().items() if k not in ("runs", "block", "name", "description")}
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _words(key: str | int) -> str:
+    return repr(key) if isinstance(key, str) else f"entry [{key + 1}]"
+
+
+def _has_entry(at: Any, key: str | int) -> bool:
+    return isinstance(at, list) and isinstance(key, int) and 0 <= key < len(at)
 
 
 def read_plan(source: str | PathLike[str] | Mapping[str, Any] | Plan) -> Plan:

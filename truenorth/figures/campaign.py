@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -45,7 +46,7 @@ def plot_campaign(campaign: Campaign) -> dict[str, Figure]:
             figures["convergence"] = plot_convergence(campaign)
         for path in campaign.plan.grid:
             if len(campaign.plan.grid[path]) > 1 and all(_number(v) is not None for v in campaign.plan.grid[path]):
-                figures[f"requirement_{path.replace('.', '_')}"] = plot_requirement(campaign, path)
+                figures[f"requirement_{re.sub(r'[^A-Za-z0-9]+', '_', path)}"] = plot_requirement(campaign, path)
     return figures
 
 
