@@ -6,7 +6,6 @@ import pytest
 
 from truenorth.alignment.procedure import Method
 from truenorth.campaign import read_plan
-from truenorth.campaign.plan import MethodPlan
 from truenorth.campaign.tuning import Search
 from truenorth.errors import DataError, UsageError
 
@@ -44,7 +43,7 @@ def test_a_grid_reaches_into_lists():
 def test_every_method_of_align_can_be_planned():
     plan = read_plan(PLAN | {"methods": list(get_args(Method))})
     assert "swaying" in [method.method for method in plan.methods]
-    assert Search.model_fields["method"].annotation == MethodPlan.model_fields["method"].annotation == Method
+    assert Search.model_fields["method"].annotation == Method
 
 
 def test_the_resolved_plan_is_the_same_plan():
@@ -63,6 +62,11 @@ def test_the_resolved_plan_is_the_same_plan():
         ({"methods": ["klaman"]}, r"methods\[1\].method: 'klaman'; expected 'auto'"),
         ({"methods": ["oba", "oba"]}, "two are named 'oba'"),
         ({"methods": "oba"}, "expected a list of methods"),
+        ({"methods": ["in_motion"]}, "'in_motion' aligns in motion, and rest has neither odometer nor gnss"),
+        (
+            {"scenarios": ["van"], "methods": [{"name": "bare", "method": "in_motion", "imu": "none"}]},
+            "'bare' aligns in motion without a specification",
+        ),
         ({"scenarios": ["quai"]}, "did you mean 'quay'"),
         ({"grid": {"imu.gyro.bias": []}}, "imu.gyro.bias has no values"),
         ({"grid": {"imu.gyroo.bias": ["1 deg/h"]}}, "'imu.gyroo.bias' leads nowhere"),

@@ -360,6 +360,28 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
 
 
+def test_alignment_in_motion_is_a_method_too(tmp_path):
+    """By the odometer that the scenario has; the same bits by two processes; no error beyond five sigma."""
+    ring = {"kind": "ring", "radius": "60 m", "speed": "10 m/s", "wait": "20 s"}
+    drive = REST | {
+        "name": "drive",
+        "duration": "90 s",
+        "motion": ring,
+        "odometer": {"scale_sigma": "0.3 %", "noise": "0.02 m/s"},
+    }
+    plan = PLAN | {"scenarios": [drive], "methods": ["in_motion"], "runs": 2, "block": 1, "times": ["60 s"]}
+    one = run_campaign(plan, tmp_path / "one").table
+    pd.testing.assert_frame_equal(run_campaign(plan, tmp_path / "two", workers=2).table, one, check_exact=True)
+    ends = outcomes(one)
+    assert list(zip(ends["time_s"], ends["status"], ends["runs"], strict=True)) == [
+        (60.0, "aligned", 2),
+        (90.0, "aligned", 2),
+    ]
+    attitude = one[one["quantity"].isin(["phi_e", "phi_n", "phi_u"])]
+    assert len(attitude) == 2 * 2 * 3
+    assert (attitude["value"].abs() < 5 * attitude["sigma"]).all()
+
+
 def test_a_base_that_sways_has_no_bound():
     """A filter that takes sway for white noise bounds nothing."""
     tones = {"roll": [{"amplitude": "1 deg", "period": "6 s"}]}

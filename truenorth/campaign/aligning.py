@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truenorth.alignment import Alignment, align
+from truenorth.alignment import Alignment, align, align_in_motion
 from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G
 from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.campaign.rows import Row
 from truenorth.position import Position
+from truenorth.records import ImuRecord
 from truenorth.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
@@ -67,7 +68,11 @@ def _aligned(
         record = simulated.record.between(None, case.built.start + time * (1 + 1e-12))
         start = simulated.motion.states(np.array(case.built.start))
         place = Position(float(start.lat), float(start.lon), float(start.alt))
-        answer = align(record, place, spec, method.method, heading_limit=plan.heading_limit)
+        if method.method == "in_motion":
+            assert spec is not None  # the plan sees to it
+            answer = _in_motion(plan, case, run, spec, record, place)
+        else:
+            answer = align(record, place, spec, method.method, heading_limit=plan.heading_limit)
         errors = [
             Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
             for quantity, value, sigma, unit in _errors(answer, simulated)
@@ -78,6 +83,14 @@ def _aligned(
         case.number, method.name, run, time, "outcome", status=answer.status, reason="; ".join(answer.reasons)
     )
     return [outcome, *errors]
+
+
+def _in_motion(plan: Plan, case: Case, run: int, spec: ImuSpec, record: ImuRecord, place: Position) -> Alignment:
+    """By the odometer and the receiver that the scenario has, as far as the log goes; where they sit is estimated."""
+    logs = case.built.simulate_aiding(seed=plan.seed, run=run, number=case.scenario_number)
+    stop = float(record.time[-1])
+    aiding = {key: logs[key].record.between(None, stop) for key in ("odometer", "gnss") if key in logs}
+    return align_in_motion(record, spec, position=place, heading_limit=plan.heading_limit, **aiding)
 
 
 def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, float, float, str]]:
@@ -96,7 +109,7 @@ def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, flo
     block = answer.phi_covariance[:usable, :usable]
     yield "nees", float(phi[:usable] @ np.linalg.solve(block, phi[:usable])) / usable, math.nan, "1"
     if answer.history is not None:
-        count = int(np.isfinite(answer.history.innovation).sum())
+        count = max(1, int(np.isfinite(answer.history.innovation).sum()))
         yield "nis", float(np.nansum(answer.history.nis)) / count, math.sqrt(2.0 / count), "1"
     for what, found, spread, drawn, unit, scale in (
         ("gyro_bias", answer.gyro_bias, answer.gyro_bias_sigma, simulated.errors.gyro_bias, "deg/h", DEG_PER_HOUR),

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator
 
@@ -44,13 +44,14 @@ class MethodPlan(Strict):
     ----------
     name : str
     method : str
-        As :func:`truenorth.align` takes it.
+        As :func:`truenorth.align` takes it; or ``in_motion``, :func:`truenorth.align_in_motion` by the odometer and the GNSS
+        receiver that the scenario has.
     imu : "simulated", "none", preset, file or mapping
         The specification that the method is given: that of the simulated IMU, none (it then asks the log), or another one.
     """
 
     name: str = Field(min_length=1)
-    method: Method
+    method: Literal[Method, "in_motion"]
     imu: str | dict[str, Any] = "simulated"
 
 
@@ -157,6 +158,12 @@ class Plan(Strict):
                     built = case.built
                 except TruenorthError as error:
                     raise DataError(f"{self._source}: {case.name}: {error}") from None
+                for method in self.methods:
+                    if method.method == "in_motion" and built.odometer is None and built.gnss is None:
+                        raise DataError(
+                            f"{self._source}: methods: {method.name!r} aligns in motion, and {case.name} has neither odometer nor "
+                            "gnss; give it one"
+                        )
                 for time in self.times:
                     if not 0 < time <= built.duration:
                         raise DataError(
@@ -244,5 +251,11 @@ def read_plan(source: str | PathLike[str] | Mapping[str, Any] | Plan) -> Plan:
     for name in names:
         if names.count(name) > 1:
             raise DataError(f"{plan._source}: methods: two are named {name!r}; give each a name of its own")
+    for method in plan.methods:
+        if method.method == "in_motion" and method.imu == "none":
+            raise DataError(
+                f"{plan._source}: methods: {method.name!r} aligns in motion without a specification, and a log on the move "
+                "cannot be asked for it; expected imu: simulated, a preset or a file"
+            )
     plan.cases  # noqa: B018  # built now, so that mistakes are told before the work
     return plan
