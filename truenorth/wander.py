@@ -79,6 +79,23 @@ def earth_axis(s: Any) -> Any:
 
 
 @compiled
+def acceleration(s: Any, force: Any, fixed_altitude: bool) -> Any:
+    """``dv_w/dt`` of a mean specific force along w, m/s^2; of the last sample where there is none yet.
+
+    That of a single sample is the base's vibration, too; over an interval the mean is what the velocity does.
+    """
+    if force[0] * force[0] + force[1] * force[1] + force[2] * force[2] < 1.0:
+        return s[12], s[13], s[14]
+    axis = earth_axis(s)
+    rate = 2.0 * earth.EARTH_RATE
+    coriolis = cross((rate * axis[0], rate * axis[1], rate * axis[2]), (s[4], s[5], s[6]))
+    up = s[14]
+    if not fixed_altitude:
+        up = force[2] - coriolis[2] - _normal_gravity_at(axis[2] * axis[2], s[11])
+    return force[0] - coriolis[0], force[1] - coriolis[1], up
+
+
+@compiled
 def advance(s: Any, T: float, part: float, dtheta: Any, dvel: Any, ends: bool, fixed_altitude: bool) -> None:
     """Carry the state on through a sample, or through a part of it.
 

@@ -106,9 +106,11 @@ def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
 
     def row(C, v_b, lag):
         s, H, z = np.zeros(24), np.zeros((3, 32)), np.zeros(3)
-        s[4:7], s[12:15] = C @ v_b, C @ (push + np.cross(w, v_b))
+        s[4:7], change_n = C @ v_b, C @ (push + np.cross(w, v_b))
         nothing = (0.0, 0.0, 0.0)
-        body_velocity_row(s, C, tuple(w), C_mb, tuple(arm), 0.02, nothing, lag, -1, -1, -1, -1, 31, np.zeros(3), H, z)
+        body_velocity_row(
+            s, C, tuple(w), tuple(change_n), C_mb, tuple(arm), 0.02, nothing, lag, -1, -1, -1, -1, 31, np.zeros(3), H, z
+        )
         return z, H[:, 31]
 
     late, change = row(C, v_b, lag)

@@ -120,7 +120,7 @@ def position_row(
 
 @compiled
 def velocity_row(
-    s: Any, C: Any, w_b: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any
+    s: Any, C: Any, w_b: Any, push: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any
 ) -> None:
     """Velocity of an antenna, east, north, up, m/s; as :func:`position_row`.
 
@@ -128,6 +128,8 @@ def velocity_row(
     ----------
     w_b : tuple of 3, rad/s
         Rate of the body against the earth, body axes.
+    push : tuple of 3, m/s^2
+        Change of the velocity along w.
     """
     u_b = cross(w_b, arm)
     u = (
@@ -155,8 +157,8 @@ def velocity_row(
             if at_arm >= 0:
                 H[i, at_arm + j] = -(C[i, 0] * m[0] + C[i, 1] * m[1] + C[i, 2] * m[2])
         if at_lag >= 0:
-            H[j, at_lag] = s[12 + j]
-        z[j] = s[4 + j] + u[j] - lag * s[12 + j]
+            H[j, at_lag] = push[j]
+        z[j] = s[4 + j] + u[j] - lag * push[j]
     H[0, _DP] = convergence * cosine * z[1]
     H[0, _DP + 1] = -convergence * sine * z[1]
     H[1, _DP] = -convergence * cosine * z[0]

@@ -29,6 +29,7 @@ def body_velocity_row(
     s: Any,
     C: Any,
     w_b: Any,
+    push: Any,
     C_mb: Any,
     arm: Any,
     scale: float,
@@ -53,6 +54,8 @@ def body_velocity_row(
         ``C_wb``.
     w_b : tuple of 3, rad/s
         Rate of the body against the earth, body axes.
+    push : tuple of 3, m/s^2
+        Change of the velocity along w.
     C_mb : (3, 3) array
         Body to vehicle axes, as assumed now.
     arm, scale, bias, lag
@@ -68,22 +71,22 @@ def body_velocity_row(
     """
     gain = 1.0 + scale
     v = _into_body(C, (s[4], s[5], s[6]))
-    change = _into_body(C, (s[12], s[13], s[14]))  # of the velocity as its axes do not turn
+    change = _into_body(C, push)  # of the velocity as its axes do not turn
     swing = cross(w_b, v)  # and as they do: in a steady turn nothing changes sideways
     u = cross(w_b, arm)
     y = (0.0, 0.0, 0.0)
     for k in range(3):
-        along = v[k] + lag * swing[k] + u[k]
-        y = (y[0] + C_mb[0, k] * along, y[1] + C_mb[1, k] * along, y[2] + C_mb[2, k] * along)
+        shown = v[k] + lag * swing[k] + u[k]
+        y = (y[0] + C_mb[0, k] * shown, y[1] + C_mb[1, k] * shown, y[2] + C_mb[2, k] * shown)
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
-        push, tilt = _into_body(C, e), _into_body(C, cross((s[4], s[5], s[6]), e))
-        push_late, tilt_late = cross(w_b, push), cross(w_b, tilt)
+        along, tilt = _into_body(C, e), _into_body(C, cross((s[4], s[5], s[6]), e))
+        along_late, tilt_late = cross(w_b, along), cross(w_b, tilt)
         turn, turn_late, sweep, mount = cross(e, arm), cross(e, v), cross(w_b, e), cross(y, e)
         for i in range(3):
             for k in range(3):
                 M = gain * C_mb[i, k]
-                H[i, _DV + j] += M * (push[k] + lag * push_late[k])
+                H[i, _DV + j] += M * (along[k] + lag * along_late[k])
                 H[i, _PHI + j] -= M * (tilt[k] + lag * tilt_late[k])
                 H[i, _BG + j] += M * (turn[k] + lag * turn_late[k])
                 if at_arm >= 0:

@@ -22,7 +22,7 @@ from truenorth.models.in_motion import reset
 from truenorth.models.ins import couple_sensors, error_dynamics, transition
 from truenorth.models.odometer import body_velocity_row
 from truenorth.models.rotation import rotation_row
-from truenorth.wander import advance, displace, earth_axis
+from truenorth.wander import acceleration, advance, displace, earth_axis
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -232,10 +232,12 @@ def measure(
         w_ib[1] - (C[0, 1] * w_ie[0] + C[1, 1] * w_ie[1] + C[2, 1] * w_ie[2]),
         w_ib[2] - (C[0, 2] * w_ie[0] + C[1, 2] * w_ie[1] + C[2, 2] * w_ie[2]),
     )
+    force = (means.vectors[0, 0], means.vectors[0, 1], means.vectors[0, 2])
+    push = acceleration(s, force, model.fixed_altitude)
     if kind == POSITION:
         position_row(s, C, arm, lag, bias, at_arm, at_lag, at_bias, measured, w.H, w.z)
     elif kind == VELOCITY:
-        velocity_row(s, C, w_eb, arm, lag, at_arm, at_lag, measured, w.H, w.z)
+        velocity_row(s, C, w_eb, push, arm, lag, at_arm, at_lag, measured, w.H, w.z)
     elif kind == BODY_VELOCITY:
         at_scale, at_mount = states[AT_SCALE], states[AT_MOUNT]
         scale = 0.0
@@ -248,7 +250,23 @@ def measure(
         for j in range(3):
             mount[0, j], mount[1, j], mount[2, j] = rotate(q, (figures[3 + j], figures[6 + j], figures[9 + j]))
         body_velocity_row(
-            s, C, w_eb, mount, arm, scale, bias, lag, at_arm, at_scale, at_mount, at_bias, at_lag, measured, w.H, w.z
+            s,
+            C,
+            w_eb,
+            push,
+            mount,
+            arm,
+            scale,
+            bias,
+            lag,
+            at_arm,
+            at_scale,
+            at_mount,
+            at_bias,
+            at_lag,
+            measured,
+            w.H,
+            w.z,
         )
     elif kind == HEIGHT:
         height_row(s, C, arm, bias[0], at_bias, measured, w.H, w.z)
