@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+UNIFORM_SIGMA = math.pi / math.sqrt(3.0)  # rad, sigma of an angle of which nothing is known
 SMALL_ANGLE_SQUARED = 1e-4  # below .01 rad the series to the fourth power is exact to rounding
 DIRECTIONS = {
     "R": (1, 0, 0),
@@ -132,6 +133,42 @@ def euler_from_dcm(C_nb: ArrayLike) -> tuple[Array, Array, Array]:
     roll = np.where(vertical, 0.0, np.arctan2(-C[..., 2, 0], C[..., 2, 2]))
     heading = np.mod(heading, 2 * np.pi)
     return np.where(heading == 2 * np.pi, 0.0, heading), pitch, roll  # mod rounds -1e-17 up to 2 pi
+
+
+def euler_jacobian(C_nb: Array) -> Array:
+    """Errors of heading, pitch and roll for a misalignment ``phi`` (E, N, U).
+
+    From ``C_hat = (I - [phi x]) C``: a body axis ``a`` seen in n moves by ``-phi x a``; heading and pitch belong to
+    the y axis (``atan2(y_E, y_N)``, ``asin(y_U)``), roll to x and z (``atan2(-x_U, z_U)``).
+
+    Parameters
+    ----------
+    C_nb : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Rows heading, pitch, roll; columns phi_E, phi_N, phi_U. It grows without bound towards pitch +-90 deg.
+    """
+    xU, yU, zU = C_nb[..., 2, 0], C_nb[..., 2, 1], C_nb[..., 2, 2]
+    yE, yN = C_nb[..., 0, 1], C_nb[..., 1, 1]
+    # -phi x a as a matrix on phi is [a x]; rows of [a x]: E (0, -a_U, a_N), N (a_U, 0, -a_E), U (-a_N, a_E, 0).
+    zero = np.zeros_like(xU)
+    up_row = {i: np.stack([-C_nb[..., 1, i], C_nb[..., 0, i], zero], -1) for i in range(3)}
+    east_row = np.stack([zero, -yU, yN], -1)
+    north_row = np.stack([yU, zero, -yE], -1)
+    cos2 = np.maximum(yE**2 + yN**2, 1e-12)[..., None]
+    heading = (yN[..., None] * east_row - yE[..., None] * north_row) / cos2
+    pitch = up_row[1] / np.sqrt(cos2)
+    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[..., None]
+    return np.stack([heading, pitch, roll], -2)
+
+
+def euler_sigma(C_nb: Array, phi_covariance: Array) -> Array:
+    """One-sigma of heading, pitch and roll (rad), none above that of an angle of which nothing is known."""
+    J = euler_jacobian(C_nb)
+    variance = np.einsum("...ij,...jk,...ik->...i", J, phi_covariance, J)
+    return np.minimum(np.sqrt(variance), UNIFORM_SIGMA)
 
 
 def to_rotation(C: ArrayLike) -> Rotation:

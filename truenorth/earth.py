@@ -23,6 +23,9 @@ GM = 3.986004418e14  # m^3/s^2
 GRAVITY_EQUATOR = 9.7803253359  # m/s^2
 SOMIGLIANA = 0.00193185265241
 CENTRIFUGAL_RATIO = 0.00344978650684  # m = w^2 a^2 b / GM
+DEFLECTION = np.radians(
+    5.0 / 3600.0
+)  # of the vertical, rad, one sigma: what gravity's direction differs from the normal
 
 
 def radii(lat: Any) -> tuple[Any, Any]:

@@ -21,6 +21,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truenorth.errors import DataError, UsageError
 from truenorth.units import format as format_quantity
 from truenorth.yaml_file import quantity, read_mapping, unknown_key
@@ -133,6 +136,13 @@ class ImuSpec:
                     f"{where}: accel_positions is {self.accel_positions}; expected three places of three lengths"
                 )
             object.__setattr__(self, "accel_positions", tuple(places))
+
+    @property
+    def bias_variance(self) -> NDArray[np.float64]:
+        """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2."""
+        gyro = self.gyro_bias**2 + self.gyro_turn_on_bias**2 + self.gyro_bias_instability**2
+        accel = self.accel_bias**2 + self.accel_turn_on_bias**2 + self.accel_bias_instability**2
+        return np.repeat([gyro, accel], 3)
 
     def with_random_walks(self, interval: float) -> ImuSpec:
         """What a filter sees of the noise of samples: random walks that hold it, at a sampling interval (s)."""

@@ -18,6 +18,8 @@ from fractions import Fraction
 from truenorth.errors import UsageError
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
+DEG_PER_HOUR = math.radians(1.0) / 3600.0  # rad/s
+MICRO_G = 1e-6 * STANDARD_GRAVITY  # m/s^2
 
 Dimension = tuple[Fraction, Fraction, Fraction, Fraction]  # exponents of angle, length, time, temperature
 

@@ -7,8 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from truenorth.alignment import align
-from truenorth.alignment.result import euler_jacobian
-from truenorth.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
+from truenorth.attitude import (
+    dcm_from_euler,
+    dcm_from_rotation_vector,
+    euler_from_dcm,
+    euler_jacobian,
+    rotation_vector_from_dcm,
+)
 from truenorth.earth import EARTH_RATE, normal_gravity
 from truenorth.position import Position
 from truenorth.records import ImuRecord
@@ -134,8 +139,8 @@ def test_still_base_sigmas_are_honest():
     spec = imu_spec("navigation")
     position = Position.from_degrees(40.0, 118.0, 0.0)
     errors, covariance, answers = _study(rest(position, 0.65, 0.03, -0.05), spec, 100, 300.0, method="kalman")
-    from truenorth.alignment.task import DEFLECTION
     from truenorth.coarse.analytic import static_jacobian
+    from truenorth.earth import DEFLECTION
 
     J = static_jacobian(position.lat, 9.8)[:, :2] * 9.8 * DEFLECTION
     covariance = covariance - J @ J.T

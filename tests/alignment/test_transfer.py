@@ -9,7 +9,7 @@ import pytest
 from tests import recordings
 from truenorth.alignment import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
-from truenorth.alignment.transfer_filter import Handover, Linear, Matching, transfer_filter
+from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_system import system_of_motion
 from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.errors import DataError, UsageError
@@ -54,7 +54,7 @@ def _start(flight, model, C_mb_true):
     at = flight.states(np.array(0.0))
     P = model.prior(0.1, 1e-6, 1e-2, 5 * DEG_PER_HOUR, tau=0.05, arm=1.0, mounting=3 * DEG, C_nb=at.C_nb)
     C = at.C_nb @ C_mb_true.T
-    return Handover(C, at.v_n, float(at.lat), float(at.lon), float(at.alt), P)
+    return SlaveStart(C, at.v_n, float(at.lat), float(at.lon), float(at.alt), P)
 
 
 def test_without_noise_it_finds_the_truth(flight, ideal):

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.inference import noise_of
 from truenorth.alignment.positions import ARM_SIGMA, SHORTEST_POSITION, prior_covariance
-from truenorth.alignment.task import DEFLECTION
 from truenorth.analysis.error_budget import Source, error_budget
+from truenorth.earth import DEFLECTION
 from truenorth.errors import UsageError
 from truenorth.filters import LinearSystem, kalman
 from truenorth.inertial import earth_rotation, integrate

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias import spec_variance, true_bias
+from truenorth.alignment.bias import true_bias
 from truenorth.alignment.fine import FineAlignment, attitude_history
-from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
+from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
+from truenorth.attitude import UNIFORM_SIGMA
 from truenorth.earth import EARTH_RATE, radii
 from truenorth.inertial import earth_rotation
 from truenorth.models.static import STATES
@@ -38,7 +39,7 @@ def at_epoch(
 
 def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Array, floor: Array) -> Alignment:
     """An answer in navigation axes, with biases as specified and no verdict yet."""
-    prior = np.sqrt(spec_variance(spec))
+    prior = np.sqrt(spec.bias_variance)
     return Alignment(
         status="not_converged",
         reasons=(),
@@ -83,7 +84,7 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
     e = fine.estimates
     bias, variance = fine.nominal_bias + e.x[:, 6:STATES], np.einsum("kii->ki", e.P)[:, 6:STATES]
     prior = np.diag(fine.system.P0)[9:STATES]
-    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance[:, 3:], prior, spec_variance(used)[3:])
+    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance[:, 3:], prior, used.bias_variance[3:])
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
         C_nb=C_nb,

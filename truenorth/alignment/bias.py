@@ -17,13 +17,6 @@ from truenorth.specs import ImuSpec
 Array = NDArray[np.float64]
 
 
-def spec_variance(spec: ImuSpec) -> Array:
-    """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2."""
-    gyro = spec.gyro_bias**2 + spec.gyro_turn_on_bias**2 + spec.gyro_bias_instability**2
-    accel = spec.accel_bias**2 + spec.accel_turn_on_bias**2 + spec.accel_bias_instability**2
-    return np.repeat([gyro, accel], 3)
-
-
 def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array, gravity: float) -> Array:
     """Prior covariance of the sum, (6, 6).
 
@@ -39,7 +32,7 @@ def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array,
         ``dw_ie_n/dL``, rad/s a radian.
     gravity : float, m/s^2
     """
-    P = np.diag(spec_variance(spec))
+    P = np.diag(spec.bias_variance)
     rate = C_n_b @ lat_rate * position.lat_sigma
     P[:3, :3] += np.outer(rate, rate)
     slope = float(normal_gravity(position.lat, position.alt + 1.0)) - gravity

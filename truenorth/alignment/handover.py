@@ -1,4 +1,4 @@
-"""What navigation goes on from: how the errors of attitude and of what acts as a bias hang together.
+"""What an alignment hands to navigation: how the errors of attitude and of what acts as a bias hang together.
 
 Heading error and east gyro bias of an alignment at rest cancel each other, and so do tilt and accelerometer bias: what
 is left of them in navigation is far less than either. The fine filter knows both with their covariance.
@@ -6,44 +6,23 @@ is left of them in navigation is far less than either. The fine filter knows bot
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.alignment.task import DEFLECTION, Task
+from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
+from truenorth.earth import DEFLECTION
 from truenorth.inertial import earth_rotation
 from truenorth.models.static import STATES
+from truenorth.navigation.handover import Handover
 
 if TYPE_CHECKING:
     from truenorth.alignment.result import Alignment
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Handover:
-    """The joint estimate of an alignment that estimated biases.
-
-    Attributes
-    ----------
-    C_nb : (3, 3) array
-        Attitude of the IMU itself, also where it turns on the body.
-    accel_bias : (3,) array, m/s^2
-        What acts as accelerometer bias: scale factor, misalignment and gravity's error as well.
-    P : (9, 9) array
-        Covariance of phi (E, N, U), gyro bias and `accel_bias` (IMU axes), the deflection of the vertical included.
-    prior : (6,) array
-        Variance a priori of what acts as gyro and accelerometer bias.
-    """
-
-    C_nb: Array
-    accel_bias: Array
-    P: Array
-    prior: Array
 
 
 def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:

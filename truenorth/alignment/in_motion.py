@@ -11,7 +11,6 @@ from typing import Any, Literal, TypeGuard, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.in_motion_latitude import find_latitude
 from truenorth.alignment.in_motion_start import (
     Guess,
@@ -23,8 +22,9 @@ from truenorth.alignment.in_motion_start import (
 )
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.moving import fifteen, moving_of
-from truenorth.alignment.result import UNIFORM_SIGMA, Alignment, History
+from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import deflection_covariance
+from truenorth.attitude import UNIFORM_SIGMA
 from truenorth.calibration import Calibration
 from truenorth.earth import EARTH_RATE, normal_gravity
 from truenorth.errors import AlignmentError, DataError, UsageError
@@ -173,7 +173,7 @@ def align_in_motion(
         raise UsageError(
             f"heading limit {math.degrees(heading_limit):g} deg, {passes} passes; expected a positive angle, one or more"
         )
-    bias = float(np.sqrt(spec_variance(task.spec)[0]))
+    bias = float(np.sqrt(task.spec.bias_variance[0]))
     level_rate = EARTH_RATE * math.cos(task.position.lat)
     able = bias < level_rate * math.sin(GYROCOMPASS)
     unknown = position is None and not _has_fixes(gnss)
@@ -347,7 +347,7 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float, lim
     mounting = None if task.odometer is None else (task.wheel.C_mb, task.wheel.lever_arm)
     speed = np.linalg.norm(track.v_n, axis=1)
     distance = float(np.trapezoid(speed, track.time))
-    prior = np.sqrt(spec_variance(task.spec))
+    prior = np.sqrt(task.spec.bias_variance)
     moving = moving_of(track, distance, "the earth's rate" if method == "gyrocompass" else "motion", mounting)
     answer = Alignment(
         status="not_converged",

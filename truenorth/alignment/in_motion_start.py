@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.task import level_of
 from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
@@ -101,7 +100,7 @@ def start_at(
         turn[DV, PHI] = skew(v_n)
         P = turn @ P @ turn.T
     P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
-    variance = spec_variance(spec)
+    variance = spec.bias_variance
     # Slow parts are states of their own.
     P[BG, BG] = np.eye(3) * (variance[0] - spec.gyro_bias_instability**2)
     P[BA, BA] = np.eye(3) * (variance[3] - spec.accel_bias_instability**2)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.answer import at_epoch, without_heading
-from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.check import LogCheck, check_means, is_blind
 from truenorth.alignment.fine import (
     CONVERGED,
@@ -216,7 +215,7 @@ def prior_covariance(spec: ImuSpec, position: Position, arm_sigma: float) -> Arr
     sigma = np.zeros(turntable.STATES)
     sigma[PHI] = LEVEL_PRIOR, LEVEL_PRIOR, HEADING_PRIOR
     sigma[DV] = VELOCITY_PRIOR
-    sigma[BIASES] = np.sqrt(spec_variance(spec))
+    sigma[BIASES] = np.sqrt(spec.bias_variance)
     slope = float(normal_gravity(position.lat, position.alt + 1.0) - normal_gravity(position.lat, position.alt))
     sigma[9:12] = np.hypot(sigma[9:12], slope * position.vertical_sigma)
     sigma[GYRO_MATRIX] = np.where(np.eye(3), spec.gyro_scale_factor, spec.gyro_misalignment).ravel()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
-from truenorth.alignment.bias import spec_variance, true_bias
+from truenorth.alignment.bias import true_bias
 from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
@@ -232,7 +232,7 @@ def answer_of(
         answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
     history = make_history(task, fine, used, sways)
     accel_bias, accel_sigma = true_bias(
-        fine.bias[3:], np.diag(fine.P)[9:STATES], np.diag(P_bias)[3:], spec_variance(used)[3:]
+        fine.bias[3:], np.diag(fine.P)[9:STATES], np.diag(P_bias)[3:], used.bias_variance[3:]
     )
     return replace(
         answer,

@@ -10,19 +10,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import euler_from_dcm, to_rotation
+from truenorth.attitude import UNIFORM_SIGMA, euler_from_dcm, euler_jacobian, euler_sigma, to_rotation
 from truenorth.position import Position
 from truenorth.specs import ImuSpec
+from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
-    from truenorth.alignment.handover import Handover
     from truenorth.alignment.moving import Moving
     from truenorth.alignment.table import TurntableErrors
     from truenorth.alignment.transfer_result import Transfer
+    from truenorth.navigation.handover import Handover
     from truenorth.quality import Inspection
 
 Array = NDArray[np.float64]
@@ -30,10 +31,6 @@ Status = Literal["aligned", "level_only", "not_converged", "not_observable", "in
 
 NOT_ESTIMATED = 0.9  # a bias whose sigma stays above this part of its prior has not been estimated
 NEAR_VERTICAL = np.radians(85.0)  # beyond this pitch heading and roll are told only together
-UNIFORM_SIGMA = np.pi / np.sqrt(3.0)  # sigma of an angle of which nothing is known, rad
-
-DEG_PER_HOUR = np.radians(1.0) / 3600.0
-MICRO_G = 9.80665e-6
 
 
 @dataclass(frozen=True)
@@ -328,39 +325,3 @@ class Alignment:
     def with_verdict(self, status: Status, reasons: tuple[str, ...]) -> Alignment:
         """The same answer under another verdict."""
         return replace(self, status=status, reasons=reasons)
-
-
-def euler_jacobian(C_nb: Array) -> Array:
-    """Errors of heading, pitch and roll for a misalignment ``phi`` (E, N, U).
-
-    From ``C_hat = (I - [phi x]) C``: a body axis ``a`` seen in n moves by ``-phi x a``; heading and pitch belong to
-    the y axis (``atan2(y_E, y_N)``, ``asin(y_U)``), roll to x and z (``atan2(-x_U, z_U)``).
-
-    Parameters
-    ----------
-    C_nb : (..., 3, 3) array
-
-    Returns
-    -------
-    (..., 3, 3) array
-        Rows heading, pitch, roll; columns phi_E, phi_N, phi_U. It grows without bound towards pitch +-90 deg.
-    """
-    xU, yU, zU = C_nb[..., 2, 0], C_nb[..., 2, 1], C_nb[..., 2, 2]
-    yE, yN = C_nb[..., 0, 1], C_nb[..., 1, 1]
-    # -phi x a as a matrix on phi is [a x]; rows of [a x]: E (0, -a_U, a_N), N (a_U, 0, -a_E), U (-a_N, a_E, 0).
-    zero = np.zeros_like(xU)
-    up_row = {i: np.stack([-C_nb[..., 1, i], C_nb[..., 0, i], zero], -1) for i in range(3)}
-    east_row = np.stack([zero, -yU, yN], -1)
-    north_row = np.stack([yU, zero, -yE], -1)
-    cos2 = np.maximum(yE**2 + yN**2, 1e-12)[..., None]
-    heading = (yN[..., None] * east_row - yE[..., None] * north_row) / cos2
-    pitch = up_row[1] / np.sqrt(cos2)
-    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[..., None]
-    return np.stack([heading, pitch, roll], -2)
-
-
-def euler_sigma(C_nb: Array, phi_covariance: Array) -> Array:
-    """One-sigma of heading, pitch and roll (rad), none above that of an angle of which nothing is known."""
-    J = euler_jacobian(C_nb)
-    variance = np.einsum("...ij,...jk,...ik->...i", J, phi_covariance, J)
-    return np.minimum(np.sqrt(variance), UNIFORM_SIGMA)

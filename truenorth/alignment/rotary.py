@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
@@ -101,7 +100,7 @@ def align_rotary(
     coarse = integrate(record, task.interval, rows_at=rows)
     C_n0_i = oba(coarse, position.lat, position.alt).C_n0_i
     tell("aligning: swaying")
-    P_bias = np.diag(spec_variance(spec)) + _place_covariance(task, spec)
+    P_bias = np.diag(spec.bias_variance) + _place_covariance(task, spec)
     if encoder is None:
         mount = Mount(np.zeros(3))
     else:

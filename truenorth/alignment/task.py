@@ -12,7 +12,7 @@ from truenorth.alignment.bias import bias_prior
 from truenorth.alignment.epoch import Epoch, find_epoch
 from truenorth.attitude import dcm_from_euler
 from truenorth.coarse.analytic import Means, means, static_jacobian
-from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.earth import DEFLECTION, EARTH_RATE, normal_gravity
 from truenorth.errors import DataError
 from truenorth.inertial import earth_rotation
 from truenorth.position import Position
@@ -22,7 +22,6 @@ from truenorth.specs import ImuSpec
 
 Array = NDArray[np.float64]
 
-DEFLECTION = math.radians(5.0 / 3600.0)  # of the vertical, one sigma: what gravity's direction differs from the normal
 FILTER_INTERVAL = 1.0  # s
 FEWEST_EPOCHS, MOST_EPOCHS = 60, 5000
 LONGEST_BRIDGE = 4.5  # nominal intervals: up to three lost samples are bridged by the next one's rate

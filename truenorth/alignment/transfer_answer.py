@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import transfer_loop as loop
-from truenorth.alignment.result import Alignment, History, Status, euler_sigma
-from truenorth.alignment.transfer_filter import Handover, TransferTrack
+from truenorth.alignment.result import Alignment, History, Status
+from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import system_along
@@ -18,6 +18,7 @@ from truenorth.attitude import (
     dcm_from_quaternion,
     dcm_from_rotation_vector,
     euler_from_dcm,
+    euler_sigma,
     rotation_vector_from_dcm,
 )
 from truenorth.earth import earth_rate_n, transport_rate_n
@@ -66,7 +67,7 @@ def assemble_transfer(
     spec: ImuSpec,
     where: str,
     assumed: Assumed,
-    start: Handover,
+    start: SlaveStart,
     track: TransferTrack,
     noise: tuple[float, float],
     what: str,
@@ -112,7 +113,7 @@ def _transfer(
     master: MasterRecord,
     model: TransferModel,
     assumed: Assumed,
-    start: Handover,
+    start: SlaveStart,
     track: TransferTrack,
     noise: tuple[float, float],
     what: str,
@@ -176,7 +177,7 @@ def _open(
     slave: ImuRecord,
     model: TransferModel,
     assumed: Assumed,
-    start: Handover,
+    start: SlaveStart,
     track: TransferTrack,
     noise: tuple[float, float],
 ) -> tuple[str, ...]:
@@ -291,7 +292,7 @@ def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
 
 
 def _judge(
-    track: TransferTrack, transfer: Transfer, start: Handover, where: str, sigma: Array, limit: float
+    track: TransferTrack, transfer: Transfer, start: SlaveStart, where: str, sigma: Array, limit: float
 ) -> tuple[Status, tuple[str, ...]]:
     """Status and reasons."""
     told = [*transfer.notes, *transfer.jumps]

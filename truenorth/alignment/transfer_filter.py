@@ -24,7 +24,7 @@ LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body 
 
 
 @dataclass(frozen=True)
-class Handover:
+class SlaveStart:
     """Where the slave is said to be at the beginning, and what is assumed.
 
     Attributes
@@ -135,7 +135,7 @@ def transfer_filter(
     slave: ImuRecord,
     master: MasterRecord,
     model: TransferModel,
-    start: Handover,
+    start: SlaveStart,
     matching: Matching,
     *,
     covariances: bool = False,
@@ -150,7 +150,7 @@ def transfer_filter(
     master : MasterRecord
         Rows that fall outside the slave's record say nothing.
     model : TransferModel
-    start : Handover
+    start : SlaveStart
         At the beginning of the slave's record.
     matching : Matching
     covariances : bool
@@ -251,7 +251,7 @@ def _rows(master: MasterRecord, delay: float, matching: Matching, linear: Linear
 
 
 def _settings(
-    model: TransferModel, matching: Matching, start: Handover, interval: float, master_interval: float
+    model: TransferModel, matching: Matching, start: SlaveStart, interval: float, master_interval: float
 ) -> loop.Loop:
     from scipy.special import chdtri
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.transfer_delay import find_delay
-from truenorth.alignment.transfer_filter import Handover
+from truenorth.alignment.transfer_filter import SlaveStart
 from truenorth.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.earth import GRAVITY_EQUATOR
 from truenorth.errors import DataError, UsageError
@@ -106,7 +105,7 @@ def model_from_spec(
 
 def bias_sigmas(spec: ImuSpec) -> tuple[Array, Array]:
     """(3,) sigmas of what acts as gyro and accelerometer bias: at level, scale factor and misalignment times gravity too."""
-    variance = spec_variance(spec)
+    variance = spec.bias_variance
     force = math.hypot(spec.accel_scale_factor, spec.accel_misalignment) * GRAVITY_EQUATOR
     return np.sqrt(variance[:3]), np.hypot(np.sqrt(variance[3:]), force)
 
@@ -119,7 +118,7 @@ def hand_over(
     assumed: Assumed,
     noise: tuple[float, float],
     position: Position | None,
-) -> tuple[ImuRecord, Handover]:
+) -> tuple[ImuRecord, SlaveStart]:
     """The slave's record from the master's first row on, and its first state as the master tells it.
 
     Parameters
@@ -185,7 +184,7 @@ def hand_over(
         C_nb=None if C_nm is None else C,
         C_mb=assumed.C_mb,
     )
-    start = Handover(C, v, lat, lon, alt, P, C_mb=assumed.C_mb, arm=assumed.lever_arm, delay=assumed.delay)
+    start = SlaveStart(C, v, lat, lon, alt, P, C_mb=assumed.C_mb, arm=assumed.lever_arm, delay=assumed.delay)
     return part, start
 
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
-from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G, Alignment, Status
+from truenorth.alignment.result import Alignment, Status
 from truenorth.earth import EARTH_RATE, normal_gravity
-from truenorth.units import significant
+from truenorth.units import DEG_PER_HOUR, MICRO_G, significant
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, band, new_figure, style, trace
+from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,8 +37,6 @@ def plot_alignment(result: Alignment) -> Figure:
     ValueError
         The method kept no history.
     """
-    from truenorth.alignment.result import DEG_PER_HOUR, MICRO_G
-
     h = result.history
     if h is None:
         raise ValueError(f"method {result.method!r} gives one answer and keeps no history to draw")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.attitude import UNIFORM_SIGMA, euler_jacobian
+
 if TYPE_CHECKING:
     from truenorth.alignment.result import Alignment, History
 
@@ -45,8 +47,6 @@ def courses(result: Alignment) -> list[Course]:
     ValueError
         The method kept no history.
     """
-    from truenorth.alignment.result import UNIFORM_SIGMA, euler_jacobian
-
     values, sigmas = result.convergence
     h = result.history
     assert h is not None  # else `convergence` has raised

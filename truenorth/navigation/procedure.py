@@ -203,8 +203,6 @@ def navigate(
 
 
 def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
-    from truenorth.alignment import Alignment
-
     spec = None if imu is None else imu_spec(imu)
     if isinstance(start, Start):
         if spec is None:
@@ -212,12 +210,12 @@ def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, st
                 "a start without a specification of the IMU; expected imu='navigation', a file or an ImuSpec"
             )
         return start, spec, spec.name
-    if isinstance(start, Alignment):
-        own, where = start.imu, start.imu_source
-        begin = start_from_alignment(start)
-    else:
+    if isinstance(start, (str, PathLike)):
         begin, own, _ = read_start(start)
         where = own.name
+    else:
+        own, where = start.imu, start.imu_source
+        begin = start_from_alignment(start)
     return begin, spec or own, where if spec is None else spec.name
 
 

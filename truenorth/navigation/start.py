@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias import spec_variance
-from truenorth.alignment.handover import Handover
-from truenorth.alignment.task import DEFLECTION
 from truenorth.coarse.analytic import static_jacobian
-from truenorth.earth import normal_gravity
+from truenorth.earth import DEFLECTION, normal_gravity
 from truenorth.errors import AlignmentError, DataError
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
 from truenorth.models.whole_bias import WholeBiases
 from truenorth.navigation.driver import Start
+from truenorth.navigation.handover import Handover
 from truenorth.position import Position
 from truenorth.specs import ImuSpec, imu_spec
 
@@ -123,7 +121,7 @@ def _by_static_limits(
     f2 = (g * C_nb[2]) ** 2
     acting = spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2)
     nabla = np.diag(accel_bias_sigma**2 + acting)
-    prior = spec_variance(spec)
+    prior = spec.bias_variance
     prior[3:] += acting
     nabla += C_nb.T @ np.diag([1.0, 1.0, 0.0]) @ C_nb * (DEFLECTION * g) ** 2
     J = static_jacobian(position.lat, g)

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias import spec_variance
 from truenorth.alignment.inference import noise_of
 from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
@@ -120,7 +119,7 @@ class _Stage:
         self.P0 = np.zeros((12, 12))
         for part, sigma in P0_SIGMAS:
             self.P0[part, part] = sigma**2 * np.eye(3)
-        self.P0[BG.start :, BG.start :] = np.diag(spec_variance(data.imu))
+        self.P0[BG.start :, BG.start :] = np.diag(data.imu.bias_variance)
 
     def again(self, bias: Array) -> InertialIntegrals:
         """The integrals with biases taken off."""
@@ -172,7 +171,7 @@ def _about(system: LinearSystem, bias: Array) -> LinearSystem:
 def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> None:
     """Methods on whole logs from the first sample on: windowed least squares, and the filter with coloured noise."""
     place, walks = data.place, noise_of(data.imu)
-    P_bias = np.diag(spec_variance(data.imu))
+    P_bias = np.diag(data.imu.bias_variance)
     for at in times:
         record = data.record.between(None, at + 0.5 * data.record.interval)
         integrals = integrate(record, 1.0)

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 from truenorth.papers.transfer.filtering import EPOCHS, Errors
 from truenorth.papers.transfer.truth import ARCMIN, BEGIN, STOP
-from truenorth.units import parse
+from truenorth.units import DEG_PER_HOUR
 
 Array = NDArray[np.float64]
 SINGLE = 10  # runs drawn one by one
 LINEAR = 10.0  # arcmin: beyond, the scale is logarithmic where the limits are wider
-DEG_PER_HOUR = parse("1 deg/h", "angular_rate")
 
 
 def draw_misalignment(errors: Errors, title: str) -> Figure:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.transfer_filter import Handover, Matching, TransferTrack, transfer_filter
+from truenorth.alignment.transfer_filter import Matching, SlaveStart, TransferTrack, transfer_filter
 from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.models.transfer import ARM, BA, BG, PHI, TAU, TransferModel
 from truenorth.papers.transfer.truth import (
@@ -165,7 +165,7 @@ def errors_of(
 def _track(flights: Flights, run: Run, method: Method, known_delay: float) -> TransferTrack:
     spec, at = flights.scenario.imu_spec, flights.start
     model = model_of(method, spec)
-    start = Handover(
+    start = SlaveStart(
         run.C_nb,
         run.v_n,
         float(at.lat),

@@ -16,7 +16,7 @@ from truenorth.papers.transfer.drawings import draw_biases, draw_level, draw_mis
 from truenorth.papers.transfer.filtering import EPOCHS, Errors, errors_of
 from truenorth.papers.transfer.observability import Seen, told_by
 from truenorth.papers.transfer.truth import ARCMIN, BEGIN, END, STOP, Case, Flights
-from truenorth.units import parse
+from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,6 @@ RUNS = 100
 KNOWN_DELAY = 0.2  # s, of the late master
 DROP = (128.0, 138.0)  # s: its silence, in the turn
 SPEED = 200.0  # m/s
-DEG_PER_HOUR, MICRO_G = parse("1 deg/h", "angular_rate"), parse("1 ug", "acceleration")
 TURN = (EPOCHS > BEGIN) & (EPOCHS <= STOP)
 VELOCITY = ("states12", "states13", "states16", "oracle")
 BOTH = (*VELOCITY, "states12_att", "states13_att", "states16_att", "oracle_att")
