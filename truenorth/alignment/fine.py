@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from truenorth.alignment.form import Form
 from truenorth.attitude import dcm_from_rotation_vector
@@ -35,6 +36,7 @@ VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
 QUIETEST_BASE = 1e-6  # m/s: keeps R positive on a base of stone and an IMU without noise
 SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at least
 COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
+COLOUR_ALARM = 1e-3  # rate at which white innovations pass for coloured
 COLOUR_RUNS = 5  # fewer blocks than this say nothing of it
 
 
@@ -231,27 +233,29 @@ def fine_align(
 
 
 def _with_base_variance(system: LinearSystem, R: Array) -> tuple[LinearSystem, Estimates, Array]:
-    """Filter with the variance of the base's velocity that the innovations ask for."""
+    """Filter with the variance of the base's velocity that the innovations ask for: first as white, then for its colour."""
     estimates = kalman(system, history="full")
-    for _ in range(MAX_NOISE_PASSES):
-        R_next, expected = base_variance(estimates, R)
-        if np.all(np.abs(R_next - R)[:2] < SAME_NOISE * expected[:2]):  # the vertical carries no attitude
-            break
-        system = replace(system, R=system.R + np.diag(R_next - R))
-        R = R_next
-        estimates = kalman(system, history="full")
+    for colour in (False, True):
+        for _ in range(MAX_NOISE_PASSES):
+            R_next, expected = base_variance(estimates, R, colour)
+            if np.all(np.abs(R_next - R)[:2] < SAME_NOISE * expected[:2]):  # the vertical carries no attitude
+                break
+            system = replace(system, R=system.R + np.diag(R_next - R))
+            R = R_next
+            estimates = kalman(system, history="full")
     return system, estimates, R
 
 
 def white_variance(velocity: Array) -> Array:
-    """Variance (3,) of what is white in a velocity (K, 3): half the mean square of its differences.
+    """Variance (3,) of what is white in a velocity (K, 3): half the variance of its differences.
 
-    A start for the variance of the base's motion that slow errors of the INS do not enter.
+    A start for the variance of the base's motion that slow errors of the INS do not enter; a bias of 100 ug is a difference of
+    a mm/s every second.
     """
-    return np.maximum(0.5 * np.mean(np.diff(velocity, axis=0) ** 2, axis=0), QUIETEST_BASE**2)
+    return np.maximum(0.5 * np.var(np.diff(velocity, axis=0), axis=0), QUIETEST_BASE**2)
 
 
-def base_variance(estimates: Estimates, R: Array, colour: bool = True) -> tuple[Array, Array]:
+def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:
     """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
 
     Returns it with the mean expected variance of the innovations.
@@ -266,9 +270,12 @@ def base_variance(estimates: Estimates, R: Array, colour: bool = True) -> tuple[
     if colour and blocks >= COLOUR_RUNS:
         e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
         low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
-        chance = 1.0 + 2.0 * np.sqrt(2.0 / blocks)  # two sigma of what white noise itself gives
-        ratio = np.where(low > chance * ratio, np.maximum(low, ratio), ratio)
-    return np.maximum(R * ratio, QUIETEST_BASE**2), expected.mean(axis=0)
+        chance = chdtri(blocks, COLOUR_ALARM) / blocks  # what white noise itself may give
+        # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
+        coloured = low > chance * ratio
+        ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)
+    mean = expected.mean(axis=0)
+    return np.maximum(R + (ratio - 1.0) * mean, QUIETEST_BASE**2), mean
 
 
 def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:

@@ -305,22 +305,23 @@ def _filtered(
     """
     system = turntable.linearise(model, record, integrals, C_n0_i, position.lat, position.alt, P0, R, x0)
     estimates = kalman(system, history="full")
-    for _ in range(NOISE_PASSES):
-        R_next, same = R.copy(), True
-        for part in parts:
-            seen = replace(
-                estimates,
-                innovation=estimates.innovation[part],
-                innovation_covariance=estimates.innovation_covariance[part],
-            )
-            before = R[part][0]
-            R_next[part], expected = base_variance(seen, before)
-            same &= bool(np.all(np.abs(R_next[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
-        if same:
-            break
-        system = replace(system, R=system.R + (R_next - R)[:, None] * np.eye(3))
-        R = R_next
-        estimates = kalman(system, history="full")
+    for colour in (False, True):
+        for _ in range(NOISE_PASSES):
+            R_next, same = R.copy(), True
+            for part in parts:
+                seen = replace(
+                    estimates,
+                    innovation=estimates.innovation[part],
+                    innovation_covariance=estimates.innovation_covariance[part],
+                )
+                before = R[part][0]
+                R_next[part], expected = base_variance(seen, before, colour)
+                same &= bool(np.all(np.abs(R_next[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
+            if same:
+                break
+            system = replace(system, R=system.R + (R_next - R)[:, None] * np.eye(3))
+            R = R_next
+            estimates = kalman(system, history="full")
     return estimates, system, R
 
 
