@@ -63,7 +63,7 @@ def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: i
 
 @compiled
 def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int, gram: Any) -> float:
-    """Sum of ``log F``; `gram` gets the products of the whitened columns of `Y`."""
+    """Sum of ``log F``; `gram` gets the products of the whitened columns of `Y`, its lower half."""
     n, columns = len(h), Y.shape[1]
     rank = n - stationary + 1
     width = columns + rank
@@ -97,9 +97,10 @@ def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int,
             if h[i] != 0.0:
                 for c in range(width):
                     e[c] -= h[i] * X[i, c]
+        weight = 1.0 / F
         for c in range(columns):
-            for d in range(columns):
-                gram[c, d] += e[c] * e[d] / F
+            for d in range(c + 1):
+                gram[c, d] += weight * e[c] * e[d]
         for i in range(rank):
             My[i] = 0.0
             for j in range(rank):
@@ -110,8 +111,9 @@ def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int,
             for c in range(width):
                 Phi_X[i, c] += f * X[j, c]
         for i in range(n):
+            gain = weight * g[i]
             for c in range(width):
-                X[i, c] = Phi_X[i, c] + g[i] / F * e[c]
+                X[i, c] = Phi_X[i, c] + gain * e[c]
     return log_F
 
 
@@ -147,7 +149,7 @@ def _left(gram: Any) -> float:
     log_N, left = 0.0, gram[0, 0]
     for i in range(p + 1):
         for j in range(min(i + 1, p)):
-            value = gram[1 + i if i < p else 0, 1 + j]
+            value = gram[1 + i, 1 + j] if i < p else gram[1 + j, 0]
             for m in range(j):
                 value -= L[i, m] * L[j, m]
             L[i, j] = math.sqrt(value) if i == j else value / L[j, j]
