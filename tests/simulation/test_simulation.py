@@ -136,3 +136,10 @@ def test_saturation():
 def test_nonsense_is_refused():
     with pytest.raises(UsageError, match="rate 0"):
         ideal_log(rest(PLACE), rate=0.0, duration=10.0)
+
+
+def test_an_imu_is_named_as_everywhere():
+    found = [simulate(rest(PLACE), duration=1.0, imu=imu).record for imu in ("navigation", imu_spec("navigation"))]
+    np.testing.assert_array_equal(found[0].gyro, found[1].gyro)
+    with pytest.raises(UsageError, match="navigatoin"):
+        simulate(rest(PLACE), duration=1.0, imu="navigatoin")

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
@@ -18,7 +19,7 @@ from truenorth.simulation.imu_errors import apply_errors, size_effect
 from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.sensing import Moving
 from truenorth.simulation.true_errors import TrueErrors
-from truenorth.specs import ImuSpec
+from truenorth.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,7 +68,7 @@ def simulate(
     rate: float = 100.0,
     duration: float = 600.0,
     start: float = 0.0,
-    imu: ImuSpec | None = None,
+    imu: ImuSpec | str | PathLike[str] | None = None,
     seed: int = 0,
     run: int = 0,
     scenario: int = 0,
@@ -83,8 +84,9 @@ def simulate(
     rate : float, Hz
     duration : float, s
     start : float, s
-    imu : ImuSpec, optional
-        Its errors are drawn; an ideal IMU when left out.
+    imu : ImuSpec or str, optional
+        A specification, a preset's name or a file, as of :func:`truenorth.imu_spec`. Its errors are drawn; an ideal IMU when
+        left out.
     seed, run, scenario : int
         The same three give the same bits.
     kind : {"increments", "rates"}
@@ -103,7 +105,7 @@ def simulate(
         A rate, a duration or a given error that makes no sense.
     """
     ideal = motion if isinstance(motion, IdealLog) else ideal_log(motion, rate=rate, duration=duration, start=start)
-    spec = imu or ImuSpec()
+    spec = ImuSpec() if imu is None else imu_spec(imu)
     interval = ideal.interval
     dtheta, dvel = (x * interval for x in ideal.rates) if kind == "rates" else (ideal.dtheta, ideal.dvel)
     if spec.accel_positions is not None:
