@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, ValidationError
@@ -137,3 +138,12 @@ def _fields(annotation: Any) -> list[str]:
 def _kind(model: type[BaseModel]) -> Any:
     field = model.model_fields.get("kind")
     return None if field is None else next(iter(get_args(field.annotation)), None)
+
+
+@contextmanager
+def numbered(key: str, number: int) -> Iterator[None]:
+    """Lead the message of a UsageError by the place of the entry in its list, counted from one as all our messages do."""
+    try:
+        yield
+    except UsageError as error:
+        raise UsageError(f"{key}[{number}]: {error}") from None

@@ -12,7 +12,7 @@ from truenorth.cli import app
 from truenorth.errors import DataError, UsageError
 from truenorth.schema import Strict
 from truenorth.simulation.scenario import Scenario, read_scenario, shipped
-from truenorth.simulation.scenario_motion import RouteMotion
+from truenorth.simulation.scenario_courses import RouteMotion
 
 BASE = {
     "name": "base",

@@ -10,7 +10,7 @@ import yaml
 from pydantic import PlainSerializer
 
 from truenorth.schema import Strict, models_in
-from truenorth.simulation import scenario_motion, scenario_sensors
+from truenorth.simulation import scenario_courses, scenario_motion, scenario_sensors
 from truenorth.simulation.encoder import EncoderSpec
 from truenorth.simulation.flexure import FlexureSpec
 from truenorth.simulation.scenario import Place, Scenario, read_scenario
@@ -24,7 +24,7 @@ NEEDED, NONE = "needed", "–"
 # Heading of a table: what it is of.
 MODELS: dict[str, type[Strict]] = {"The scenario": Scenario, "position": Place}
 MODELS |= {
-    name: getattr(scenario_motion, model)
+    name: getattr(scenario_motion, model, None) or getattr(scenario_courses, model)
     for name, model in {
         "motion: rest": "RestMotion",
         "motion: sway": "SwayMotion",

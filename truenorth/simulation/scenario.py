@@ -31,7 +31,8 @@ from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
 from truenorth.simulation.flexure import Flexed, FlexureSpec
 from truenorth.simulation.indexer import Indexed
 from truenorth.simulation.motion import Motion
-from truenorth.simulation.scenario_motion import Disturbance, MotionModel, RouteMotion, disturbed
+from truenorth.simulation.scenario_courses import RouteMotion
+from truenorth.simulation.scenario_motion import Disturbance, MotionModel, disturbed
 from truenorth.simulation.scenario_sensors import AIDING, IndexerModel
 from truenorth.simulation.sensing import Moving
 from truenorth.simulation.streams import stream
