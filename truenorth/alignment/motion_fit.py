@@ -236,11 +236,11 @@ def _climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
         gain = value - found
         after = gradient(trial, found)
         s, y = trial - u, after - slope
+        u, value, slope = trial, found, after
+        if gain < CLOSE or not np.isfinite(y).all():  # at the edge of what is a model at all
+            break
         if s @ y > 1e-10:
             rho = 1.0 / (s @ y)
             left = np.eye(size) - rho * np.outer(s, y)
             inverse = left @ inverse @ left.T + rho * np.outer(s, s)
-        u, value, slope = trial, found, after
-        if gain < CLOSE:
-            break
     return scale.motion(u)
