@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -45,6 +46,33 @@ def test_align_and_go_on(files, tmp_path):
     unplaced = call("align", log, "--odometer", odometer, "--imu", "navigation", "--json")
     assert unplaced.exit_code == 0, unplaced.output
     assert "the latitude was not given: found from the log" in unplaced.stdout
+
+
+def test_navigation_takes_the_wheel_over(files, tmp_path):
+    """Pulses are 2 % shorter than told: the alignment finds it, and navigation does not have to be told of it."""
+    log, odometer = files / "imu.csv", tmp_path / "odo.csv"
+    head, *rows = (files / "odo.csv").read_text().splitlines()
+    size = head.split(",").index("pulse_size")
+    changed = [[*row.split(",")[:size], f"{1.02 * float(row.split(',')[size]):.6f}"] for row in rows]
+    odometer.write_text("\n".join([head, *(",".join(row) for row in changed)]) + "\n")
+    common = ["--odometer", odometer, "--lat", 39.9, "--lon", 116.3, "--alt", 50, "--imu", "navigation"]
+    result = call("align", log, *common, "--to", 200, "-o", tmp_path / "start", "--json")
+    assert json.loads(result.stdout)["odometer_scale"] == pytest.approx(0.02, abs=0.004)
+    truth = read_scenario("odometer_ring").ideal().motion.states(np.array([240.0]))
+
+    def speed_off(*options):
+        track = call("navigate", log, "--start", tmp_path / "start", "--odometer", odometer, "--json", *options)
+        assert track.exit_code == 0, track.output
+        told = json.loads(track.stdout)
+        return np.hypot(*told["v_n_m_s"][:2]) / np.hypot(*truth.v_n[0, :2]) - 1.0, told["reasons"]
+
+    for options in ([], ["--odometer-noise", "0.1"]):
+        off, reasons = speed_off(*options)
+        assert abs(off) < 0.004
+        assert any("are the alignment's" in reason for reason in reasons)
+        assert not any("warning" in reason for reason in reasons)
+    _, reasons = speed_off("--mounting", "0,0,0")  # told how it sits, and with that how it counts
+    assert any("seems to count" in reason for reason in reasons)
 
 
 @pytest.mark.parametrize(

@@ -157,7 +157,9 @@ def navigate(
         ramp=damping_ramp,
         reference_sigma=log_error,
     )
-    read_start(start)  # what is wrong with it, before a long log is read
+    begin, _, _ = read_start(start)  # what is wrong with it, before a long log is read
+    told = wheel_arm is not None or mounting is not None or bool(parts & {"scale", "mounting", "lever_arm"})
+    found = None if told else begin.wheel  # by an alignment on the move
     if output is not None:
         writable_folder(output)
     with stages(quiet=as_json) as tell:
@@ -184,7 +186,7 @@ def navigate(
             smooth=smooth,
             imu=imu,
             antenna=replace(antenna, latency=latency),
-            wheel=replace(wheel, noise=odometer_noise),
+            wheel=replace(found or wheel, noise=odometer_noise),
             log=replace(wheel, lever_arm_sigma=0.0),
             barometer=_barometer(),
             baro_loop=baro_loop,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from truenorth.models.whole_bias import WholeBiases, taken_apart
 from truenorth.navigation import kernel
 from truenorth.navigation.aiding import COLUMNS, KINDS, Aiding
 from truenorth.records import ImuRecord
+
+if TYPE_CHECKING:
+    from truenorth.navigation.sensors import Mounting
 
 Array = NDArray[np.float64]
 POLE = np.radians(89.999)  # beyond, north has no meaning that a metre of position leaves
@@ -39,6 +43,8 @@ class Start:
         Covariance of the errors phi, dv, dp, gyro and accelerometer bias (see :mod:`truenorth.models.ins`), ENU.
     whole : WholeBiases or None
         The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
+    wheel : Mounting or None
+        How an alignment on the move found the odometer to sit and to count.
     """
 
     time: float
@@ -51,6 +57,7 @@ class Start:
     accel_bias: Array
     P: Array
     whole: WholeBiases | None = None
+    wheel: Mounting | None = None
 
 
 @dataclass(frozen=True)

@@ -99,7 +99,8 @@ def navigate(
     imu : ImuSpec or str, optional
         Specification; the alignment's own when left out.
     antenna, wheel, log, barometer : Mounting, optional
-        How each sensor sits, and what of that is to be estimated.
+        How each sensor sits, and what of that is to be estimated. Without `wheel` an odometer sits and counts as an
+        alignment on the move has found.
     baro_loop : float, s
         Time constant of a third-order loop on the barometer instead of a Kalman gain; 0: none.
     scale_factors : bool
@@ -137,6 +138,7 @@ def navigate(
     logs: dict[str, Record | None] = {"gnss": gnss, "odometer": odometer, "velocity": velocity, "baro": baro}
     given = {name: aid for name, aid in logs.items() if aid is not None}
     begin, spec, imu_source = _start_of(start, imu)
+    wheel = wheel or begin.wheel
     if calibration is not None:
         record = calibration.apply(record)
     record = _from_start(record, begin)
@@ -173,6 +175,8 @@ def navigate(
     status, reasons = check_residuals(track)
     if why:
         reasons.append(why)
+    if odometer is not None and _is_the_alignments(wheel, begin):
+        reasons.append("odometer: scale, mounting and wheel arm are the alignment's, and estimated on")
     if baro is not None and height != "baro":
         reasons.append(
             f"the barometer is not used: height is {height!r}; for its heights altitude 'baro' (--altitude baro)"
@@ -200,6 +204,17 @@ def navigate(
 
     tell(f"damping: {damping.method}")
     return damp_navigation(result, reference, noise, damping, log)
+
+
+def _is_the_alignments(wheel: Mounting | None, start: Start) -> bool:
+    """Whether an odometer is taken to sit and count as the alignment has found."""
+    found = start.wheel
+    return (
+        wheel is not None
+        and found is not None
+        and bool(np.all(wheel.C_mb == found.C_mb))
+        and wheel.scale_sigma == found.scale_sigma
+    )
 
 
 def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:

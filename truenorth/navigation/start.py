@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +20,7 @@ from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
 from truenorth.models.whole_bias import WholeBiases
 from truenorth.navigation.driver import Start
 from truenorth.navigation.handover import Handover
+from truenorth.navigation.sensors import Mounting
 from truenorth.position import Position
 from truenorth.specs import ImuSpec, imu_spec
 
@@ -45,7 +48,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
         )
     moving = alignment.moving or alignment.transfer
     if moving is not None:
-        return _moving_start(
+        start = _moving_start(
             alignment.time,
             alignment.C_nb,
             moving.v_n,
@@ -55,6 +58,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
             alignment.position,
             alignment.imu,
         )
+        return start if alignment.moving is None else replace(start, wheel=_found_wheel(alignment.moving.summary()))
     joint = alignment.handover
     if joint is None:
         joint = _by_static_limits(
@@ -150,6 +154,23 @@ def _moving_start(
     return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
 
 
+def _found_wheel(summary: Mapping[str, Any]) -> Mounting | None:
+    """How an alignment on the move says the odometer sits and counts; None: it had none.
+
+    The scale's prior holds all of the error found, not only what is left of it: an odometer is told as it counts. What the
+    alignment knows of heading and the mounting's yaw together is left out.
+    """
+    if "odometer_scale" not in summary:
+        return None
+    return Mounting(
+        lever_arm=np.array(summary["wheel_arm_m"], dtype=np.float64),
+        lever_arm_sigma=float(max(summary["wheel_arm_sigma_m"])),
+        C_mb=np.array(summary["mounting_C_mb"], dtype=np.float64),
+        angle_sigma=math.radians(max(summary["mounting_sigma_deg"])),
+        scale_sigma=math.hypot(summary["odometer_scale"], summary["odometer_scale_sigma"]),
+    )
+
+
 def positive(P: Array) -> Array:
     """The nearest correlation structure without negative eigenvalues; variances stay as they are or grow by rounding."""
     sigma = np.sqrt(np.maximum(np.diag(P), 1e-300))
@@ -201,6 +222,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             v_n, P = np.array(n["v_n"], dtype=np.float64), np.array(n["P"], dtype=np.float64)
             biases = numbers["gyro_bias"], numbers["accel_bias"]
             start = _moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
+            start = replace(start, wheel=_found_wheel(s))
             return start, spec, str(s.get("source", ""))
         gyro_bias = numbers.pop("gyro_bias")
         if "handover" in n:
