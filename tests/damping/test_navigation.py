@@ -121,6 +121,7 @@ def test_the_logs_constant_error_is_found(ship):
     assert after.amplitude[schuler].max() < 0.1 * before.amplitude[schuler].max()
     assert json.dumps(result.summary(), allow_nan=False)
     assert "log error east" in result.damping.in_words()
+    assert "min (to 2.8 min)" in result.damping.in_words()  # half of 89.3 min squared over a day
 
 
 @pytest.mark.parametrize(("lat", "heading"), [(-45.78, 231.0), (79.0, 120.0), (-80.0, -30.0), (0.5, 270.0)])
@@ -163,6 +164,17 @@ def test_a_sick_log(ship, method):
     assert np.abs(two[after, :2]).max() < np.abs(one[after, :2]).max() + 0.2
     assert np.abs(two[after, 2:4]).max() < 2.0 * np.abs(one[after, 2:4]).max() + 3000.0
     assert np.degrees(np.abs(two[after, 6]).max()) < np.degrees(np.abs(one[after, 6]).max()) + 0.1
+
+
+@pytest.mark.parametrize("method", ["external", "kalman"])
+@pytest.mark.parametrize("factor", [0.0, 1.0 / 0.514444])
+def test_a_log_that_cannot_be_this_ships(ship, method, factor):
+    """Dead, or knots taken for m/s: nothing in the log itself is amiss, and it is not believed in silence."""
+    log = ship.log()
+    result = ship.navigate(Damper(method), VelocityRecord(log.time, factor * log.velocity, "navigation"))
+    assert result.status == "inconsistent"
+    assert "m/s is expected; check its units" in result.reasons[0] + result.reasons[1]
+    assert ship.navigate(Damper(method), log).status == "navigated"
 
 
 def test_a_switch_later_than_the_start(ship):

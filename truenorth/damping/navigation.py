@@ -33,6 +33,7 @@ GATE = 1.0 - 1e-6  # with which a good row passes: one in six days at 1 Hz is lo
 WINDOW = 5.0  # s, of filter 2
 CHANGE_SIGMA = 0.001  # m/s^2, of filter 2's measurement
 SHORTEST = 16  # epochs of a spectrum
+CONTRADICTED = 5.0  # sigmas between INS and log for half of the time: of sound ones one in a million
 LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of models.ins: PHI, and the level parts of DV and DP
 
 
@@ -56,6 +57,8 @@ class Damping:
         The reference's constant error east, north as the 15-state filter found it.
     rejected : int
         Measurements that the filter's gate kept out.
+    length : float, s
+        From the switch to the end: what tells lines apart.
     """
 
     damper: Damper
@@ -68,12 +71,15 @@ class Damping:
     reference_error: Array | None = None
     reference_error_sigma: Array | None = None
     rejected: int = 0
+    length: float = np.inf
 
     def in_words(self) -> str:
         """One line: method, switch, the lines it had, and what the log's error was found to be."""
         parts = [f"{self.damper.method} from {self.switch:.0f} s on"]
         if not np.isnan(self.lines[0]):
-            parts.append("undamped Schuler lines at " + " and ".join(f"{x / 60.0:.1f}" for x in self.lines) + " min")
+            apart = 0.5 * self.lines[1] ** 2 / self.length  # half of what the log's length can tell apart
+            lines = " and ".join(f"{x / 60.0:.1f}" for x in self.lines)
+            parts.append(f"undamped Schuler lines at {lines} min (to {apart / 60.0:.1f} min)")
         if self.reference is not None:
             parts.append(f"log noise {self.reference.noise:.3f} m/s")
         if self.reference_error is not None and self.reference_error_sigma is not None:
@@ -180,20 +186,43 @@ def damp_navigation(
         lines=_lines(course.v_n[seen, :2] - base, course.interval),
         modes=tuple(eigenvalues(course, loop, course.epochs // 2)),
         rejected=0 if estimate is None else estimate.rejected,
+        length=float(course.time[-1] - course.time[start]),
     )
     if estimate is not None and damper.method == "augmented":
         last, last_sigma = estimate.x[-1, REF], estimate.sigma[-1, REF]
         report = replace(report, reference_error=last, reference_error_sigma=last_sigma)
     words = [] if reference is None else reference.reasons()
+    contradicted = None
+    if reference is not None and damper.needs_reference:
+        contradicted = _contradiction(course, reference, track.sigma[:, 3:5], damper, start)
     if report.rejected:
         words.append(f"velocity log: {report.rejected} measurements rejected by the filter's gate")
     if damper.method == "internal":
         words.append("internal damping: what the vehicle's own manoeuvres add is not in the bands")
     return replace(
         result,
+        status=result.status if contradicted is None else "inconsistent",
         track=track if damper.method == "none" else _corrected(track, damped, sigma, start, estimate),
-        reasons=(*result.reasons, *words),
+        reasons=(*result.reasons, *([] if contradicted is None else [contradicted]), *words),
         damping=report,
+    )
+
+
+def _contradiction(course: Course, reference: Reference, sigma: Array, damper: Damper, start: int) -> str | None:
+    """Why a log cannot be this vehicle's, in words; None: it can.
+
+    For more than half of the log it differs from the free INS by more than both can be wrong. A log that is dead or in other
+    units does; outliers, jumps and silences do not.
+    """
+    off = np.abs(course.v_n[start:, :2] - reference.velocity[start:])
+    expected = np.sqrt(sigma[start:] ** 2 + damper.reference_sigma**2 + reference.noise**2)
+    there = np.isfinite(off).all(axis=1)
+    if not there.any() or np.median((off / expected)[there].max(axis=1)) <= CONTRADICTED:
+        return None
+    east, north = np.median(off[there], axis=0)
+    return (
+        f"velocity log: differs from the free INS by {east:.2f} m/s east, {north:.2f} m/s north (median), "
+        f"{np.median(expected[there]):.2f} m/s is expected; check its units, axes, mounting, whether it lives, and --log-error"
     )
 
 
