@@ -1,7 +1,9 @@
 """`truenorth align --master` from the shell: the real recording, its options and its messages."""
 
 import json
+import re
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -37,6 +39,19 @@ def test_what_a_person_reads(logs):
     assert "mounting, deg: heading 0.3" in result.stdout
     assert "right 0 (as given)" in result.stdout
     assert "not well told apart" in result.stdout
+
+
+def test_another_time_base_and_what_is_not_seen(logs, tmp_path):
+    """A delay of more than an hour keeps the digits that its sigma has; what velocity does not see is not "as given"."""
+    slave, master = logs
+    late = pd.read_csv(master)
+    late["time"] += 5000.0
+    late.to_csv(tmp_path / "late.csv", index=False)
+    result = CliRunner().invoke(app, ["align", slave, "--master", str(tmp_path / "late.csv")])
+    assert result.exit_code == 0, result.output
+    assert re.search(r"delay, ms: 50000\d\d\.\d+ ± 0\.", result.stdout)
+    result = CliRunner().invoke(app, ["align", slave, "--master", master, "--matching", "velocity"])
+    assert "mounting, deg: not seen by velocity matching" in result.stdout
 
 
 def test_bad_options(logs):

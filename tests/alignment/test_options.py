@@ -18,6 +18,7 @@ VALUES = {
     "--mounting-sigma": "5",
     "--method": "oba",
     "--at": "50",
+    "--advise": "0.1",
 }
 
 

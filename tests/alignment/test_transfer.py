@@ -1,6 +1,7 @@
 """Transfer alignment: the closed loop against the linear filter and the truth, the real recording, bad and odd masters."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from tests import recordings
 from truenorth.alignment import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
+from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import system_of_motion
 from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.errors import DataError, UsageError
@@ -193,14 +195,46 @@ def test_ten_seconds_of_silence(real, found):
     np.testing.assert_allclose(rotation_vector_from_dcm(result.C_nb @ found.C_nb.T), 0, atol=2 * ARCMIN)
 
 
-def test_a_jump_is_told_and_taken_up(real, found):
+@pytest.mark.parametrize("size", [0.5, 2.0])
+def test_a_jump_is_told_and_taken_up(real, found, size):
     slave, master = real
     v = master.v_n.copy()
-    v[250:, 0] += 0.5
+    v[250:, 0] += size
     result = align_transfer(slave, replace(master, v_n=v))
+    assert result.status == "aligned"  # the rows until it is taken up are no drift of the slave's
     assert len(result.transfer.jumps) == 1
-    assert "velocity jumped by 0.5 m/s" in result.transfer.jumps[0]
+    assert f"velocity jumped by {size:.2g} m/s" in result.transfer.jumps[0]
     np.testing.assert_allclose(rotation_vector_from_dcm(result.C_nb @ found.C_nb.T), 0, atol=2 * ARCMIN)
+
+
+def test_an_attitude_that_jumps_is_refused_for_that_reason(real):
+    """By 3 deg of heading: the slave's own velocity does not turn with it."""
+    slave, master = real
+    turned = dcm_from_euler(math.radians(3.0), 0.0, 0.0) @ master.C_nb
+    after = (np.arange(len(master)) >= 250)[:, None, None]
+    result = align_transfer(slave, replace(master, C_nb=np.where(after, turned, master.C_nb)))
+    assert result.status == "inconsistent"
+    assert "align a part without the jump" in result.reasons[0]
+    assert "attitude jumped by 3 deg" in result.reasons[1]
+
+
+@pytest.mark.parametrize("how", ["steps", "runs"])
+def test_a_clock_that_steps_or_runs_at_another_rate_is_named(real, how):
+    """A second in the middle of the log, or 2 %: neither is a bad specification nor a lever arm."""
+    slave, master = real
+    time = master.time + (master.time > 25.0) if how == "steps" else 1.02 * master.time
+    result = align_transfer(slave, replace(master, time=time))
+    assert result.status == "inconsistent"
+    assert "one of the clocks steps or runs at another rate" in result.reasons[0]
+    assert sum("jumped by" in reason for reason in result.reasons) <= 3
+
+
+def test_clocks_that_agree_are_not_parted(real):
+    slave, master = real
+    assert parted_clocks(slave, master, np.eye(3)) == ""
+    assert parted_clocks(slave, master.shifted(300.0), np.eye(3)) == ""
+    assert parted_clocks(slave, replace(master, C_nb=None), np.eye(3)) == ""
+    assert parted_clocks(slave, master[:5], np.eye(3)) == ""
 
 
 def test_wild_rows_are_left_out(real, found):
@@ -302,8 +336,12 @@ def test_bad_requests(real):
         align_transfer(slave, master, matching="velocity", flexure=FlexureSpec(sigma=(1e-3, 1e-3, 1e-3)))
     with pytest.raises(UsageError, match="lever_arm is"):
         align_transfer(slave, master, lever_arm=(1.0, 2.0))
-    with pytest.raises(UsageError, match="delay_sigma is -1"):
+    with pytest.raises(UsageError, match="delay_sigma is -1 s"):
         align_transfer(slave, master, delay_sigma=-1.0)
+    with pytest.raises(UsageError, match="mounting_sigma is -2 deg"):
+        align_transfer(slave, master, mounting_sigma=math.radians(-2.0))
+    with pytest.raises(UsageError, match="in Python the slave's heading="):  # no option of that name
+        align_transfer(slave, replace(master, C_nb=None, v_n=0.0 * master.v_n))
     with pytest.raises(UsageError, match="--lat"):
         align_transfer(slave, replace(master, lat=None, lon=None, alt=None))
     with pytest.raises(DataError, match="gap of"):

@@ -204,7 +204,8 @@ def advise(
         ("longest", longest, 2 * SHORTEST),
     ):
         if not (math.isfinite(value) and value > least):
-            raise UsageError(f"advise: {name} is {value:g}; expected a number above {least:g}")
+            shown = f"{math.degrees(value):g} deg" if name == "heading_sigma" else f"{value:g}"
+            raise UsageError(f"advise: {name} is {shown}; expected a number above {least:g}")
     if not schemes:
         raise UsageError("advise: no schemes; expected one at least, such as {'two positions': (180,)}")
     spec = imu_spec(imu).with_random_walks(1.0 / rate)

@@ -16,7 +16,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
 from truenorth.alignment.transfer_answer import assemble_transfer, final_attitudes
 from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, transfer_filter
-from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec
+from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.attitude import dcm_from_euler
 from truenorth.calibration import Calibration
 from truenorth.errors import DataError, UsageError
@@ -114,13 +114,13 @@ def align_transfer(
     what = _matching(matching, master)
     arm = _three(lever_arm, "lever_arm", "metres: right, forward, up of the slave, from the master")
     angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
-    for name, value in (
-        ("lever_arm_sigma", lever_arm_sigma),
-        ("delay_sigma", delay_sigma),
-        ("mounting_sigma", mounting_sigma),
+    for name, value, shown in (
+        ("lever_arm_sigma", lever_arm_sigma, f"{lever_arm_sigma:g} m"),
+        ("delay_sigma", delay_sigma, f"{delay_sigma:g} s"),
+        ("mounting_sigma", mounting_sigma, f"{math.degrees(mounting_sigma):g} deg"),
     ):
         if not 0.0 <= value < math.inf:
-            raise UsageError(f"{name} is {value}; expected zero (known) or a positive one-sigma")
+            raise UsageError(f"{name} is {shown}; expected zero (known) or a positive one-sigma")
     if not math.isfinite(delay):
         raise UsageError(f"delay is {delay}; expected seconds")
     if not heading_limit > 0.0:
@@ -164,8 +164,9 @@ def align_transfer(
         )
     matched = Matching(*noise, gate=GATE)
     track = transfer_filter(part, master, model, start, matched, covariances=True, linear=linear)
+    parted = parted_clocks(slave, master, C_mb)
     answer = assemble_transfer(
-        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit
+        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, parted
     )
     if position is not None and master.lat is None:
         answer = replace(

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 
 MOST_EPOCHS = 400  # of the linear system that says what is told apart
 MOST_ROWS = 5000  # of the history
+MOST_JUMPS = 3  # of the master, that the reasons tell one by one
 DISTRUST = 0.2  # share of rejected rows above which master and slave contradict each other
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
@@ -73,15 +74,17 @@ def assemble_transfer(
     what: str,
     notes: tuple[str, ...],
     heading_limit: float,
+    parted: str,
 ) -> Alignment:
-    """The answer at the last row of the master, judged."""
+    """The answer at the last row of the master, judged; `parted` says what is wrong with the clocks, if anything."""
     P = track.last_P
     phi_covariance, floor = misalignment_covariance(P)
     gyro_prior, accel_prior = bias_sigmas(spec)
     lat, lon, alt = (float(x) for x in track.position[-1])
     transfer = _transfer(slave, master, model, assumed, start, track, noise, what, notes)
     sigma = track.sigma[-1]
-    status, reasons = _judge(track, transfer, start, where, euler_sigma(track.C_nb[-1], phi_covariance), heading_limit)
+    reached = euler_sigma(track.C_nb[-1], phi_covariance)
+    status, reasons = _judge(track, transfer, start, where, reached, heading_limit, parted)
     return Alignment(
         status=status,
         reasons=reasons,
@@ -292,11 +295,15 @@ def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
 
 
 def _judge(
-    track: TransferTrack, transfer: Transfer, start: SlaveStart, where: str, sigma: Array, limit: float
+    track: TransferTrack, transfer: Transfer, start: SlaveStart, where: str, sigma: Array, limit: float, parted: str
 ) -> tuple[Status, tuple[str, ...]]:
     """Status and reasons."""
-    told = [*transfer.notes, *transfer.jumps]
+    told = [*transfer.notes, *transfer.jumps[:MOST_JUMPS]]
+    if len(transfer.jumps) > MOST_JUMPS:
+        told.append(f"{len(transfer.jumps) - MOST_JUMPS} more jumps of the master were taken up")
     told += [f"not well told apart by this motion: {words}" for words in transfer.open]
+    if parted:
+        return "inconsistent", (parted, *told)
     share = transfer.rejected / max(1, transfer.rejected + transfer.used)
     if share > DISTRUST:
         return "inconsistent", (
@@ -318,9 +325,11 @@ def _judge(
             )
     lopsided = _lopsided(track)
     if lopsided:
+        part = ", or align a part without the jump (--from, --to), which may be an error of the master's own"
+        part = part if transfer.jumps else ""
         return "inconsistent", (
             f"{lopsided} differ from the prediction to one side all the time: the slave's errors are larger than its specification "
-            f"({where}) allows, or the master's drift; give the right --imu",
+            f"({where}) allows, or the master's drift; give the right --imu{part}",
             *told,
         )
     if sigma[0] <= limit:
@@ -343,11 +352,14 @@ def _judge(
 
 
 def _lopsided(track: TransferTrack) -> str:
-    """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row."""
-    nu = (track.innovation / track.innovation_sigma)[len(track.time) // 4 :]
+    """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row.
+
+    Rows that were used, that is: those of a jump lie on one side too, until it is taken up.
+    """
+    later = slice(len(track.time) // 4, None)
+    nu, verdict = (track.innovation / track.innovation_sigma)[later], track.verdict[later]
     for kind, name in enumerate(("velocities", "attitudes")):
-        rows = nu[:, 3 * kind : 3 * kind + 3]
-        rows = rows[np.isfinite(rows).all(axis=1)]
+        rows = nu[verdict[:, kind] == loop.USED, 3 * kind : 3 * kind + 3]
         if len(rows) < FEWEST:
             continue
         follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.transfer_delay import find_delay
+from truenorth.alignment.transfer_delay import WINDOW, find_delay
 from truenorth.alignment.transfer_filter import SlaveStart
 from truenorth.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.earth import GRAVITY_EQUATOR
@@ -80,6 +80,23 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
             "more motion in common"
         )
     return assumed, ()
+
+
+def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> str:
+    """In words that the first and the last third of the master are late by different delays; "" where nothing says so."""
+    first, last = len(master) // 3, 2 * len(master) // 3
+    if first < 2:
+        return ""
+    # Half a window: where the agreement is just sure, a delay is found to a tenth of it.
+    least = max(0.5 * WINDOW["rate" if master.C_nb is not None else "force"], master.interval)
+    begin, end = (find_delay(slave, part, C_mb) for part in (master[:first], master[last:]))
+    if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < least:
+        return ""
+    return (
+        f"the master's stamps are {begin.delay:.2f} s behind the slave's clock until {master.time[first - 1]:.1f} s and "
+        f"{end.delay:.2f} s from {master.time[last]:.1f} s on, by their motion: one of the clocks steps or runs at another rate; "
+        "align a part of the logs (--from, --to), or put the times right"
+    )
 
 
 def model_from_spec(
@@ -201,7 +218,7 @@ def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:
     else:
         raise UsageError(
             f"{master.source}: it tells velocity alone, and {math.hypot(east, north):.1f} m/s at the start, too slow for a course: "
-            "give the slave's heading (--heading)"
+            "give a master with attitude, a part of the logs that begins on the move (--from), or in Python the slave's heading="
         )
     t = master.time[:rows] - master.time[:rows].mean()
     a_n = t @ v / float(t @ t)

@@ -33,10 +33,12 @@ BELONGS = {
 CLASHES = {
     "--method": ("--positions", "--indexer", "--master"),
     "--at": ("--positions", "--master", "--odometer", "--gnss"),
+    "--advise": ("--master", "--odometer", "--gnss"),
 }
 INSTEAD = {
     "--method": "leave it out: the procedure has a method of its own",
     "--at": "the attitude holds at the log's end: cut the log with --to",
+    "--advise": "its positions are for a base that stays: ask truenorth advise, with --speed for a vehicle with a master INS",
 }
 
 

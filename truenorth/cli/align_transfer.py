@@ -133,21 +133,26 @@ def align_to_master(
 
 
 def print_transfer(console: Console, transfer: Transfer) -> None:
-    """Delay, lever arm and mounting, each with its sigma or that it was not estimated."""
+    """Delay, lever arm and mounting, each with its sigma, or that it was not estimated or not matched."""
 
     def told(name: str, value: float, sigma: float, estimated: bool) -> str:
         if sigma == 0.0:
             return f"{name} {value:.4g} (as given)"
-        return f"{name} {value:.4g} ± {sigma:.3g}" if estimated else f"{name} not estimated (± {sigma:.3g})"
+        # A delay of hours is known to a millisecond: as many digits as the sigma has.
+        digits = max(4, 3 + math.floor(math.log10(max(abs(value), sigma) / sigma)))
+        return f"{name} {value:.{digits}g} ± {sigma:.3g}" if estimated else f"{name} not estimated (± {sigma:.3g})"
 
     s = transfer.summary()
     console.print(
         f"delay, ms: {told('', s['delay_ms'], s['delay_sigma_ms'], s['delay_estimated']).strip()}", soft_wrap=True
     )
-    for title, key, unit, names in (
-        ("lever arm, m", "lever_arm", "m", ("right", "forward", "up")),
-        ("mounting, deg", "mounting", "deg", ("heading", "pitch", "roll")),
+    for title, key, unit, names, blind in (
+        ("lever arm, m", "lever_arm", "m", ("right", "forward", "up"), "attitude"),
+        ("mounting, deg", "mounting", "deg", ("heading", "pitch", "roll"), "velocity"),
     ):
+        if s["matching"] == blind:
+            console.print(f"{title}: not seen by {blind} matching", soft_wrap=True)
+            continue
         columns = (s[f"{key}_{unit}"], s[f"{key}_sigma_{unit}"], s[f"{key}_estimated"])
         parts = [told(*row) for row in zip(names, *columns, strict=True)]
         console.print(f"{title}: {', '.join(parts)}", soft_wrap=True)
