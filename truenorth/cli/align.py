@@ -76,7 +76,9 @@ def align(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[str, typer.Option(help="auto, analytic, inertial, oba, kalman or swaying.")] = "auto",
+    method: Annotated[
+        str, typer.Option(help="auto, analytic, inertial, oba, kalman or swaying; on the move gyrocompass or motion.")
+    ] = "auto",
     axes: Axes = None,
     units: Units = None,
     rate: Rate = None,
