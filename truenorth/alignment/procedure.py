@@ -162,6 +162,8 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
         "swaying": "the base sways: mean rates mean nothing, the inertial frame follows every motion",
     }
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
+    if overall == "rotating":
+        why += " (where a turntable does it, --positions auto tells more)"
     if task.record.duration < SHORTEST_SWAYING or not (overall in words or _all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
