@@ -82,6 +82,7 @@ def test_navigation_takes_the_wheel_over(files, tmp_path):
         (["--imu", "navigation", "--lat", "39.9", "--at", "50"], "cut the log with --to"),
         (["--imu", "navigation", "--lat", "39.9", "--method", "oba"], "gyrocompass"),
         (["--imu", "navigation", "--lat", "39.9", "--mounting-sigma", "0"], "--mounting-sigma"),
+        (["--imu", "navigation", "--lat", "39.9", "--latency", "0.1"], "belongs to --gnss"),
     ],
 )
 def test_wrong_usage(files, arguments, words):

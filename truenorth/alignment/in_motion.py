@@ -54,6 +54,7 @@ PASSES = 2
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
+LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
 
 
 @dataclass(frozen=True)
@@ -288,10 +289,14 @@ def _with_floors(gnss: GnssRecord) -> GnssRecord:
 
 
 def usual_antenna(gnss: GnssRecord | None) -> Mounting:
-    """Of an antenna of which nothing is said: fixes without sigmas of their own are off together for minutes."""
-    if gnss is None or gnss.position_sigma is not None:
-        return Mounting()
-    return Mounting(bias_sigma=RECEIVER_BIAS, bias_time=RECEIVER_TIME)
+    """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes.
+
+    By how much: what the receiver says of a fix; it is right about the size, and silent about how its errors hang together.
+    """
+    told = None if gnss is None or gnss.position_sigma is None else gnss.position_sigma[:, :2]
+    told = None if told is None else told[np.isfinite(told)]
+    bias = RECEIVER_BIAS if told is None or not told.size else float(np.median(told))
+    return Mounting(latency_sigma=LATENCY_SIGMA, bias_sigma=bias, bias_time=RECEIVER_TIME)
 
 
 def _has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:

@@ -13,6 +13,7 @@ import typer
 from truenorth.cli.align_in_motion import (
     AntennaArm,
     Gnss,
+    Latency,
     MountingAngles,
     MountingSigma,
     Odometer,
@@ -135,6 +136,7 @@ def align(
     offset: Offset = 0.0,
     wheel_arm: WheelArm = None,
     antenna_arm: AntennaArm = None,
+    latency: Latency = None,
     mounting: MountingAngles = None,
     mounting_sigma: MountingSigma = 3.0,
     odometer_noise: OdometerNoise = None,
@@ -222,6 +224,7 @@ def align(
                 offset=offset,
                 wheel_arm=wheel_arm,
                 antenna_arm=antenna_arm,
+                latency=latency,
                 mounting=mounting,
                 mounting_sigma=mounting_sigma,
                 odometer_noise=odometer_noise,

@@ -52,6 +52,14 @@ AntennaArm = Annotated[
     str | None,
     typer.Option(help="IMU to the GNSS antenna, m: right,forward,up.", rich_help_panel=PANEL, show_default=False),
 ]
+Latency = Annotated[
+    float | None,
+    typer.Option(
+        help="GNSS measurements are older than their stamps by this, s; estimated without it.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
 MountingAngles = Annotated[
     str | None,
     typer.Option(
@@ -80,6 +88,7 @@ def align_moving(
     offset: float,
     wheel_arm: str | None,
     antenna_arm: str | None,
+    latency: float | None,
     mounting: str | None,
     mounting_sigma: float,
     odometer_noise: float | None,
@@ -99,7 +108,7 @@ def align_moving(
     import numpy as np
 
     from truenorth.alignment import align_in_motion
-    from truenorth.alignment.in_motion import WHEEL
+    from truenorth.alignment.in_motion import WHEEL, usual_antenna
     from truenorth.errors import UsageError
     from truenorth.formats import read_gnss, read_odometer
     from truenorth.navigation.sensors import mounting_angles
@@ -119,12 +128,12 @@ def align_moving(
         arm = np.array(numbers_of(wheel_arm, "--wheel-arm", 3, "right,forward,up in metres"))
         wheel = replace(wheel, lever_arm=arm, lever_arm_sigma=0.0)
     receiver = None if gnss is None else read_gnss(gnss)
-    antenna = None
+    antenna = usual_antenna(receiver)
     if antenna_arm is not None:
-        from truenorth.alignment.in_motion import usual_antenna
-
         arm = np.array(numbers_of(antenna_arm, "--antenna-arm", 3, "right,forward,up in metres"))
-        antenna = replace(usual_antenna(receiver), lever_arm=arm)
+        antenna = replace(antenna, lever_arm=arm)
+    if latency is not None:
+        antenna = replace(antenna, latency=latency, latency_sigma=0.0)
     return align_in_motion(
         record,
         imu,
