@@ -15,6 +15,7 @@ VALUES = {
     "--lever-arm-sigma": "0.5",
     "--offset": "2",
     "--odometer-noise": "0.1",
+    "--latency": "0.1",
     "--mounting-sigma": "5",
     "--method": "oba",
     "--at": "50",
