@@ -8,10 +8,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from truenorth.core.position import Position
 from truenorth.formats import write_imu
-from truenorth.position import Position
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 RUNS = 5
 

@@ -16,9 +16,9 @@ from pyins import strapdown as pyins_strapdown
 from pyins import transform
 from pyins.util import ACCEL_COLS, GYRO_COLS, LLA_COLS, RPH_COLS, VEL_COLS
 
-from truenorth.attitude import dcm_from_euler
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.records import ImuRecord
-from truenorth.strapdown import NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
 
 T, COUNT, REPEATS = 0.01, 60_000, 7
 C_FRD_RFU = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # of vectors; north-east-down from ENU as well

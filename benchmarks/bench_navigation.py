@@ -10,14 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from truenorth.core.position import Position
 from truenorth.models.ins import InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Start, navigate_track
-from truenorth.position import Position
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
-from truenorth.specs import imu_spec
 
 SECONDS, REPEATS = 3600.0, 3
 FREE_LIMIT, AIDED_LIMIT = 0.15, 1.0  # s

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from truenorth.position import Position
+from truenorth.core.position import Position
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import IdealLog, Sway, Tone, ideal_log, simulate, simulate_runs
-from truenorth.specs import ImuSpec, imu_spec
 
 REPEATS = 7
 RUNS = 200

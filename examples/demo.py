@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import truenorth
-from truenorth.attitude import euler_from_dcm
+from truenorth.core.attitude import euler_from_dcm
 from truenorth.simulation import Sway, Tone, simulate
 
 FOLDER = Path("demo")

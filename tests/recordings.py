@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from truenorth.core.position import Position
 from truenorth.formats import read_gnss, read_master, read_odometer
-from truenorth.position import Position
 from truenorth.records import GnssRecord, ImuRecord, MasterRecord, OdometerRecord
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

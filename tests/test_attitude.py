@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from truenorth import attitude
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core import attitude
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
 
 angles = st.floats(-10.0, 10.0)
 vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from truenorth.calibration import Calibration
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.records import ImuRecord
+from truenorth.records.calibration import Calibration
 
 FILE = """
 gyro:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from truenorth.cli import main
+from truenorth.core.position import Position
 from truenorth.formats import write_imu
-from truenorth.position import Position
 from truenorth.records import ImuRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(34.25, 108.9, 380.0)
 WHERE = ["--lat", "34.25", "--lon", "108.9", "--alt", "380"]
@@ -355,8 +355,8 @@ def test_wrong_usage_of_inspect(capsys, monkeypatch, log, arguments, words):
 
 def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):
     """A full disk half way through, and a kill at any moment: the target is whole or not there."""
-    from truenorth.atomic import atomic_path
-    from truenorth.errors import UsageError
+    from truenorth.core.atomic import atomic_path
+    from truenorth.core.errors import UsageError
 
     target = tmp_path / "result.csv"
 
@@ -369,7 +369,7 @@ def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):
         half_a_file()
     assert list(tmp_path.iterdir()) == []
     code = (
-        "import os, signal\nfrom truenorth.atomic import atomic_path\n"
+        "import os, signal\nfrom truenorth.core.atomic import atomic_path\n"
         f"with atomic_path({str(target)!r}) as path:\n    path.write_text('half')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], check=False, env=dict(os.environ))

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truenorth import earth
-from truenorth.compiled import compiled
+from truenorth.core import earth
+from truenorth.core.compiled import compiled
 
 latitudes = st.floats(-1.55, 1.55)
 SEMI_MINOR = earth.SEMI_MAJOR * (1 - earth.FLATTENING)

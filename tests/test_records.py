@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from truenorth.attitude import dcm_from_euler, quaternion_from_dcm, rotation_vector_from_dcm
-from truenorth.errors import DataError
-from truenorth.position import Position
+from truenorth.core.attitude import dcm_from_euler, quaternion_from_dcm, rotation_vector_from_dcm
+from truenorth.core.errors import DataError
+from truenorth.core.position import Position
 from truenorth.records import (
     GnssRecord,
     HeightRecord,

@@ -5,8 +5,8 @@ from dataclasses import fields
 
 import pytest
 
-from truenorth.errors import DataError, UsageError
-from truenorth.specs import KEYS, PRESETS, ImuSpec, imu_spec
+from truenorth.core.errors import DataError, UsageError
+from truenorth.records.specs import KEYS, PRESETS, ImuSpec, imu_spec
 
 DEG = math.pi / 180
 G = 9.80665

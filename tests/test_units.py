@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truenorth.errors import UsageError
-from truenorth.units import DIMENSIONS, format, parse, parse_quantity, parse_unit
+from truenorth.core.errors import UsageError
+from truenorth.core.units import DIMENSIONS, format, parse, parse_quantity, parse_unit
 
 DEG = math.pi / 180
 G = 9.80665

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
         align_rotary,
         align_transfer,
     )
-    from truenorth.calibration import Calibration
     from truenorth.campaign import run_campaign
-    from truenorth.errors import AlignmentError, DataError, TruenorthError, UsageError
+    from truenorth.core.errors import AlignmentError, DataError, TruenorthError, UsageError
+    from truenorth.core.position import Position
     from truenorth.formats import (
         read_encoder,
         read_gnss,
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
         write_record,
     )
     from truenorth.navigation import Mounting, Navigation, navigate
-    from truenorth.position import Position
     from truenorth.quality import inspect
     from truenorth.records import (
         GnssRecord,
@@ -45,29 +44,30 @@ if TYPE_CHECKING:
         Trajectory,
         VelocityRecord,
     )
+    from truenorth.records.calibration import Calibration
+    from truenorth.records.specs import ImuSpec, imu_spec
     from truenorth.report import write_report
     from truenorth.simulation import simulate
-    from truenorth.specs import ImuSpec, imu_spec
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "Alignment": "alignment",
-    "AlignmentError": "errors",
-    "Calibration": "calibration",
-    "DataError": "errors",
+    "AlignmentError": "core.errors",
+    "Calibration": "records.calibration",
+    "DataError": "core.errors",
     "GnssRecord": "records",
     "HeightRecord": "records",
     "ImuRecord": "records",
-    "ImuSpec": "specs",
+    "ImuSpec": "records.specs",
     "MasterRecord": "records",
     "Mounting": "navigation",
     "Navigation": "navigation",
     "OdometerRecord": "records",
-    "Position": "position",
+    "Position": "core.position",
     "Trajectory": "records",
-    "TruenorthError": "errors",
-    "UsageError": "errors",
+    "TruenorthError": "core.errors",
+    "UsageError": "core.errors",
     "VelocityRecord": "records",
     "advise": "alignment",
     "align": "alignment",
@@ -75,7 +75,7 @@ _HOMES = {
     "align_positions": "alignment",
     "align_rotary": "alignment",
     "align_transfer": "alignment",
-    "imu_spec": "specs",
+    "imu_spec": "records.specs",
     "inspect": "quality",
     "navigate": "navigation",
     "read_encoder": "formats",

@@ -10,10 +10,10 @@ import pytest
 from truenorth.alignment import advise, align, align_positions
 from truenorth.alignment.advice import SCHEMES
 from truenorth.cli import main
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(45.0, 0.0)
 

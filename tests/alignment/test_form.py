@@ -8,14 +8,14 @@ import pytest
 from truenorth.alignment import align
 from truenorth.alignment import procedure as steps_of_align
 from truenorth.alignment.form import WHITE, pick_form
-from truenorth.inertial import integrate
+from truenorth.core.position import Position
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel
 from truenorth.models.static_force import force_system, gained_velocity
-from truenorth.position import Position
 from truenorth.quality.regimes import motion_summary
 from truenorth.records import ImuRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import Sway, Tone, rest, simulate
-from truenorth.specs import imu_spec
+from truenorth.strapdown.inertial import integrate
 
 PLACE = Position.from_degrees(45.0, 0.0)
 SPEC = imu_spec(

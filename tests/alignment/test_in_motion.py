@@ -8,11 +8,11 @@ import pytest
 
 from truenorth import OdometerRecord, UsageError, align_in_motion, imu_spec, navigate
 from truenorth.alignment.in_motion_start import backtracked, departures, path_to_the_end
-from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.coarse.odometer import odometer_alignment
+from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.models.ins import BG, DP
 from truenorth.navigation import Mounting
-from truenorth.position import METRES_PER_RADIAN, Position
 from truenorth.simulation import OdometerSpec, simulate, simulate_odometer
 from truenorth.simulation.scenario import read_scenario
 

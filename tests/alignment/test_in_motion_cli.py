@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from truenorth.cli import app
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.formats import write_imu, write_record
 from truenorth.simulation.scenario import read_scenario
 

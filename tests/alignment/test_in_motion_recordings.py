@@ -105,7 +105,7 @@ def test_car_dead_reckons_by_the_odometer(car):
 
 
 def test_car_without_gnss_claims_no_heading(car):
-    from truenorth.position import Position
+    from truenorth.core.position import Position
 
     imu, odometer, _, _ = car
     place = Position.from_degrees(59.35, 18.07, 30.0)

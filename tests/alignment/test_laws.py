@@ -7,19 +7,19 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from truenorth.alignment import align
-from truenorth.attitude import (
+from truenorth.core.attitude import (
     dcm_from_euler,
     dcm_from_rotation_vector,
     euler_from_dcm,
     euler_jacobian,
     rotation_vector_from_dcm,
 )
-from truenorth.earth import EARTH_RATE, normal_gravity
-from truenorth.position import Position
+from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.position import Position
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
 from truenorth.simulation.scenario import read_scenario
-from truenorth.specs import ImuSpec, imu_spec
 
 XIAN = Position.from_degrees(34.25, 108.9, 380.0, horizontal_sigma=0.0, vertical_sigma=0.0)
 
@@ -141,7 +141,7 @@ def test_still_base_sigmas_are_honest():
     position = Position.from_degrees(40.0, 118.0, 0.0)
     errors, covariance, answers = _study(rest(position, 0.65, 0.03, -0.05), spec, 100, 300.0, method="kalman")
     from truenorth.coarse.analytic import static_jacobian
-    from truenorth.earth import DEFLECTION
+    from truenorth.core.earth import DEFLECTION
 
     J = static_jacobian(position.lat, 9.8)[:, :2] * 9.8 * DEFLECTION
     covariance = covariance - J @ J.T

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from truenorth.cli import app
 from truenorth.cli.align_options import BELONGS, CLASHES, PROCEDURES
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 VALUES = {
     "--positions": "auto",

@@ -11,16 +11,16 @@ from truenorth.alignment import align, align_positions
 from truenorth.alignment.positions import find_positions
 from truenorth.alignment.task import deflection_covariance
 from truenorth.alignment.touched import find_touch
-from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.cli import main
-from truenorth.earth import normal_gravity
-from truenorth.errors import AlignmentError, UsageError
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import normal_gravity
+from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.position import Position
 from truenorth.formats import write_imu
-from truenorth.position import Position
 from truenorth.quality.regimes import motion_summary
 from truenorth.records import ImuRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, Spin, rest, simulate, steps
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(45.0, 9.0, 100.0, horizontal_sigma=0.0, vertical_sigma=0.0)
 

@@ -10,16 +10,16 @@ from typer.testing import CliRunner
 
 from truenorth.alignment import align_rotary
 from truenorth.alignment.rotary import angles_at, angles_from_gyros
-from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.cli import app
-from truenorth.earth import ecef_axes
-from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import ecef_axes
+from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.formats import read_encoder, write_record
-from truenorth.inertial import integrate
 from truenorth.papers.rotary.truth import simulate_run
-from truenorth.position import Position
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.simulation import Axis, C_bs_from_angles, Indexed, Indexer, Spin, rest, simulate
+from truenorth.strapdown.inertial import integrate
 
 ARCMIN = math.radians(1 / 60)
 
@@ -110,7 +110,7 @@ def still():
 
 
 def simulate_run_spec():
-    from truenorth.specs import imu_spec
+    from truenorth.records.specs import imu_spec
 
     return imu_spec("navigation")
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import truenorth
+from truenorth.core.position import Position
 from truenorth.models.ins import InsModel
-from truenorth.position import Position
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 BASE = imu_spec("navigation")
 POSITION = Position.from_degrees(40.0, 118.0)

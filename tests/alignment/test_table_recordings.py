@@ -6,7 +6,7 @@ import pytest
 from tests import recordings
 from truenorth.alignment import align, align_positions
 from truenorth.coarse import means, two_position
-from truenorth.specs import imu_spec
+from truenorth.records.specs import imu_spec
 
 # A MEMS whose axes are set as well as the better ones of its class: offsets are told apart from tilt as well as that.
 MEMS = {

@@ -13,16 +13,16 @@ from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import system_of_motion
-from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
-from truenorth.errors import DataError, UsageError
+from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.filters import kalman
 from truenorth.models.transfer import ARM, TAU, TransferModel
-from truenorth.position import Position
 from truenorth.records import MasterRecord
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_master
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
-from truenorth.specs import ImuSpec, imu_spec
 
 DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
 SPAN = 60.0

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from truenorth.alignment.transfer_advice import advise_manoeuvre
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 
 HERE, ARCMIN = Position(math.radians(34.0), 0.0, 5000.0), math.radians(1.0 / 60.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from truenorth.analysis.allan import noise_coefficients, overlapping_adev
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
 
 

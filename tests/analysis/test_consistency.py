@@ -19,7 +19,7 @@ from truenorth.analysis.consistency import (
     standardised,
     whiteness,
 )
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, kalman
 
 SURE = 1.0 - 1e-6

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from tests.filters.dense import random_system
 from tests.filters.nonlinear_models import tracking
 from truenorth.analysis.cramer_rao import cramer_rao, linearised_at
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, extended, kalman
 
 RUNS, EPOCHS, LANDMARKS = 4000, 30, np.array([[0.0, 0.0], [40.0, 10.0]])

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from tests.filters.dense import random_system
 from truenorth.analysis.error_budget import Source, error_budget, sources_of
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.gains import filter_gains
 

@@ -10,12 +10,12 @@ from scipy.signal import lfilter
 
 from truenorth.alignment.inference import noise_of
 from truenorth.analysis.log_noise import gauss_markov_variance, noise_from_log
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
+from truenorth.core.units import parse
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import ImuSpec, imu_spec
-from truenorth.units import parse
 
 KNOWN = ImuSpec(
     gyro_random_walk=parse("0.01 deg/sqrt(h)", "angle_random_walk"),

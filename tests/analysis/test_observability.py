@@ -9,8 +9,8 @@ from scipy.linalg import expm, subspace_angles
 
 from truenorth.analysis.combinations import entangled_states
 from truenorth.analysis.observability import Segment, observability, piecewise_observability
-from truenorth.attitude import skew
-from truenorth.errors import UsageError
+from truenorth.core.attitude import skew
+from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, kalman
 
 G, RADIUS, W_IE = 9.806, 6.371e6, 7.292115e-5

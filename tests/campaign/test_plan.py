@@ -7,7 +7,7 @@ import pytest
 from truenorth.alignment.procedure import Method
 from truenorth.campaign import read_plan
 from truenorth.campaign.tuning import Search
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 
 REST = {
     "name": "rest",

@@ -21,7 +21,7 @@ from truenorth.campaign.execution import work
 from truenorth.campaign.store import Block, Store, opened, versions
 from truenorth.cli import app
 from truenorth.cli.campaign import pace
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 
 
 @pytest.fixture(scope="module")

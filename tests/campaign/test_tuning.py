@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 from tests.campaign.test_plan import REST
 from truenorth.campaign.tuning import _score, read_search, tune
 from truenorth.cli import app
-from truenorth.errors import DataError
-from truenorth.specs import imu_spec
+from truenorth.core.errors import DataError
+from truenorth.records.specs import imu_spec
 
 STILL = REST | {"imu": {"gyro": {"bias": "0.01 deg/h", "random_walk": "0.003 deg/sqrt(h)"}, "accel": {"bias": "50 ug"}}}
 SEARCH = {

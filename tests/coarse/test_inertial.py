@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tests import recordings
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.coarse import (
     coarse_covariance,
     dual_vector,
@@ -15,11 +14,12 @@ from truenorth.coarse import (
     two_position,
 )
 from truenorth.coarse.uncertainty import base_velocity
-from truenorth.inertial import integrate
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.position import Position
 from truenorth.models.static import StaticModel
-from truenorth.position import Position
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.strapdown.inertial import integrate
 
 PLACE = Position.from_degrees(40.0, 118.0)
 METHODS = [(method, form) for method in (dual_vector, oba) for form in ("velocity", "position")]

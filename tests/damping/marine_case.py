@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
-from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.yaml_file import read_mapping
 from truenorth.damping.course import Course
 from truenorth.simulation import simulate
 from truenorth.simulation.scenario import SHIPPED, read_scenario
-from truenorth.strapdown import NavigationState, mechanise
-from truenorth.yaml_file import read_mapping
+from truenorth.strapdown.level import NavigationState, mechanise
 
 HOUR = 3600.0
 DEG_PER_HOUR = np.radians(1.0) / HOUR
@@ -34,7 +34,7 @@ def navigate(ideal, truth, x0, gyro_bias, accel_bias):
     """The course of a free INS that begins with errors `x0` (7,) and has these biases."""
     sim = simulate(ideal, errors={"gyro_bias": gyro_bias, "accel_bias": accel_bias})
     lat, lon, alt = truth.position[0]
-    from truenorth.earth import radii
+    from truenorth.core.earth import radii
 
     R_M, R_N = radii(lat)
     start = NavigationState.at(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth, navigate
+from truenorth.core.errors import DataError
 from truenorth.damping.course import Course, errors_of
-from truenorth.errors import DataError
 from truenorth.models.marine import BA, BG, MarineModel, position_in_angles
 
 QUIET = MarineModel(0.0, 0.0)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.damping.marine_case import DEG_PER_HOUR, HOUR, MICRO_G, ideal_and_truth
+from truenorth.core.errors import UsageError
+from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.prior import carried_prior, paper_prior
-from truenorth.errors import UsageError
 from truenorth.models.marine import BA, BG, DP, DV, PHI, REF, MarineModel
 from truenorth.simulation import simulate
-from truenorth.strapdown import NavigationState, mechanise
-from truenorth.units import parse
+from truenorth.strapdown.level import NavigationState, mechanise
 
 SIGMA = np.zeros(13)  # of the paper's errors
 SIGMA[DV], SIGMA[DP], SIGMA[PHI] = 0.1, 62.0, np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)
@@ -171,7 +171,7 @@ def test_the_augmented_filter_is_honest():
 
 
 def _spec():
-    from truenorth.specs import ImuSpec
+    from truenorth.records.specs import ImuSpec
 
     return ImuSpec(gyro_random_walk=WALKS["gyro_random_walk"], accel_random_walk=WALKS["accel_random_walk"])
 

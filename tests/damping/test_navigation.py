@@ -10,16 +10,16 @@ from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
 from tests.recordings import rlg_vehicle_xian
 from truenorth.alignment import align
 from truenorth.cli import app
+from truenorth.core.errors import UsageError
+from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.damping.options import Damper
-from truenorth.errors import UsageError
 from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.navigation.sensors import mounting_angles
 from truenorth.records import VelocityRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation import simulate
-from truenorth.specs import ImuSpec
-from truenorth.units import parse
 
 SIGMA = np.zeros(13)
 SIGMA[DV], SIGMA[DP], SIGMA[PHI] = 0.1, 62.0, np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)
@@ -259,10 +259,10 @@ def test_what_is_refused(ship):
 
 def test_from_the_shell(tmp_path):
     """At the quay for ten minutes, with a report."""
+    from truenorth.core.position import Position
     from truenorth.formats import write_imu
-    from truenorth.position import Position
+    from truenorth.records.specs import imu_spec
     from truenorth.simulation import rest
-    from truenorth.specs import imu_spec
 
     place = Position.from_degrees(48.0, 11.0)
     record = simulate(rest(place, 0.6), rate=20.0, duration=800.0, imu=imu_spec("navigation"), seed=2).record

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
-from truenorth import earth
+from truenorth.core import earth
+from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
 from truenorth.damping.loop import Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, SCHULER_RATE, Network, first_order, second_order
-from truenorth.errors import UsageError
 from truenorth.models.marine import BA, BG, MOTION, MarineModel
 
 QUIET = MarineModel(0.0, 0.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
+from truenorth.core.errors import DataError
 from truenorth.damping.reference import cleaned, reference_of
-from truenorth.errors import DataError
 from truenorth.models.marine import BA, BG, MarineModel
 from truenorth.records import VelocityRecord
 

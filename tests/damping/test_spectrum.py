@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.damping.test_networks import still_course
+from truenorth.core.errors import UsageError
 from truenorth.damping import Filter, carried_prior, earth_line, filter_modes, schuler_lines, spectrum
 from truenorth.damping.filters import run_filters
-from truenorth.errors import UsageError
 from truenorth.models.marine import MarineModel
 
 DAY = 86400.0

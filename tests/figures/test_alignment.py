@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
+from truenorth.core.position import Position
 from truenorth.figures.convergence import NIS_BLOCK, averaged_nis, courses, settled_limits
-from truenorth.position import Position
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(40.0, 118.0)
 

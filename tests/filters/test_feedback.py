@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import random_system
 from tests.filters.test_kalman import SYSTEMS, TIGHT
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import feedback, kalman
 
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import random_system
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
 
 L = np.array([[1.0, 0.5, 0.0], [0.0, 0.0, 2.0]])

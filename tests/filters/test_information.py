@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import Dense, one_run, random_system
 from tests.filters.test_kalman import SYSTEMS, TIGHT
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import (
     InformationState,
     LinearSystem,

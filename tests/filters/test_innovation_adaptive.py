@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import one_run, random_system
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, innovation_adaptive, kalman
 
 KINDS = ["innovation", "residual"]

@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from truenorth.analysis.consistency import chi_square_band, nees
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import NonlinearSystem, check_jacobians, extended, iterated, matrix_function, vector_function
 
 RUNS, EPOCHS = 200, 60

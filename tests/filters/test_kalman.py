@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import Dense, one_run, random_system
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, kalman
 
 TIGHT = {"rtol": 1e-9, "atol": 1e-9}

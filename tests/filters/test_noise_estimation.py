@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import random_system
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, kalman, sage_husa, variational
 
 BOTH = [sage_husa, variational]

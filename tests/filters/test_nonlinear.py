@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.filters.dense import one_run, random_system
 from tests.filters.nonlinear_models import TURNING, conditionally_linear, in_disguise, tracking
 from truenorth.analysis.consistency import chi_square_band, nees
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import (
     Gate,
     StrongTracking,

@@ -14,7 +14,7 @@ from tests.filters.nonlinear_models import (
     linear_transition_jacobian,
     tracking,
 )
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import check_jacobians, matrix_function, vector_function
 
 

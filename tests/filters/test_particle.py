@@ -16,7 +16,7 @@ from scipy.stats import t as student
 from tests.filters.dense import random_system
 from tests.filters.nonlinear_models import TURNING, conditionally_linear, growth, in_disguise, squared, tracking
 from truenorth.analysis.consistency import chi_square_band, nees
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import NonlinearSystem, gauss_hermite, kalman, particle
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters.quadrature import cubature_rule, gauss_hermite_rule, unscented_rule
 
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.filters.dense import Dense, random_system
 from truenorth.analysis.consistency import chi_square_quantile
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, gated, kalman, robust
 
 

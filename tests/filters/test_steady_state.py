@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.filters.dense import random_system
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, kalman, steady_state
 from truenorth.filters.gains import filter_gains
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.filters.dense import random_system
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem
 
 

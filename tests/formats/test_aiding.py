@@ -5,10 +5,10 @@ import pytest
 from scipy.io import savemat
 
 import truenorth
-from truenorth.attitude import dcm_from_euler, quaternion_from_dcm
-from truenorth.errors import DataError, UsageError
+from truenorth.core.attitude import dcm_from_euler, quaternion_from_dcm
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.formats import write_record
-from truenorth.position import Position
 from truenorth.records import GnssRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
 RNG = np.random.default_rng(3)
@@ -133,7 +133,7 @@ def test_velocity_in_other_axes_and_the_other_way(tmp_path):
 
 
 def test_gnss_in_earth_fixed_and_local_coordinates(tmp_path):
-    from truenorth.earth import ecef_axes, ecef_from_geodetic
+    from truenorth.core.earth import ecef_axes, ecef_from_geodetic
 
     lat, lon, alt = np.radians([48.0, 48.001]), np.radians([11.0, 11.002]), np.array([500.0, 520.0])
     v_n = np.array([[3.0, -4.0, 1.0], [1.0, 2.0, -0.5]])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests import recordings
-from truenorth.earth import radii
+from truenorth.core.earth import radii
 from truenorth.records import GnssRecord
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.io import savemat
 
 from tests import recordings
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_imu
 
 TIME = np.arange(1, 8) / 100

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
 

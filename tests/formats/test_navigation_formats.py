@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats import read_imu
 
 DEG = np.pi / 180

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import truenorth
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 
 
 def sentence(body):

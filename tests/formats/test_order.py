@@ -6,7 +6,7 @@ import pytest
 import truenorth
 from tests.formats.test_aiding import CASES, RECORDS, N, log
 from tests.formats.test_nmea import gga, read, rmc
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats import write_record
 from truenorth.formats.order import LONGEST_LATE
 from truenorth.records import Late

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_imu
 
 KINDS = ["ros1", "sqlite3", "mcap"]

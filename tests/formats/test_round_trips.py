@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
 

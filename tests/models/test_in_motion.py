@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
 from truenorth.models.in_motion import left_jacobian, reset
 
 

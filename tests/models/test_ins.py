@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-from truenorth.earth import radii
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.earth import radii
+from truenorth.core.position import Position
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES, InsModel
-from truenorth.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import ideal_log
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 LAT, ALT, SPEED = np.radians(60.0), 3000.0, 200.0
 RATE = 50.0

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.position import Position
 from truenorth.filters import check_jacobians
-from truenorth.inertial import earth_rotation, integrate
 from truenorth.models.large_azimuth import attitude_error, large_azimuth_system
 from truenorth.models.stationary import StationaryModel
-from truenorth.position import Position
 from truenorth.simulation import rest, simulate
+from truenorth.strapdown.inertial import earth_rotation, integrate
 
 LAT, HEADING = math.radians(50.0), 0.7
 P0 = np.diag([3e-3, 3e-3, 1.8, 5e-8, 5e-8, 5e-8, 1e-3, 1e-3, 1e-3, 1e-3]) ** 2
@@ -48,7 +48,7 @@ def test_the_true_state_predicts_the_log(log, form, azimuth):
 
 
 def _state(form, wrong, azimuth):
-    from truenorth.attitude import quaternion_from_dcm, rotation_vector_from_dcm
+    from truenorth.core.attitude import quaternion_from_dcm, rotation_vector_from_dcm
 
     if form == "quaternion":
         return np.concatenate([quaternion_from_dcm(wrong), np.zeros(7)])

@@ -5,19 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.coarse.lever_arm import arm_velocity
-from truenorth.errors import UsageError
-from truenorth.inertial import earth_rotation, integrate
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.models.disturbance import AxisMotion, Oscillator
 from truenorth.models.rotary import BA, BG, DV, PHI, RotaryModel, earth_axes
 from truenorth.models.static import StaticModel
 from truenorth.models.swaying import ARM, SWAYING_STATES, arm_rows, with_arm, with_motion, without_sway
 from truenorth.papers.rotary.drawings import modulated
 from truenorth.papers.rotary.truth import INDEXER_RATES
-from truenorth.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import Axis, Indexed, Indexer, Spin, Sway, Tone, simulate
+from truenorth.strapdown.inertial import earth_rotation, integrate
 
 PLACE = Position.from_degrees(40.0, 118.0)
 INDEXER = Indexer(tuple(Axis(name, Spin(rate)) for name, rate in zip("zx", INDEXER_RATES, strict=True)))

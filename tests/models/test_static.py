@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.earth import normal_gravity
-from truenorth.inertial import gravity_velocity, integrate
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import normal_gravity
+from truenorth.core.position import Position
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
-from truenorth.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import Sway, Tone, simulate
+from truenorth.strapdown.inertial import gravity_velocity, integrate
 
 LAT, ALT = np.radians(40.0), 100.0
 
@@ -56,7 +56,7 @@ def test_jacobian_is_the_derivative_of_the_integration(state, interval, toleranc
         offset = dx[DV]
     moved, _ = _mean_velocity(record, interval, C_hat, gyro_bias, accel_bias)
 
-    from truenorth.inertial import earth_rotation
+    from truenorth.strapdown.inertial import earth_rotation
 
     middle = (integrals.time[1:] + integrals.time[:-1]) / 2
     C_n_n0 = np.swapaxes(earth_rotation(middle, LAT), 1, 2)
@@ -107,7 +107,7 @@ def test_gravity_integrals_are_the_earth():
     """A still IMU at any latitude measures minus gravity; its integral in n0 cancels gravity's."""
     t = np.array([0.0, 100.0, 1000.0])
     for lat in (-1.2, 0.0, 0.7):
-        from truenorth.earth import earth_rate_n, normal_gravity
+        from truenorth.core.earth import earth_rate_n, normal_gravity
 
         steps = 20000
         dt = t[-1] / steps

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
-from truenorth.earth import earth_rate_n, transport_rate_n
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
+from truenorth.core.earth import earth_rate_n, transport_rate_n
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.models.transfer import (
     ARM,
     BA,
@@ -21,12 +22,11 @@ from truenorth.models.transfer import (
     attitude_rows,
     velocity_rows,
 )
-from truenorth.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import MasterSpec, ideal_log, simulate_master
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 RATE, SPAN = 50.0, 40.0
 ALL = TransferModel(0.0, 0.0, mounting=True, flexure_sigma=(1e-3, 2e-3, 3e-3), flexure_beta=0.7)

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from truenorth.inertial import integrate
+from truenorth.core.position import Position
 from truenorth.models import turntable
 from truenorth.models.static import StaticModel
 from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX, STATES
-from truenorth.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
+from truenorth.strapdown.inertial import integrate
 
 LAT = math.radians(45.0)
 

@@ -5,7 +5,7 @@ import pytest
 
 from truenorth.models.ins import BA, BG, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, InsModel
 from truenorth.models.whole_bias import WholeBiases, taken_apart, time_average
-from truenorth.specs import imu_spec
+from truenorth.records.specs import imu_spec
 
 SPEC = imu_spec("navigation")
 MODEL = InsModel.from_spec(SPEC)

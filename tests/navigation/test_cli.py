@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from truenorth.alignment import align
+from truenorth.core.position import Position
 from truenorth.formats import write_imu
-from truenorth.position import Position
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(48.0, 11.0, 500.0)
 

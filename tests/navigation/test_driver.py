@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from truenorth.analysis.consistency import nees
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-from truenorth.earth import earth_rate_n, normal_gravity, radii
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.earth import earth_rate_n, normal_gravity, radii
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Start, navigate_track
-from truenorth.position import Position
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation import ideal_log, rest, simulate
 from truenorth.simulation.course import Leg, course
 from truenorth.simulation.manoeuvres import s_turn, straight
-from truenorth.specs import ImuSpec
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 SPEC = ImuSpec(
     gyro_bias=np.radians(0.1) / 3600,
@@ -370,7 +370,7 @@ PROGRAM = """
 import numpy as np
 from truenorth.navigation import Start, kernel, navigate
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord
-from truenorth.specs import imu_spec
+from truenorth.records.specs import imu_spec
 t, seconds = 0.02 * np.arange(1, 1001), np.arange(1.0, 20.0)
 still = np.tile([0.0, 0.0, 9.8], (len(t), 1))
 start = Start(0.0, np.eye(3), np.zeros(3), 0.6, 0.1, 0.0, np.zeros(3), np.zeros(3), 1e-4 * np.eye(15))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-from truenorth.earth import EARTH_RATE, earth_rate_n, normal_gravity, radii, transport_rate_n
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity, radii, transport_rate_n
+from truenorth.core.position import Position
 from truenorth.models.ins import BG, DP, DV, PHI, STATES, InsModel
 from truenorth.navigation.driver import Start, navigate_track
-from truenorth.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import Sway, Tone, simulate
 from truenorth.simulation.course import course

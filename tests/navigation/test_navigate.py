@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
-from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.navigation.sensors import mounting_angles
 from truenorth.navigation.start import read_start, start_from_alignment
-from truenorth.position import Position
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, VelocityRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
-from truenorth.specs import imu_spec
-from truenorth.wander import C_en
+from truenorth.strapdown.wander import C_en
 
 SPEC = imu_spec("tactical")
 PLACE = Position.from_degrees(48.0, 11.0, 500.0)
@@ -40,7 +40,7 @@ def drive():
     simulation = simulate(motion, rate=100.0, duration=180.0, imu=SPEC, seed=3)
     s = motion.states(0.0)
     rng = np.random.default_rng(1)
-    from truenorth.attitude import dcm_from_rotation_vector
+    from truenorth.core.attitude import dcm_from_rotation_vector
 
     C = dcm_from_rotation_vector(-SIGMA[:3] * rng.standard_normal(3)) @ s.C_nb
     start = Start(0.0, C, np.zeros(3), PLACE.lat, PLACE.lon, PLACE.alt, np.zeros(3), np.zeros(3), np.diag(SIGMA**2))

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.attitude import rotation_vector_from_dcm
-from truenorth.earth import normal_gravity
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import normal_gravity
 from truenorth.models.ins import InsModel
 from truenorth.navigation.driver import Start, navigate_track
 from truenorth.records import ImuRecord
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 SWAP = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED and ENU, FRD and RFU, both ways
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests import recordings
 from truenorth.alignment import align
-from truenorth.attitude import dcm_from_euler
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.records import GnssRecord
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from truenorth import wander
-from truenorth.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.linalg import padded
 from truenorth.filters.recursion import workspace
-from truenorth.linalg import padded
 from truenorth.models.ins import BG, Extra, InsModel
 from truenorth.navigation import kernel
 from truenorth.navigation.aiding import Aiding, state
 from truenorth.navigation.driver import _sources, with_states
+from truenorth.strapdown import wander
 
 LAT, LON, ALT = 1.2, -2.0, 500.0
 MODEL = InsModel(0.0, 0.0, extras=(Extra("slow gyro bias", np.full(3, 1e-6), 300.0),))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tests.navigation.test_navigate import SPEC, drive, fixes
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.errors import DataError
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.errors import DataError
 from truenorth.navigation import Mounting, navigate
 from truenorth.navigation.second_look import second_look
 from truenorth.records import OdometerRecord, VelocityRecord
@@ -153,8 +153,8 @@ def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
 def test_a_latency_on_a_shaking_vehicle():
     """The acceleration of single samples is vibration, by which a latency seemed half as long: within 5 % of .2 s."""
     from truenorth.navigation import Start
+    from truenorth.records.specs import imu_spec
     from truenorth.simulation.scenario import read_scenario
-    from truenorth.specs import imu_spec
 
     van = read_scenario({**read_scenario("van").to_mapping(), "duration": "240 s"})
     simulation, spec = van.simulate(seed=3), imu_spec("industrial")

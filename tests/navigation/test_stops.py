@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from truenorth.core.position import Position
 from truenorth.navigation import Start, navigate
 from truenorth.navigation.stops import seconds_at_rest
-from truenorth.position import Position
 from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(48.0, 11.0, 500.0)
 SPEC = imu_spec("industrial")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_euler
-from truenorth.errors import DataError
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import DataError
 from truenorth.navigation.velocity_axes import FORWARD_LEFT, check_axes
 from truenorth.records import GnssRecord, OdometerRecord, Trajectory, VelocityRecord
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
+from truenorth.core.position import Position
 from truenorth.navigation.gnss_frames import check_frames
 from truenorth.navigation.whereabouts import check_fixes, check_heights
-from truenorth.position import Position
 from truenorth.records import GnssRecord, HeightRecord
 
 N = 60

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from truenorth.cli import app
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
 from truenorth.papers import reproduce
 from truenorth.papers.claims import Claim, markdown
@@ -49,10 +49,10 @@ def test_the_model_is_that_of_the_mechanisation():
 
     Over 5 s at rest: later the latitude error, which is no state here, begins to count.
     """
-    from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-    from truenorth.position import Position
+    from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+    from truenorth.core.position import Position
     from truenorth.simulation import rest, simulate
-    from truenorth.strapdown import NavigationState, mechanise
+    from truenorth.strapdown.level import NavigationState, mechanise
 
     lat, seconds, heading = math.radians(50.0), 5.0, 0.7
     record = simulate(

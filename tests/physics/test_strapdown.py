@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
-from truenorth.earth import earth_rate_n, normal_gravity, radii, transport_rate_n
-from truenorth.errors import UsageError
-from truenorth.increments import last_rows
+from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.core.earth import earth_rate_n, normal_gravity, radii, transport_rate_n
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
-from truenorth.strapdown import Memory, NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.strapdown.increments import last_rows
+from truenorth.strapdown.level import Memory, NavigationState, inertial_integrals, integrate_attitude, mechanise
 
 ALGORITHMS = ("previous", "1", "2", "3", "4")
 METRES = np.array([6.4e6, 6.4e6, 1.0])  # of latitude, longitude, height
@@ -349,8 +349,9 @@ def test_inertial_integrals_of_an_analytic_force(record):
 
 PROGRAM = """
 import numpy as np
-from truenorth import inertial_integration, strapdown
-from truenorth.increments import last_rows
+from truenorth.strapdown import inertial_integration
+from truenorth.strapdown import level as strapdown
+from truenorth.strapdown.increments import last_rows
 from truenorth.records import ImuRecord
 rows = np.full((9, 3), 1e-3)
 for kind in ("rates", "increments"):

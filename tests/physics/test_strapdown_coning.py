@@ -6,13 +6,13 @@ from math import factorial
 import numpy as np
 import pytest
 
-from truenorth.attitude import rotation_vector_from_quaternion
-from truenorth.coning import BEFORE, WITHIN, coefficients
-from truenorth.earth import EARTH_RATE
-from truenorth.errors import DataError, UsageError
-from truenorth.increments import increments, last_rows
+from truenorth.core.attitude import rotation_vector_from_quaternion
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.errors import DataError, UsageError
 from truenorth.records import ImuRecord
-from truenorth.strapdown import NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.strapdown.coning import BEFORE, WITHIN, coefficients
+from truenorth.strapdown.increments import increments, last_rows
+from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
 
 ALGORITHMS = ("previous", "1", "2", "3", "4")
 

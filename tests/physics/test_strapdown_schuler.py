@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.earth import EARTH_RATE, FLATTENING, SEMI_MAJOR, earth_rate_n, normal_gravity, radii
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import EARTH_RATE, FLATTENING, SEMI_MAJOR, earth_rate_n, normal_gravity, radii
 from truenorth.records import ImuRecord
-from truenorth.strapdown import Mechanisation, NavigationState, mechanise
+from truenorth.strapdown.level import Mechanisation, NavigationState, mechanise
 
 
 def at_rest(

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from truenorth.core.units import significant
 from truenorth.figures.convergence import Course
 from truenorth.report.charts import _convergence, _sigmas
-from truenorth.units import significant
 
 T = np.arange(20.0)
 ANGLES = [Course(name, 0.1 / (1 + T), 0.2 / (1 + T), np.full(20, 0.005)) for name in ("heading", "pitch", "roll")]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.quality import inspect
+from truenorth.records.specs import imu_spec
 from truenorth.report import save_alignment, write_report
 from truenorth.simulation import rest, simulate
-from truenorth.specs import imu_spec
 
 PLACE = Position.from_degrees(40.0, 118.0)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from truenorth import schema
-from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm
-from truenorth.earth import ecef_axes, ecef_from_geodetic
-from truenorth.errors import DataError, UsageError
-from truenorth.position import Position
+from truenorth.core import schema
+from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
+from truenorth.core.earth import ecef_axes, ecef_from_geodetic
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.simulation import (
     EncoderSpec,
     Flexed,
@@ -32,7 +32,7 @@ from truenorth.simulation import (
 from truenorth.simulation.aiding import STREAMS, velocity_b
 from truenorth.simulation.course import Leg, course, with_lever_arm
 from truenorth.simulation.streams import STREAMS as IMU_STREAMS
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 PLACE = Position.from_degrees(48.0, 11.0, 500.0)
 ARM = (0.4, -1.3, -0.6)
@@ -338,7 +338,7 @@ def test_master_errors_are_computed_minus_true():
 
 
 def test_the_oscillation_of_a_master_obeys_the_error_equations():
-    from truenorth.earth import normal_gravity, radii
+    from truenorth.core.earth import normal_gravity, radii
 
     spec = MasterSpec(rate=0.5, schuler=0.5)
     ferry = Sway(PLACE)

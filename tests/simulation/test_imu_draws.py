@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from truenorth.errors import DataError, UsageError
-from truenorth.position import Position
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import given_errors, ideal_log, rest, simulate, simulate_runs
 from truenorth.simulation.imu_errors import apply_errors
 from truenorth.simulation.streams import STREAMS
-from truenorth.specs import ImuSpec, imu_spec
 
 PLACE = Position.from_degrees(40.0, 118.0)
 EVERYTHING = imu_spec(Path(__file__).parents[2] / "examples" / "imu_every_term.yaml")

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation.drift import gauss_markov
 from truenorth.simulation.imu_errors import apply_errors
-from truenorth.specs import ImuSpec
 
 T = 0.1
 SERIES = 60  # of three axes

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation import Sway, Tone, ideal_log, simulate
 from truenorth.simulation.imu_errors import apply_errors, temperature
 from truenorth.simulation.response import respond
 from truenorth.simulation.sensing import increments
 from truenorth.simulation.true_errors import SHAPES
-from truenorth.specs import ImuSpec
 
 T = 0.01
 RNG = np.random.default_rng(20)

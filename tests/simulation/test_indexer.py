@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.simulation.test_simulation import SHIP
-from truenorth.attitude import rotation_vector_from_dcm
-from truenorth.errors import UsageError
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.errors import UsageError
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import (
     Axis,
     C_bs_from_angles,
@@ -26,8 +27,7 @@ from truenorth.simulation import (
     steps,
 )
 from truenorth.simulation.axis_angles import SCHEMES
-from truenorth.specs import ImuSpec, imu_spec
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 deg = np.radians
 ARCSEC = deg(1 / 3600)

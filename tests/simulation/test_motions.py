@@ -5,9 +5,9 @@ import pytest
 
 from tests.physics.test_strapdown_coning import residual
 from tests.simulation.test_route import TOWN
-from truenorth.attitude import euler_from_dcm, rotation_vector_from_dcm
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.attitude import euler_from_dcm, rotation_vector_from_dcm
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.simulation import Disturbed, Motion, Sway, Tone, rest, simulate
 from truenorth.simulation.course import Leg, course, ring
 from truenorth.simulation.manoeuvres import accelerate, climb, s_turn, straight, turn, wing_rock
@@ -15,7 +15,7 @@ from truenorth.simulation.profile import Ramp, profile, pulse
 from truenorth.simulation.route import Driving, route
 from truenorth.simulation.sea import Hull, WaveSpectrum, narrow_band, sea_motion
 from truenorth.simulation.turntable import Hold, positions, turntable
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 PLACE = Position.from_degrees(45.0, 10.0, 100.0)
 deg = np.radians
@@ -109,7 +109,7 @@ def test_a_shaken_mount_leaves_what_sculling_theory_says():
 
 def test_two_days_at_sea_do_not_drift():
     """East along the parallel for 48 h: latitude stays, longitude is distance over the parallel's radius."""
-    from truenorth.earth import radii
+    from truenorth.core.earth import radii
 
     ship = course(PLACE, [Leg(10.0)], heading=np.pi / 2, speed=10.0)
     at = ship.states(np.array(48 * 3600.0))
@@ -131,7 +131,7 @@ def test_a_long_log_is_not_integrated_anew_for_every_block():
 @pytest.mark.parametrize("name", FAMILIES)
 def test_velocity_and_rate_are_derivatives(name):
     """Central differences of position and attitude, at times away from the corners and on them."""
-    from truenorth.earth import earth_rate_n, radii, transport_rate_n
+    from truenorth.core.earth import earth_rate_n, radii, transport_rate_n
 
     motion = FAMILIES[name]
     t, h = np.array([3.3, 77.7, 150.2, 433.1]), 1e-4

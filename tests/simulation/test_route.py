@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.simulation.route import Driving, WayPoint, route
 from truenorth.simulation.waypoints import read_waypoints, thinned
 

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 import truenorth
 from truenorth.cli import app
-from truenorth.errors import DataError, UsageError
-from truenorth.schema import Strict
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.schema import Strict
 from truenorth.simulation.scenario import Scenario, read_scenario, shipped
 from truenorth.simulation.scenario_courses import RouteMotion
 
@@ -218,7 +218,7 @@ def test_quantities_are_never_bare_numbers():
     """Every number with a dimension in the schema takes text with a unit; what is left is dimensionless."""
 
     def bare(model: type[Strict], path: str, seen: set[type]) -> list[str]:
-        from truenorth.schema import models_in
+        from truenorth.core.schema import models_in
 
         found = []
         for name, field in model.model_fields.items():

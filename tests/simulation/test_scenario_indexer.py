@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.simulation import C_bs_from_angles
 from truenorth.simulation.folder import save_run
 from truenorth.simulation.scenario import read_scenario

@@ -4,13 +4,13 @@ import allantools
 import numpy as np
 import pytest
 
-from truenorth.attitude import rotation_vector_from_dcm
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
 from truenorth.simulation.imu_errors import apply_errors
-from truenorth.specs import ImuSpec, imu_spec
-from truenorth.strapdown import NavigationState, mechanise
+from truenorth.strapdown.level import NavigationState, mechanise
 
 PLACE = Position.from_degrees(40.0, 118.0)
 deg = np.radians
@@ -50,7 +50,7 @@ def test_rates_and_forces_are_the_derivatives_of_the_truth():
     t = np.array([3.3, 101.7])
     h = 1e-4
     ahead, at, behind = (SHIP.states(t + s * h) for s in (1, 0, -1))
-    from truenorth.earth import earth_rate_n, gravity_n, radii, transport_rate_n
+    from truenorth.core.earth import earth_rate_n, gravity_n, radii, transport_rate_n
 
     w_nb_n = rotation_vector_from_dcm(ahead.C_nb @ np.swapaxes(behind.C_nb, 1, 2)) / (2 * h)
     w_in_n = earth_rate_n(at.lat) + transport_rate_n(at.lat, at.alt, at.v_n)

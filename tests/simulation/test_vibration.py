@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
+from truenorth.core.units import STANDARD_GRAVITY as G
 from truenorth.simulation.scenario import read_scenario
 from truenorth.simulation.vibration import random_vibration
-from truenorth.units import STANDARD_GRAVITY as G
 
 BASE = {"name": "engine", "duration": "60 s", "position": {"lat": "45 deg"}, "motion": {"kind": "rest"}}
 

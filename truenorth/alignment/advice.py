@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 from truenorth.alignment.inference import noise_of
 from truenorth.alignment.positions import ARM_SIGMA, SHORTEST_POSITION, prior_covariance
 from truenorth.analysis.error_budget import Source, error_budget
-from truenorth.earth import DEFLECTION
-from truenorth.errors import UsageError
+from truenorth.core.earth import DEFLECTION
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.filters import LinearSystem, kalman
-from truenorth.inertial import earth_rotation, integrate
 from truenorth.models import turntable
 from truenorth.models.static import BA, BG, DV, PHI, StaticModel
 from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX
-from truenorth.position import Position
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
 from truenorth.simulation.sensing import Moving
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.strapdown.inertial import earth_rotation, integrate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,11 +11,11 @@ from truenorth.alignment.bias import true_bias
 from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
-from truenorth.attitude import UNIFORM_SIGMA
-from truenorth.earth import EARTH_RATE, radii
-from truenorth.inertial import earth_rotation
+from truenorth.core.attitude import UNIFORM_SIGMA
+from truenorth.core.earth import EARTH_RATE, radii
 from truenorth.models.static import STATES
-from truenorth.specs import ImuSpec
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.inertial import earth_rotation
 
 Array = NDArray[np.float64]
 

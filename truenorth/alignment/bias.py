@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import normal_gravity
-from truenorth.position import Position
-from truenorth.specs import ImuSpec
+from truenorth.core.earth import normal_gravity
+from truenorth.core.position import Position
+from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

@@ -18,11 +18,11 @@ from truenorth.alignment.fine import fine_align, white_variance
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import Means
-from truenorth.earth import EARTH_RATE, normal_gravity
+from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, earth_rotation
 from truenorth.models.static import StaticModel, mean_velocity
 from truenorth.quality.regimes import MotionSummary
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
 

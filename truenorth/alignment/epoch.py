@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
-from truenorth.strapdown import increments
+from truenorth.strapdown.level import increments
 
 Array = NDArray[np.float64]
 

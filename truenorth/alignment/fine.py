@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from truenorth.alignment.form import Form
-from truenorth.attitude import dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.position import Position
 from truenorth.filters import Estimates, LinearSystem, kalman
 from truenorth.filters.gains import Gains, filter_gains, initial_part
-from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
 from truenorth.models.static_force import force_system, gained_velocity
-from truenorth.position import Position
 from truenorth.records import ImuRecord
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
-from truenorth.earth import DEFLECTION
-from truenorth.inertial import earth_rotation
+from truenorth.core.earth import DEFLECTION
 from truenorth.models.static import STATES
 from truenorth.navigation.handover import Handover
+from truenorth.strapdown.inertial import earth_rotation
 
 if TYPE_CHECKING:
     from truenorth.alignment.result import Alignment

@@ -24,10 +24,11 @@ from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.moving import fifteen, moving_of
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import deflection_covariance
-from truenorth.attitude import UNIFORM_SIGMA
-from truenorth.calibration import Calibration
-from truenorth.earth import EARTH_RATE, normal_gravity
-from truenorth.errors import AlignmentError, DataError, UsageError
+from truenorth.core.attitude import UNIFORM_SIGMA
+from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.position import METRES_PER_RADIAN, Position
+from truenorth.core.units import significant
 from truenorth.models.ins import BA, BG, DP, PHI, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Track, navigate_track, with_states
@@ -35,10 +36,9 @@ from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
-from truenorth.position import METRES_PER_RADIAN, Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
-from truenorth.specs import ImuSpec, imu_spec
-from truenorth.units import significant
+from truenorth.records.calibration import Calibration
+from truenorth.records.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "gyrocompass", "motion"]

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from truenorth.position import METRES_PER_RADIAN, Position
+from truenorth.core.position import METRES_PER_RADIAN, Position
 
 GRID = np.radians(np.arange(-80.0, 81.0, 10.0))
 CLOSE = math.radians(5e-4)  # two metres in five kilometres: far below what gyros tell

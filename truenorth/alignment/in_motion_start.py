@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from truenorth.alignment.task import level_of
-from truenorth.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
-from truenorth.earth import radii
-from truenorth.increments import increments
+from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
+from truenorth.core.earth import radii
+from truenorth.core.position import Position
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
 from truenorth.navigation.driver import Start, Track
 from truenorth.navigation.sensors import Mounting
-from truenorth.position import Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
-from truenorth.specs import ImuSpec
-from truenorth.strapdown import inertial_integrals
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.level import inertial_integrals
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from truenorth.alignment.check import LogCheck
 from truenorth.analysis.allan import noise_coefficients
 from truenorth.models.static import StaticModel
 from truenorth.records import ImuRecord
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
 

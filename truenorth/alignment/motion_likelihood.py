@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.windowed import hann
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
 from truenorth.filters.scalar import restricted
 from truenorth.models.disturbance import AxisMotion, Oscillator, add_autocovariance, fill_blocks
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm
+from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
 if TYPE_CHECKING:

@@ -36,21 +36,21 @@ from truenorth.alignment.task import Task, bridged, level_of, make_task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.alignment.verdict import Circumstances, judge
 from truenorth.analysis.allan import noise_coefficients
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-from truenorth.calibration import Calibration
 from truenorth.coarse import Means, means, oba
-from truenorth.earth import EARTH_RATE, normal_gravity
-from truenorth.errors import AlignmentError, UsageError
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.position import Position
 from truenorth.filters import Estimates, LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, initial_part
-from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
 from truenorth.models import turntable
 from truenorth.models.static import DV, PHI, StaticModel, mean_velocity
 from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX, matrices, without_errors
-from truenorth.position import Position
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
-from truenorth.specs import PRESETS, ImuSpec, imu_spec
+from truenorth.records.calibration import Calibration
+from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
 
 Array = NDArray[np.float64]
 

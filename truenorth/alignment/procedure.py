@@ -23,18 +23,18 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
 from truenorth.alignment.verdict import Circumstances, judge
-from truenorth.calibration import Calibration
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.uncertainty import base_velocity
-from truenorth.earth import EARTH_RATE
-from truenorth.errors import AlignmentError, UsageError
-from truenorth.inertial import integrate
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.position import Position
 from truenorth.models.static import STATES, StaticModel
 from truenorth.models.static_force import gained_velocity
-from truenorth.position import Position
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.records.calibration import Calibration
+from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying"]

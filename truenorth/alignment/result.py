@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import UNIFORM_SIGMA, euler_from_dcm, euler_jacobian, euler_sigma, to_rotation
-from truenorth.position import Position
-from truenorth.specs import ImuSpec
-from truenorth.units import DEG_PER_HOUR, MICRO_G
+from truenorth.core.attitude import UNIFORM_SIGMA, euler_from_dcm, euler_jacobian, euler_sigma, to_rotation
+from truenorth.core.position import Position
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
+from truenorth.records.specs import ImuSpec
 
 if TYPE_CHECKING:
     import pandas as pd

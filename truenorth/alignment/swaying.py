@@ -24,11 +24,11 @@ from truenorth.alignment.fine import (
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import windowed_fit
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.earth import normal_gravity
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import normal_gravity
+from truenorth.core.position import Position
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, initial_part
-from truenorth.inertial import InertialIntegrals, integrate
 from truenorth.models.disturbance import AxisMotion
 from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel
 from truenorth.models.swaying import (
@@ -40,8 +40,8 @@ from truenorth.models.swaying import (
     with_motion,
     without_sway,
 )
-from truenorth.position import Position
 from truenorth.records import ImuRecord
+from truenorth.strapdown.inertial import InertialIntegrals, integrate
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.touched import Touch
-from truenorth.attitude import euler_from_dcm
+from truenorth.core.attitude import euler_from_dcm
 
 Array = NDArray[np.float64]
 

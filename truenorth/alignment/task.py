@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.bias import bias_prior
 from truenorth.alignment.epoch import Epoch, find_epoch
-from truenorth.attitude import dcm_from_euler
 from truenorth.coarse.analytic import Means, means, static_jacobian
-from truenorth.earth import DEFLECTION, EARTH_RATE, normal_gravity
-from truenorth.errors import DataError
-from truenorth.inertial import earth_rotation
-from truenorth.position import Position
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.earth import DEFLECTION, EARTH_RATE, normal_gravity
+from truenorth.core.errors import DataError
+from truenorth.core.position import Position
 from truenorth.quality.regimes import MotionSummary, motion_summary
 from truenorth.records import ImuRecord
-from truenorth.specs import ImuSpec
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.inertial import earth_rotation
 
 Array = NDArray[np.float64]
 

@@ -17,13 +17,13 @@ from truenorth.alignment.task import bridged
 from truenorth.alignment.transfer_answer import assemble_transfer, final_attitudes
 from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, transfer_filter
 from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec, parted_clocks
-from truenorth.attitude import dcm_from_euler
-from truenorth.calibration import Calibration
-from truenorth.errors import DataError, UsageError
-from truenorth.position import Position
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.calibration import Calibration
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.flexure import FlexureSpec
-from truenorth.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
 What = Literal["auto", "velocity", "attitude", "both"]

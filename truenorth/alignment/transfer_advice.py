@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, model_from_spec
 from truenorth.alignment.transfer_system import system_of_motion
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.filters import kalman
 from truenorth.models.transfer import PHI
-from truenorth.position import Position
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, s_turn, straight, turn, wing_rock
 from truenorth.simulation.sensing import Moving
-from truenorth.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,21 +14,21 @@ from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import system_along
 from truenorth.analysis.observability import observability
-from truenorth.attitude import (
+from truenorth.core.attitude import (
     dcm_from_quaternion,
     dcm_from_rotation_vector,
     euler_from_dcm,
     euler_sigma,
     rotation_vector_from_dcm,
 )
-from truenorth.earth import earth_rate_n, transport_rate_n
-from truenorth.increments import increments, interval_lengths
-from truenorth.inertial_integration import integrate_attitude
+from truenorth.core.earth import earth_rate_n, transport_rate_n
+from truenorth.core.position import Position
 from truenorth.models.transfer import ARM, BA, BG, MOUNT, TAU, TransferModel
-from truenorth.position import Position
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation.motion import MotionStates
-from truenorth.specs import ImuSpec
+from truenorth.strapdown.increments import increments, interval_lengths
+from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import rotation_vector_from_dcm
-from truenorth.earth import GRAVITY_EQUATOR
-from truenorth.increments import increments
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 

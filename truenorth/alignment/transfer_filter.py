@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import transfer_loop as loop
-from truenorth.attitude import dcm_from_quaternion, quaternion_from_dcm
-from truenorth.earth import earth_rate_n, gravity_n, transport_rate_n
-from truenorth.errors import DataError
+from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
+from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
+from truenorth.core.errors import DataError
+from truenorth.core.linalg import padded
 from truenorth.filters.recursion import SOUND
-from truenorth.increments import increments, interval_lengths, read_only
-from truenorth.linalg import padded
 from truenorth.models.transfer import TransferModel
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.strapdown.increments import increments, interval_lengths, read_only
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

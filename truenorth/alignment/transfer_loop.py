@@ -12,16 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
-from truenorth.attitude import cross, quaternion_from_rotation_vector, quaternion_product
-from truenorth.compiled import compiled
-from truenorth.coning import coefficients
+from truenorth.core import earth
+from truenorth.core.attitude import cross, quaternion_from_rotation_vector, quaternion_product
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import load, propagate_covariance
 from truenorth.filters.recursion import SOUND, update, workspace
-from truenorth.linalg import load, propagate_covariance
 from truenorth.models.ins import STATES as INS_STATES
 from truenorth.models.transfer import attitude_rows, transfer_dynamics, transfer_transition, velocity_rows
 from truenorth.navigation.kernel import joint_nis, set_matrix
-from truenorth.strapdown import mechanise_increments
+from truenorth.strapdown.coning import coefficients
+from truenorth.strapdown.level import mechanise_increments
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -256,7 +256,7 @@ def run(
     master : Master
     loop : Loop
     s : (19,) array
-        The slave's state at the beginning of the first sample, see :mod:`truenorth.strapdown`; left as it is at the end.
+        The slave's state at the beginning of the first sample, see :mod:`truenorth.strapdown.level`; left as it is at the end.
     aux : (n,) array
         What is assumed: biases, delay and lever arm beside the known ones, flexure, in the places of their states; its first six
         and those of the mounting are not used.

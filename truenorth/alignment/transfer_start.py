@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_delay import WINDOW, find_delay
 from truenorth.alignment.transfer_filter import SlaveStart
-from truenorth.attitude import dcm_from_euler, euler_from_dcm
-from truenorth.earth import GRAVITY_EQUATOR
-from truenorth.errors import DataError, UsageError
-from truenorth.increments import increments
+from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
+from truenorth.core.earth import GRAVITY_EQUATOR
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.models.transfer import PHI, TransferModel, turn_noise
-from truenorth.position import Position
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
-from truenorth.specs import ImuSpec
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import earth_rate_n, gravity_n, transport_rate_n
+from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.filters import LinearSystem
 from truenorth.models.transfer import TransferModel
 from truenorth.simulation.motion import MotionStates

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import Alignment, Status
-from truenorth.earth import EARTH_RATE, normal_gravity
-from truenorth.units import DEG_PER_HOUR, MICRO_G, significant
+from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G, significant
 
 Array = NDArray[np.float64]
 

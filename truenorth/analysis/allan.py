@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import UsageError
-from truenorth.units import Dimension, parse_unit
+from truenorth.core.errors import UsageError
+from truenorth.core.units import Dimension, parse_unit
 
 Array = NDArray[np.float64]
 

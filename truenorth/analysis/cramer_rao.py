@@ -16,7 +16,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, NonlinearSystem
 from truenorth.filters.nonlinear_system import ModelFunction, require_jacobians, require_vector_space
 

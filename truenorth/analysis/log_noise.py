@@ -1,6 +1,6 @@
 """From a log at rest to what a filter needs of its noise, in one call.
 
-The Allan variance of each channel is fitted by the processes that an :class:`truenorth.specs.ImuSpec` is made of, and that
+The Allan variance of each channel is fitted by the processes that an :class:`truenorth.records.specs.ImuSpec` is made of, and that
 filters and the simulator take: random walk, quantisation, and a bias that wanders as a first-order Gauss-Markov process,
 
 ``sigma^2(tau) = (2 b^2 / x) (1 - (3 - 4 e^-x + e^-2x) / (2 x))``, ``x = tau / T``, with b its sigma and T its correlation time,
@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.analysis.allan import SHORTEST_RECORD, AllanDeviation, fit_shapes, overlapping_adev
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.analysis.combinations import Entangled, entangled_states
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters import LinearSystem, smoother
 
 Array = NDArray[np.float64]

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truenorth.alignment import Alignment, align, align_in_motion
-from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.campaign.rows import Row
-from truenorth.position import Position
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.position import Position
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records import ImuRecord
-from truenorth.specs import ImuSpec, imu_spec
-from truenorth.units import DEG_PER_HOUR, MICRO_G
+from truenorth.records.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     from truenorth.campaign.plan import Case, MethodPlan, Plan

@@ -17,9 +17,9 @@ from truenorth.alignment import align
 from truenorth.alignment.task import deflection_covariance
 from truenorth.campaign.aligning import ARCMIN
 from truenorth.campaign.plan import Case, Plan
-from truenorth.earth import normal_gravity
-from truenorth.errors import TruenorthError
-from truenorth.position import Position
+from truenorth.core.earth import normal_gravity
+from truenorth.core.errors import TruenorthError
+from truenorth.core.position import Position
 from truenorth.records import ImuRecord
 from truenorth.simulation import IdealLog
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.store import Block, other_versions, versions
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 AHEAD = 2  # blocks under way for each worker: memory stays bounded, and no worker waits
 ATTEMPTS = 3  # for a block whose worker was lost

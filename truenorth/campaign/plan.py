@@ -26,11 +26,11 @@ from typing import Any, Literal
 from pydantic import Field, PrivateAttr, field_validator
 
 from truenorth.alignment.procedure import Method
-from truenorth.errors import DataError, TruenorthError
-from truenorth.schema import Angle, Strict, Time, validated
+from truenorth.core.errors import DataError, TruenorthError
+from truenorth.core.schema import Angle, Strict, Time, validated
+from truenorth.core.yaml_file import read_mapping
+from truenorth.records.specs import PRESETS
 from truenorth.simulation.scenario import Scenario, read_scenario
-from truenorth.specs import PRESETS
-from truenorth.yaml_file import read_mapping
 
 # A path into a scenario, motion.legs[2].rate: entries of a list count from one, as in our messages.
 _PATH = re.compile(r"[^.\[\]]+(\[\d+\])*(\.[^.\[\]]+(\[\d+\])*)*")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from truenorth.campaign.execution import in_processes, in_this_process, on_cluster
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.store import opened, read_table
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 if TYPE_CHECKING:
     import pandas as pd

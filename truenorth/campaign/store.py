@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from truenorth import __version__
-from truenorth.atomic import atomic_path, writable_folder
-from truenorth.errors import DataError, UsageError
+from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -28,12 +28,12 @@ from truenorth.campaign.aligning import align_runs
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.rows import table_of
 from truenorth.campaign.summary import summarise
-from truenorth.errors import DataError, UsageError
-from truenorth.schema import Strict, validated
-from truenorth.specs import KEYS, ImuSpec, imu_spec
-from truenorth.units import format as format_quantity
-from truenorth.units import parse
-from truenorth.yaml_file import read_mapping, unknown_key
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.schema import Strict, validated
+from truenorth.core.units import format as format_quantity
+from truenorth.core.units import parse
+from truenorth.core.yaml_file import read_mapping, unknown_key
+from truenorth.records.specs import KEYS, ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +97,7 @@ class Tuned:
         UsageError
             The folder cannot be written to.
         """
-        from truenorth.atomic import atomic_path, writable_folder
+        from truenorth.core.atomic import atomic_path, writable_folder
 
         target = writable_folder(folder)
         paths = [target / name for name in ("tuned.yaml", "trials.csv", "judged.csv")]

@@ -20,7 +20,7 @@ from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
-from truenorth.errors import TruenorthError
+from truenorth.core.errors import TruenorthError
 
 INTERRUPTED = 130
 

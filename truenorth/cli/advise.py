@@ -71,9 +71,9 @@ def advise(
     """Say how long, and in which positions or by which manoeuvre, an IMU needs for a wanted heading."""
     from truenorth.alignment.advice import advise as advise_for
     from truenorth.alignment.transfer_advice import advise_manoeuvre
-    from truenorth.atomic import writable_folder
-    from truenorth.errors import UsageError
-    from truenorth.position import Position
+    from truenorth.core.atomic import writable_folder
+    from truenorth.core.errors import UsageError
+    from truenorth.core.position import Position
 
     if attitude_noise is not None and speed is None:
         raise UsageError("--attitude-noise is of a master INS; expected --speed with it")
@@ -122,7 +122,7 @@ def print_advice(console: Console, advice: Advice | ManoeuvreAdvice) -> None:
 
 
 def _save(advice: Advice | ManoeuvreAdvice, folder: Path) -> list[Path]:
-    from truenorth.atomic import atomic_path
+    from truenorth.core.atomic import atomic_path
 
     paths = [folder / "advice.json", folder / "advice.png"]
     with atomic_path(paths[0]) as temporary:

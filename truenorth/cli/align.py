@@ -149,9 +149,9 @@ def align(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying."""
-    from truenorth.atomic import writable_folder
-    from truenorth.errors import UsageError
-    from truenorth.position import Position
+    from truenorth.core.atomic import writable_folder
+    from truenorth.core.errors import UsageError
+    from truenorth.core.position import Position
 
     check_options(context)
     moving = odometer is not None or gnss is not None
@@ -192,7 +192,7 @@ def align(
                 units_given=units is not None,
             )
         from truenorth.alignment import align as align_record
-        from truenorth.calibration import Calibration
+        from truenorth.records.calibration import Calibration
 
         known = None if calibration is None else Calibration.from_file(calibration)
         limit = math.radians(heading_limit)
@@ -279,7 +279,7 @@ def align(
 
 def _refuse_implausible(record: ImuRecord, lat: float | None, any_attitude: bool, units_given: bool) -> None:
     """Stop at mistakes of units and axes that leave no other reading; mention those that do."""
-    from truenorth.errors import DataError
+    from truenorth.core.errors import DataError
     from truenorth.quality.plausibility import check_plausibility
     from truenorth.quality.regimes import motion_summary
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from truenorth.alignment import Alignment
-    from truenorth.calibration import Calibration
-    from truenorth.position import Position
+    from truenorth.core.position import Position
     from truenorth.records import ImuRecord
+    from truenorth.records.calibration import Calibration
 
 PANEL = "On the move"
 
@@ -109,7 +109,7 @@ def align_moving(
 
     from truenorth.alignment import align_in_motion
     from truenorth.alignment.in_motion import WHEEL, usual_antenna
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
     from truenorth.formats import read_gnss, read_odometer
     from truenorth.navigation.sensors import mounting_angles
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 PROCEDURES = {
     "--positions": "a turntable",

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from truenorth.alignment import Alignment
-    from truenorth.calibration import Calibration
-    from truenorth.position import Position
+    from truenorth.core.position import Position
     from truenorth.records import ImuRecord
+    from truenorth.records.calibration import Calibration
 
 
 def align_table(

@@ -12,9 +12,9 @@ from truenorth.cli.reading import numbers_of
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
-    from truenorth.calibration import Calibration
-    from truenorth.position import Position
+    from truenorth.core.position import Position
     from truenorth.records import ImuRecord
+    from truenorth.records.calibration import Calibration
 
 PANEL = "IMU on an indexer"
 GYROS = "gyros"

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from truenorth.alignment import Alignment
     from truenorth.alignment.transfer_result import Transfer
-    from truenorth.calibration import Calibration
-    from truenorth.position import Position
+    from truenorth.core.position import Position
     from truenorth.records import ImuRecord, MasterRecord
+    from truenorth.records.calibration import Calibration
     from truenorth.simulation.flexure import FlexureSpec
 
 PANEL = "Against a master INS"
@@ -159,7 +159,7 @@ def print_transfer(console: Console, transfer: Transfer) -> None:
 
 
 def _delay(text: str | None, usual: float) -> tuple[float, float]:
-    from truenorth.units import parse
+    from truenorth.core.units import parse
 
     if text is None:
         return 0.0, usual
@@ -168,9 +168,9 @@ def _delay(text: str | None, usual: float) -> tuple[float, float]:
 
 
 def _flexure(text: str) -> FlexureSpec:
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
+    from truenorth.core.units import parse
     from truenorth.simulation.flexure import FlexureSpec
-    from truenorth.units import parse
 
     first, comma, second = text.partition(",")
     if not comma:

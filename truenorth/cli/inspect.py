@@ -41,9 +41,9 @@ def inspect(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Look at a log: rate, gaps, frozen or saturated samples, likely unit and axes mistakes, motion, noise."""
-    from truenorth.atomic import atomic_path, writable_folder
-    from truenorth.errors import UsageError
-    from truenorth.position import Position
+    from truenorth.core.atomic import atomic_path, writable_folder
+    from truenorth.core.errors import UsageError
+    from truenorth.core.position import Position
 
     place = None if lat is None else Position.from_degrees(lat, 0.0, 0.0)
     if plot is not None:

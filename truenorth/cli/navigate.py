@@ -138,10 +138,10 @@ def navigate(
     """Carry an IMU log on from an alignment: position, velocity and attitude with their uncertainty."""
     from dataclasses import replace
 
-    from truenorth.atomic import writable_folder
-    from truenorth.calibration import Calibration
+    from truenorth.core.atomic import writable_folder
     from truenorth.navigation import navigate as navigate_record
     from truenorth.navigation.start import read_start
+    from truenorth.records.calibration import Calibration
 
     parts = _parts(estimate)
     antenna = _mounting(lever_arm, "--lever-arm", None, parts & {"lever_arm", "latency"})
@@ -251,7 +251,7 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
 def _drifting(antenna: Mounting, drift: str | None) -> Mounting:
     from dataclasses import replace
 
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
 
     if drift is None:
         return antenna
@@ -276,7 +276,7 @@ def _barometer() -> Mounting:
 
 
 def _parts(estimate: str | None) -> set[str]:
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
 
     parts = {part.strip().replace("-", "_") for part in estimate.split(",")} if estimate else set()
     unknown = parts - set(PARTS)
@@ -286,7 +286,7 @@ def _parts(estimate: str | None) -> set[str]:
 
 
 def _stops(zupt: str | None) -> Any:
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
 
     if zupt is None or zupt == "auto":
         return zupt

@@ -62,7 +62,7 @@ def read_log(
     """Read a log as the options say, and cut the window out of it."""
     import math
 
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
     from truenorth.formats import read_imu
 
     for option, value in (("--from", start), ("--to", stop)):
@@ -99,7 +99,7 @@ def numbers_of(text: str, option: str, count: int, meaning: str) -> list[float]:
     UsageError
         Other than `count` finite numbers.
     """
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
 
     try:
         numbers = [float(part) for part in text.split(",")]

@@ -43,7 +43,7 @@ def reproduce(
     ] = False,
 ) -> None:
     """Reproduce a published system: figures.csv, the paper's figures, and claims.md with what holds."""
-    from truenorth.atomic import writable_folder
+    from truenorth.core.atomic import writable_folder
     from truenorth.papers import reproduce as reproduced
 
     writable_folder(output)  # before the work, not after it

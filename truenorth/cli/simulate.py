@@ -47,7 +47,7 @@ def simulate(
     ] = False,
 ) -> None:
     """Simulate a scenario: the IMU's log and those of its aiding sensors, and the truth that made them."""
-    from truenorth.errors import UsageError
+    from truenorth.core.errors import UsageError
     from truenorth.simulation.scenario import read_scenario, shipped
 
     console = make_console()
@@ -66,7 +66,7 @@ def simulate(
         return
     if output is None:
         raise UsageError("no output folder; name one with -o")
-    from truenorth.atomic import writable_folder
+    from truenorth.core.atomic import writable_folder
     from truenorth.simulation.folder import save_run
 
     writable_folder(output)  # before the work, not after it

@@ -36,9 +36,9 @@ def tune(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the result.", show_default=False)],
 ) -> None:
     """Search for the specification with which a method errs least and says so honestly; needs truenorth[tune]."""
-    from truenorth.atomic import writable_folder
     from truenorth.campaign.tuning import read_search
     from truenorth.campaign.tuning import tune as search_for
+    from truenorth.core.atomic import writable_folder
 
     chosen = read_search(search)
     writable_folder(output)  # before the work, not after it

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.coarse.wahba import triad
-from truenorth.earth import EARTH_RATE, earth_rate_n, normal_gravity
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.records import ImuRecord
-from truenorth.strapdown import increments
+from truenorth.strapdown.level import increments
 
 Array = NDArray[np.float64]
 BLOCKS = 10  # the scatter of this many block means tells how well the mean is known

@@ -6,7 +6,7 @@ The gyros carry frame ``i`` on whatever the base does; integrated specific force
 ``dual_vector``  two intervals and TRIAD, on velocity or on its integral (position);
 ``oba``          optimisation-based alignment: the q-method over all intervals, recursively.
 
-Sources: Qin et al. (2005); Wu et al. (2011); see :mod:`truenorth.inertial`.
+Sources: Qin et al. (2005); Wu et al. (2011); see :mod:`truenorth.strapdown.inertial`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import skew
 from truenorth.coarse.wahba import davenport_matrices, error_gain, rotation_from_davenport, triad
-from truenorth.inertial import InertialIntegrals, gravity_position, gravity_velocity
+from truenorth.core.attitude import skew
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, gravity_velocity
 
 Array = NDArray[np.float64]
 Form = Literal["velocity", "position"]

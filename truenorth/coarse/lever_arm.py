@@ -14,8 +14,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import rotation_vector_from_dcm
-from truenorth.errors import UsageError
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
 RateSource = Literal["gyros", "nominal", "attitude"]

@@ -31,17 +31,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector
 from truenorth.coarse.inertial import Form
 from truenorth.coarse.wahba import davenport_matrices, rotation_from_davenport
-from truenorth.earth import EARTH_RATE, earth_rate_n, ecef_axes, normal_gravity, radii
-from truenorth.errors import DataError
-from truenorth.increments import increments
-from truenorth.inertial import InertialIntegrals, integrate
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, ecef_axes, normal_gravity, radii
+from truenorth.core.errors import DataError
+from truenorth.core.position import Position
 from truenorth.navigation.sensors import Mounting
-from truenorth.position import Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
-from truenorth.strapdown import inertial_integrals
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.inertial import InertialIntegrals, integrate
+from truenorth.strapdown.level import inertial_integrals
 
 Array = NDArray[np.float64]
 

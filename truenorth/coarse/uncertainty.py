@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import skew
 from truenorth.coarse.inertial import CoarseAttitude, latitude_gain
-from truenorth.inertial import InertialIntegrals, gravity_velocity
+from truenorth.core.attitude import skew
 from truenorth.models.static import StaticModel
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
 
 Array = NDArray[np.float64]
 TREND_DEGREE = 3  # errors of the INS are this smooth over a window; the rest is the base's motion

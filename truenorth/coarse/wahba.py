@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_quaternion, skew
+from truenorth.core.attitude import dcm_from_quaternion, skew
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
-from truenorth.errors import DataError
+from truenorth.core import earth
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.errors import DataError
 from truenorth.models.marine import DV, PHI, MarineModel, position_in_angles
 
 Array = NDArray[np.float64]

@@ -23,8 +23,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
-from truenorth.errors import UsageError
 from truenorth.filters import FilterState, LinearSystem, gated, kalman
 from truenorth.models.marine import DV, MOTION, REF, MarineModel
 

@@ -27,10 +27,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
+from truenorth.core import earth
+from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
 from truenorth.damping.networks import SCHULER_RATE, Network
-from truenorth.errors import UsageError
 from truenorth.models.marine import DV, MOTION, PHI, MarineModel
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.errors import DataError, UsageError
 from truenorth.damping.bands import constant_error_sigma, network_sigma
 from truenorth.damping.course import Course
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
@@ -16,11 +17,10 @@ from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import Reference, reference_of
 from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
-from truenorth.errors import DataError, UsageError
 from truenorth.models import ins
 from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI, REF, STATES, MarineModel
 from truenorth.records import VelocityRecord
-from truenorth.specs import ImuSpec
+from truenorth.records.specs import ImuSpec
 
 if TYPE_CHECKING:
     from truenorth.navigation.driver import Track

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
-from truenorth.errors import UsageError
+from truenorth.core import earth
+from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
 

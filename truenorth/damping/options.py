@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 Method = Literal["none", "internal", "external", "kalman", "double", "augmented"]
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
+from truenorth.core import earth
+from truenorth.core.units import parse
 from truenorth.damping.course import Course
 from truenorth.models.marine import BA, BG, DP, DV, PHI, REF, STATES, MarineModel
-from truenorth.units import parse
 
 Array = NDArray[np.float64]
 

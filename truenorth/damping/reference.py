@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.errors import DataError
 from truenorth.damping.course import Course
-from truenorth.errors import DataError
 from truenorth.records import VelocityRecord
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, band, new_figure, style, trace
-from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import UNIFORM_SIGMA, euler_jacobian
+from truenorth.core.attitude import UNIFORM_SIGMA, euler_jacobian
 
 if TYPE_CHECKING:
     from truenorth.alignment.result import Alignment, History

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from truenorth.core.units import parse_unit
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
-from truenorth.units import parse_unit
 
 if TYPE_CHECKING:
     from truenorth.analysis.allan import NoiseCoefficients

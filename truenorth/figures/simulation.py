@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from truenorth.attitude import euler_from_dcm
-from truenorth.earth import radii
+from truenorth.core.attitude import euler_from_dcm
+from truenorth.core.earth import radii
+from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
 from truenorth.records import GnssRecord, HeightRecord, MasterRecord, OdometerRecord, Record, VelocityRecord
-from truenorth.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
     from truenorth.simulation.aiding import Aided

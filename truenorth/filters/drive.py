@@ -9,11 +9,11 @@ from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import Array, Size, padded
 from truenorth.filters.recursion import NO_FILTER, NO_INNOVATION_VARIANCE, NOT_FINITE, Histories
 from truenorth.filters.stack import System
 from truenorth.filters.system import Estimates, FilterState, runs_of
-from truenorth.linalg import Array, Size, padded
 
 History = Literal["last", "sigma", "full"]
 T = TypeVar("T", bound=tuple[Any, ...])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters.drive import History
 from truenorth.filters.linearisation import NO_RULE
 from truenorth.filters.nonlinear import run_nonlinear

@@ -27,8 +27,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size, dot, mirror, propagate_covariance, transposed_times
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     Histories,
@@ -44,7 +45,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size, dot, mirror, propagate_covariance, transposed_times
 
 Fading = Literal["single", "noise", "multiple", "improved"]
 SINGLE, NOISE, MULTIPLE, IMPROVED = range(4)

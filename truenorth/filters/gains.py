@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters.stack import Array
 from truenorth.filters.system import Estimates, LinearSystem
 

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import Array
 from truenorth.filters.system import Estimates
-from truenorth.linalg import Array
 
 STEP = 1.0 / 0.6  # of a hypothesis' sigma to the next one: the sum of equal ones then ripples by .16 % ...
 REACH = 3.5  # ... and reaches so many sigmas of the whole to both sides

@@ -15,8 +15,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size, dot, padded, take_off, transposed_times
 from truenorth.filters.drive import History, NoFilterError, drive
 from truenorth.filters.recursion import (
     NO_FILTER,
@@ -34,7 +35,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size, dot, padded, take_off, transposed_times
 
 TINY = 1e-150  # its square is still a number
 

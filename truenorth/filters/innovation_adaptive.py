@@ -19,8 +19,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size, dot, transposed_times
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     Histories,
@@ -37,7 +38,6 @@ from truenorth.filters.recursion import (
 )
 from truenorth.filters.sage_husa import check_independent_rows
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size, dot, transposed_times
 
 AdaptiveKind = Literal["innovation", "residual"]
 

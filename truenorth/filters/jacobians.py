@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters.nonlinear_system import ModelFunction, NonlinearSystem, added
 from truenorth.filters.sigma_points import cholesky_order
 from truenorth.filters.stack import Array

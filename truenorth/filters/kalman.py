@@ -7,7 +7,8 @@ to Guidance*, 1968; rows one by one and correlated noise: D. Simon, *Optimal Sta
 
 from __future__ import annotations
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import Size
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     Histories,
@@ -22,7 +23,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Size
 
 
 @compiled

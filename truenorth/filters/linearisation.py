@@ -26,12 +26,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.compiled import compiled
-from truenorth.filters.nonlinear_system import Functions, NonlinearRuns
-from truenorth.filters.quadrature import QuadratureRule
-from truenorth.filters.recursion import Workspace
-from truenorth.filters.stack import NEGATIVE
-from truenorth.linalg import (
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import (
     Array,
     Size,
     load,
@@ -40,6 +36,10 @@ from truenorth.linalg import (
     propagate_covariance,
     take_off,
 )
+from truenorth.filters.nonlinear_system import Functions, NonlinearRuns
+from truenorth.filters.quadrature import QuadratureRule
+from truenorth.filters.recursion import Workspace
+from truenorth.filters.stack import NEGATIVE
 
 NO_RULE = QuadratureRule(np.zeros((0, 0)), np.zeros(0), np.zeros(0))
 SEMIDEFINITE = 1e-14  # of a variance: what is left of it after the states before is rounding

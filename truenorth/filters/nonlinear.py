@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import Array, Size, load
 from truenorth.filters.drive import History, drive
 from truenorth.filters.fading import SINGLE, fade, remember
 from truenorth.filters.linearisation import (
@@ -47,7 +48,6 @@ from truenorth.filters.recursion import (
 from truenorth.filters.robust import GATE_EPOCHS, Gate, judge_and_update, squared
 from truenorth.filters.strong_tracking import StrongTracking
 from truenorth.filters.system import Estimates, FilterState
-from truenorth.linalg import Array, Size, load
 
 NO_GATE = -1
 

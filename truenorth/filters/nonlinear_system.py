@@ -26,8 +26,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from truenorth.compiled import compiled_callback
-from truenorth.errors import DataError, UsageError
+from truenorth.core.compiled import compiled_callback
+from truenorth.core.errors import DataError, UsageError
 from truenorth.filters.stack import Array, System, flatten_runs
 
 VECTOR = "void(float64[::1], float64[::1], float64[::1])"

@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size, load
 from truenorth.filters.drive import History, drive
 from truenorth.filters.linearisation import (
     Points,
@@ -56,7 +57,6 @@ from truenorth.filters.recursion import (
 from truenorth.filters.robust import squared
 from truenorth.filters.sigma_points import cholesky_order
 from truenorth.filters.system import Estimates, FilterState
-from truenorth.linalg import Array, Size, load
 
 
 class Cloud(NamedTuple):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters.stack import Array
 
 MOST_NODES = 100_000

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.compiled import compiled
-from truenorth.filters.system import Runs
-from truenorth.linalg import (
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import (
     Array,
     Size,
     dot,
@@ -20,6 +19,7 @@ from truenorth.linalg import (
     take_off_pair,
     transposed_times,
 )
+from truenorth.filters.system import Runs
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 ROUNDING = 1e-13  # of a variance

@@ -24,8 +24,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     LOG_2PI,
@@ -47,7 +48,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size
 
 Weighting = Literal["huber", "igg3"]
 GATE_ROWS, GATE_EPOCHS, HUBER, IGG3 = range(4)

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size, dot, transposed_times
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     Histories,
@@ -31,7 +32,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size, dot, transposed_times
 
 
 @compiled(forceinline=True)

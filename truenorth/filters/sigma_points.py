@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.filters.drive import History
 from truenorth.filters.nonlinear import run_nonlinear
 from truenorth.filters.nonlinear_system import NonlinearSystem, require_jacobians, require_vector_space

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import Array, Size, load, padded, propagate_covariance, transposed_times
 from truenorth.filters.drive import in_parts, part
 from truenorth.filters.kalman import kalman
 from truenorth.filters.recursion import (
@@ -30,7 +31,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs, runs_of
-from truenorth.linalg import Array, Size, load, padded, propagate_covariance, transposed_times
 
 ROUNDING = 1e-13  # of the filtered variance: a smaller smoothed one is not known
 

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import Array, Size, dot, multiply
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     LOG_2PI,
@@ -37,7 +38,6 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size, dot, multiply
 
 SEMIDEFINITE = 1e-14  # of a variance: what is left of it after the states before is rounding
 

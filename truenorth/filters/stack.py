@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 
 Array = NDArray[np.float64]
 S = TypeVar("S", bound="System")

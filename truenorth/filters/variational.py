@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import Array, Size, dot, load, transposed_times
 from truenorth.filters.drive import History, drive
 from truenorth.filters.recursion import (
     SOUND,
@@ -33,7 +34,6 @@ from truenorth.filters.recursion import (
 )
 from truenorth.filters.sage_husa import check_independent_rows
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
-from truenorth.linalg import Array, Size, dot, load, transposed_times
 
 
 @compiled(forceinline=True)

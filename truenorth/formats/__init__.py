@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.formats.aiding import (
     read_encoder,
     read_height,
@@ -131,7 +131,7 @@ def write_record(record: Record, path: str | PathLike[str]) -> None:
     UsageError
         Another suffix, or a folder that cannot be written to.
     """
-    from truenorth.atomic import atomic_path
+    from truenorth.core.atomic import atomic_path
 
     path = Path(path)
     suffix = path.suffix.lower()

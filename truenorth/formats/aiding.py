@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
 from truenorth.formats.order import ordered
@@ -345,7 +345,7 @@ def whole(found: Found, *names: str) -> Array | None:
 
 
 def _poses(found: Found) -> dict[str, Any]:
-    from truenorth.attitude import dcm_from_euler, dcm_from_quaternion
+    from truenorth.core.attitude import dcm_from_euler, dcm_from_quaternion
 
     angles, q = whole(found, "heading", "pitch", "roll"), whole(found, "q_w", "q_x", "q_y", "q_z")
     C_nb = None
@@ -370,7 +370,7 @@ def _turned(values: Array | None, axes: str | None) -> Array | None:
     """Columns x, y, z along right, forward, up; NaN stays with its axis."""
     if values is None or axes is None:
         return values
-    from truenorth.attitude import body_axes
+    from truenorth.core.attitude import body_axes
 
     C = body_axes(axes)
     source = np.abs(C).argmax(axis=1)
@@ -379,7 +379,7 @@ def _turned(values: Array | None, axes: str | None) -> Array | None:
 
 def _pulse_size(found: Found, given: float | str | None) -> float | None:
     if given is not None:
-        from truenorth.units import parse
+        from truenorth.core.units import parse
 
         return parse(given, "length") if isinstance(given, str) else float(given)
     if not found.has("pulse_size"):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.layout import BLOCKS, Kind, Layout
 from truenorth.formats.table import choose, finish, named_kind, unit_factor
 from truenorth.records import COLUMNS, ImuRecord

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import choose, finish

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 
 SUFFIXES = {
     ".csv": "csv",

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.formats.aiding import NAVIGATION, PLACE, FilePath, Pairs, known, made, open_log, sigmas
 from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
 from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Quantity
-from truenorth.position import Position
 from truenorth.records import GnssRecord
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def _earth_fixed(found: Found) -> dict[str, Any]:
     place = [q.name for q in EARTH_FIXED]
     if not found.has(*place):
         return {}
-    from truenorth.earth import ecef_axes, geodetic_from_ecef
+    from truenorth.core.earth import ecef_axes, geodetic_from_ecef
 
     lat, lon, alt = geodetic_from_ecef(np.column_stack([found.values[name] for name in place]))
     C_ne = np.swapaxes(ecef_axes(lat, lon), -1, -2)
@@ -134,7 +134,7 @@ def _local(found: Found, origin: Position | None) -> dict[str, Any]:
         raise UsageError(
             f"{found.source}: local coordinates without an origin; give origin=Position.from_degrees(lat, lon, alt)"
         )
-    from truenorth.earth import ecef_axes, ecef_from_geodetic, geodetic_from_ecef
+    from truenorth.core.earth import ecef_axes, ecef_from_geodetic, geodetic_from_ecef
 
     away = found.stack("east", "north", "up")
     assert away is not None

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
 from truenorth.formats.text import bare_table, delimiter_of, is_comment, split

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.yaml_file import read_mapping, unknown_key
 from truenorth.records import COLUMNS
-from truenorth.yaml_file import read_mapping, unknown_key
 
 Kind = Literal["rates", "increments"]
 
@@ -142,7 +142,7 @@ def _units(value: Any) -> dict[str, str]:
 
 
 def _rate(value: Any) -> float:
-    from truenorth.units import parse
+    from truenorth.core.units import parse
 
     rate = parse(value, "frequency") if isinstance(value, str) else value
     if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < math.inf:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats.order import put_in_order
 from truenorth.records import GnssRecord
 

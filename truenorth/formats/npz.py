@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats.arrays import record_from_arrays
 from truenorth.formats.layout import BLOCKS, Layout
 from truenorth.records import ImuRecord, Record

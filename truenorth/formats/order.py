@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats.quantities import Found
 from truenorth.formats.table import check_order
 from truenorth.records import IN_ORDER, Late

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import choose, finish

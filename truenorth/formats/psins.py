@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
+from truenorth.core.units import parse_unit
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
 from truenorth.formats.text import TextTable, bare_table, delimiter_of, is_comment, split
 from truenorth.records import ImuRecord
-from truenorth.units import parse_unit
 
 EXPECTED = "rows of gx gy gz ax ay az [t], increments in rad and m/s"
 ARCSEC = parse_unit("arcsec")[0]

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
+from truenorth.core.yaml_file import unknown_key
 from truenorth.formats.table import check_finite
 from truenorth.records import IN_ORDER, Late
-from truenorth.units import DIMENSIONS, parse_quantity, parse_unit
-from truenorth.yaml_file import unknown_key
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Quantity:
     name : str
         Ours.
     dimension : str
-        A key of :data:`truenorth.units.DIMENSIONS`.
+        A key of :data:`truenorth.core.units.DIMENSIONS`.
     unit : str
         Where neither the file nor the caller names one.
     aliases : tuple of str

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
 from truenorth.records import ImuRecord

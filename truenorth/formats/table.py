@@ -9,10 +9,10 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.layout import ARRAY_ONLY, Kind, Layout
 from truenorth.records import COLUMNS, ImuRecord
-from truenorth.units import DIMENSIONS, parse_quantity, parse_unit
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,7 @@ def finish(
     axes = (layout.axes or axes).strip().upper()
     if axes == "RFU":
         return record
-    from truenorth.attitude import body_axes  # compiled code: not for a log that needs no turning
+    from truenorth.core.attitude import body_axes  # compiled code: not for a log that needs no turning
 
     return record.rotated(body_axes(axes))
 

@@ -19,9 +19,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from truenorth.attitude import cross, rotate
-from truenorth.compiled import compiled
-from truenorth.wander import curvature, earth_axis
+from truenorth.core.attitude import cross, rotate
+from truenorth.core.compiled import compiled
+from truenorth.strapdown.wander import curvature, earth_axis
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
 
@@ -68,7 +68,7 @@ def position_row(
     Parameters
     ----------
     s : (24,) array
-        The state, see :mod:`truenorth.wander`.
+        The state, see :mod:`truenorth.strapdown.wander`.
     C : (3, 3) array
         ``C_wb``.
     arm : tuple of 3, m

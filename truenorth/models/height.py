@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
 
 _PHI, _DP = 0, 6
 

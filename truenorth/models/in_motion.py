@@ -34,8 +34,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from truenorth.attitude import cross, quaternion_from_rotation_vector, rotate
-from truenorth.compiled import compiled
+from truenorth.core.attitude import cross, quaternion_from_rotation_vector, rotate
+from truenorth.core.compiled import compiled
 
 _PHI, _DV = 0, 3
 SMALL = 1e-4  # rad, below which the Jacobian's series is exact to rounding
@@ -70,7 +70,7 @@ def reset(s: Any, x: Any, P: Any) -> None:
     Parameters
     ----------
     s : (24,) array
-        The state before the correction, see :mod:`truenorth.wander`.
+        The state before the correction, see :mod:`truenorth.strapdown.wander`.
     x : (n,) array
         The estimated errors; that of velocity becomes what takes the velocity where it belongs.
     P : (N, N) array

@@ -40,8 +40,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.compiled import compiled
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.compiled import compiled
 from truenorth.filters import matrix_function, vector_function
 
 Array = NDArray[np.float64]

@@ -39,13 +39,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth import earth
-from truenorth.attitude import cross
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
-from truenorth.linalg import padded
-from truenorth.specs import ImuSpec
-from truenorth.wander import curvature
+from truenorth.core import earth
+from truenorth.core.attitude import cross
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import padded
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.wander import curvature
 
 Array = NDArray[np.float64]
 
@@ -178,7 +178,7 @@ def transition(size: Any, F: Any, decay: Any, T: float, Phi: Any, Phi_t: Any) ->
     Parameters
     ----------
     size : tuple
-        See :mod:`truenorth.linalg`.
+        See :mod:`truenorth.core.linalg`.
     F : (N, N) array
         Rows 9 and on hold zeros: those states only decay.
     decay : (n,) array, 1/s

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import (
+from truenorth.core.attitude import (
     cross,
     dcm_from_quaternion,
     dcm_from_rotation_vector,
@@ -31,10 +31,10 @@ from truenorth.attitude import (
     quaternion_product,
     rotate,
 )
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
 from truenorth.filters import NonlinearSystem, matrix_function, vector_function
-from truenorth.inertial import InertialIntegrals, gravity_velocity
 from truenorth.models.stationary import PHI, StationaryModel
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
 
 Array = NDArray[np.float64]
 Form = Literal["tilt_azimuth", "rotation_vector", "quaternion"]

@@ -28,14 +28,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth import earth
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
-from truenorth.linalg import padded
+from truenorth.core import earth
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import padded
+from truenorth.core.units import parse
 from truenorth.models import ins
 from truenorth.models.ins import error_dynamics, transition
-from truenorth.specs import ImuSpec
-from truenorth.units import parse
+from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

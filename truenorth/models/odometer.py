@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from truenorth.attitude import cross
-from truenorth.compiled import compiled
+from truenorth.core.attitude import cross
+from truenorth.core.compiled import compiled
 
 _PHI, _DV, _BG = 0, 3, 9
 
@@ -49,7 +49,7 @@ def body_velocity_row(
     Parameters
     ----------
     s : (24,) array
-        The state, see :mod:`truenorth.wander`.
+        The state, see :mod:`truenorth.strapdown.wander`.
     C : (3, 3) array
         ``C_wb``.
     w_b : tuple of 3, rad/s

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, gravity_velocity
 from truenorth.models import static
 from truenorth.models.static import STATES, StaticModel
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
 
 Array = NDArray[np.float64]
 

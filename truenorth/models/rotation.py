@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from truenorth.attitude import cross
-from truenorth.compiled import compiled
+from truenorth.core.attitude import cross
+from truenorth.core.compiled import compiled
 
 _PHI, _BG = 0, 9
 

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import skew
+from truenorth.core.attitude import skew
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
 
 Array = NDArray[np.float64]
 

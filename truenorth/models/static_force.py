@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_velocity
 from truenorth.models.static import DV, STATES
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity
 
 Array = NDArray[np.float64]
 

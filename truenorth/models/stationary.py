@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import EARTH_RATE, normal_gravity, radii
+from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
 
 Array = NDArray[np.float64]
 

@@ -22,11 +22,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, earth_rotation
 from truenorth.models.disturbance import AxisMotion
 from truenorth.models.static import STATES
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
 

@@ -40,10 +40,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import cross
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
-from truenorth.linalg import padded
+from truenorth.core.attitude import cross
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.core.linalg import padded
 from truenorth.models.ins import STATES as INS_STATES
 from truenorth.models.ins import TURN_TIME, error_dynamics
 

@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.filters import LinearSystem
-from truenorth.inertial import InertialIntegrals, earth_rotation
 from truenorth.models import static
 from truenorth.models.static import DV, PHI, StaticModel
 from truenorth.records import ImuRecord
-from truenorth.strapdown import increments, inertial_integrals
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
+from truenorth.strapdown.level import increments, inertial_integrals
 
 Array = NDArray[np.float64]
 

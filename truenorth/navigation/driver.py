@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import wander
-from truenorth.earth import radii
-from truenorth.errors import DataError, UsageError
+from truenorth.core.earth import radii
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import padded
 from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
-from truenorth.increments import increments, interval_lengths, read_only
-from truenorth.linalg import padded
 from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, InsModel
 from truenorth.models.whole_bias import WholeBiases, taken_apart
 from truenorth.navigation import kernel
 from truenorth.navigation.aiding import COLUMNS, KINDS, Aiding
 from truenorth.records import ImuRecord
+from truenorth.strapdown import wander
+from truenorth.strapdown.increments import increments, interval_lengths, read_only
 
 if TYPE_CHECKING:
     from truenorth.navigation.sensors import Mounting

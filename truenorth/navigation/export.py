@@ -9,8 +9,8 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from truenorth.atomic import atomic_path
-from truenorth.errors import UsageError
+from truenorth.core.atomic import atomic_path
+from truenorth.core.errors import UsageError
 
 if TYPE_CHECKING:
     from truenorth.navigation.result import Navigation

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import radii
-from truenorth.errors import DataError
+from truenorth.core.earth import radii
+from truenorth.core.errors import DataError
 from truenorth.records import GnssRecord
 
 Array = NDArray[np.float64]

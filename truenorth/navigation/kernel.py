@@ -11,18 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
-from truenorth.attitude import quaternion_from_rotation_vector, quaternion_product, rotate
-from truenorth.compiled import compiled
+from truenorth.core import earth
+from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product, rotate
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import load, multiply, propagate_covariance
 from truenorth.filters.recursion import SOUND, row_variance, update, workspace
-from truenorth.linalg import load, multiply, propagate_covariance
 from truenorth.models.gnss import position_row, velocity_row
 from truenorth.models.height import height_row
 from truenorth.models.in_motion import reset
 from truenorth.models.ins import couple_sensors, error_dynamics, transition
 from truenorth.models.odometer import body_velocity_row
 from truenorth.models.rotation import rotation_row
-from truenorth.wander import acceleration, advance, displace, earth_axis
+from truenorth.strapdown.wander import acceleration, advance, displace, earth_axis
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

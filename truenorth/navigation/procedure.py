@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.models.ins import BA, BG, DP, PHI, InsModel
 from truenorth.navigation.aiding import Aiding
 from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
@@ -22,14 +23,13 @@ from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
-from truenorth.position import Position
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, Trajectory, VelocityRecord
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
-    from truenorth.calibration import Calibration
     from truenorth.damping.options import Damper
+    from truenorth.records.calibration import Calibration
 
 Array = NDArray[np.float64]
 R = TypeVar("R", bound=Record)

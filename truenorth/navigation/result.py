@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import euler_from_dcm, euler_sigma, to_rotation
-from truenorth.earth import radii
+from truenorth.core.attitude import euler_from_dcm, euler_sigma, to_rotation
+from truenorth.core.earth import radii
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.models.ins import BA, BG, DP, DV, PHI
 from truenorth.navigation.driver import Residuals, Track
 from truenorth.records import Late
-from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 if TYPE_CHECKING:
     import pandas as pd

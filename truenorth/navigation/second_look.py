@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.navigation.aiding import FALSE_REJECTION, Role
 from truenorth.navigation.driver import Track
 from truenorth.navigation.sensors import Mounting

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import dcm_from_euler
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import UsageError
 from truenorth.models.ins import Extra
 from truenorth.navigation.aiding import FALSE_REJECTION, Aiding, Role, state
 from truenorth.navigation.gnss_frames import check_frames

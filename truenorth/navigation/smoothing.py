@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import wander
 from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
 from truenorth.navigation import kernel
+from truenorth.strapdown import wander
 
 if TYPE_CHECKING:
     from truenorth.navigation.driver import Timeline

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.coarse.analytic import static_jacobian
-from truenorth.earth import DEFLECTION, normal_gravity
-from truenorth.errors import AlignmentError, DataError
+from truenorth.core.earth import DEFLECTION, normal_gravity
+from truenorth.core.errors import AlignmentError, DataError
+from truenorth.core.position import Position
 from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
 from truenorth.models.whole_bias import WholeBiases
 from truenorth.navigation.driver import Start
 from truenorth.navigation.handover import Handover
 from truenorth.navigation.sensors import Mounting
-from truenorth.position import Position
-from truenorth.specs import ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.records import GnssRecord, OdometerRecord, Trajectory, VelocityRecord
 
 Array = NDArray[np.float64]

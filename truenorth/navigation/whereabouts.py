@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import ecef_from_geodetic
-from truenorth.errors import DataError
-from truenorth.position import Position
+from truenorth.core.earth import ecef_from_geodetic
+from truenorth.core.errors import DataError
+from truenorth.core.position import Position
 from truenorth.records import GnssRecord, HeightRecord
 
 Array = NDArray[np.float64]

@@ -13,8 +13,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truenorth.atomic import atomic_path, writable_folder
-from truenorth.errors import UsageError
+from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.errors import UsageError
 from truenorth.papers.claims import Claim, markdown
 from truenorth.papers.table import Figure, to_frame, write_figures
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truenorth.core.units import parse_unit
 from truenorth.quality.plausibility import Turning, check_plausibility
 from truenorth.quality.regimes import KINDS, Kind, MotionSummary, Regime, motion_summary
 from truenorth.quality.sampling import Finding, Sampling, check_sampling
 from truenorth.records import ImuRecord
-from truenorth.units import parse_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,12 +13,12 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import EARTH_RATE
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.units import STANDARD_GRAVITY as G
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding
 from truenorth.quality.signals import even_rates
 from truenorth.records import ImuRecord
-from truenorth.units import STANDARD_GRAVITY as G
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.records.base import IN_ORDER, Late, Record, check_positive, check_range
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.earth import radii
-from truenorth.errors import DataError
+from truenorth.core.earth import radii
+from truenorth.core.errors import DataError
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # of the interval: times this little outside the span are its ends
@@ -60,7 +60,7 @@ class Between:
 
     def slerp(self, C: Array) -> Array:
         """(M, 3, 3) of (N, 3, 3) direction cosines: one turn at constant rate about one axis between two samples."""
-        from truenorth.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+        from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 
         start = C[self.row]
         turn = rotation_vector_from_dcm(np.swapaxes(start, -1, -2) @ C[self.row + 1])

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.records.base import GAP_FACTOR, IN_ORDER, Late, Record, check_together
 from truenorth.records.gnss import check_place, in_degrees
 from truenorth.records.interpolation import interpolated
@@ -51,7 +51,7 @@ class Poses(Record):
         DataError
             As for the record; a quaternion whose norm is not 1 within 1e-6.
         """
-        from truenorth.attitude import dcm_from_quaternion
+        from truenorth.core.attitude import dcm_from_quaternion
 
         q = np.asarray(q_nb, dtype=np.float64)
         source = others.get("source", "quaternions")
@@ -107,7 +107,7 @@ class Poses(Record):
         table = in_degrees({name: values for name, values in super().columns().items() if name not in NINE})
         if self.C_nb is None:
             return table
-        from truenorth.attitude import euler_from_dcm
+        from truenorth.core.attitude import euler_from_dcm
 
         heading, pitch, roll = (np.degrees(x) for x in euler_from_dcm(self.C_nb))
         return table | {"roll": roll, "pitch": pitch, "heading": np.mod(heading, 360.0)}

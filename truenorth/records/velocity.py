@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError
+from truenorth.core.errors import DataError
 from truenorth.records.base import IN_ORDER, Late, Record, check_positive
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truenorth.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_path, writable_folder
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truenorth.atomic import atomic_path
+from truenorth.core.atomic import atomic_path
 
 if TYPE_CHECKING:
     import pandas as pd

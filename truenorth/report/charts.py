@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment, History
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
 from truenorth.figures.style import COLOURS, REFERENCE, evenly, thin
-from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 Array = NDArray[np.float64]
 

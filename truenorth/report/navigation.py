@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_path, writable_folder
 from truenorth.figures.navigation import ellipses, track_unit
 from truenorth.figures.style import COLOURS, evenly
 from truenorth.navigation.export import geojson

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truenorth.attitude import UNIFORM_SIGMA
+from truenorth.core.attitude import UNIFORM_SIGMA
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G, parse_unit
 from truenorth.report.charts import charts
-from truenorth.units import DEG_PER_HOUR, MICRO_G, parse_unit
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment

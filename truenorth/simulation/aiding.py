@@ -15,9 +15,9 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.earth import earth_rate_n
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import earth_rate_n
+from truenorth.core.errors import UsageError
 from truenorth.records import Record
 from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.streams import stream

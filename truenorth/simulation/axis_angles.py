@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.simulation.profile import Profile, Ramp, profile
 from truenorth.simulation.tones import Tone, Triple, cosines
 

@@ -15,9 +15,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import normal_gravity, radii
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.earth import normal_gravity, radii
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.simulation.motion import Kinematics, Motion
 from truenorth.simulation.profile import Profile, Ramp, lead_in, profile
 

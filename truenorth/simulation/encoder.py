@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.records.encoder import EncoderRecord
 from truenorth.simulation.aiding import Aided, AidingSpec, Draws, sample_times
 from truenorth.simulation.indexer import Indexer

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import dcm_from_euler
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import UsageError
 from truenorth.simulation.aiding import Draws
 from truenorth.simulation.motion import MotionStates, body_rates
 from truenorth.simulation.processes import second_order_gauss_markov

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from truenorth import __version__, write_imu, write_record
-from truenorth.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_path, writable_folder
 
 if TYPE_CHECKING:
     from truenorth.simulation.aiding import Aided

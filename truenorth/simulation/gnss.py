@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import earth_rate_n, radii, transport_rate_n
+from truenorth.core.earth import earth_rate_n, radii, transport_rate_n
 from truenorth.records import GnssRecord, HeightRecord
 from truenorth.simulation.aiding import Aided, Draws, OutlyingSpec, kept, outliers, sample_times
 from truenorth.simulation.motion import MotionStates, displaced

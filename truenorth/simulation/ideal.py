@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.simulation.sensing import Moving, acceleration_gain, increments, leverage
 
 Array = NDArray[np.float64]

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation.drift import gauss_markov, random_walk
 from truenorth.simulation.response import respond
 from truenorth.simulation.streams import STREAMS, stream
 from truenorth.simulation.true_errors import SensorErrors, TrueErrors, drawn_errors
-from truenorth.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector, skew
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_rotation_vector, skew
+from truenorth.core.errors import UsageError
 from truenorth.simulation.axis_angles import Turning
 from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.sensing import Moving

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.simulation.course import Leg
 from truenorth.simulation.motion import Motion
 from truenorth.simulation.sway import Disturbed

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_euler, dcm_from_rotation_vector
-from truenorth.earth import normal_gravity, radii
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
+from truenorth.core.earth import normal_gravity, radii
+from truenorth.core.errors import UsageError
 from truenorth.records import MasterRecord
 from truenorth.simulation.aiding import Aided, Draws, DroppingSpec, kept, sample_times
 from truenorth.simulation.gnss import moved, place_of

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import dcm_from_euler
-from truenorth.earth import earth_rate_n, gravity_n, radii, transport_rate_n
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.earth import earth_rate_n, gravity_n, radii, transport_rate_n
 from truenorth.records import Trajectory
 
 Array = NDArray[np.float64]

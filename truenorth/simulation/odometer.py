@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_euler
-from truenorth.errors import UsageError
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import UsageError
 from truenorth.records import OdometerRecord
 from truenorth.simulation.aiding import (
     Aided,

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
 POINTS = 8  # of the polynomial

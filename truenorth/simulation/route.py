@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import radii
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.earth import radii
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.simulation.course import Course
 from truenorth.simulation.profile import Profile, Ramp, profile
 

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.ideal import IdealLog, ideal_log
 from truenorth.simulation.imu_errors import apply_errors, size_effect
 from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.sensing import Moving
 from truenorth.simulation.true_errors import TrueErrors
-from truenorth.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -22,9 +22,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator
 
-from truenorth.errors import DataError, TruenorthError, UsageError
-from truenorth.position import Position
-from truenorth.schema import Angle, Frequency, Length, Strict, Time, validated
+from truenorth.core.errors import DataError, TruenorthError, UsageError
+from truenorth.core.position import Position
+from truenorth.core.schema import Angle, Frequency, Length, Strict, Time, validated
+from truenorth.core.yaml_file import read_mapping
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import IdealLog, Simulation, given_errors, ideal_log, simulate
 from truenorth.simulation.aiding import Aided
 from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
@@ -37,8 +39,6 @@ from truenorth.simulation.scenario_sensors import AIDING, IndexerModel
 from truenorth.simulation.sensing import Moving
 from truenorth.simulation.streams import stream
 from truenorth.simulation.unit_spec import UnitSpec
-from truenorth.specs import ImuSpec, imu_spec
-from truenorth.yaml_file import read_mapping
 
 MOTION_STREAM = 200  # of the motion's own draws, and one more for each disturbance
 SHIPPED = resources.files("truenorth.simulation") / "scenarios"

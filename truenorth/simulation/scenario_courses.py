@@ -12,8 +12,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from truenorth.position import Position
-from truenorth.schema import Acceleration, Angle, AngularRate, Length, Speed, Strict, Time, numbered
+from truenorth.core.position import Position
+from truenorth.core.schema import Acceleration, Angle, AngularRate, Length, Speed, Strict, Time, numbered
 from truenorth.simulation import manoeuvres
 from truenorth.simulation.course import Leg, check_leg, course, ring
 from truenorth.simulation.motion import Motion

@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from truenorth.position import Position
-from truenorth.schema import (
+from truenorth.core.position import Position
+from truenorth.core.schema import (
     Acceleration,
     AccelerationDensity,
     Angle,

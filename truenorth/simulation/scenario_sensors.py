@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from truenorth.errors import UsageError
-from truenorth.schema import Angle, AngularRate, Strict, Time
+from truenorth.core.errors import UsageError
+from truenorth.core.schema import Angle, AngularRate, Strict, Time
 from truenorth.simulation.axis_angles import SCHEMES, Spin, Swing, Turning, scheme
 from truenorth.simulation.encoder import EncoderSpec
 from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height

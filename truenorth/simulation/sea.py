@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
+from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.simulation.tones import Tone
-from truenorth.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 COMPONENTS = 48

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import skew
+from truenorth.core.attitude import skew
 from truenorth.simulation.motion import MotionStates
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.simulation.motion import Kinematics, Motion, displaced
 from truenorth.simulation.profile import Profile, pulse
 from truenorth.simulation.tones import Tone, Triple, cosines, shortest, sines

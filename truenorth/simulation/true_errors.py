@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.yaml_file import quantity, unknown_key
+from truenorth.records.specs import KEYS, ImuSpec
 from truenorth.simulation.streams import STREAMS, stream
-from truenorth.specs import KEYS, ImuSpec
-from truenorth.yaml_file import quantity, unknown_key
 
 Array = NDArray[np.float64]
 SHAPES: dict[str, tuple[int, ...]] = {

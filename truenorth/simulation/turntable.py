@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import UsageError
-from truenorth.position import Position
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.simulation.motion import Kinematics, Motion
 from truenorth.simulation.profile import Profile, Ramp, profile
 

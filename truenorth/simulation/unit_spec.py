@@ -9,10 +9,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from truenorth.errors import DataError, UsageError
-from truenorth.units import DIMENSIONS, parse
-from truenorth.units import format as format_quantity
-from truenorth.yaml_file import quantity, unknown_key
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import DIMENSIONS, parse
+from truenorth.core.units import format as format_quantity
+from truenorth.core.yaml_file import quantity, unknown_key
 
 SI = {"angle": "rad", "length": "m", "speed": "m/s", "time": "s", "frequency": "Hz", "ratio": "1"}
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 from truenorth.simulation.tones import Tone
 
 COMPONENTS = 64

@@ -9,10 +9,10 @@ from os import PathLike
 from pathlib import Path
 from xml.etree import ElementTree
 
-from truenorth.earth import SEMI_MAJOR
-from truenorth.errors import DataError, UsageError
+from truenorth.core.earth import SEMI_MAJOR
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.yaml_file import unknown_key
 from truenorth.simulation.route import WayPoint
-from truenorth.yaml_file import unknown_key
 
 # Columns of a CSV file by the field of a way-point; angles in degrees.
 COLUMNS = {

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.loop import Loop, network_correction
@@ -15,7 +16,6 @@ from truenorth.damping.networks import second_order
 from truenorth.damping.prior import carried_prior, paper_prior
 from truenorth.models.marine import DP, REF, STATES, MarineModel
 from truenorth.papers.damping.truth import HOUR, LOG_NOISE, Voyage
-from truenorth.units import parse
 
 Array = NDArray[np.float64]
 

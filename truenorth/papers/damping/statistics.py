@@ -13,7 +13,7 @@ from truenorth.damping.filters import run_filters
 from truenorth.models.marine import REF
 from truenorth.papers.damping.methods import LONG, LONG_REFERENCE_PRIOR, SWITCH, Case, filters_of, run_all
 from truenorth.papers.damping.truth import LOG_NOISE, Voyage
-from truenorth.specs import ImuSpec
+from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
+from truenorth.core import earth
+from truenorth.core.units import parse
 from truenorth.damping.course import Course
 from truenorth.models.marine import BA, BG, DP, DV, PHI, STATES
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation import IdealLog, simulate
 from truenorth.simulation.scenario import read_scenario
-from truenorth.specs import ImuSpec
-from truenorth.strapdown import NavigationState, mechanise
-from truenorth.units import parse
+from truenorth.strapdown.level import NavigationState, mechanise
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 from truenorth.papers.odometer.loop import Errors
-from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 Array = NDArray[np.float64]
 ARCMIN = np.radians(1.0) / 60.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.coarse.odometer import odometer_alignment
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.models.in_motion_azimuth import STATES, correction
 from truenorth.models.ins import BA, BG, DP, DV, PHI, InsModel
 from truenorth.models.ins import STATES as INS_STATES

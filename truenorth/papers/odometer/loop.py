@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import wander
-from truenorth.attitude import dcm_from_quaternion, quaternion_from_dcm, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.filters import (
     Estimates,
     Gate,
@@ -25,6 +24,7 @@ from truenorth.models import in_motion_azimuth as model
 from truenorth.models.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
 from truenorth.papers.odometer.mechanisation import mechanise_interval
 from truenorth.papers.odometer.scenario import Drives
+from truenorth.strapdown import wander
 
 Array = NDArray[np.float64]
 Filter = Callable[..., Estimates]

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth import earth
-from truenorth.compiled import compiled
+from truenorth.core import earth
+from truenorth.core.compiled import compiled
 from truenorth.models.in_motion_azimuth import PARAMETERS
 from truenorth.navigation.kernel import set_matrix
-from truenorth.wander import advance, curvature, earth_axis
+from truenorth.strapdown.wander import advance, curvature, earth_axis
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def mechanise_interval(
     errors : (B, 7) array
         Gyro and accelerometer bias and odometer scale as known so far, taken off.
     s : (B, 24) array
-        The state (:mod:`truenorth.wander`); changed in place.
+        The state (:mod:`truenorth.strapdown.wander`); changed in place.
     p : (B, 28) array
         Parameters of the error model (:mod:`truenorth.models.in_motion_azimuth`), filled in.
     z : (B, 3) array, m

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import align
-from truenorth.attitude import euler_from_dcm
+from truenorth.core.attitude import euler_from_dcm
 from truenorth.papers.claims import Claim
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
 from truenorth.papers.odometer.loop import run_method

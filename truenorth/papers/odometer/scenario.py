@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.position import Position
+from truenorth.core.position import Position
 from truenorth.records import ImuRecord, OdometerRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
-from truenorth.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.rotary import angles_at
-from truenorth.attitude import rotation_vector_from_dcm
 from truenorth.coarse.lever_arm import RateSource, arm_velocity
 from truenorth.coarse.wahba import q_method, triad
-from truenorth.increments import increments
-from truenorth.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES, Run
 from truenorth.records import ImuRecord
 from truenorth.simulation.indexer import C_bs_from_angles
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
 
 Array = NDArray[np.float64]
 

@@ -20,14 +20,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.earth import ecef_axes
-from truenorth.position import Position
+from truenorth.core.earth import ecef_axes
+from truenorth.core.position import Position
+from truenorth.core.yaml_file import read_mapping
 from truenorth.records import EncoderRecord, ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.sensing import Moving
 from truenorth.simulation.streams import stream
-from truenorth.specs import ImuSpec
-from truenorth.yaml_file import read_mapping
 
 Array = NDArray[np.float64]
 Noise = Literal["per_sample", "random_walk"]

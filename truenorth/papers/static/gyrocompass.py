@@ -19,8 +19,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector
-from truenorth.earth import EARTH_RATE, earth_rate_n, normal_gravity
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import align
-from truenorth.attitude import dcm_from_euler, dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.coarse import oba
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.position import Position
 from truenorth.filters import (
     FilterState,
     around_circle,
@@ -22,17 +23,16 @@ from truenorth.filters import (
     particle,
     unscented,
 )
-from truenorth.inertial import InertialIntegrals, earth_rotation, integrate
 from truenorth.models.large_azimuth import Form, attitude_error, large_azimuth_system
 from truenorth.models.stationary import StationaryModel
 from truenorth.papers.claims import Claim
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
 from truenorth.papers.table import Figure, figure, of_errors
-from truenorth.position import Position
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.streams import stream
-from truenorth.specs import ImuSpec
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.analysis.observability import PiecewiseObservability, Segment, piecewise_observability
 from truenorth.campaign.comparison import paired
+from truenorth.core.units import parse
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
 from truenorth.models.stationary import DV, NAMES, STATE_UNITS, StationaryModel
 from truenorth.papers.claims import Claim
@@ -22,8 +23,7 @@ from truenorth.papers.static.large import DURATION, align_all, large_claims, lar
 from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
 from truenorth.papers.table import Figure, figure, of_errors
-from truenorth.specs import ImuSpec
-from truenorth.units import parse
+from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

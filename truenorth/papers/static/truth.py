@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_euler
+from truenorth.core.attitude import dcm_from_euler
 from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
 from truenorth.simulation.streams import stream
 

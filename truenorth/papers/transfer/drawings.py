@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from truenorth.core.units import DEG_PER_HOUR
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 from truenorth.papers.transfer.filtering import EPOCHS, Errors
 from truenorth.papers.transfer.truth import ARCMIN, BEGIN, STOP
-from truenorth.units import DEG_PER_HOUR
 
 Array = NDArray[np.float64]
 SINGLE = 10  # runs drawn one by one

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, TransferTrack, transfer_filter
-from truenorth.attitude import rotation_vector_from_dcm
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.models.transfer import ARM, BA, BG, PHI, TAU, TransferModel
 from truenorth.papers.transfer.truth import (
     ARM_SIGMA,
@@ -24,7 +24,7 @@ from truenorth.papers.transfer.truth import (
     Flights,
     Run,
 )
-from truenorth.specs import ImuSpec
+from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 

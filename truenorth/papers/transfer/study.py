@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.campaign.comparison import paired
+from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.papers.claims import Claim
 from truenorth.papers.study import Study
 from truenorth.papers.table import Figure, figure, of_errors
@@ -16,7 +17,6 @@ from truenorth.papers.transfer.drawings import draw_biases, draw_level, draw_mis
 from truenorth.papers.transfer.filtering import EPOCHS, Errors, errors_of
 from truenorth.papers.transfer.observability import Seen, told_by
 from truenorth.papers.transfer.truth import ARCMIN, BEGIN, END, STOP, Case, Flights
-from truenorth.units import DEG_PER_HOUR, MICRO_G
 
 Array = NDArray[np.float64]
 

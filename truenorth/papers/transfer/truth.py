@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import dcm_from_rotation_vector, euler_from_dcm
+from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_master
 from truenorth.simulation.motion import MotionStates

@@ -24,9 +24,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
-from truenorth.units import format as format_quantity
-from truenorth.yaml_file import quantity, read_mapping, unknown_key
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import format as format_quantity
+from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 
 Places = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
@@ -185,7 +185,7 @@ class ImuSpec:
         """
         import yaml
 
-        from truenorth.atomic import atomic_path
+        from truenorth.core.atomic import atomic_path
 
         with atomic_path(path) as temporary:
             temporary.write_text(yaml.safe_dump(self.to_mapping(), sort_keys=False, allow_unicode=True), "utf-8")

@@ -25,9 +25,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.attitude import cross
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.attitude import cross
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
 Algorithm = Literal["previous", "1", "2", "3", "4"]

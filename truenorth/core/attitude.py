@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.compiled import compiled
-from truenorth.errors import UsageError
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

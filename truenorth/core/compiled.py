@@ -16,7 +16,7 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"nopython": True, "error_model": "numpy", "fastmath": False, "nogil": True}
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).parents[1]
 
 
 def compiled(function: F | None = None, **options: Any) -> Any:

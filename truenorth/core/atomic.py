@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 
 def writable_folder(folder: str | os.PathLike[str]) -> Path:

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import skew
-from truenorth.earth import EARTH_RATE, earth_rate_n, normal_gravity
-from truenorth.errors import AlignmentError
+from truenorth.core.attitude import skew
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
+from truenorth.core.errors import AlignmentError
 from truenorth.records import ImuRecord
-from truenorth.strapdown import increments, inertial_integrals
+from truenorth.strapdown.level import increments, inertial_integrals
 
 Array = NDArray[np.float64]
 SUB_EPOCHS = 5  # points within a filter interval at which the mean attitude is sampled

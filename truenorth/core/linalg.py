@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.compiled import compiled
+from truenorth.core.compiled import compiled
 
 Array = NDArray[np.float64]
 Size = tuple[Any, ...]

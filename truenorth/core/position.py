@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 METRES_PER_RADIAN = 6_371_000.0  # mean earth radius: good enough for a position's uncertainty
 

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.errors import DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 from truenorth.records import ImuRecord
-from truenorth.yaml_file import quantity, read_mapping, unknown_key
 
 Array = NDArray[np.float64]
 

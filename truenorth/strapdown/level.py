@@ -1,6 +1,6 @@
 """Strapdown mechanisation: increments to attitude, velocity and position in the local level frame (ENU), compiled.
 
-Its counterpart in an inertial frame, which alignment needs, is :mod:`truenorth.inertial_integration`; both are offered
+Its counterpart in an inertial frame, which alignment needs, is :mod:`truenorth.strapdown.inertial_integration`; both are offered
 here.
 
 Sources: P. Savage, "Strapdown inertial navigation integration algorithm design", J. Guid. Control Dyn. 21 (1998),
@@ -17,8 +17,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth import earth
-from truenorth.attitude import (
+from truenorth.core import earth
+from truenorth.core.attitude import (
     cross,
     dcm_from_quaternion,
     normalised,
@@ -27,12 +27,12 @@ from truenorth.attitude import (
     quaternion_product,
     rotate,
 )
-from truenorth.compiled import compiled
-from truenorth.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
-from truenorth.errors import UsageError
-from truenorth.increments import increments, interval_lengths, last_rows, read_only
-from truenorth.inertial_integration import inertial_integrals, integrate_attitude
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
+from truenorth.strapdown.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
+from truenorth.strapdown.increments import increments, interval_lengths, last_rows, read_only
+from truenorth.strapdown.inertial_integration import inertial_integrals, integrate_attitude
 
 __all__ = [
     "Mechanisation",
@@ -264,7 +264,7 @@ def mechanise_increments(
     dtheta, dvel : (N, 3) arrays, rad and m/s
         Increments along the body's axes, biases taken off.
     k : (n-1,) array
-        Weights of the cross products of an update's n samples (:func:`truenorth.coning.coefficients`).
+        Weights of the cross products of an update's n samples (:func:`truenorth.strapdown.coning.coefficients`).
     k_before : float
         Weight of the product with the sample before the update.
     fixed_altitude : bool

@@ -8,10 +8,10 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, ValidationError
 
-from truenorth.errors import DataError, UsageError
-from truenorth.units import DIMENSIONS, parse
-from truenorth.units import format as format_quantity
-from truenorth.yaml_file import unknown_key
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import DIMENSIONS, parse
+from truenorth.core.units import format as format_quantity
+from truenorth.core.yaml_file import unknown_key
 
 
 class Strict(BaseModel):

@@ -8,8 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from truenorth.errors import DataError, UsageError
-from truenorth.units import parse
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import parse
 
 
 def read_mapping(path: str | PathLike[str]) -> dict[Any, Any]:

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.attitude import (
+from truenorth.core.attitude import (
     dcm_from_quaternion,
     normalised,
     quaternion_from_rotation_vector,
     quaternion_product,
     rotate,
 )
-from truenorth.compiled import compiled
-from truenorth.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
-from truenorth.errors import UsageError
-from truenorth.increments import read_only
+from truenorth.core.compiled import compiled
+from truenorth.core.errors import UsageError
+from truenorth.strapdown.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
+from truenorth.strapdown.increments import read_only
 
 Array = NDArray[np.float64]
 

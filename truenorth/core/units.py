@@ -15,7 +15,7 @@ import re
 from difflib import get_close_matches
 from fractions import Fraction
 
-from truenorth.errors import UsageError
+from truenorth.core.errors import UsageError
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 DEG_PER_HOUR = math.radians(1.0) / 3600.0  # rad/s

@@ -5,7 +5,7 @@ everywhere. Position is the rotation ``q_ew`` from w to earth axes, whose third 
 n-vector). Everything in an update is a polynomial in these, no tangent of latitude enters. It starts as ENU, and its
 answers are turned into ENU when they are put out.
 
-Update and order are those of :func:`truenorth.strapdown.mechanise` with the sample before ("previous"). A sample can be
+Update and order are those of :func:`truenorth.strapdown.level.mechanise` with the sample before ("previous"). A sample can be
 taken in parts, so that a measurement between two samples finds the state at its own time.
 
 Sources: P. Savage, *Strapdown Analytics*, 2nd ed. (2007), sec. 4.4 and 7.3; K. Gade, "A non-singular horizontal position
@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth import earth
-from truenorth.attitude import (
+from truenorth.core import earth
+from truenorth.core.attitude import (
     cross,
     dcm_from_quaternion,
     normalised,
@@ -29,8 +29,8 @@ from truenorth.attitude import (
     quaternion_product,
     rotate,
 )
-from truenorth.compiled import compiled
-from truenorth.coning import rotation_vector, velocity_increment
+from truenorth.core.compiled import compiled
+from truenorth.strapdown.coning import rotation_vector, velocity_increment
 
 Array = NDArray[np.float64]
 

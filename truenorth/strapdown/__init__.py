@@ -1,0 +1,1 @@
+"""Mechanisation: from increments of angle and velocity to attitude, velocity and position, in several frames."""
