@@ -1,0 +1,118 @@
+"""How far gyros explain the turning of gravity: unit, order and signs of their axes against the accelerometers'.
+
+Gravity's direction in body axes turns as ``du/dt = -w x u`` whatever the mounting, so that data in which it turns show the
+gyros' scale and their axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TURN_STEP = 0.5  # s, over which the turn of gravity is compared with the gyros
+LEAST_TURN = np.radians(0.5)  # rad, RMS of gravity's turn over TURN_STEP, for a judgement on the gyros
+EQUAL = 0.02  # readings whose shares differ by less are equals
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Turning:
+    """How the gyros explain the turning of gravity in body axes.
+
+    Parameters
+    ----------
+    scale : float
+        Measured rate over the rate that gravity's direction shows, axes as given; NaN where nothing turned.
+    agreement : float
+        Share of gravity's turning explained with the axes as given and that scale, at most 1.
+    best_axes : str
+        Signed axes, such as ``+y +x -z``, of the reading that agrees best: what the gyro columns x, y, z hold.
+    best_agreement : float
+        Its agreement.
+    """
+
+    scale: float
+    agreement: float
+    best_axes: str
+    best_agreement: float
+
+
+def fit_turning(interval: float, rates: Array) -> Turning:
+    """Fit the gyros to the turn of gravity, ``du = -theta x u``, for all 48 signed axes.
+
+    Cells of 0.1 s in which the specific force is not of its usual size are left out of both sides; both are
+    then averaged over 0.5 s twice, against noise. The agreement of a reading is the share of ``sum |du|^2`` that
+    it explains with its best positive scale.
+
+    Parameters
+    ----------
+    interval : float, s
+        Of the cells, about 0.1 s.
+    rates : (6, cells) array
+        Mean rates and mean specific forces of even cells, in any unit.
+
+    Returns
+    -------
+    Turning
+        All NaN where the record is too short or nothing turned.
+    """
+    nothing = Turning(np.nan, np.nan, "", np.nan)
+    cells = max(1, round(TURN_STEP / interval))
+    size = np.linalg.norm(rates[3:], axis=0)
+    if rates.shape[1] < 20 * cells or not np.all(size > 0.0):
+        return nothing
+    up = rates[3:] / size
+    usual = np.abs(size / np.median(size) - 1.0) < 0.1
+    good = usual[1:] & usual[:-1]
+    angle = rates[:3] - rates[:3].mean(axis=1, keepdims=True)  # bias and earth rate; a sway keeps its swing
+    theta = 0.5 * interval * (angle[:, 1:] + angle[:, :-1])
+    middle = np.where(good, 0.5 * (up[:, 1:] + up[:, :-1]), 0.0)
+    turn = _smooth(np.where(good, np.diff(up, axis=1), 0.0), cells)
+    if np.sqrt(np.mean(np.sum(turn**2, axis=0))) < LEAST_TURN * interval / TURN_STEP:
+        return nothing
+
+    # Turn if axis i holds column j, for all i and j: each reading is a sum of three of the nine.
+    basis = np.stack(
+        [
+            [_smooth(-np.cross(np.eye(3)[i], middle, axisb=0, axisc=0) * theta[j], cells).ravel() for j in range(3)]
+            for i in range(3)
+        ]
+    )
+    products = np.einsum("ijn,kln->ijkl", basis, basis)
+    overlaps, total = basis @ turn.ravel(), float(np.sum(turn**2))
+    readings = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            reading = np.zeros((3, 3))
+            reading[range(3), order] = signs
+            power = float(np.einsum("ij,ijkl,kl", reading, products, reading))
+            overlap = float(np.sum(reading * overlaps))
+            explained = max(0.0, overlap) ** 2 / (power * total) if power > 0.0 else 0.0
+            readings.append((explained, power / overlap if overlap > 0.0 else np.nan, order, signs))
+    identity = next(r for r in readings if r[2] == (0, 1, 2) and r[3] == (1.0, 1.0, 1.0))
+    most = max(r[0] for r in readings)
+    # A turn about one axis leaves others open: of equals, the reading nearest to the axes as given.
+    equals = [r for r in readings if r[0] > most - EQUAL]
+    best = max(equals, key=lambda r: sum(sign for i, sign in enumerate(r[3]) if r[2][i] == i))
+    return Turning(identity[1], identity[0], _columns(best[2], best[3]), best[0])
+
+
+def _smooth(signal: Array, cells: int) -> Array:
+    """(3, m) means over `cells`, taken twice, of every `cells`-th column."""
+    for _ in range(2):
+        total = np.cumsum(np.pad(signal, ((0, 0), (1, 0))), axis=1)
+        signal = (total[:, cells:] - total[:, :-cells]) / cells
+    return signal[:, ::cells]
+
+
+def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:
+    """What the columns x, y, z hold when axis i is column ``order[i]`` times ``signs[i]``."""
+    names = [""] * 3
+    for axis, (column, sign) in enumerate(zip(order, signs)):
+        names[column] = ("+" if sign > 0 else "-") + AXES[axis]
+    return " ".join(names)
