@@ -2,16 +2,20 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
+from tests.campaign.test_plan import PLAN, REST
 from truenorth.cli import main
 from truenorth.core.position import Position
-from truenorth.formats import write_imu
+from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
@@ -290,19 +294,62 @@ def test_an_interrupt_is_exit_code_130_and_no_half_result(log, tmp_path):
     assert list((tmp_path / "result").iterdir()) == []
 
 
-def test_an_unexpected_error_keeps_its_traceback(log):
+def test_an_unexpected_error_is_one_line_and_its_traceback_is_in_a_file(log, tmp_path):
     code = (
         "import truenorth.alignment as a\n"
         "def broken(*args, **kwargs): raise ZeroDivisionError('a bug of ours')\n"
         "a.align = broken\n"
-        "from truenorth.cli import main; main()"
+        "from truenorth.__main__ import main; main()"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, "align", str(log), *WHERE], capture_output=True, text=True, check=False
+        [sys.executable, "-c", code, "align", str(log), *WHERE],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
     )
-    assert done.returncode == 1
-    assert "Traceback" in done.stderr
-    assert "ZeroDivisionError: a bug of ours" in done.stderr
+    assert done.returncode == 70
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("truenorth: internal error: ZeroDivisionError: a bug of ours")
+    (details,) = tmp_path.iterdir()
+    assert str(details) in done.stderr
+    assert "Traceback" in details.read_text()
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.03, 0.1, 0.3, 0.6])
+def test_an_interrupt_at_the_start_is_one_line_too(log, moment):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "truenorth", "align", str(log), *WHERE],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(0.15 + moment)  # by then Python itself has started
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert "Traceback" not in err
+    assert process.returncode in (130, -signal.SIGINT, 0)
+
+
+INPUTS = {
+    "align a history": (["align", "history.parquet", *WHERE, "-o", "."], "history.parquet"),
+    "simulate a scenario": (["simulate", "scenario.yaml", "-o", "."], "scenario.yaml"),
+    "a campaign's plan": (["campaign", "plan.yaml", "-o", "."], "plan.yaml"),
+}
+
+
+@pytest.mark.parametrize("case", INPUTS)
+def test_no_command_writes_over_its_input(capsys, monkeypatch, log, tmp_path, case):
+    arguments, name = INPUTS[case]
+    monkeypatch.chdir(tmp_path)
+    write_imu(read_imu(log), tmp_path / "history.parquet")
+    (tmp_path / "scenario.yaml").write_text(yaml.safe_dump(REST))
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(PLAN))
+    before = (tmp_path / name).read_bytes()
+    code, _, err = run(capsys, monkeypatch, *arguments)
+    assert (tmp_path / name).read_bytes() == before
+    assert code == 2
+    assert "is an input of the command" in err
 
 
 def test_brackets_in_names_are_no_markup(capsys, monkeypatch, log, tmp_path):

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -315,9 +316,58 @@ def test_a_worker_that_dies_is_replaced(undisturbed, tmp_path, monkeypatch):
     pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
 
 
-def dying_work(plan, block):
-    from pathlib import Path
+def test_workers_end_with_their_parent(tmp_path):
+    """Killed -9, a campaign leaves no process behind."""
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(PLAN | {"runs": 400, "block": 50}))
+    command = [sys.executable, "-m", "truenorth", "campaign", "plan.yaml", "-o", "out", "--workers", "2"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60.0
+    while len(children_of(process.pid)) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    workers = children_of(process.pid)
+    assert len(workers) >= 2
+    time.sleep(2.0)  # they have started, and work
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    deadline = time.monotonic() + 20.0
+    while any(alive(worker) for worker in workers) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not any(alive(worker) for worker in workers)
 
+
+def children_of(pid):
+    try:
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    except FileNotFoundError:
+        pytest.skip("this system has no /proc with the children of a process")
+    return [int(word) for word in text.split()]
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split(")")[-1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.slow
+def test_the_only_worker_of_a_cluster_dies_and_is_replaced(undisturbed, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    killed = []
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+
+        def kill(done, total):
+            if done and not killed:
+                killed.append(next(iter(cluster.workers.values())).pid)
+                os.kill(killed[0], signal.SIGKILL)
+
+        plan = PLAN | {"block": 1}
+        table = run_campaign(plan, tmp_path, scheduler=cluster.scheduler_address, progress=kill).table
+    assert killed
+    pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
+
+
+def dying_work(plan, block):
     marker = Path(os.environ["TRUENORTH_TEST_MARKER"])
     try:
         marker.unlink()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -76,7 +77,9 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
                 while left or under_way:
                     while left and len(under_way) < AHEAD * workers:
                         block = left.pop(0)
-                        under_way[pool.submit(work, mapping, block)] = block
+                        with uninterrupted():  # the first task starts the workers
+                            future = pool.submit(work, mapping, block)
+                        under_way[future] = block
                     done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                     for future in done:
                         result = future.result()
@@ -98,11 +101,43 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of spawned processes; on the way out, an interrupt does not wait for the blocks under way."""
     import multiprocessing
 
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent)
     try:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def end_with_parent() -> None:
+    """End this worker at once where its parent has died, however it died: nobody would take its result."""
+    import multiprocessing
+    import threading
+
+    parent = multiprocessing.parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold back an interrupt (Ctrl-C) for this process until the block ends, and for the processes started in it for good.
+
+    The terminal interrupts all processes of a command alike; workers that are about to start would each print a traceback.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -140,13 +175,13 @@ def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[
     except (OSError, ValueError) as error:
         raise UsageError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
     with client:
-        plan_there = client.scatter(plan.to_mapping(), broadcast=True)
+        mapping = plan.to_mapping()  # goes with each block: data scattered to workers dies with the last of them
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
         left, here = list(blocks), versions()
 
         def submit(block: Block) -> Any:
             key = f"{plan.fingerprint[:12]}-{block.shard}"
-            return client.submit(work_alike, plan_there, block, here, key=key, pure=False, retries=ATTEMPTS)
+            return client.submit(work_alike, mapping, block, here, key=key, pure=False, retries=ATTEMPTS)
 
         under_way = {submit(block): block for block in left[:ahead]}
         left = left[ahead:]

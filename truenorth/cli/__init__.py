@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from collections.abc import Iterator
 
 import typer
 
@@ -20,6 +21,7 @@ from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
+from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
 
 INTERRUPTED = 130
@@ -56,6 +58,19 @@ def _main(
     pass
 
 
+OUTPUTS = ("-o", "--output", "--plot")
+
+
+def _inputs(arguments: list[str]) -> Iterator[str]:
+    """What on the command line may name an input: every word but those that name an output."""
+    before = ""
+    for word in arguments:
+        option, _, value = word.partition("=")
+        if before not in OUTPUTS and option not in OUTPUTS:
+            yield value or word
+        before = word
+
+
 def main() -> None:
     """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
@@ -64,7 +79,8 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still told
             stream.reconfigure(errors="replace")
     try:
-        app()
+        with protected(_inputs(sys.argv[1:])):
+            app()
     except TruenorthError as error:
         print(f"truenorth: {error}", file=sys.stderr)
         sys.exit(error.exit_code)

@@ -122,13 +122,12 @@ def print_advice(console: Console, advice: Advice | ManoeuvreAdvice) -> None:
 
 
 def _save(advice: Advice | ManoeuvreAdvice, folder: Path) -> list[Path]:
-    from truenorth.core.atomic import atomic_path
+    from truenorth.core.atomic import atomic_files
 
     paths = [folder / "advice.json", folder / "advice.png"]
-    with atomic_path(paths[0]) as temporary:
-        temporary.write_text(json.dumps(advice.summary(), indent=2, allow_nan=False), "utf-8")
-    with atomic_path(paths[1]) as temporary:
-        advice.plot().savefig(temporary, format="png")
+    with atomic_files() as file:
+        file(paths[0]).write_text(json.dumps(advice.summary(), indent=2, allow_nan=False), "utf-8")
+        advice.plot().savefig(file(paths[1]))
     return paths
 
 

@@ -6,14 +6,13 @@ import html
 import io
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_files, writable_folder
 from truenorth.core.errors import UsageError
 from truenorth.papers.claims import Claim, markdown
 from truenorth.papers.table import Figure, to_frame, write_figures
@@ -65,11 +64,11 @@ class Study:
         """
         target = writable_folder(folder)
         paths: list[Path] = []
-        with ExitStack() as files:
+        with atomic_files() as file:
 
             def place(name: str) -> Path:
                 paths.append(target / name)
-                return files.enter_context(atomic_path(paths[-1]))
+                return file(paths[-1])
 
             write_figures(self.figures, place("figures.csv"))
             place("claims.md").write_text(markdown(self.title, self.claims, self.remarks), encoding="utf-8")

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_files, atomic_path, writable_folder
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -62,13 +61,13 @@ def save_alignment(result: Alignment, folder: str | PathLike[str]) -> list[Path]
 
     target = writable_folder(folder)
     summary, history, report = (target / name for name in ("summary.json", "history.parquet", "report.html"))
-    with ExitStack() as files:
+    with atomic_files() as file:
         content = result.summary() | {"navigation": navigation_block(result)}  # what `truenorth navigate` goes on from
         text = json.dumps(content, indent=2, allow_nan=False) + "\n"
-        files.enter_context(atomic_path(summary)).write_text(text, encoding="utf-8")
+        file(summary).write_text(text, encoding="utf-8")
         if result.history is not None:
-            result.to_frame().to_parquet(files.enter_context(atomic_path(history)))
-        files.enter_context(atomic_path(report)).write_text(alignment_page(result), encoding="utf-8")
+            result.to_frame().to_parquet(file(history))
+        file(report).write_text(alignment_page(result), encoding="utf-8")
     if result.history is None:
         history.unlink(missing_ok=True)
         return [summary, report]

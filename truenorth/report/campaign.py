@@ -5,11 +5,10 @@ from __future__ import annotations
 import base64
 import io
 import math
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truenorth.core.atomic import atomic_path
+from truenorth.core.atomic import atomic_files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,11 +63,11 @@ def save_campaign(campaign: Campaign) -> list[Path]:
     }
     figures = campaign.plot()
     paths: list[Path] = []
-    with ExitStack() as files:
+    with atomic_files() as file:
 
         def place(name: str) -> Path:
             paths.append(campaign.folder / name)
-            return files.enter_context(atomic_path(paths[-1]))
+            return file(paths[-1])
 
         for name, table in tables.items():
             table.to_csv(place(name), index=False)

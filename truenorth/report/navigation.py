@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_files, writable_folder
 from truenorth.figures.navigation import ellipses, track_unit
 from truenorth.figures.style import COLOURS, evenly
 from truenorth.navigation.export import geojson
@@ -41,8 +40,8 @@ def save_navigation(result: Navigation, folder: str | PathLike[str]) -> list[Pat
     """
     target = writable_folder(folder)
     paths = [target / name for name in FILES]
-    with ExitStack() as files:
-        summary, track, innovations, line_file, report = (files.enter_context(atomic_path(path)) for path in paths)
+    with atomic_files() as file:
+        summary, track, innovations, line_file, report = (file(path) for path in paths)
         summary.write_text(json.dumps(result.summary(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
         result.to_frame().to_parquet(track)
         result.innovations().to_parquet(innovations)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping
-from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from truenorth import __version__, write_imu, write_record
-from truenorth.core.atomic import atomic_path, writable_folder
+from truenorth.core.atomic import atomic_files, writable_folder
 
 if TYPE_CHECKING:
     from truenorth.simulation.aiding import Aided
@@ -67,8 +66,8 @@ def save_run(
     names = [f"imu.{suffix}", f"truth.{suffix}", "scenario.yaml", "summary.json"]
     names += [f"{key}.{suffix}" for key in records]
     paths = [target / name for name in names]
-    with ExitStack() as files:
-        imu, truth, resolved, summary, *others = [files.enter_context(atomic_path(path)) for path in paths]
+    with atomic_files() as file:
+        imu, truth, resolved, summary, *others = [file(path) for path in paths]
         write_imu(simulation.record, imu)
         for record, path in zip(records.values(), others, strict=True):
             write_record(record, path)
@@ -80,7 +79,7 @@ def save_run(
         if plot:
             paths.append(target / "figure.png")
             title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
-            simulation.plot(title, aiding).savefig(files.enter_context(atomic_path(paths[-1])))
+            simulation.plot(title, aiding).savefig(file(paths[-1]))
     return paths
 
 
