@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from truenorth.report import write_report
     from truenorth.simulation import simulate
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "Alignment": "alignment",
