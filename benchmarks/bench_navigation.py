@@ -10,14 +10,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from truenorth.aiding.source import Aiding
 from truenorth.core.position import Position
-from truenorth.models.ins import InsModel
-from truenorth.navigation.aiding import Aiding
-from truenorth.navigation.driver import Start, navigate_track
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
+from truenorth.state.state import Start
 
 SECONDS, REPEATS = 3600.0, 3
 FREE_LIMIT, AIDED_LIMIT = 0.15, 1.0  # s

@@ -11,10 +11,10 @@ from truenorth.alignment.in_motion_start import backtracked, departures, path_to
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
-from truenorth.models.ins import BG, DP
 from truenorth.navigation import Mounting
 from truenorth.simulation import OdometerSpec, simulate, simulate_odometer
 from truenorth.simulation.scenario import read_scenario
+from truenorth.state.layout import BG, DP
 
 ARCMIN = math.radians(1.0) / 60.0
 RING = read_scenario("odometer_ring")

@@ -10,7 +10,7 @@ from truenorth import align, align_in_motion, navigate
 from truenorth.alignment.in_motion_start import backtracked
 from truenorth.coarse.odometer import gnss_track
 from truenorth.navigation import Mounting
-from truenorth.navigation.driver import Start
+from truenorth.state.state import Start
 
 FOG = {
     "name": "FOG",

@@ -8,7 +8,7 @@ import pytest
 
 import truenorth
 from truenorth.core.position import Position
-from truenorth.models.ins import InsModel
+from truenorth.errors.model import InsModel
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 

@@ -112,8 +112,9 @@ def test_fusion_by_hand():
 
 def test_the_prior_is_that_of_the_navigation():
     """P0 carried to the switch against the covariance that the navigation's own driver carries (in another frame)."""
-    from truenorth.models.ins import InsModel
-    from truenorth.navigation.driver import Start, navigate_track
+    from truenorth.errors.model import InsModel
+    from truenorth.estimate.run import navigate_track
+    from truenorth.state.state import Start
 
     ideal, truth = ideal_and_truth(hours=3.0)
     order = [4, 5, 6, 0, 1, 2, 3, 10, 11, 12, 7, 8, 9]  # phi, dv, dp, bg, ba

@@ -16,10 +16,10 @@ from truenorth.damping.course import Course, errors_of
 from truenorth.damping.options import Damper
 from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI
 from truenorth.navigation import Mounting, Start, navigate
-from truenorth.navigation.sensors import mounting_angles
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import simulate
+from truenorth.state.mounting import mounting_angles
 
 SIGMA = np.zeros(13)
 SIGMA[DV], SIGMA[DP], SIGMA[PHI] = 0.1, 62.0, np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)

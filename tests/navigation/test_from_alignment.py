@@ -5,11 +5,11 @@ import pytest
 
 from truenorth.alignment import align
 from truenorth.core.position import Position
-from truenorth.models.ins import BA, BG, PHI
 from truenorth.navigation import navigate
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import ideal_log, rest, simulate
+from truenorth.state.layout import BA, BG, PHI
 
 PLACE = Position.from_degrees(40.0, 116.0, 50.0, horizontal_sigma=1e-3, vertical_sigma=1e-3)
 

@@ -10,13 +10,13 @@ from truenorth.alignment import align
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.navigation import Mounting, Start, navigate
-from truenorth.navigation.sensors import mounting_angles
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
+from truenorth.state.mounting import mounting_angles
 from truenorth.strapdown.wander import C_en
 
 SPEC = imu_spec("tactical")

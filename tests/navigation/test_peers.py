@@ -7,9 +7,10 @@ import pytest
 
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import normal_gravity
-from truenorth.models.ins import InsModel
-from truenorth.navigation.driver import Start, navigate_track
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord
+from truenorth.state.state import Start
 from truenorth.strapdown.level import NavigationState, mechanise
 
 SWAP = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED and ENU, FRD and RFU, both ways

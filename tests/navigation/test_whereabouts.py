@@ -7,9 +7,9 @@ import pytest
 
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
-from truenorth.navigation.gnss_frames import check_frames
 from truenorth.navigation.whereabouts import check_fixes, check_heights
 from truenorth.records import GnssRecord, HeightRecord
+from truenorth.records.gnss_frames import check_frames
 
 N = 60
 T = 100.0 + np.arange(N)

@@ -11,6 +11,8 @@ from typing import Any, Literal, TypeGuard, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.sensors import from_gnss, from_odometer
+from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_latitude import find_latitude
 from truenorth.alignment.in_motion_start import (
     Guess,
@@ -29,16 +31,17 @@ from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
-from truenorth.models.ins import BA, BG, DP, PHI, InsModel
-from truenorth.navigation.aiding import Aiding
-from truenorth.navigation.driver import Track, navigate_track, with_states
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
-from truenorth.navigation.sensors import Mounting, from_gnss, from_odometer
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.layout import BA, BG, DP, PHI
+from truenorth.state.mounting import Mounting
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 Method = Literal["auto", "gyrocompass", "motion"]

@@ -14,11 +14,12 @@ from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odomet
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
-from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
-from truenorth.navigation.driver import Start, Track
-from truenorth.navigation.sensors import Mounting
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.mounting import Mounting
+from truenorth.state.state import Start
+from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.level import inertial_integrals
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from truenorth.alignment.result import NOT_ESTIMATED, Alignment, Status
-from truenorth.navigation.driver import Track
 from truenorth.navigation.procedure import check_residuals
+from truenorth.state.track import Track
 
 LEVEL_LIMIT = math.radians(3.0)  # a tilt less certain than this is no level
 
@@ -43,10 +43,10 @@ def _wheel(answer: Alignment) -> list[str]:
     moving = answer.moving
     if moving is None or moving.wheel is None:
         return []
-    w, model = moving.wheel, moving.track.model
+    w, layout = moving.wheel, moving.track.layout
     told = []
-    for extra in model.extras:
-        if extra.name == "odometer scale" and w.scale_sigma < NOT_ESTIMATED * extra.sigma[0]:
+    for name, prior in zip(layout.names, layout.priors, strict=True):
+        if name == "odometer scale" and w.scale_sigma < NOT_ESTIMATED * prior[0]:
             told.append(f"the odometer counts {100 * w.scale:+.2f} % ({100 * w.scale_sigma:.2g} % one sigma)")
     return told
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
-from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
+from truenorth.state.layout import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
 if TYPE_CHECKING:
-    from truenorth.navigation.driver import Track
+    from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Moving:
     ----------
     v_n : (3,) array, m/s
     P : (15, 15) array
-        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.models.ins`).
+        Covariance of phi, dv, dp, gyro and accelerometer bias (:mod:`truenorth.errors.ins`).
     distance : float, m
         Travelled.
     heading_from : str
@@ -105,20 +105,20 @@ def _signed(angle: float) -> float:
 
 def fifteen(track: Track) -> Array:
     """(K, 15, 15) covariance of phi, dv, dp and the whole biases, their slow parts included."""
-    model = track.model
-    M = np.zeros((STATES, model.states))
+    layout = track.layout
+    M = np.zeros((STATES, layout.states))
     M[:, :STATES] = np.eye(STATES)
     for group, slow in ((BG, SLOW_GYRO), (BA, SLOW_ACCEL)):
-        extra = model.slice_of(slow)
-        if extra is not None:
-            M[group, extra] = np.eye(3)
+        own = layout.slice_of(slow)
+        if own is not None:
+            M[group, own] = np.eye(3)
     return np.asarray(M @ track.P @ M.T)
 
 
 def wheel_of(track: Track, C_mb: Array, lever_arm: Array) -> Wheel:
     """How the wheel sits after a track, from what was assumed."""
-    model, sensors, sigma = track.model, track.sensors[-1], track.sigma[-1]
-    scale, angles, arm = (model.slice_of(f"odometer {role}") for role in ("scale", "mounting", "lever arm"))
+    layout, sensors, sigma = track.layout, track.sensors[-1], track.sigma[-1]
+    scale, angles, arm = (layout.slice_of(f"odometer {role}") for role in ("scale", "mounting", "lever arm"))
     if angles is not None:
         about_x, about_z = sensors[angles]
         C_mb = dcm_from_rotation_vector(-np.array([about_x, 0.0, about_z])) @ C_mb
@@ -141,7 +141,7 @@ def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[
     variance = P[PHI, PHI][2, 2]
     if wheel is not None:
         # Heading and mounting yaw hang together: the error of the vehicle's heading is phi_U and what is left of the yaw.
-        angles = track.model.slice_of("odometer mounting")
+        angles = track.layout.slice_of("odometer mounting")
         if angles is not None:
             full = track.P[-1]
             yaw = angles.start + 1

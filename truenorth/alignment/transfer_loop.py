@@ -16,10 +16,10 @@ from truenorth.core import earth
 from truenorth.core.attitude import cross, quaternion_from_rotation_vector, quaternion_product
 from truenorth.core.compiled import compiled
 from truenorth.core.linalg import load, propagate_covariance
+from truenorth.estimate.loop import joint_nis, set_matrix
 from truenorth.filters.recursion import SOUND, update, workspace
-from truenorth.models.ins import STATES as INS_STATES
 from truenorth.models.transfer import attitude_rows, transfer_dynamics, transfer_transition, velocity_rows
-from truenorth.navigation.kernel import joint_nis, set_matrix
+from truenorth.state.layout import STATES as INS_STATES
 from truenorth.strapdown.coning import coefficients
 from truenorth.strapdown.level import mechanise_increments
 

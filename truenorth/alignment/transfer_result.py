@@ -34,7 +34,7 @@ class Transfer:
     v_n : (3,) array, m/s
         Of the slave at the alignment's epoch.
     P : (15, 15) array
-        Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.models.ins`): what navigation begins with.
+        Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.errors.ins`): what navigation begins with.
     jumps : tuple of str
         Where the master jumped, in words.
     open : tuple of str

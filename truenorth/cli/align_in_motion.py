@@ -111,7 +111,7 @@ def align_moving(
     from truenorth.alignment.in_motion import WHEEL, usual_antenna
     from truenorth.core.errors import UsageError
     from truenorth.formats import read_gnss, read_odometer
-    from truenorth.navigation.sensors import mounting_angles
+    from truenorth.state.mounting import mounting_angles
 
     if imu is None:
         raise UsageError(

@@ -231,7 +231,7 @@ def _mounting(arm: str | None, option: str, angles: str | None, parts: set[str])
     import numpy as np
 
     from truenorth.navigation import Mounting
-    from truenorth.navigation.sensors import mounting_angles
+    from truenorth.state.mounting import mounting_angles
 
     sigma = {part: SIGMAS[part] for part in parts if part in SIGMAS}
     lever = np.zeros(3) if arm is None else np.array(numbers_of(arm, option, 3, "right,forward,up in metres"))

@@ -37,8 +37,8 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, ecef_axes, normal_gravity, radii
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
-from truenorth.navigation.sensors import Mounting
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.state.mounting import Mounting
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import InertialIntegrals, integrate
 from truenorth.strapdown.level import inertial_integrals

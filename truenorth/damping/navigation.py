@@ -17,15 +17,15 @@ from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import Reference, reference_of
 from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
-from truenorth.models import ins
 from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI, REF, STATES, MarineModel
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.state import layout as ins
 
 if TYPE_CHECKING:
-    from truenorth.navigation.driver import Track
     from truenorth.navigation.result import Navigation
-    from truenorth.navigation.sensors import Mounting
+    from truenorth.state.mounting import Mounting
+    from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ WINDOW = 5.0  # s, of filter 2
 CHANGE_SIGMA = 0.001  # m/s^2, of filter 2's measurement
 SHORTEST = 16  # epochs of a spectrum
 CONTRADICTED = 5.0  # sigmas between INS and log for half of the time: of sound ones one in a million
-LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of models.ins: PHI, and the level parts of DV and DP
+LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of errors.ins: PHI, and the level parts of DV and DP
 
 
 @dataclass(frozen=True)

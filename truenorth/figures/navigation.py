@@ -86,7 +86,7 @@ def ellipse(P: Array) -> Array:
 
 def ellipses(result: Navigation) -> list[Array]:
     """One-sigma ellipses of position at a dozen epochs, metres from the start."""
-    from truenorth.models.ins import DP
+    from truenorth.state.layout import DP
 
     horizontal = slice(DP.start, DP.start + 2)
     rows = evenly(len(result.time), ELLIPSES)

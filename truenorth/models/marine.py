@@ -11,7 +11,7 @@ States, errors computed minus true:
 | BG | gyro bias left, measured minus true, body axes | rad/s |
 | REF | constant error of the reference velocity east, north (15 states) | m/s |
 
-It is the INS model of :mod:`truenorth.models.ins` in ENU with altitude fixed, its rows of the vertical channel left out and
+It is the INS model of :mod:`truenorth.errors.ins` in ENU with altitude fixed, its rows of the vertical channel left out and
 its biases first-order Gauss-Markov processes. Against the paper's states, ``dp_N = (R_M + h) dL`` and
 ``dp_E = (R_N + h) cos L dlon``: a metre has one meaning at every latitude (:func:`position_in_angles`).
 
@@ -33,9 +33,9 @@ from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import padded
 from truenorth.core.units import parse
-from truenorth.models import ins
-from truenorth.models.ins import error_dynamics, transition
+from truenorth.errors.ins import error_dynamics, transition
 from truenorth.records.specs import ImuSpec
+from truenorth.state import layout as ins
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ MOTION = slice(0, 7)  # what drives each other; the biases run by themselves
 STATES = 13
 NAMES = ("v_e", "v_n", "p_e", "p_n", "phi_e", "phi_n", "phi_u")
 
-# The same states in the order of models.ins; its vertical channel, which does not move, has no place here.
+# The same states in the order of errors.ins; its vertical channel, which does not move, has no place here.
 OF_INS = np.array([3, 4, 6, 7, 0, 1, 2, 12, 13, 14, 9, 10, 11])
 
 

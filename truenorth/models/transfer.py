@@ -14,7 +14,7 @@ States, errors of the slave computed minus true; which of those behind the twelv
 | theta, theta' | flexure: the slave's seat turned against the rigid body, slave axes, and its rate | rad, rad/s |
 
 (m are the *master's* axes, in which mu does not turn with what is estimated: in the slave's axes the filter would take its own
-corrections of tilt for knowledge of heading.) The dynamics of the twelve are those of :mod:`truenorth.models.ins` in ENU
+corrections of tilt for knowledge of heading.) The dynamics of the twelve are those of :mod:`truenorth.errors.ins` in ENU
 without the position error, whose part in minutes is below a millionth. The master is late by tau and stands at -r in the slave, so
 that
 
@@ -44,8 +44,8 @@ from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import padded
-from truenorth.models.ins import STATES as INS_STATES
-from truenorth.models.ins import TURN_TIME, error_dynamics
+from truenorth.errors.ins import TURN_TIME, error_dynamics
+from truenorth.state.layout import STATES as INS_STATES
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -81,7 +81,7 @@ class TransferModel:
     gyro_rate_walk, accel_rate_walk : float
         Random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s).
     turn_noise : float, s
-        What scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.models.ins.InsModel`.
+        What scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.errors.model.InsModel`.
     delay, lever_arm, mounting : bool
         States for them: 12 without any, 13 with the delay, 16 with the lever arm, 3 more for the mounting angles.
     delay_walk : float, s/sqrt(s)
@@ -307,7 +307,7 @@ def transfer_dynamics(C: Any, f: Any, v: Any, axis: Any, alt: float, full: Any, 
     Parameters
     ----------
     C, f, v, axis, alt
-        As :func:`truenorth.models.ins.error_dynamics`, ENU.
+        As :func:`truenorth.errors.ins.error_dynamics`, ENU.
     full : (15, 15) array
         Room for the model with position.
     F : (6, N) array, N >= 12

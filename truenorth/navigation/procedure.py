@@ -11,20 +11,24 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
+from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.models.ins import BA, BG, DP, PHI, InsModel
-from truenorth.navigation.aiding import Aiding
-from truenorth.navigation.driver import Residuals, Start, Track, navigate_track, with_states
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, mean_nis
 from truenorth.navigation.second_look import second_look, slow_errors
-from truenorth.navigation.sensors import Mounting, from_gnss, from_height, from_odometer, from_velocity
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, Trajectory, VelocityRecord
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.layout import BA, BG, DP, PHI
+from truenorth.state.mounting import Mounting
+from truenorth.state.state import Start
+from truenorth.state.track import Residuals, Track
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment

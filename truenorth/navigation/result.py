@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import euler_from_dcm, euler_sigma, to_rotation
 from truenorth.core.earth import radii
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.models.ins import BA, BG, DP, DV, PHI
-from truenorth.navigation.driver import Residuals, Track
 from truenorth.records import Late
+from truenorth.state.layout import BA, BG, DP, DV, PHI
+from truenorth.state.track import Residuals, Track
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -161,11 +161,9 @@ class Navigation:
             columns[f"gyro_bias_{axis}_sigma_deg_h"] = t.sigma[:, BG][:, i] / DEG_PER_HOUR
             columns[f"accel_bias_{axis}_ug"] = t.accel_bias[:, i] / MICRO_G
             columns[f"accel_bias_{axis}_sigma_ug"] = t.sigma[:, BA][:, i] / MICRO_G
-        for extra in t.model.extras:
-            where = t.model.slice_of(extra.name)
-            assert where is not None  # it is one of the model's own
+        for group, where in t.layout.groups.items():
             for i, column in enumerate(range(where.start, where.stop)):
-                name = extra.name.replace(" ", "_") + (f"_{i + 1}" if len(extra.sigma) > 1 else "")
+                name = group.replace(" ", "_") + (f"_{i + 1}" if where.stop - where.start > 1 else "")
                 columns[name] = t.sensors[:, column]
                 columns[f"{name}_sigma"] = t.sigma[:, column]
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
@@ -245,9 +243,8 @@ class Navigation:
     def estimated(self) -> dict[str, dict[str, list[float]]]:
         """What was estimated of the aiding sensors at the end: value and one-sigma, SI."""
         found = {}
-        for extra in self.track.model.extras:
-            where = self.track.model.slice_of(extra.name)
-            found[extra.name] = {
+        for group, where in self.track.layout.groups.items():
+            found[group] = {
                 "value": self.track.sensors[-1, where].tolist(),
                 "sigma": self.track.sigma[-1, where].tolist(),
             }

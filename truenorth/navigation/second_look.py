@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.source import Role
 from truenorth.core.errors import DataError
-from truenorth.navigation.aiding import FALSE_REJECTION, Role
-from truenorth.navigation.driver import Track
-from truenorth.navigation.sensors import Mounting
+from truenorth.state.mounting import FALSE_REJECTION, Mounting
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def second_look(run: Callable[[Mapping[str, Mounting]], Track], mounting: Mappin
             )
             continue
         for role in roles:
-            where = track.model.slice_of(f"{name} {role}")
+            where = track.layout.slice_of(f"{name} {role}")
             if where is None or getattr(given, OPEN[role].sigma) > 0.0:
                 continue
             value, sigma = track.sensors[-1, where], track.sigma[-1, where]
@@ -110,7 +110,7 @@ def _contradicted(track: Track) -> float:
 
 
 def _beyond(track: Track, name: str, role: Role) -> bool:
-    where = track.model.slice_of(f"{name} {role}")
+    where = track.layout.slice_of(f"{name} {role}")
     return where is not None and bool(np.any(np.abs(track.sensors[-1, where]) > SMALL * OPEN[role].prior))
 
 

@@ -17,12 +17,12 @@ from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError
 from truenorth.core.position import Position
-from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES
-from truenorth.models.whole_bias import WholeBiases
-from truenorth.navigation.driver import Start
 from truenorth.navigation.handover import Handover
-from truenorth.navigation.sensors import Mounting
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.mounting import Mounting
+from truenorth.state.prior import WholeBiases
+from truenorth.state.state import Start
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.source import Aiding
 from truenorth.core.errors import UsageError
-from truenorth.navigation.aiding import Aiding
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.strapdown.increments import increments

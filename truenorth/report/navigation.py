@@ -20,8 +20,8 @@ from truenorth.report.damping import damping_charts, damping_facts
 from truenorth.report.page import CHART_OPTIONS, short
 
 if TYPE_CHECKING:
-    from truenorth.navigation.driver import Residuals
     from truenorth.navigation.result import Navigation
+    from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 

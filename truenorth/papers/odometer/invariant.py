@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.sensors import from_odometer
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track, with_states
 from truenorth.models.in_motion_azimuth import STATES, correction
-from truenorth.models.ins import BA, BG, DP, DV, PHI, InsModel
-from truenorth.models.ins import STATES as INS_STATES
-from truenorth.navigation.driver import Start, navigate_track, with_states
-from truenorth.navigation.sensors import Mounting, from_odometer
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, POSITION_SIGMA, VELOCITY_SIGMA, Errors
 from truenorth.papers.odometer.scenario import Drives
+from truenorth.state.layout import BA, BG, DP, DV, PHI
+from truenorth.state.layout import STATES as INS_STATES
+from truenorth.state.mounting import Mounting
+from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
 

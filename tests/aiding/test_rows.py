@@ -3,17 +3,19 @@
 import numpy as np
 import pytest
 
+from truenorth.aiding.source import Aiding, state
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.linalg import padded
+from truenorth.errors.group import Group
+from truenorth.errors.model import InsModel
+from truenorth.estimate import loop as kernel
+from truenorth.estimate.run import _sources, with_states
 from truenorth.filters.recursion import workspace
-from truenorth.models.ins import BG, Extra, InsModel
-from truenorth.navigation import kernel
-from truenorth.navigation.aiding import Aiding, state
-from truenorth.navigation.driver import _sources, with_states
+from truenorth.state.layout import BG
 from truenorth.strapdown import wander
 
 LAT, LON, ALT = 1.2, -2.0, 500.0
-MODEL = InsModel(0.0, 0.0, extras=(Extra("slow gyro bias", np.full(3, 1e-6), 300.0),))
+MODEL = InsModel(0.0, 0.0, groups=(Group("slow gyro bias", np.full(3, 1e-6), 300.0),))
 W_B = np.array([0.3, -0.2, 0.5])
 
 
@@ -50,14 +52,14 @@ def _predicted(kind, dx):
     s[wander.VELOCITY] = spin.inv().apply(s[wander.VELOCITY])
     s[wander.ACCELERATION] = [1.0, -2.0, 0.5]
     aux = np.zeros(n)
-    for role, extra in source.states.items():  # small-angle mounting is exact for small assumed angles only
-        aux[model.slice_of(extra.name)] = 1e-4 if role == "mounting" else 0.02
+    for role, group in source.states.items():  # small-angle mounting is exact for small assumed angles only
+        aux[model.layout.slice_of(group.name)] = 1e-4 if role == "mounting" else 0.02
     x = -dx.copy()
     kernel.feed_back(s, aux, n, x)
     sums = kernel.Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1))
     means = kernel.Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1))
     kernel.set_matrix(s, sums.C_now)
-    means.vectors[2] = W_B + dx[BG] + dx[model.slice_of("slow gyro bias")]
+    means.vectors[2] = W_B + dx[BG] + dx[model.layout.slice_of("slow gyro bias")]
     w = workspace(padded(n), 3)
     compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False, 0.0, 0.0, False)
     kernel.measure(
@@ -97,7 +99,7 @@ def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
     """In a steady turn a log's velocity stays as it is, whatever its latency; the error is of its second order."""
     from scipy.spatial.transform import Rotation
 
-    from truenorth.models.odometer import body_velocity_row
+    from truenorth.aiding.body_velocity import body_velocity_row
 
     v_b, w, arm, lag = np.array([0.3, 20.0, 0.1]), np.array(w), np.array([0.5, -1.0, 0.2]), 0.1
     C = dcm_from_euler(0.4, 0.1, -0.2)

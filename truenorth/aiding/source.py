@@ -10,32 +10,32 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.aiding import row
 from truenorth.core.errors import DataError, UsageError
-from truenorth.models.ins import Extra
-from truenorth.navigation import kernel
+from truenorth.errors.group import Group
+from truenorth.state.mounting import FALSE_REJECTION
 
 Array = NDArray[np.float64]
 Kind = Literal["position", "velocity", "body velocity", "height", "rotation", "disturbance"]
 Role = Literal["lever arm", "scale", "mounting", "bias", "lag"]
 
 KINDS: dict[str, int] = {
-    "position": kernel.POSITION,
-    "velocity": kernel.VELOCITY,
-    "body velocity": kernel.BODY_VELOCITY,
-    "height": kernel.HEIGHT,
-    "rotation": kernel.ROTATION,
-    "disturbance": kernel.DISTURBANCE,
+    "position": row.POSITION,
+    "velocity": row.VELOCITY,
+    "body velocity": row.BODY_VELOCITY,
+    "height": row.HEIGHT,
+    "rotation": row.ROTATION,
+    "disturbance": row.DISTURBANCE,
 }
 LENGTHS: dict[str, int] = {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1}
 COLUMNS: dict[str, int] = {
-    "lever arm": kernel.AT_ARM,
-    "scale": kernel.AT_SCALE,
-    "mounting": kernel.AT_MOUNT,
-    "bias": kernel.AT_BIAS,
-    "lag": kernel.AT_LAG,
+    "lever arm": row.AT_ARM,
+    "scale": row.AT_SCALE,
+    "mounting": row.AT_MOUNT,
+    "bias": row.AT_BIAS,
+    "lag": row.AT_LAG,
 }
 NO_GATE = math.inf
-FALSE_REJECTION = 1e-4  # of a sound measurement by the gate
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Aiding:
         IMU to sensor, body axes.
     C_mb : (3, 3) array
         Body to the sensor's axes.
-    states : mapping of role to Extra
+    states : mapping of role to Group
         What of the sensor is estimated: "lever arm" (3), "scale" (1), "mounting" (2: about x and z), "bias" (3; 1 of a
         height), "lag" (1).
     gate : float
@@ -75,7 +75,7 @@ class Aiding:
     sigma: Array
     lever_arm: Array = field(default_factory=lambda: np.zeros(3))
     C_mb: Array = field(default_factory=lambda: np.eye(3))
-    states: Mapping[Role, Extra] = field(default_factory=dict)
+    states: Mapping[Role, Group] = field(default_factory=dict)
     gate: float = FALSE_REJECTION
     loop: float = 0.0
 
@@ -105,10 +105,10 @@ class Aiding:
             raise DataError(
                 f"{self.name}: row {row + 1}: sigma {self.sigma[row, column]}; expected a positive one-sigma noise"
             )
-        for role, extra in self.states.items():
+        for role, group in self.states.items():
             length = 1 if role == "bias" and self.kind == "height" else LENGTHS[role]
-            if len(extra.sigma) != length:
-                raise UsageError(f"{self.name}: {role} has {len(extra.sigma)} states; expected {length}")
+            if len(group.sigma) != length:
+                raise UsageError(f"{self.name}: {role} has {len(group.sigma)} states; expected {length}")
 
     def gates(self) -> Array:
         """(3,) limits of the normalised innovation squared of one, two and three rows."""
@@ -121,6 +121,6 @@ class Aiding:
 
 def state(
     name: str, role: Role, sigma: ArrayLike, correlation_time: float = math.inf, walk: float = 0.0
-) -> dict[Role, Extra]:
+) -> dict[Role, Group]:
     """One estimated property of the sensor of this name, for `Aiding.states`."""
-    return {role: Extra(f"{name} {role}", np.atleast_1d(np.asarray(sigma, np.float64)), correlation_time, walk)}
+    return {role: Group(f"{name} {role}", np.atleast_1d(np.asarray(sigma, np.float64)), correlation_time, walk)}

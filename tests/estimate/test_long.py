@@ -6,12 +6,14 @@ import pytest
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity, radii, transport_rate_n
 from truenorth.core.position import Position
-from truenorth.models.ins import BG, DP, DV, PHI, STATES, InsModel
-from truenorth.navigation.driver import Start, navigate_track
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord
 from truenorth.simulation import Sway, Tone, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight
+from truenorth.state.layout import BG, DP, DV, PHI, STATES
+from truenorth.state.state import Start
 
 LAT = np.radians(45.78)
 HOURS, STEP, ROW = 48.0, 1.0, 60.0  # h, s, s

@@ -7,19 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from truenorth.aiding.source import Aiding
 from truenorth.analysis.consistency import nees
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, normal_gravity, radii
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES, InsModel
-from truenorth.navigation.aiding import Aiding
-from truenorth.navigation.driver import Start, navigate_track
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import ideal_log, rest, simulate
 from truenorth.simulation.course import Leg, course
 from truenorth.simulation.manoeuvres import s_turn, straight
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.state import Start
 from truenorth.strapdown.level import NavigationState, mechanise
 
 SPEC = ImuSpec(
@@ -263,8 +265,8 @@ def test_measurements_in_any_order_at_any_time():
 
 def test_a_lever_arm_a_lag_and_an_outlier():
     """Lever arm and lag left to the filter are found within 4 sigma; fixes 100 m off are rejected, the sound ones kept."""
-    from truenorth.navigation.aiding import state
-    from truenorth.navigation.driver import with_states
+    from truenorth.aiding.source import state
+    from truenorth.estimate.run import with_states
 
     seconds, rng = 200.0, np.random.default_rng(4)
     motion = flight(45.0, seconds)
@@ -279,11 +281,11 @@ def test_a_lever_arm_a_lag_and_an_outlier():
     dx = SIGMA * rng.standard_normal(STATES)
     track = navigate_track(simulation.record, start_at(motion, dx), model, aiding, interval=0.5)
     for name, true in (("GNSS lever arm", [2.0, 5.0, 1.0]), ("GNSS lag", [0.15])):
-        where = model.slice_of(name)
+        where = model.layout.slice_of(name)
         off = track.sensors[-1, where] - true
         assert np.all(np.abs(off) < 4 * track.sigma[-1, where])
     # At constant speed a forward arm and a lag are one combination, seen to centimetres; the arm's prior parts them.
-    forward, lag = model.slice_of("GNSS lever arm").start + 1, model.slice_of("GNSS lag").start
+    forward, lag = model.layout.slice_of("GNSS lever arm").start + 1, model.layout.slice_of("GNSS lag").start
     combination = np.zeros(model.states)
     combination[[forward, lag]] = 1.0, -200.0
     off = combination @ track.sensors[-1] - (5.0 - 200.0 * 0.15)
@@ -368,7 +370,8 @@ def test_covariance_of_the_loop_is_that_of_many_runs():
 
 PROGRAM = """
 import numpy as np
-from truenorth.navigation import Start, kernel, navigate
+from truenorth.estimate import loop as kernel
+from truenorth.navigation import Start, navigate
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord
 from truenorth.records.specs import imu_spec
 t, seconds = 0.02 * np.arange(1, 1001), np.arange(1.0, 20.0)

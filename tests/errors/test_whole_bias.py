@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from truenorth.models.ins import BA, BG, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, InsModel
-from truenorth.models.whole_bias import WholeBiases, taken_apart, time_average
+from truenorth.errors.model import InsModel
+from truenorth.errors.whole_bias import taken_apart, time_average
 from truenorth.records.specs import imu_spec
+from truenorth.state.layout import BA, BG, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
+from truenorth.state.prior import WholeBiases
 
 SPEC = imu_spec("navigation")
 MODEL = InsModel.from_spec(SPEC)
@@ -39,7 +41,7 @@ def test_parts_are_those_of_the_joint_gaussian():
     whole = WholeBiases(np.repeat([c, SPEC.accel_bias**2], 3), averaged)
     bias = np.append(np.full(3, see @ gain * measured), np.zeros(3))
     P, values = taken_apart(MODEL, P15, bias, whole)
-    slow = MODEL.slice_of(SLOW_GYRO)
+    slow = MODEL.layout.slice_of(SLOW_GYRO)
     ends = [0, 1501]
     for i in range(3):
         at = [BG.start + i, slow.start + i]
@@ -57,6 +59,6 @@ def test_what_holds_at_the_start_adds_up_again():
     constant = np.repeat([SPEC.gyro_bias**2, SPEC.accel_bias**2], 3)
     P, values = taken_apart(MODEL, P15, bias, WholeBiases(constant))
     add = np.eye(STATES, MODEL.states)
-    add[BG, MODEL.slice_of(SLOW_GYRO)] = add[BA, MODEL.slice_of(SLOW_ACCEL)] = np.eye(3)
+    add[BG, MODEL.layout.slice_of(SLOW_GYRO)] = add[BA, MODEL.layout.slice_of(SLOW_ACCEL)] = np.eye(3)
     np.testing.assert_allclose(add @ P @ add.T, P15, rtol=1e-9, atol=1e-25)
     np.testing.assert_allclose((add @ values)[BG.start :], bias)

@@ -11,34 +11,44 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.body_velocity import body_velocity_row
+from truenorth.aiding.height import height_row
+from truenorth.aiding.position import position_row
+from truenorth.aiding.rest import rotation_row
+from truenorth.aiding.row import (
+    AT_ARM,
+    AT_BIAS,
+    AT_LAG,
+    AT_MOUNT,
+    AT_SCALE,
+    BODY_VELOCITY,
+    DISTURBANCE,
+    FIRST_GATE,
+    HEIGHT,
+    LOOP,
+    POSITION,
+    ROTATION,
+    VELOCITY,
+)
+from truenorth.aiding.velocity import velocity_row
 from truenorth.core import earth
 from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import compiled
 from truenorth.core.linalg import load, multiply, propagate_covariance
+from truenorth.errors.ins import couple_sensors, error_dynamics, transition
+from truenorth.errors.invariant import reset
 from truenorth.filters.recursion import SOUND, row_variance, update, workspace
-from truenorth.models.gnss import position_row, velocity_row
-from truenorth.models.height import height_row
-from truenorth.models.in_motion import reset
-from truenorth.models.ins import couple_sensors, error_dynamics, transition
-from truenorth.models.odometer import body_velocity_row
-from truenorth.models.rotation import rotation_row
 from truenorth.strapdown.wander import acceleration, advance, displace, earth_axis
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-NOTHING, POSITION, VELOCITY, BODY_VELOCITY, HEIGHT, ROTATION, DISTURBANCE = range(7)
 ABSENT, USED, REJECTED = range(3)
 
 LONGEST_STEP = 0.3  # of the loop's time constant: longer steps would make it swing
 SAME_TIME = 1e-6  # s: an event this near the end of a sample is at its end
 _PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
 GRAVITY_GRADIENT = 2.0 * earth.GRAVITY_EQUATOR / earth.SEMI_MAJOR  # 1/s^2: of the free vertical channel
-
-# Columns of Sources.figures and Sources.states.
-ARM, MOUNT, GATES = slice(0, 3), slice(3, 12), slice(12, 15)
-FIRST_GATE, LOOP, FIGURES = 12, 15, 16
-AT_ARM, AT_SCALE, AT_MOUNT, AT_BIAS, AT_LAG, PLACES = range(6)
 
 
 class Samples(NamedTuple):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
-from truenorth.models.in_motion import left_jacobian, reset
+from truenorth.errors.invariant import left_jacobian, reset
 
 
 def jacobian(phi):

@@ -1,6 +1,6 @@
 """What GNSS tells an INS: position and velocity of an antenna, written once, as compiled functions of one epoch.
 
-A row is *predicted less measured*, so that ``z = H x + noise`` with the states of :mod:`truenorth.models.ins` (errors
+A row is *predicted less measured*, so that ``z = H x + noise`` with the states of :mod:`truenorth.errors.ins` (errors
 computed minus true; what is left of a parameter, true minus assumed). With the lever arm l (body axes) and the clock lag
 tau (the measurement shows the antenna as it was tau before its time stamp):
 
@@ -23,7 +23,7 @@ from truenorth.core.attitude import cross, rotate
 from truenorth.core.compiled import compiled
 from truenorth.strapdown.wander import curvature, earth_axis
 
-_PHI, _DV, _DP, _BG = 0, 3, 6, 9
+_PHI, _DV, _DP = 0, 3, 6
 
 
 @compiled
@@ -116,53 +116,3 @@ def position_row(
         z[j] += bias[j]
         if at_bias >= 0:
             H[j, at_bias + j] = -1.0
-
-
-@compiled
-def velocity_row(
-    s: Any, C: Any, w_b: Any, push: Any, arm: Any, lag: float, at_arm: int, at_lag: int, measured: Any, H: Any, z: Any
-) -> None:
-    """Velocity of an antenna, east, north, up, m/s; as :func:`position_row`.
-
-    Parameters
-    ----------
-    w_b : tuple of 3, rad/s
-        Rate of the body against the earth, body axes.
-    push : tuple of 3, m/s^2
-        Change of the velocity along w.
-    """
-    u_b = cross(w_b, arm)
-    u = (
-        C[0, 0] * u_b[0] + C[0, 1] * u_b[1] + C[0, 2] * u_b[2],
-        C[1, 0] * u_b[0] + C[1, 1] * u_b[1] + C[1, 2] * u_b[2],
-        C[2, 0] * u_b[0] + C[2, 1] * u_b[1] + C[2, 2] * u_b[2],
-    )
-    sine, cosine = azimuth(s)
-    axis = earth_axis(s)
-    Kxx, Kxy, Kyy = curvature(axis, s[11])
-    # Curvature along east, and with it the convergence of the meridians a metre eastwards.
-    east = cosine * cosine * Kxx - 2.0 * sine * cosine * Kxy + sine * sine * Kyy
-    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
-    convergence = 0.0
-    if level > 0.0:
-        convergence = axis[2] / level * east
-    for j in range(3):
-        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
-        c = cross(u, e)
-        g, m = cross(e, arm), cross(w_b, e)
-        for i in range(3):
-            H[i, _PHI + j] = c[i]
-            H[i, _DV + j] = e[i]
-            H[i, _BG + j] = C[i, 0] * g[0] + C[i, 1] * g[1] + C[i, 2] * g[2]
-            if at_arm >= 0:
-                H[i, at_arm + j] = -(C[i, 0] * m[0] + C[i, 1] * m[1] + C[i, 2] * m[2])
-        if at_lag >= 0:
-            H[j, at_lag] = push[j]
-        z[j] = s[4 + j] + u[j] - lag * push[j]
-    H[0, _DP] = convergence * cosine * z[1]
-    H[0, _DP + 1] = -convergence * sine * z[1]
-    H[1, _DP] = -convergence * cosine * z[0]
-    H[1, _DP + 1] = convergence * sine * z[0]
-    into_north(s, H, z)
-    for j in range(3):
-        z[j] -= measured[j]

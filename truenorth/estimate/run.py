@@ -9,141 +9,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding import row
+from truenorth.aiding.source import COLUMNS, KINDS, Aiding
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.linalg import padded
+from truenorth.errors.model import InsModel
+from truenorth.errors.whole_bias import taken_apart
+from truenorth.estimate import loop as kernel
 from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
-from truenorth.models.ins import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, InsModel
-from truenorth.models.whole_bias import WholeBiases, taken_apart
-from truenorth.navigation import kernel
-from truenorth.navigation.aiding import COLUMNS, KINDS, Aiding
 from truenorth.records import ImuRecord
+from truenorth.state.layout import BA, BG, DP, DV, PHI
+from truenorth.state.state import Start
+from truenorth.state.track import Residuals, Track
 from truenorth.strapdown import wander
 from truenorth.strapdown.increments import increments, interval_lengths, read_only
 
 if TYPE_CHECKING:
-    from truenorth.navigation.sensors import Mounting
+    pass
 
 Array = NDArray[np.float64]
 POLE = np.radians(89.999)  # beyond, north has no meaning that a metre of position leaves
-
-
-@dataclass(frozen=True)
-class Start:
-    """Where navigation begins: the state at one epoch, and what is known of its errors.
-
-    Attributes
-    ----------
-    time : float, s
-    C_nb : (3, 3) array
-    v_n : (3,) array, m/s
-    lat, lon, alt : float, rad, rad, m
-    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
-    P : (15, 15) array
-        Covariance of the errors phi, dv, dp, gyro and accelerometer bias (see :mod:`truenorth.models.ins`), ENU.
-    whole : WholeBiases or None
-        The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
-    wheel : Mounting or None
-        How an alignment on the move found the odometer to sit and to count.
-    """
-
-    time: float
-    C_nb: Array
-    v_n: Array
-    lat: float
-    lon: float
-    alt: float
-    gyro_bias: Array
-    accel_bias: Array
-    P: Array
-    whole: WholeBiases | None = None
-    wheel: Mounting | None = None
-
-
-@dataclass(frozen=True)
-class Residuals:
-    """What one source's measurements said against the prediction.
-
-    Attributes
-    ----------
-    name : str
-    time : (M,) array, s
-    innovation, sigma : (M, 3) arrays
-        Predicted less measured, and the one-sigma expected of it; NaN where absent.
-    nis : (M,) array
-        Normalised innovation squared of the rows together; its mean is their number where the model is right.
-    used : (M,) array of bool
-        Not rejected by the gate.
-    outside : int
-        Measurements before the start or after the end of the IMU's log.
-    """
-
-    name: str
-    time: Array
-    innovation: Array
-    sigma: Array
-    nis: Array
-    used: NDArray[np.bool_]
-    outside: int
-
-    @property
-    def rows(self) -> NDArray[np.int64]:
-        """(M,) how many components each measurement has."""
-        return np.isfinite(self.innovation).sum(axis=1)
-
-    @property
-    def rejected(self) -> int:
-        """How many the gate kept out."""
-        return int(np.sum(~self.used))
-
-
-@dataclass(frozen=True)
-class Track:
-    """The state along the track, ENU; one row an output epoch.
-
-    Attributes
-    ----------
-    time : (K,) array, s
-    C_nb : (K, 3, 3) array
-    v_n : (K, 3) array, m/s
-    position : (K, 3) array
-        Latitude, longitude (rad), height (m).
-    sensors : (K, n) array
-        What is assumed of the sensors, in the places of the states: biases, scale factors, ...
-    P : (K, n, n) array
-        Covariance of the errors; K = 0 where none was asked for.
-    model : InsModel
-    residuals : tuple of Residuals
-    """
-
-    time: Array
-    C_nb: Array
-    v_n: Array
-    position: Array
-    sensors: Array
-    P: Array
-    model: InsModel
-    residuals: tuple[Residuals, ...]
-
-    def bias(self, group: slice, slow: str) -> Array:
-        """(K, 3) a sensor's whole bias, its slow part included."""
-        extra = self.model.slice_of(slow)
-        return self.sensors[:, group] + (0.0 if extra is None else self.sensors[:, extra])
-
-    @property
-    def gyro_bias(self) -> Array:
-        """(K, 3) rad/s."""
-        return self.bias(BG, SLOW_GYRO)
-
-    @property
-    def accel_bias(self) -> Array:
-        """(K, 3) m/s^2."""
-        return self.bias(BA, SLOW_ACCEL)
-
-    @property
-    def sigma(self) -> Array:
-        """(K, n) one-sigma of the errors."""
-        return np.sqrt(np.maximum(np.einsum("kii->ki", self.P), 0.0))
 
 
 @dataclass(frozen=True)
@@ -227,7 +113,7 @@ def navigate_track(
         Its first sample begins at the start's epoch.
     start : Start
     model : InsModel
-        With the states that `aiding` asks for among its extras (see :func:`with_states`).
+        With the states that `aiding` asks for among its groups (see :func:`with_states`).
     aiding : sequence of Aiding
     interval : float, s
         Of the filter's prediction; forces and turns within it are integrated sample by sample.
@@ -238,7 +124,7 @@ def navigate_track(
     smooth : bool
         Smooth over the whole log (Rauch, Tung, Striebel).
     invariant : bool
-        Corrections turn velocity with attitude (:mod:`truenorth.models.in_motion`): for starts with a heading that is far off.
+        Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
 
     Returns
     -------
@@ -307,7 +193,7 @@ def navigate_track(
         _raise(code, plan, event, aiding)
     state, sensors, P = kept.state, kept.aux, kept.P
     if smooth:
-        from truenorth.navigation.smoothing import smoothed
+        from truenorth.estimate.smoothing import smoothed
 
         state, sensors, P = smoothed(plan, kept, P0)
     C_nb, v_n, position, C_nw = wander.north(state)
@@ -317,13 +203,13 @@ def navigate_track(
     residuals = tuple(
         _residuals(source, plan, kept, number) for number, source in enumerate(aiding) if source.kind != "disturbance"
     )
-    return Track(plan.time[plan.output], C_nb, v_n, position, sensors, P, model, residuals)
+    return Track(plan.time[plan.output], C_nb, v_n, position, sensors, P, model.layout, residuals)
 
 
 def with_states(model: InsModel, aiding: Sequence[Aiding]) -> InsModel:
     """The model with the states that the aiding sensors ask for; one that two sources share stands once."""
-    extras = {extra.name: extra for source in aiding for extra in source.states.values()}
-    return replace(model, extras=(*model.extras, *extras.values()))
+    groups = {group.name: group for source in aiding for group in source.states.values()}
+    return replace(model, groups=(*model.groups, *groups.values()))
 
 
 def convergence(C_nw: Array, v_n: Array, position: Array, n: int) -> Array:
@@ -351,15 +237,15 @@ def _solve(J: Array, P: Array) -> Array:
 
 
 def _sources(aiding: Sequence[Aiding], model: InsModel) -> kernel.Sources:
-    figures = np.zeros((len(aiding), kernel.FIGURES))
-    states = np.full((len(aiding), kernel.PLACES), -1, dtype=np.int64)
+    figures = np.zeros((len(aiding), row.FIGURES))
+    states = np.full((len(aiding), row.PLACES), -1, dtype=np.int64)
     for number, source in enumerate(aiding):
-        figures[number, kernel.ARM] = source.lever_arm
-        figures[number, kernel.MOUNT] = source.C_mb.ravel()
-        figures[number, kernel.GATES] = source.gates()
-        figures[number, kernel.LOOP] = source.loop
-        for role, extra in source.states.items():
-            states[number, COLUMNS[role]] = model.first_of(extra.name)
+        figures[number, row.ARM] = source.lever_arm
+        figures[number, row.MOUNT] = source.C_mb.ravel()
+        figures[number, row.GATES] = source.gates()
+        figures[number, row.LOOP] = source.loop
+        for role, group in source.states.items():
+            states[number, COLUMNS[role]] = model.layout.first_of(group.name)
     return kernel.Sources(np.array([KINDS[source.kind] for source in aiding], dtype=np.int64), figures, states)
 
 

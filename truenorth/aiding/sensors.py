@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.attitude import dcm_from_euler
+from truenorth.aiding.source import Aiding, Role, state
 from truenorth.core.errors import UsageError
-from truenorth.models.ins import Extra
-from truenorth.navigation.aiding import FALSE_REJECTION, Aiding, Role, state
-from truenorth.navigation.gnss_frames import check_frames
+from truenorth.errors.group import Group
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
+from truenorth.records.gnss_frames import check_frames
+from truenorth.state.mounting import Mounting
 
 Array = NDArray[np.float64]
 
@@ -21,87 +20,24 @@ POSITION_SIGMA = np.array([3.0, 3.0, 5.0])  # m, of a fix whose receiver says no
 USER_RANGE = 2.0  # m, of one range, where only dilutions of precision are given
 VELOCITY_SIGMA = np.array([0.1, 0.1, 0.2])  # m/s
 ODOMETER_SIGMA = 0.05  # m/s, beside the pulses' size
-SLIP_SIGMA = 0.1  # m/s, of a wheel sideways and of a body on its springs up and down
 LOG_SIGMA = 0.1  # m/s
 BARO_SIGMA, BARO_DRIFT, BARO_TIME = 1.0, 10.0, 3600.0  # m, m, s: noise, weather
-LONGEST_ARM = 100.0  # m; ships have no longer ones
 FASTEST = 10.0  # Hz: faster odometers are averaged, since their errors are not new ten times a second
 
 
-@dataclass(frozen=True)
-class Mounting:
-    """How an aiding sensor sits on the vehicle, and how well that is known.
-
-    Attributes
-    ----------
-    lever_arm : (3,) array, m
-        IMU to sensor (antenna, wheel), IMU body axes: right, forward, up.
-    lever_arm_sigma : float, m
-        0: known; else the arm is estimated.
-    C_mb : (3, 3) array
-        IMU body to vehicle axes (right, forward, up) for body velocities.
-    angle_sigma : float, rad
-        Of pitch and yaw of that; 0: known.
-    scale_sigma : float
-        Of an odometer's or a log's scale factor; 0: known.
-    bias_sigma : float, m/s or m
-        Of a slow error of a velocity log, a barometer or a receiver's positions; 0: none.
-    bias_time : float, s
-        Its correlation time.
-    latency : float, s
-        The measurement is older than its time stamp by this much.
-    latency_sigma : float, s
-        0: known; else the latency is estimated.
-    gate : float
-        Probability of rejecting a sound measurement; 0: none is rejected.
-    noise : float or None, m/s or m
-        One-sigma noise where the record itself does not say; None: a usual value.
-    slip : float, m/s
-        One-sigma velocity of a wheel sideways and upwards (the non-holonomic constraint).
-    """
-
-    lever_arm: Array = field(default_factory=lambda: np.zeros(3))
-    lever_arm_sigma: float = 0.0
-    C_mb: Array = field(default_factory=lambda: np.eye(3))
-    angle_sigma: float = 0.0
-    scale_sigma: float = 0.0
-    bias_sigma: float = 0.0
-    bias_time: float = math.inf
-    latency: float = 0.0
-    latency_sigma: float = 0.0
-    gate: float = FALSE_REJECTION
-    noise: float | None = None
-    slip: float = SLIP_SIGMA
-
-    def __post_init__(self) -> None:
-        arm = np.asarray(self.lever_arm, dtype=np.float64)
-        if arm.shape != (3,) or not np.all(np.isfinite(arm)):
-            raise UsageError(f"lever arm {self.lever_arm!r}; expected three finite numbers: right, forward, up, metres")
-        if np.linalg.norm(arm) > LONGEST_ARM:
-            raise UsageError(
-                f"lever arm {arm.tolist()} is {np.linalg.norm(arm):.0f} m long; expected metres (right, forward, up): were "
-                "centimetres or millimetres handed in?"
-            )
-        object.__setattr__(self, "lever_arm", arm)
-
-    def states(self, name: str, *roles: Role) -> dict[Role, Extra]:
-        """States of those properties that are not known."""
-        sigmas: dict[Role, ArrayLike] = {
-            "lever arm": np.full(3, self.lever_arm_sigma),
-            "mounting": np.full(2, self.angle_sigma),
-            "scale": self.scale_sigma,
-            "lag": self.latency_sigma,
-        }
-        found: dict[Role, Extra] = {}
-        for role in roles:
-            if np.any(np.asarray(sigmas[role]) > 0.0):
-                found |= state(name, role, sigmas[role])
-        return found
-
-
-def mounting_angles(heading: float, pitch: float = 0.0, roll: float = 0.0) -> Array:
-    """``C_mb`` from where the IMU's axes point on the vehicle: its heading, pitch, roll against the vehicle, rad."""
-    return np.asarray(dcm_from_euler(heading, pitch, roll), dtype=np.float64)
+def states_of(mounting: Mounting, name: str, *roles: Role) -> dict[Role, Group]:
+    """States of those properties of a sensor that are not known."""
+    sigmas: dict[Role, ArrayLike] = {
+        "lever arm": np.full(3, mounting.lever_arm_sigma),
+        "mounting": np.full(2, mounting.angle_sigma),
+        "scale": mounting.scale_sigma,
+        "lag": mounting.latency_sigma,
+    }
+    found: dict[Role, Group] = {}
+    for role in roles:
+        if np.any(np.asarray(sigmas[role]) > 0.0):
+            found |= state(name, role, sigmas[role])
+    return found
 
 
 def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -> list[Aiding]:
@@ -131,7 +67,7 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         sigma = _position_sigma(record, POSITION_SIGMA if mounting.noise is None else np.full(3, mounting.noise))
         if not heights:
             measured[:, 2] = np.nan
-        states = mounting.states("GNSS", "lever arm", "lag")
+        states = states_of(mounting, "GNSS", "lever arm", "lag")
         if mounting.bias_sigma > 0.0:
             states |= state("GNSS", "bias", np.full(3, mounting.bias_sigma), mounting.bias_time)
         found.append(
@@ -152,7 +88,7 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         if not heights:
             measured[:, 2] = np.nan
         sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
-        states = mounting.states("GNSS", "lever arm", "lag")
+        states = states_of(mounting, "GNSS", "lever arm", "lag")
         found.append(
             Aiding(
                 "GNSS velocity",
@@ -195,7 +131,7 @@ def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:
     zero = np.zeros_like(forward)
     measured = np.stack([zero, forward, zero], axis=1)
     noise = np.stack([zero + slip, np.hypot(sigma, counted) + zero, zero + slip], axis=1)
-    states = mounting.states("odometer", "lever arm", "scale", "mounting", "lag")
+    states = states_of(mounting, "odometer", "lever arm", "scale", "mounting", "lag")
     return [
         Aiding(
             "odometer",
@@ -217,7 +153,7 @@ def from_velocity(record: VelocityRecord, mounting: Mounting) -> list[Aiding]:
     sigma = _or_default(record.sigma, np.full(3, noise), len(record))
     time = record.time - mounting.latency
     if record.frame == "navigation":
-        states = mounting.states("velocity log", "lever arm", "lag")
+        states = states_of(mounting, "velocity log", "lever arm", "lag")
         return [
             Aiding(
                 "velocity log",
@@ -230,7 +166,7 @@ def from_velocity(record: VelocityRecord, mounting: Mounting) -> list[Aiding]:
                 gate=mounting.gate,
             )
         ]
-    states = mounting.states("velocity log", "lever arm", "scale", "mounting", "lag")
+    states = states_of(mounting, "velocity log", "lever arm", "scale", "mounting", "lag")
     if mounting.bias_sigma > 0.0:
         states |= state("velocity log", "bias", np.full(3, mounting.bias_sigma), mounting.bias_time)
     return [
@@ -270,7 +206,7 @@ def from_height(record: HeightRecord, mounting: Mounting, loop: float = 0.0) -> 
     sigma = np.full((len(record), 3), np.nan)
     noise = BARO_SIGMA if mounting.noise is None else mounting.noise
     sigma[:, 0] = noise if record.sigma is None else np.where(np.isfinite(record.sigma), record.sigma, noise)
-    states: dict[Role, Extra] = {}
+    states: dict[Role, Group] = {}
     if mounting.bias_sigma > 0.0:
         states = state("barometer", "bias", mounting.bias_sigma, mounting.bias_time)
     return [

@@ -6,11 +6,12 @@ import pytest
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
-from truenorth.models.ins import BA, BG, DP, DV, PHI, STATES, InsModel
+from truenorth.errors.model import InsModel
 from truenorth.records import ImuRecord
 from truenorth.simulation import ideal_log
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
 from truenorth.strapdown.level import NavigationState, mechanise
 
 LAT, ALT, SPEED = np.radians(60.0), 3000.0, 200.0

@@ -12,32 +12,17 @@ the data say of ``c`` and ``w(T)``, they say through m alone: both follow from i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.models.ins import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES, InsModel
+from truenorth.errors.model import InsModel
+from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES
+from truenorth.state.prior import WholeBiases
 
 Array = NDArray[np.float64]
 
 SHORT = 1e-3  # of the correlation time: a process does not change in less
-
-
-@dataclass(frozen=True)
-class WholeBiases:
-    """How to take apart the biases of a start.
-
-    Attributes
-    ----------
-    constant : (6,) array
-        Variance a priori of what is constant of the gyro and accelerometer biases, (rad/s)^2 and (m/s^2)^2.
-    averaged : float, s
-        They are means over the time before the start; 0: they hold at the start.
-    """
-
-    constant: Array
-    averaged: float = 0.0
 
 
 def time_average(x: float) -> tuple[float, float]:
@@ -69,12 +54,12 @@ def taken_apart(model: InsModel, P15: Array, bias: Array, whole: WholeBiases) ->
     values[BG.start : BA.stop] = bias
     P = model.prior(np.zeros((STATES, STATES)))
     for group, name, c in ((BG, SLOW_GYRO, whole.constant[:3]), (BA, SLOW_ACCEL, whole.constant[3:])):
-        slow = model.slice_of(name)
+        slow = model.layout.slice_of(name)
         if slow is None:
             continue
         s = np.diag(P)[slow].copy()
-        extra = model.extras[[e.name for e in model.extras].index(name)]
-        mean, late = time_average(whole.averaged / extra.correlation_time)
+        process = model.groups[model.layout.names.index(name)]
+        mean, late = time_average(whole.averaged / process.correlation_time)
         told = c + mean * s  # variance a priori of what the data see
         a, b = c / told, late * s / told
         M[group, group], M[slow, group] = np.diag(a), np.diag(b)

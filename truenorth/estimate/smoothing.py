@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.estimate import loop as kernel
 from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
-from truenorth.navigation import kernel
 from truenorth.strapdown import wander
 
 if TYPE_CHECKING:
-    from truenorth.navigation.driver import Timeline
+    from truenorth.estimate.run import Timeline
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,205 @@
+"""The error model of a specification: noise of an INS, its states and the groups behind them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import padded
+from truenorth.errors.group import Group
+from truenorth.errors.ins import TURN_TIME, couple_sensors, error_dynamics, transition
+from truenorth.records.specs import ImuSpec
+from truenorth.state.layout import BA, BG, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
+
+Array = NDArray[np.float64]
+
+GYRO_SCALE, ACCEL_SCALE = "gyro scale factor", "accelerometer scale factor"
+
+
+@dataclass(frozen=True)
+class InsModel:
+    """Noise of an INS, and its states; everything one-sigma, SI.
+
+    Attributes
+    ----------
+    gyro_random_walk : float, rad/sqrt(s)
+    accel_random_walk : float, m/s/sqrt(s)
+    gyro_rate_walk, accel_rate_walk : float
+        Random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s).
+    turn_noise : (2,) tuple, s
+        What scale factors and misalignments of the gyros do in turns, as noise: their variances times `TURN_TIME`.
+    groups : tuple of Group
+        Further states, in order.
+    fixed_altitude : bool
+        Height held: its error and that of vertical velocity stay as they are.
+    """
+
+    gyro_random_walk: float
+    accel_random_walk: float
+    gyro_rate_walk: float = 0.0
+    accel_rate_walk: float = 0.0
+    turn_noise: tuple[float, float] = (0.0, 0.0)
+    groups: tuple[Group, ...] = ()
+    fixed_altitude: bool = False
+
+    @classmethod
+    def from_spec(
+        cls,
+        spec: ImuSpec,
+        *,
+        scale_factors: bool = False,
+        groups: tuple[Group, ...] = (),
+        fixed_altitude: bool = False,
+    ) -> InsModel:
+        """The model of a specification: its bias instabilities are Gauss-Markov states of their own.
+
+        Parameters
+        ----------
+        spec : ImuSpec
+        scale_factors : bool
+            States for the scale factors; else they count as noise in turns, as the gyros' misalignments do.
+        groups : tuple of Group
+            Of aiding sensors.
+        fixed_altitude : bool
+        """
+        own: list[Group] = []
+        for name, sigma, time in (
+            (SLOW_GYRO, spec.gyro_bias_instability, spec.correlation_time),
+            (SLOW_ACCEL, spec.accel_bias_instability, spec.correlation_time),
+            (GYRO_SCALE, spec.gyro_scale_factor * scale_factors, math.inf),
+            (ACCEL_SCALE, spec.accel_scale_factor * scale_factors, math.inf),
+        ):
+            if sigma > 0.0:
+                own.append(Group(name, np.full(3, sigma), time))
+        scale = 0.0 if scale_factors else spec.gyro_scale_factor
+        return cls(
+            gyro_random_walk=spec.gyro_random_walk,
+            accel_random_walk=spec.accel_random_walk,
+            turn_noise=(scale**2 * TURN_TIME, spec.gyro_misalignment**2 * TURN_TIME),
+            gyro_rate_walk=spec.gyro_rate_random_walk,
+            accel_rate_walk=spec.accel_rate_random_walk,
+            groups=(*own, *groups),
+            fixed_altitude=fixed_altitude,
+        )
+
+    @property
+    def layout(self) -> Layout:
+        """Where the states stand."""
+        return Layout(tuple(g.name for g in self.groups), tuple(tuple(map(float, g.sigma)) for g in self.groups))
+
+    @property
+    def states(self) -> int:
+        """How many."""
+        return self.layout.states
+
+    @property
+    def sensor_states(self) -> NDArray[np.int64]:
+        """(4,) what :func:`couple_sensors` asks for."""
+        return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL, GYRO_SCALE, ACCEL_SCALE)])
+
+    @property
+    def decay(self) -> Array:
+        """(n,) inverse correlation time of each state, 1/s."""
+        parts = [np.full(len(group.sigma), 1.0 / group.correlation_time) for group in self.groups]
+        return np.concatenate([np.zeros(STATES), *parts])
+
+    @property
+    def noise(self) -> Array:
+        """(n,) spectral density of the white noise that drives each state, its unit^2/s."""
+        q = np.zeros(self.states)
+        q[PHI], q[DV] = self.gyro_random_walk**2, self.accel_random_walk**2
+        q[BG], q[BA] = self.gyro_rate_walk**2, self.accel_rate_walk**2
+        if self.fixed_altitude:
+            q[DV.stop - 1] = 0.0
+        start = STATES
+        for group in self.groups:
+            stop = start + len(group.sigma)
+            q[start:stop] = 2.0 * group.sigma**2 / group.correlation_time + group.walk**2
+            start = stop
+        return q
+
+    def prior(self, P15: ArrayLike) -> Array:
+        """(n, n) covariance at the start: the given one of the fifteen, the groups' own sigmas behind it."""
+        P = np.zeros((self.states, self.states))
+        P[:STATES, :STATES] = P15
+        if self.fixed_altitude:
+            P[DV.stop - 1, :] = 0.0
+            P[:, DV.stop - 1] = 0.0
+        if self.groups:
+            P[STATES:, STATES:] = np.diag(np.concatenate([group.sigma for group in self.groups]) ** 2)
+        return P
+
+    def linearise(
+        self,
+        T: ArrayLike,
+        C_nb: ArrayLike,
+        f_n: ArrayLike,
+        v_n: ArrayLike,
+        lat: ArrayLike,
+        alt: ArrayLike,
+        w_ib_b: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> tuple[Array, Array]:
+        """Stack the model over K intervals of a trajectory, in ENU, for :class:`truenorth.filters.LinearSystem`.
+
+        Parameters
+        ----------
+        T : (K,) array, s
+        C_nb : (K, 3, 3) array
+            Mean over each interval, as all that follow.
+        f_n : (K, 3) array, m/s^2
+        v_n : (K, 3) array, m/s
+        lat, alt : (K,) arrays, rad and m
+        w_ib_b : (K, 3) array, rad/s
+            Needed for scale factors and misalignments of the gyros.
+
+        Returns
+        -------
+        Phi, Q : (K, n, n) arrays
+            ``Q = (Phi q Phi' + q) T/2``: the noise's density by the trapezoid.
+        """
+        T, C, f, v, lat, alt = (np.ascontiguousarray(a, dtype=np.float64) for a in (T, C_nb, f_n, v_n, lat, alt))
+        axis = np.stack([np.zeros_like(lat), np.cos(lat), np.sin(lat)], axis=-1)
+        w_b = np.ascontiguousarray(np.broadcast_to(np.asarray(w_ib_b, dtype=np.float64), f.shape))
+        f_b = np.einsum("kij,ki->kj", C, f)
+        n = self.states
+        Phi = np.empty((len(T), n, n))
+        fixed, at = self.fixed_altitude, self.sensor_states
+        _stack(padded(n), T, C, f, f_b, w_b, v, axis, alt, fixed, at, self.decay, Phi)
+        q = np.zeros((len(T), n, n))
+        q[:] = np.diag(self.noise)
+        square = w_b**2
+        turning = self.turn_noise[0] * square + self.turn_noise[1] * (square.sum(axis=1, keepdims=True) - square)
+        q[:, PHI, PHI] += (C * turning[:, None, :]) @ np.swapaxes(C, 1, 2)
+        return Phi, 0.5 * T[:, None, None] * (Phi @ q @ np.swapaxes(Phi, 1, 2) + q)
+
+
+@compiled
+def _stack(
+    size: Any,
+    T: Any,
+    C: Any,
+    f_n: Any,
+    f_b: Any,
+    w_b: Any,
+    v: Any,
+    axis: Any,
+    alt: Any,
+    fixed: bool,
+    at: Any,
+    decay: Any,
+    out: Any,
+) -> None:
+    N, n = len(size), len(decay)
+    F, Phi, Phi_t = np.zeros((N, N)), np.zeros((N, N)), np.zeros((N, N))
+    for k in range(len(T)):
+        error_dynamics(C[k], f_n[k], v[k], axis[k], alt[k], True, fixed, F)
+        couple_sensors(C[k], w_b[k], f_b[k], at, fixed, F)
+        transition(size, F, decay, T[k], Phi, Phi_t)
+        for i in range(n):
+            for j in range(n):
+                out[k, i, j] = Phi[i, j]

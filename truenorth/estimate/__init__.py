@@ -1,0 +1,1 @@
+"""Estimators: the closed loop with its events, and its smoother."""

@@ -1,0 +1,80 @@
+"""How an aiding sensor sits on the vehicle, and how well that is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import UsageError
+
+Array = NDArray[np.float64]
+
+SLIP_SIGMA = 0.1  # m/s, of a wheel sideways and of a body on its springs up and down
+LONGEST_ARM = 100.0  # m; ships have no longer ones
+FALSE_REJECTION = 1e-4  # of a sound measurement by the gate
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """How an aiding sensor sits on the vehicle, and how well that is known.
+
+    Attributes
+    ----------
+    lever_arm : (3,) array, m
+        IMU to sensor (antenna, wheel), IMU body axes: right, forward, up.
+    lever_arm_sigma : float, m
+        0: known; else the arm is estimated.
+    C_mb : (3, 3) array
+        IMU body to vehicle axes (right, forward, up) for body velocities.
+    angle_sigma : float, rad
+        Of pitch and yaw of that; 0: known.
+    scale_sigma : float
+        Of an odometer's or a log's scale factor; 0: known.
+    bias_sigma : float, m/s or m
+        Of a slow error of a velocity log, a barometer or a receiver's positions; 0: none.
+    bias_time : float, s
+        Its correlation time.
+    latency : float, s
+        The measurement is older than its time stamp by this much.
+    latency_sigma : float, s
+        0: known; else the latency is estimated.
+    gate : float
+        Probability of rejecting a sound measurement; 0: none is rejected.
+    noise : float or None, m/s or m
+        One-sigma noise where the record itself does not say; None: a usual value.
+    slip : float, m/s
+        One-sigma velocity of a wheel sideways and upwards (the non-holonomic constraint).
+    """
+
+    lever_arm: Array = field(default_factory=lambda: np.zeros(3))
+    lever_arm_sigma: float = 0.0
+    C_mb: Array = field(default_factory=lambda: np.eye(3))
+    angle_sigma: float = 0.0
+    scale_sigma: float = 0.0
+    bias_sigma: float = 0.0
+    bias_time: float = math.inf
+    latency: float = 0.0
+    latency_sigma: float = 0.0
+    gate: float = FALSE_REJECTION
+    noise: float | None = None
+    slip: float = SLIP_SIGMA
+
+    def __post_init__(self) -> None:
+        arm = np.asarray(self.lever_arm, dtype=np.float64)
+        if arm.shape != (3,) or not np.all(np.isfinite(arm)):
+            raise UsageError(f"lever arm {self.lever_arm!r}; expected three finite numbers: right, forward, up, metres")
+        if np.linalg.norm(arm) > LONGEST_ARM:
+            raise UsageError(
+                f"lever arm {arm.tolist()} is {np.linalg.norm(arm):.0f} m long; expected metres (right, forward, up): were "
+                "centimetres or millimetres handed in?"
+            )
+        object.__setattr__(self, "lever_arm", arm)
+
+
+def mounting_angles(heading: float, pitch: float = 0.0, roll: float = 0.0) -> Array:
+    """``C_mb`` from where the IMU's axes point on the vehicle: its heading, pitch, roll against the vehicle, rad."""
+    return np.asarray(dcm_from_euler(heading, pitch, roll), dtype=np.float64)

@@ -1,0 +1,55 @@
+"""One epoch: where a vehicle is, how it lies and moves, and what is assumed of its IMU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.state.mounting import Mounting
+from truenorth.state.prior import WholeBiases
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class State:
+    """Attitude, velocity and place at one epoch, ENU, and the biases assumed.
+
+    Attributes
+    ----------
+    time : float, s
+    C_nb : (3, 3) array
+    v_n : (3,) array, m/s
+    lat, lon, alt : float, rad, rad, m
+    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
+    """
+
+    time: float
+    C_nb: Array
+    v_n: Array
+    lat: float
+    lon: float
+    alt: float
+    gyro_bias: Array
+    accel_bias: Array
+
+
+@dataclass(frozen=True)
+class Start(State):
+    """Where navigation begins: a state, and what is known of its errors.
+
+    Attributes
+    ----------
+    P : (15, 15) array
+        Covariance of the errors phi, dv, dp, gyro and accelerometer bias (see :mod:`truenorth.errors.ins`), ENU.
+    whole : WholeBiases or None
+        The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
+    wheel : Mounting or None
+        How an alignment on the move found the odometer to sit and to count.
+    """
+
+    P: Array
+    whole: WholeBiases | None = None
+    wheel: Mounting | None = None

@@ -1,0 +1,99 @@
+"""Many epochs: the track of a vehicle, with covariance, and what the measurements on the way said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, Layout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What one source's measurements said against the prediction.
+
+    Attributes
+    ----------
+    name : str
+    time : (M,) array, s
+    innovation, sigma : (M, 3) arrays
+        Predicted less measured, and the one-sigma expected of it; NaN where absent.
+    nis : (M,) array
+        Normalised innovation squared of the rows together; its mean is their number where the model is right.
+    used : (M,) array of bool
+        Not rejected by the gate.
+    outside : int
+        Measurements before the start or after the end of the IMU's log.
+    """
+
+    name: str
+    time: Array
+    innovation: Array
+    sigma: Array
+    nis: Array
+    used: NDArray[np.bool_]
+    outside: int
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """(M,) how many components each measurement has."""
+        return np.isfinite(self.innovation).sum(axis=1)
+
+    @property
+    def rejected(self) -> int:
+        """How many the gate kept out."""
+        return int(np.sum(~self.used))
+
+
+@dataclass(frozen=True)
+class Track:
+    """The state along the track, ENU; one row an output epoch.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    C_nb : (K, 3, 3) array
+    v_n : (K, 3) array, m/s
+    position : (K, 3) array
+        Latitude, longitude (rad), height (m).
+    sensors : (K, n) array
+        What is assumed of the sensors, in the places of the states: biases, scale factors, ...
+    P : (K, n, n) array
+        Covariance of the errors; K = 0 where none was asked for.
+    layout : Layout
+        Of the states.
+    residuals : tuple of Residuals
+    """
+
+    time: Array
+    C_nb: Array
+    v_n: Array
+    position: Array
+    sensors: Array
+    P: Array
+    layout: Layout
+    residuals: tuple[Residuals, ...]
+
+    def bias(self, group: slice, slow: str) -> Array:
+        """(K, 3) a sensor's whole bias, its slow part included."""
+        own = self.layout.slice_of(slow)
+        return self.sensors[:, group] + (0.0 if own is None else self.sensors[:, own])
+
+    @property
+    def gyro_bias(self) -> Array:
+        """(K, 3) rad/s."""
+        return self.bias(BG, SLOW_GYRO)
+
+    @property
+    def accel_bias(self) -> Array:
+        """(K, 3) m/s^2."""
+        return self.bias(BA, SLOW_ACCEL)
+
+    @property
+    def sigma(self) -> Array:
+        """(K, n) one-sigma of the errors."""
+        return np.sqrt(np.maximum(np.einsum("kii->ki", self.P), 0.0))
