@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
+
+from truenorth.core.kernel_store import KernelStore
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"nopython": True, "error_model": "numpy", "fastmath": False, "nogil": True}
-PACKAGE = Path(__file__).parents[1]
 
 
 def compiled(function: F | None = None, **options: Any) -> Any:
     """Compile a function with Numba: IEEE arithmetic, NumPy division rules, cached on disk.
 
-    The cache is kept by the text of all files that hold compiled code, since kernels call each other across files and
-    Numba itself watches only the one a kernel stands in. Where no cache folder is writable (a read-only installation),
-    Numba raises at decoration time; the function is then compiled anew in each process.
+    A kernel on the disk is named by all that its code depends on (:mod:`~truenorth.core.fingerprint`), where Numba's
+    own cache watches only the file that a kernel stands in, not those that it calls into. Where no folder can be
+    written to, the function is compiled anew in each process.
 
     Parameters
     ----------
@@ -39,13 +36,9 @@ def compiled(function: F | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda f: compiled(f, **options)
-    try:
-        with _cache_folder(_folder()):
-            return numba.jit(cache=True, **(OPTIONS | options))(function)
-    except RuntimeError as error:  # "cannot cache function ...: no locator available"
-        if "cache" not in str(error):
-            raise
-        return numba.jit(cache=False, **(OPTIONS | options))(function)
+    dispatcher = numba.jit(**(OPTIONS | options))(function)
+    dispatcher._cache = KernelStore(dispatcher.py_func, dispatcher.targetoptions)
+    return dispatcher
 
 
 def compiled_callback(signature: str) -> Callable[[F], Any]:
@@ -66,47 +59,10 @@ def compiled_callback(signature: str) -> Callable[[F], Any]:
     """
 
     def decorate(function: F) -> Any:
-        options: dict[str, Any] = {"nopython": True, "error_model": "numpy"}
-        try:
-            with _cache_folder(_folder()):
-                return numba.cfunc(signature, cache=True, **options)(function)
-        except RuntimeError as error:  # "cannot cache function ...: no locator available"
-            if "cache" not in str(error):
-                raise
-            return numba.cfunc(signature, cache=False, **options)(function)
+        options = {"nopython": True, "error_model": "numpy"}
+        callback: Any = CFunc(function, normalize_signature(signature), locals={}, options=options)
+        callback._cache = KernelStore(function, options | {"callback": True})
+        callback.compile()
+        return callback
 
     return decorate
-
-
-@cache
-def _folder() -> str:
-    """The cache folder of this very source: beside the package where that is writable, else in the user's cache."""
-    text = hashlib.sha256()
-    for file in sorted(PACKAGE.rglob("*.py")):
-        content = file.read_bytes()
-        if b"compiled" in content:  # every kernel, and the plain functions that are said to be compiled elsewhere
-            text.update(file.relative_to(PACKAGE).as_posix().encode())
-            text.update(content)
-    name = f"kernels-{text.hexdigest()[:16]}"
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for parent in (PACKAGE / "__pycache__", home / "truenorth"):
-        try:
-            (parent / name).mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=parent / name):
-                return str(parent / name)
-        except OSError:
-            continue
-    return str(PACKAGE / "__pycache__")
-
-
-@contextmanager
-def _cache_folder(folder: str) -> Iterator[None]:
-    """Numba's cache folder for the functions decorated inside; an environment's own choice is respected."""
-    config: Any = numba.config
-    before = config.CACHE_DIR
-    if not before:
-        config.CACHE_DIR = folder
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before

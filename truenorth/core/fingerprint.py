@@ -1,0 +1,167 @@
+"""What the machine code of a compiled function depends on, as one digest.
+
+Numba freezes into a kernel its own bytecode, the constants and the module-level values it names, and the code of every
+compiled function it calls. The digest covers exactly these, through all calls: it changes where the machine code may
+change, and stays where only a comment, a docstring, a line number, another function or the folder changes. Equal
+sources thus share kernels across checkouts, and an edit compiles its dependents only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Callable
+from enum import Enum
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from numba.core import types
+from numba.core.ccallback import CFunc
+from numba.core.dispatcher import Dispatcher
+
+FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
+CONFIG: Any = numba.config
+TOOLS = repr((
+    *(sys.implementation.name, sys.version_info[:2], numba.__version__, llvmlite.__version__, np.__version__),
+    *(CONFIG.OPT, CONFIG.BOUNDSCHECK, CONFIG.LOOP_VECTORIZE, CONFIG.SLP_VECTORIZE, CONFIG.USING_SVML),
+))  # fmt: skip
+
+
+class UnknownValueError(Exception):
+    """A kernel names a value of a kind that the digest does not cover."""
+
+
+def fingerprint(function: Callable[..., Any], options: dict[str, Any], signature: Any) -> str:
+    """Digest of all that the machine code of a function for one signature is made from, the processor apart.
+
+    Parameters
+    ----------
+    function : callable
+        The Python function.
+    options : dict
+        What it is compiled with.
+    signature : numba signature, or tuple of numba types
+        Of its arguments.
+
+    Raises
+    ------
+    UnknownValueError
+        The function, or one that it calls, names a value of a kind that is not covered.
+    """
+    sources = _Sources()
+    sources.see(function)
+    text = [TOOLS, _of_options(options), _of_types(signature, sources)]
+    text += sources.walk()
+    return hashlib.sha256("\n".join(text).encode()).hexdigest()
+
+
+class _Sources:
+    """Functions in the order in which they were met, each described once."""
+
+    def __init__(self) -> None:
+        self.order: list[Any] = []
+        self.place: dict[int, int] = {}
+
+    def see(self, function: Any) -> int:
+        """The place of a function in the order; calls in a circle therefore end."""
+        if id(function) not in self.place:
+            self.place[id(function)] = len(self.order)
+            self.order.append(function)
+        return self.place[id(function)]
+
+    def walk(self) -> list[str]:
+        """Describe all functions; those met on the way are described too."""
+        text = []
+        for function in self.order:  # grows while it is walked
+            text.append(self.of_function(function))
+        return text
+
+    def of_function(self, function: Any) -> str:
+        code = function.__code__
+        names = _names(code)
+        scope = function.__globals__
+        named = {name: self.of(scope[name], names) for name in sorted(names) if name in scope}
+        cells = [self.of(cell.cell_contents, names) for cell in function.__closure__ or ()]
+        defaults = self.of(function.__defaults__, names)
+        home = f"{function.__module__}.{code.co_qualname}"
+        return repr((home, self.of_code(code, function.__doc__, names), named, cells, defaults))
+
+    def of_code(self, code: CodeType, doc: str | None, names: set[str]) -> str:
+        skip = 1 if code.co_consts and isinstance(doc, str) and code.co_consts[0] == doc else 0
+        constants = [self.of(value, names) for value in code.co_consts[skip:]]
+        variables = (code.co_varnames, code.co_freevars, code.co_cellvars, code.co_names)
+        counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
+        return repr((code.co_code, constants, variables, counts, code.co_exceptiontable))
+
+    def of(self, value: Any, names: set[str]) -> str:
+        """A value that a function names; `names` are those that it may ask a module for."""
+        if isinstance(value, Enum):
+            return f"{self._of_class(type(value), names)}.{value.name}"
+        if value is None or isinstance(value, (bool, int, float, complex, str, bytes)):
+            return f"{type(value).__name__} {value!r}"
+        if isinstance(value, (tuple, list)):
+            return f"{_name(type(value))}({', '.join(self.of(v, names) for v in value)})"
+        if isinstance(value, (set, frozenset)):
+            return f"set({', '.join(sorted(self.of(v, names) for v in value))})"
+        if isinstance(value, (np.ndarray, np.generic)):
+            array = np.asarray(value)
+            return f"array({array.dtype!r}, {array.shape}, {array.flags.c_contiguous}, {array.tobytes()!r})"
+        if isinstance(value, Dispatcher):
+            return f"compiled({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
+        if isinstance(value, CFunc):
+            return f"callback({self.see(value.__wrapped__)})"
+        if isinstance(value, CodeType):
+            return self.of_code(value, None, names)
+        if isinstance(value, type):
+            return self._of_class(value, names)
+        if isinstance(value, FunctionType) and value.__module__.split(".")[0] not in FOREIGN:
+            return f"function({self.see(value)})"
+        if isinstance(value, ModuleType):
+            return self._of_module(value, names)
+        if isinstance(value, (types.Type, np.dtype)):
+            return repr(value)
+        if isinstance(value, (FunctionType, BuiltinFunctionType, np.ufunc)) or type(value).__module__ == "numpy":
+            return f"{type(value).__name__} {getattr(value, '__module__', '')}.{value.__name__}"
+        raise UnknownValueError(f"a kernel names {value!r}, of {type(value)}")
+
+    def _of_class(self, kind: type, names: set[str]) -> str:
+        if issubclass(kind, Enum):
+            return f"{_name(kind)}({', '.join(f'{m.name}={self.of(m.value, names)}' for m in kind)})"
+        return f"{_name(kind)}{getattr(kind, '_fields', '')}"
+
+    def _of_module(self, module: ModuleType, names: set[str]) -> str:
+        if module.__name__.split(".")[0] in FOREIGN:
+            return module.__name__
+        held = {name: self.of(getattr(module, name), names) for name in sorted(names) if hasattr(module, name)}
+        return f"{module.__name__} {held!r}"
+
+
+def _of_options(options: dict[str, Any]) -> str:
+    return repr(sorted(options.items()))
+
+
+def _names(code: CodeType) -> set[str]:
+    """What a function and the functions inside it look up by name."""
+    inner = (value for value in code.co_consts if isinstance(value, CodeType))
+    return set(code.co_names).union(*map(_names, inner))
+
+
+def _name(kind: type) -> str:
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _of_types(signature: Any, sources: _Sources) -> str:
+    """The types of the arguments. Their own text does not tell two classes of one name apart, nor two functions."""
+    if isinstance(signature, tuple):
+        return f"({', '.join(_of_types(t, sources) for t in signature)})"
+    if not isinstance(signature, types.Type):
+        return f"{_of_types(signature.args, sources)} -> {signature.return_type}"
+    if isinstance(signature, types.Dispatcher):
+        return sources.of(signature.dispatcher, set())
+    if isinstance(signature, types.BaseTuple):
+        kind, parts = getattr(signature, "instance_class", tuple), getattr(signature, "types", ())
+        return f"{sources.of(kind, set())}{_of_types(tuple(parts), sources)}"
+    return str(signature)

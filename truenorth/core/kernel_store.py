@@ -1,0 +1,182 @@
+"""Compiled kernels on the disk: one file for each function and signature, named by what its code depends on.
+
+A file never changes what it means, so that any number of processes and checkouts read and write one folder at once: a
+file is written aside and renamed, and two processes that compile the same kernel write the same file. Numba's own
+cache keeps an index and numbered files instead; two processes that compile two signatures at once can leave each other's
+code under the wrong number.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import re
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core import config
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from truenorth.core.fingerprint import UnknownValueError, fingerprint
+
+PACKAGE = Path(__file__).parents[1]
+BOUND = 512 * 2**20  # bytes that the kernels of all versions may take, before the longest unused go
+DAY = 86400.0  # s
+SUM = 32  # bytes of the checksum that a file begins with
+
+
+class KernelStore:
+    """What Numba asks for a kernel of one function, and hands each that it compiled (its interface of caches).
+
+    Parameters
+    ----------
+    function : callable
+        The Python function.
+    options : dict
+        What it is compiled with.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        self.function = function
+        self.options = options
+        self.files: dict[Any, str | None] = {}  # the name of the file of a signature, as it was when first asked for
+
+    @property
+    def cache_path(self) -> str:
+        """The folder that is written to; empty where there is none."""
+        return str(write_folder() or "")
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The kernel of a signature, or None."""
+        target.refresh()
+        name = self._file(signature, target.codegen())
+        for folder in folders() if name else ():
+            payload = _read(folder / str(name))
+            if payload is not None:
+                return CompileResult._rebuild(target, *payload)
+        if name and "<locals>" in self.function.__code__.co_qualname:
+            # The linker takes what has one name for one function, and a function made anew has the name of the last.
+            self.function.__qualname__ = f"{self.function.__code__.co_qualname}.{Path(name).stem[-16:]}"
+        return None
+
+    def save_overload(self, signature: Any, kernel: Any) -> None:
+        """Keep a kernel; one that holds an address of this process is not kept."""
+        folder = write_folder()
+        name = self._file(signature, kernel.codegen)
+        if folder is None or name is None or kernel.library.has_dynamic_globals or kernel.lifted:
+            return
+        try:
+            _write(folder / name, dumps(kernel._reduce()))
+        except OSError:  # a full disk costs the next process a compilation, not this one its answer
+            return
+        prune_once(folder)
+
+    def flush(self) -> None:
+        """Forget what is known of the sources, as Numba asks before it compiles anew."""
+        self.files.clear()
+
+    enable = disable = flush
+
+    def _file(self, signature: Any, codegen: Any) -> str | None:
+        if signature not in self.files:
+            try:
+                text = f"{fingerprint(self.function, self.options, signature)} {codegen.magic_tuple()}"
+            except UnknownValueError:
+                self.files[signature] = None
+            else:
+                readable = re.sub(r"[^\w.]", "", f"{self.function.__module__}.{self.function.__code__.co_qualname}")
+                self.files[signature] = f"{readable[-100:]}-{hashlib.sha256(text.encode()).hexdigest()[:32]}.kernel"
+        return self.files[signature]
+
+
+@cache
+def folders() -> tuple[Path, ...]:
+    """Where kernels are looked for: the environment's own choice alone; else the user's cache, then the package's."""
+    chosen = getattr(config, "CACHE_DIR", "")
+    if chosen:
+        return (Path(chosen) / "truenorth",)
+    places = (_user_cache, lambda: PACKAGE / "__pycache__")
+    found = []
+    for place in places:
+        try:
+            found.append(place() / "kernels")
+        except RuntimeError:  # a user without a home
+            continue
+    return tuple(found)
+
+
+def _user_cache() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "truenorth"
+
+
+@cache
+def write_folder() -> Path | None:
+    """The first of the folders that can be written to; without any, each process compiles for itself."""
+    for folder in folders():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return None
+
+
+def _read(path: Path) -> Any:
+    """What a file holds; None where it is missing, or was torn by a loss of power."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    if hashlib.sha256(content[SUM:]).digest() != content[:SUM]:
+        return None
+    with suppress(OSError):  # gone since, or of another user
+        if time.time() - path.stat().st_mtime > DAY:
+            os.utime(path)  # used today: the last to be pruned
+    return pickle.loads(content[SUM:])
+
+
+def _write(path: Path, content: bytes) -> None:
+    handle, aside = tempfile.mkstemp(dir=path.parent, suffix=".aside")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        os.chmod(aside, 0o644)
+        os.replace(aside, path)
+    except BaseException:
+        Path(aside).unlink(missing_ok=True)
+        raise
+
+
+@cache
+def prune_once(folder: Path) -> None:
+    """Once in a process that compiles: keep the folder within its bound."""
+    prune(folder, BOUND)
+
+
+def prune(folder: Path, bound: int) -> None:
+    """Delete the kernels that were used longest ago until the others take three quarters of `bound` bytes.
+
+    What was left aside by a process that was killed goes after a day.
+    """
+    kept = sorted(_aged(folder), reverse=True)
+    total = sum(size for _, size, _ in kept)
+    room = bound * 3 // 4 if total > bound else total
+    for used, size, path in kept:
+        room -= size
+        if room < 0 or (path.suffix == ".aside" and time.time() - used > DAY):
+            path.unlink(missing_ok=True)
+
+
+def _aged(folder: Path) -> Iterator[tuple[float, int, Path]]:
+    for path in folder.iterdir():
+        with suppress(OSError):  # another process prunes
+            status = path.stat()
+            yield status.st_mtime, status.st_size, path
