@@ -8,10 +8,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from truenorth.core.version import __version__ as __version__
+from truenorth.results import Views, load, plot, register_result, save
+
 if TYPE_CHECKING:
+    from truenorth.advice import advise, advise_manoeuvre
     from truenorth.alignment import (
         Alignment,
-        advise,
         align,
         align_in_motion,
         align_positions,
@@ -49,8 +52,6 @@ if TYPE_CHECKING:
     from truenorth.report import write_report
     from truenorth.simulation import simulate
 
-__version__ = "0.2.0"
-
 _HOMES = {
     "Alignment": "alignment",
     "AlignmentError": "core.errors",
@@ -69,7 +70,8 @@ _HOMES = {
     "TruenorthError": "core.errors",
     "UsageError": "core.errors",
     "VelocityRecord": "records",
-    "advise": "alignment",
+    "advise": "advice",
+    "advise_manoeuvre": "advice",
     "align": "alignment",
     "align_in_motion": "alignment",
     "align_positions": "alignment",
@@ -111,7 +113,9 @@ __all__ = [
     "TruenorthError",
     "UsageError",
     "VelocityRecord",
+    "Views",
     "advise",
+    "advise_manoeuvre",
     "align",
     "align_in_motion",
     "align_positions",
@@ -119,7 +123,9 @@ __all__ = [
     "align_transfer",
     "imu_spec",
     "inspect",
+    "load",
     "navigate",
+    "plot",
     "read_encoder",
     "read_gnss",
     "read_height",
@@ -128,7 +134,9 @@ __all__ = [
     "read_odometer",
     "read_trajectory",
     "read_velocity",
+    "register_result",
     "run_campaign",
+    "save",
     "simulate",
     "write_imu",
     "write_record",

@@ -7,8 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from truenorth.alignment import advise, align, align_positions
-from truenorth.alignment.advice import SCHEMES
+from truenorth.advice import advise
+from truenorth.advice.positions import SCHEMES
+from truenorth.alignment import align, align_positions
 from truenorth.cli import main
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position

@@ -5,13 +5,13 @@ import pytest
 
 from tests import recordings
 from truenorth.alignment import align
-from truenorth.analysis.allan import noise_coefficients
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.units import significant
 from truenorth.filters import around_circle, extended, gaussian_sum
 from truenorth.models.large_azimuth import attitude_error, large_azimuth_system
 from truenorth.models.stationary import StationaryModel
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
+from truenorth.quality.noise import noise_coefficients
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.strapdown.inertial import earth_rotation, integrate
 from truenorth.strapdown.level import increments

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from truenorth.alignment.transfer_advice import advise_manoeuvre
+from truenorth.advice.manoeuvres import advise_manoeuvre
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 

@@ -7,8 +7,9 @@ import warnings
 import numpy as np
 import pytest
 
-from truenorth.analysis.allan import noise_coefficients, overlapping_adev
+from truenorth.analysis.allan import overlapping_adev
 from truenorth.core.errors import UsageError
+from truenorth.quality.noise import noise_coefficients
 from truenorth.records import ImuRecord
 
 

@@ -8,7 +8,7 @@ from truenorth.simulation.scenario import read_scenario, shipped
 
 def page(name, duration):
     scenario = read_scenario(name).model_copy(update={"duration": duration})
-    return scenario.simulate().plot(name, scenario.simulate_aiding())
+    return scenario.simulate().plot(title=name, aiding=scenario.simulate_aiding())
 
 
 @pytest.mark.parametrize("name", shipped())

@@ -12,7 +12,8 @@ from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.quality import inspect
 from truenorth.records.specs import imu_spec
-from truenorth.report import save_alignment, write_report
+from truenorth.report import write_report
+from truenorth.results import save
 from truenorth.simulation import rest, simulate
 
 PLACE = Position.from_degrees(40.0, 118.0)
@@ -31,8 +32,8 @@ def levelled():
 
 
 def test_files(aligned, tmp_path):
-    paths = save_alignment(aligned, tmp_path / "new" / "folder")
-    assert [p.name for p in paths] == ["summary.json", "history.parquet", "report.html"]
+    paths = save(aligned, tmp_path / "new" / "folder")
+    assert [p.name for p in paths] == ["summary.json", "history.parquet", "report.html", "result.npz"]
     assert sorted(p.name for p in paths[0].parent.iterdir()) == sorted(p.name for p in paths)
     assert json.loads(paths[0].read_text())["status"] == "aligned"
     import pandas as pd
@@ -96,17 +97,17 @@ def test_figures_have_no_exponent(value, shown):
 
 def test_a_result_without_history_leaves_none_of_an_earlier_one(aligned, levelled, tmp_path):
     """Else the folder would hold the summary of one log beside the history of another."""
-    save_alignment(aligned, tmp_path)
+    save(aligned, tmp_path)
     assert (tmp_path / "history.parquet").exists()
-    assert [p.name for p in save_alignment(levelled, tmp_path)] == ["summary.json", "report.html"]
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["report.html", "summary.json"]
+    assert [p.name for p in save(levelled, tmp_path)] == ["summary.json", "report.html", "result.npz"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report.html", "result.npz", "summary.json"]
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
 def test_an_interrupt_leaves_the_earlier_files_together(aligned, levelled, tmp_path, monkeypatch, stop):
     import truenorth.report.page
 
-    save_alignment(levelled, tmp_path)
+    save(levelled, tmp_path)
     before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
 
     def interrupted(result):
@@ -114,7 +115,7 @@ def test_an_interrupt_leaves_the_earlier_files_together(aligned, levelled, tmp_p
 
     monkeypatch.setattr(truenorth.report.page, "alignment_page", interrupted)
     with pytest.raises(stop):
-        save_alignment(aligned, tmp_path)
+        save(aligned, tmp_path)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
 
 

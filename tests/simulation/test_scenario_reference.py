@@ -10,13 +10,13 @@ import yaml
 from pydantic import PlainSerializer
 
 from truenorth.core.schema import Strict, models_in
+from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ENTRIES, imu_spec
+from truenorth.records.unit_spec import UnitSpec, _written
 from truenorth.simulation import scenario_courses, scenario_motion, scenario_sensors
 from truenorth.simulation.encoder import EncoderSpec
-from truenorth.simulation.flexure import FlexureSpec
 from truenorth.simulation.scenario import Place, Scenario, read_scenario
 from truenorth.simulation.scenario_sensors import AIDING
-from truenorth.simulation.unit_spec import UnitSpec, _written
 
 PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
 NEEDED, NONE = "needed", "–"

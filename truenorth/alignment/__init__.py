@@ -12,7 +12,6 @@ from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.rotary import align_rotary
 
 if TYPE_CHECKING:
-    from truenorth.alignment.advice import advise
     from truenorth.alignment.in_motion import align_in_motion
     from truenorth.alignment.transfer import align_transfer
 
@@ -21,7 +20,6 @@ __all__ = [
     "History",
     "Moving",
     "Wheel",
-    "advise",
     "align",
     "align_in_motion",
     "align_positions",
@@ -31,7 +29,6 @@ __all__ = [
 
 # They stand on navigation or simulation, which stand on the results here: loaded when first used.
 LATER = {
-    "advise": "truenorth.alignment.advice",
     "align_in_motion": "truenorth.alignment.in_motion",
     "align_transfer": "truenorth.alignment.transfer",
 }

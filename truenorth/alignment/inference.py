@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import LogCheck
-from truenorth.analysis.allan import noise_coefficients
 from truenorth.models.static import StaticModel
+from truenorth.quality.noise import noise_coefficients
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 

@@ -35,7 +35,6 @@ from truenorth.alignment.table import TablePosition, TurntableErrors
 from truenorth.alignment.task import Task, bridged, level_of, make_task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.alignment.verdict import Circumstances, judge
-from truenorth.analysis.allan import noise_coefficients
 from truenorth.coarse import Means, means, oba
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE, normal_gravity
@@ -46,6 +45,7 @@ from truenorth.filters.gains import filter_gains, initial_part
 from truenorth.models import turntable
 from truenorth.models.static import DV, PHI, StaticModel, mean_velocity
 from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX, matrices, without_errors
+from truenorth.quality.noise import noise_coefficients
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration

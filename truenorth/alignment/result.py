@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import UNIFORM_SIGMA, euler_from_dcm, euler_jacobian, euler_sigma, to_rotation
+from truenorth.core.attitude import UNIFORM_SIGMA, angle_text, euler_from_dcm, euler_jacobian, euler_sigma, to_rotation
 from truenorth.core.position import Position
+from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records.specs import ImuSpec
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
     from truenorth.alignment.moving import Moving
@@ -80,8 +79,8 @@ class History:
         return euler_sigma(self.C_nb, self.phi_covariance)
 
 
-@dataclass(frozen=True)
-class Alignment:
+@dataclass(frozen=True, repr=False)
+class Alignment(Shown):
     """Attitude of the body at one epoch, with all that is needed to judge it.
 
     Attributes
@@ -232,6 +231,14 @@ class Alignment:
         """(3,) whether the data told this bias, or only the specification does."""
         return self.accel_bias_sigma < NOT_ESTIMATED * self.accel_bias_prior
 
+    def in_brief(self) -> dict[str, str]:
+        """Status, method, the angles with their sigmas."""
+        shown = {"status": self.status, "method": self.method, "time": f"{self.time:.3f} s"}
+        for i, name in enumerate(("heading", "pitch", "roll")):
+            value = f"{np.degrees(self.euler[i]):.4f}°" if i or self.heading_known else "refused"
+            shown[name] = f"{value} ± {angle_text(float(self.euler_sigma[i]))}"
+        return shown
+
     def summary(self) -> dict[str, Any]:
         """One flat dictionary in datasheet units, ready for JSON; a heading that may not be used is None."""
         deg = np.degrees
@@ -309,18 +316,6 @@ class Alignment:
             columns[f"innovation_{axis}_sigma_m_s"] = h.innovation_sigma[:, i]
         columns["nis"] = h.nis
         return pd.DataFrame(columns, index=pd.Index(h.time, name="time"))
-
-    def plot(self) -> Figure:
-        """Convergence of pitch, roll and heading with sigma bands, biases and innovations, as a matplotlib figure."""
-        from truenorth.figures.alignment import plot_alignment
-
-        return plot_alignment(self)
-
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write summary.json, history.parquet (where there is a history) and report.html; return their paths."""
-        from truenorth.report import save_alignment
-
-        return save_alignment(self, folder)
 
     def with_verdict(self, status: Status, reasons: tuple[str, ...]) -> Alignment:
         """The same answer under another verdict."""

@@ -30,10 +30,10 @@ from truenorth.alignment.task import Task, bridged, make_task
 from truenorth.alignment.verdict import Circumstances, judge
 from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.simulation.indexer import C_bs_from_angles
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]

@@ -22,8 +22,8 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
+from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.simulation.flexure import FlexureSpec
 
 Array = NDArray[np.float64]
 What = Literal["auto", "velocity", "attitude", "both"]

@@ -25,8 +25,8 @@ from truenorth.core.earth import earth_rate_n, transport_rate_n
 from truenorth.core.position import Position
 from truenorth.models.transfer import ARM, BA, BG, MOUNT, TAU, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
-from truenorth.simulation.motion import MotionStates
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial_integration import integrate_attitude
 

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.filters import LinearSystem
 from truenorth.models.transfer import TransferModel
-from truenorth.simulation.motion import MotionStates
-from truenorth.simulation.sensing import Moving
+from truenorth.records.motion import MotionStates, Moving
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
 
@@ -148,36 +147,9 @@ def overlapping_adev(
     return AllanDeviation(tau, deviation, sigma)
 
 
-def noise_coefficients(record: ImuRecord) -> tuple[NoiseCoefficients, NoiseCoefficients]:
-    """Noise coefficients of the gyros and of the accelerometers of a record at rest.
-
-    The Allan variance at octave averaging times is fitted by the sum of the quantisation, random walk, bias
-    instability and rate random walk terms (IEEE Std 952-1997, C.1), by weighted least squares, with no
-    coefficient below zero and none that the data do not ask for. A record in motion gives the noise of the
-    motion. The sigma of the random walk is honest on white noise (z-scores of RMS 0.95 over 900 simulated
-    channels); that of the rate random walk, carried by few degrees of freedom, is optimistic by about 1.6.
-
-    Parameters
-    ----------
-    record : ImuRecord
-        At rest, evenly sampled.
-
-    Returns
-    -------
-    gyro, accel : NoiseCoefficients
-
-    Raises
-    ------
-    UsageError
-        Fewer than 20 rows.
-    """
-    if len(record) < SHORTEST_RECORD:
-        raise UsageError(f"{record.source}: {len(record)} rows; noise coefficients need at least {SHORTEST_RECORD}")
-    return _fit(record.gyro, record), _fit(record.accel, record)
-
-
-def _fit(data: Array, record: ImuRecord) -> NoiseCoefficients:
-    allan = overlapping_adev(data, record.interval, kind=record.kind)
+def fit_noise(data: ArrayLike, interval: float, kind: Literal["rates", "increments"]) -> NoiseCoefficients:
+    """Noise coefficients of three like channels at rest, (N, 3), evenly sampled; see `truenorth.quality.noise`."""
+    allan = overlapping_adev(data, interval, kind=kind)
     values, sigmas = np.zeros((4, 3)), np.full((4, 3), np.nan)
     for axis in range(3):
         values[:, axis], sigmas[:, axis], _ = fit_shapes(

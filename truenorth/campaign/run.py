@@ -13,16 +13,16 @@ from truenorth.campaign.execution import in_processes, in_this_process, on_clust
 from truenorth.campaign.plan import Plan, read_plan
 from truenorth.campaign.store import opened, read_table
 from truenorth.core.errors import UsageError
+from truenorth.core.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class Campaign:
+@dataclass(frozen=True, repr=False)
+class Campaign(Shown):
     """A campaign's folder, read.
 
     Attributes
@@ -86,17 +86,19 @@ class Campaign:
         """Names of the cases by their number."""
         return {case.number: case.name for case in self.plan.cases}
 
-    def plot(self) -> dict[str, Figure]:
-        """Figures by name: convergence, distributions, overview and, where the plan has a grid, requirement."""
-        from truenorth.figures.campaign import plot_campaign
+    def in_brief(self) -> dict[str, str]:
+        """Name, cases, methods and runs of the plan."""
+        plan = self.plan
+        methods = ", ".join(method.name for method in plan.methods)
+        return {"name": plan.name, "cases": str(len(plan.cases)), "methods": methods, "runs": str(plan.runs)}
 
-        return plot_campaign(self)
+    def to_frame(self) -> pd.DataFrame:
+        """Statistics over runs; see `summary`."""
+        return self.summary
 
-    def save(self) -> list[Path]:
-        """Write summary.csv, comparison.csv, the figures and report.html into the folder; return their paths."""
-        from truenorth.report.campaign import save_campaign
-
-        return save_campaign(self)
+    def save(self, folder: str | PathLike[str] | None = None) -> list[Path]:
+        """Write tables, figures and report.html into the campaign's own folder, or another; see :func:`truenorth.save`."""
+        return super().save(self.folder if folder is None else folder)
 
 
 def run_campaign(

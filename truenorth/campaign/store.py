@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from truenorth import __version__
 from truenorth.core.atomic import atomic_path, writable_folder
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,7 +18,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
@@ -30,6 +29,7 @@ from truenorth.campaign.rows import table_of
 from truenorth.campaign.summary import summarise
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.schema import Strict, validated
+from truenorth.core.shown import Shown
 from truenorth.core.units import format as format_quantity
 from truenorth.core.units import parse
 from truenorth.core.yaml_file import read_mapping, unknown_key
@@ -68,8 +68,8 @@ class Search(Strict):
     seed: int = Field(0, ge=0)
 
 
-@dataclass(frozen=True)
-class Tuned:
+@dataclass(frozen=True, repr=False)
+class Tuned(Shown):
     """The outcome of a search.
 
     Attributes
@@ -89,23 +89,13 @@ class Tuned:
     trials: pd.DataFrame
     judged: pd.DataFrame
 
-    def save(self, folder: str | PathLike[str]) -> list[Path]:
-        """Write tuned.yaml (the specification), trials.csv and judged.csv.
+    def in_brief(self) -> dict[str, str]:
+        """The search and how many trials it took."""
+        return {"name": self.search.name, "method": self.search.method, "trials": str(len(self.trials))}
 
-        Raises
-        ------
-        UsageError
-            The folder cannot be written to.
-        """
-        from truenorth.core.atomic import atomic_path, writable_folder
-
-        target = writable_folder(folder)
-        paths = [target / name for name in ("tuned.yaml", "trials.csv", "judged.csv")]
-        self.spec.to_yaml(paths[0])
-        for path, table in zip(paths[1:], (self.trials, self.judged), strict=True):
-            with atomic_path(path) as temporary:
-                table.to_csv(temporary, index=False)
-        return paths
+    def to_frame(self) -> pd.DataFrame:
+        """The trials; see `trials`."""
+        return self.trials
 
 
 def read_search(source: str | PathLike[str] | Mapping[str, Any]) -> Search:

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 
 import typer
 
-from truenorth import __version__
 from truenorth.cli.advise import advise
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
@@ -23,6 +22,7 @@ from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
 from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
+from truenorth.core.version import __version__
 
 INTERRUPTED = 130
 

@@ -14,9 +14,9 @@ from truenorth.cli.console import make_console, stages
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from truenorth.advice.manoeuvres import ManoeuvreAdvice
+    from truenorth.advice.positions import Advice
     from truenorth.alignment import Alignment
-    from truenorth.alignment.advice import Advice
-    from truenorth.alignment.transfer_advice import ManoeuvreAdvice
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -69,8 +69,8 @@ def advise(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Say how long, and in which positions or by which manoeuvre, an IMU needs for a wanted heading."""
-    from truenorth.alignment.advice import advise as advise_for
-    from truenorth.alignment.transfer_advice import advise_manoeuvre
+    from truenorth.advice.manoeuvres import advise_manoeuvre
+    from truenorth.advice.positions import advise as advise_for
     from truenorth.core.atomic import writable_folder
     from truenorth.core.errors import UsageError
     from truenorth.core.position import Position
@@ -105,8 +105,8 @@ def advise(
 
 def advice_after(result: Alignment, heading: float) -> Advice:
     """Advice for the IMU and the base that an alignment has seen; `heading` in degrees."""
-    from truenorth.alignment.advice import DISTURBANCE
-    from truenorth.alignment.advice import advise as advise_for
+    from truenorth.advice.positions import DISTURBANCE
+    from truenorth.advice.positions import advise as advise_for
 
     seen = float(max(result.disturbance[:2]))
     disturbance = seen if math.isfinite(seen) and seen > 0.0 else DISTURBANCE

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from truenorth.core.position import Position
     from truenorth.records import ImuRecord, MasterRecord
     from truenorth.records.calibration import Calibration
-    from truenorth.simulation.flexure import FlexureSpec
+    from truenorth.records.flexure import FlexureSpec
 
 PANEL = "Against a master INS"
 Master = Annotated[
@@ -170,7 +170,7 @@ def _delay(text: str | None, usual: float) -> tuple[float, float]:
 def _flexure(text: str) -> FlexureSpec:
     from truenorth.core.errors import UsageError
     from truenorth.core.units import parse
-    from truenorth.simulation.flexure import FlexureSpec
+    from truenorth.records.flexure import FlexureSpec
 
     first, comma, second = text.partition(",")
     if not comma:

@@ -171,6 +171,14 @@ def euler_sigma(C_nb: Array, phi_covariance: Array) -> Array:
     return np.minimum(np.sqrt(variance), UNIFORM_SIGMA)
 
 
+def angle_text(sigma: float) -> str:
+    """A one-sigma of an angle (rad) for a person: degrees, with minutes of arc where it is small."""
+    if sigma > 0.99 * UNIFORM_SIGMA:
+        return "unknown"
+    degrees = float(np.degrees(sigma))
+    return f"{degrees:.2f}°" if degrees >= 1.0 else f"{degrees:.4f}° ({degrees * 60:.2f}′)"
+
+
 def to_rotation(C: ArrayLike) -> Rotation:
     """The same rotation (or stack of them) as a SciPy object."""
     from scipy.spatial.transform import Rotation

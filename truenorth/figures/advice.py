@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 
 if TYPE_CHECKING:
-    from truenorth.alignment.advice import Advice
+    from truenorth.advice.manoeuvres import ManoeuvreAdvice
+    from truenorth.advice.positions import Advice
 
 SMALL = 0.03  # sources with a smaller part of the variance in all schemes are drawn together
 
@@ -54,4 +55,20 @@ def plot_advice(advice: Advice) -> Figure:
         right.grid(axis="y", visible=False)
         right.set(xlabel="part of the variance of heading, %", title="What it is made of", xlim=(0, 100))
         right.legend(loc="upper center", bbox_to_anchor=(0.4, -0.16), ncols=2)
+    return figure
+
+
+def plot_manoeuvres(advice: ManoeuvreAdvice) -> Figure:
+    """Draw heading's sigma over time in each manoeuvre, and the wanted one."""
+    with style():
+        figure = new_figure(8.0, 4.5)
+        ax = figure.subplots()
+        for (name, sigma), colour in zip(advice.heading_sigma.items(), COLOURS * 2):
+            ax.plot(advice.time, 60 * np.degrees(sigma), color=colour, label=name)
+        ax.axhline(60 * np.degrees(advice.wanted), color=REFERENCE, linestyle="--", label="wanted")
+        ax.axvline(advice.begun, color=REFERENCE, linestyle=":", linewidth=1.0)
+        ax.set(yscale="log", xlabel="time, s", ylabel="heading, one sigma, arcmin")
+        ax.set_title(f"Heading by transfer alignment; each manoeuvre begins at {advice.begun:.0f} s")
+        ax.margins(x=0.0)
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=4)
     return figure

@@ -10,12 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from truenorth.core.errors import UsageError
 from truenorth.core.units import parse_unit
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
 
 if TYPE_CHECKING:
     from truenorth.analysis.allan import NoiseCoefficients
     from truenorth.quality import Inspection
+    from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
 
@@ -78,7 +80,7 @@ def _title(inspection: Inspection) -> str:
 
 def _signals(inspection: Inspection, rate: Axes, force: Axes) -> None:
     """One-second means, over the faint samples where these do not fill the panel."""
-    record, motion = inspection.record, inspection.motion
+    record, motion = _record(inspection), inspection.motion
     scale = 1.0 / record.interval if record.kind == "increments" else 1.0
     middle = _middle(inspection)
     panels = (
@@ -103,7 +105,7 @@ def _signals(inspection: Inspection, rate: Axes, force: Axes) -> None:
 
 def _middle(inspection: Inspection) -> Array:
     """(3,) usual specific force, m/s^2: single samples may know few values, their means know more."""
-    record, motion = inspection.record, inspection.motion
+    record, motion = _record(inspection), inspection.motion
     if motion.time.size:
         return np.asarray(np.median(motion.specific_force, axis=0))
     scale = 1.0 / record.interval if record.kind == "increments" else 1.0
@@ -176,3 +178,11 @@ def _allan(ax: Axes, noise: NoiseCoefficients | None, title: str, unit: str) -> 
     ax.set_xlabel("averaging time, s")
     ax.set_ylabel("deg/h" if unit == "deg/h" else "µg")
     ax.grid(True, which="minor", linewidth=0.3, color="#E8E8E8")
+
+
+def _record(inspection: Inspection) -> ImuRecord:
+    if inspection.record is None:
+        raise UsageError(
+            f"{inspection.source}: an inspection that was read from a file has no log to draw; inspect the log again"
+        )
+    return inspection.record

@@ -18,8 +18,8 @@ from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, 
 from truenorth.records import GnssRecord, HeightRecord, MasterRecord, OdometerRecord, Record, VelocityRecord
 
 if TYPE_CHECKING:
+    from truenorth.records.motion import MotionStates
     from truenorth.simulation.aiding import Aided
-    from truenorth.simulation.motion import MotionStates
     from truenorth.simulation.runs import Simulation
 
 Array = NDArray[np.float64]

@@ -4,22 +4,42 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 from xml.sax.saxutils import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import UsageError
-
-if TYPE_CHECKING:
-    from truenorth.navigation.result import Navigation
 
 POINTS = 10_000  # of a line; more than a map shows
 PLACES = 8  # of a degree: a millimetre
 
 
-def export(result: Navigation, path: Path) -> Path:
+class Exported(Protocol):
+    """What is needed of a navigation."""
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """(K,) s."""
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """(K, 3) latitude, longitude (rad), height (m)."""
+
+    @property
+    def source(self) -> str:
+        """Name of the log."""
+
+    def summary(self) -> dict[str, Any]:
+        """One flat dictionary."""
+
+    def to_frame(self) -> Any:
+        """The table."""
+
+
+def export(result: Exported, path: Path) -> Path:
     """Write by the suffix; see :meth:`Navigation.export`."""
     writers = {".geojson": geojson, ".kml": kml, ".csv": csv}
     if path.suffix.lower() not in writers:
@@ -30,7 +50,7 @@ def export(result: Navigation, path: Path) -> Path:
     return path
 
 
-def geojson(result: Navigation) -> str:
+def geojson(result: Exported) -> str:
     """The track as a line (RFC 7946: longitude, latitude, height), with its end as a point."""
     lines = _lines(result)
     shape: dict[str, Any] = (
@@ -54,7 +74,7 @@ def geojson(result: Navigation) -> str:
     return json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False) + "\n"
 
 
-def kml(result: Navigation) -> str:
+def kml(result: Exported) -> str:
     """The track as a line at its height (KML 2.2)."""
     strings = "".join(
         f"<LineString><altitudeMode>absolute</altitudeMode><coordinates>"
@@ -69,12 +89,12 @@ def kml(result: Navigation) -> str:
     )
 
 
-def csv(result: Navigation) -> str:
+def csv(result: Exported) -> str:
     """The table of :meth:`Navigation.to_frame`, every digit."""
     return str(result.to_frame().to_csv())
 
 
-def _lines(result: Navigation) -> list[list[list[float]]]:
+def _lines(result: Exported) -> list[list[list[float]]]:
     """Points in degrees and metres, in parts that do not cross the date line (RFC 7946, 3.1.9)."""
     rows = np.unique(np.linspace(0, len(result.time) - 1, min(POINTS, len(result.time))).astype(int))
     lat, lon, alt = result.position[rows].T

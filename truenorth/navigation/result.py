@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import euler_from_dcm, euler_sigma, to_rotation
+from truenorth.core.attitude import angle_text, euler_from_dcm, euler_sigma, to_rotation
 from truenorth.core.earth import radii
+from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records import Late
 from truenorth.state.layout import BA, BG, DP, DV, PHI
@@ -21,10 +22,9 @@ from truenorth.state.track import Residuals, Track
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
 
-    from truenorth.damping.navigation import Damping
+    from truenorth.damping.result import Damping
     from truenorth.records import Trajectory
 
 Array = NDArray[np.float64]
@@ -32,8 +32,8 @@ Status = Literal["navigated", "inconsistent"]
 Altitude = Literal["fixed", "free", "baro", "gnss"]
 
 
-@dataclass(frozen=True)
-class Navigation:
+@dataclass(frozen=True, repr=False)
+class Navigation(Shown):
     """Where a vehicle was, how it was turned and how fast it went, with all that is needed to judge it.
 
     Attributes
@@ -198,6 +198,17 @@ class Navigation:
             source=f"navigation of {self.source}",
         )
 
+    def in_brief(self) -> dict[str, str]:
+        """Status, span, and where and how the vehicle was at the end."""
+        (lat, lon, alt), sigma = self.position[-1], self.position_sigma[-1]
+        return {
+            "status": self.status,
+            "span": f"{self.time[0]:.1f} to {self.time[-1]:.1f} s, {self.distance:.0f} m",
+            "end": f"{np.degrees(lat):.6f}°, {np.degrees(lon):.6f}°, {alt:.1f} m",
+            "sigma east, north, up": ", ".join(f"{s:.3g}" for s in sigma) + " m",
+            "heading": f"{np.degrees(self.euler[-1, 0]):.4f}° ± {angle_text(float(self.euler_sigma[-1, 0]))}",
+        }
+
     def summary(self) -> dict[str, Any]:
         """One flat dictionary in datasheet units, ready for JSON."""
         deg = np.degrees
@@ -249,18 +260,6 @@ class Navigation:
                 "sigma": self.track.sigma[-1, where].tolist(),
             }
         return found
-
-    def plot(self) -> Figure:
-        """Track, velocity, attitude with bands, innovations and NIS, as a matplotlib figure."""
-        from truenorth.figures.navigation import plot_navigation
-
-        return plot_navigation(self)
-
-    def save(self, folder: str | PathLike[str]) -> list[Path]:
-        """Write summary.json, track.parquet, innovations.parquet, track.geojson and report.html; return their paths."""
-        from truenorth.report.navigation import save_navigation
-
-        return save_navigation(self, folder)
 
     def export(self, path: str | PathLike[str]) -> Path:
         """Write the track as .geojson, .kml or .csv, by the suffix.

@@ -80,7 +80,7 @@ class Study:
     def _page(self) -> str:
         from jinja2 import Environment, PackageLoader
 
-        from truenorth import __version__
+        from truenorth.core.version import __version__
 
         environment = Environment(
             loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True

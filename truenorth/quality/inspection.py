@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truenorth.core.shown import Shown
 from truenorth.core.units import parse_unit
 from truenorth.quality.plausibility import Turning, check_plausibility
 from truenorth.quality.regimes import KINDS, Kind, MotionSummary, Regime, motion_summary
@@ -14,7 +15,7 @@ from truenorth.quality.sampling import Finding, Sampling, check_sampling
 from truenorth.records import ImuRecord
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import pandas as pd
     from rich.table import Table
 
     from truenorth.analysis.allan import NoiseCoefficients
@@ -24,8 +25,8 @@ REST_MARGIN = 2.0  # s between a motion and a stretch at rest
 SEVERITIES = ("error", "warning", "note")
 
 
-@dataclass(frozen=True)
-class Inspection:
+@dataclass(frozen=True, repr=False)
+class Inspection(Shown):
     """Health, noise and motion of one record; all figures in SI.
 
     Parameters
@@ -47,8 +48,8 @@ class Inspection:
         That stretch; its kind is ``disturbed`` where no still one is long enough: the noise is then an upper bound.
     findings : tuple of Finding
         Errors first.
-    record : ImuRecord
-        What was inspected; the figure shows it.
+    record : ImuRecord or None
+        What was inspected; the figure shows it. None where the inspection was read from a file.
     """
 
     source: str
@@ -64,7 +65,7 @@ class Inspection:
     accel_noise: NoiseCoefficients | None
     noise_from: Regime | None
     findings: tuple[Finding, ...]
-    record: ImuRecord = field(repr=False, compare=False)
+    record: ImuRecord | None = field(compare=False, metadata={"archive": False})
 
     @property
     def regimes(self) -> tuple[Regime, ...]:
@@ -100,6 +101,21 @@ class Inspection:
     def ok(self) -> bool:
         """Whether there is no finding of severity ``error``."""
         return all(finding.severity != "error" for finding in self.findings)
+
+    def in_brief(self) -> dict[str, str]:
+        """Span, rate, motion and findings."""
+        return {
+            "source": self.source,
+            "span": f"{self.start:.1f} to {self.stop:.1f} s, {self.samples} samples at {1.0 / self.interval:.4g} Hz",
+            "motion": self.overall,
+            "findings": "; ".join(f"{f.severity}: {f.message}" for f in self.findings) or "none",
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """The stretches of one kind of motion: start, stop (s) and kind, one row each."""
+        import pandas as pd
+
+        return pd.DataFrame([(r.start, r.stop, r.kind) for r in self.regimes], columns=["start_s", "stop_s", "kind"])
 
     def to_dict(self) -> dict[str, Any]:
         """Everything in datasheet units, ready for JSON: a figure that does not exist is None, never NaN."""
@@ -183,12 +199,6 @@ class Inspection:
                     table.add_row(f"  {words}", f"{shown} {unit}")
         return table
 
-    def plot(self) -> Figure:
-        """Draw rates and specific force over the motion regimes, and the Allan deviation."""
-        from truenorth.figures.inspection import plot_inspection
-
-        return plot_inspection(self)
-
 
 def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
     """Look for what is wrong with a record, and measure its noise and motion.
@@ -231,7 +241,8 @@ def _noise_at_rest(
     record: ImuRecord, motion: MotionSummary, findings: list[Finding]
 ) -> tuple[NoiseCoefficients | None, NoiseCoefficients | None, Regime | None]:
     """Noise of the longest still stretch, else of the longest disturbed one; gaps cut a stretch."""
-    from truenorth.analysis.allan import SHORTEST_RECORD, noise_coefficients
+    from truenorth.analysis.allan import SHORTEST_RECORD
+    from truenorth.quality.noise import noise_coefficients
 
     for kinds in (("still",), ("still", "disturbed")):
         rest = motion.longest(*kinds)

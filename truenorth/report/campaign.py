@@ -5,10 +5,10 @@ from __future__ import annotations
 import base64
 import io
 import math
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from truenorth.core.atomic import atomic_files
+from truenorth.core.shown import Write
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,19 +41,10 @@ COLUMNS = {
 }
 
 
-def save_campaign(campaign: Campaign) -> list[Path]:
-    """Write the tables (summary, comparison, outcomes, convergence), the figures as PNG and report.html into the folder.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    UsageError
-        The folder cannot be written to.
-    """
+def campaign_files(campaign: Campaign) -> dict[str, Write]:
+    """Tables (summary, comparison, outcomes, convergence), figures as PNG and report.html; see :func:`truenorth.save`."""
     from truenorth.campaign.summary import outcomes
+    from truenorth.figures.campaign import plot_campaign
 
     tables = {
         "summary.csv": campaign.summary,
@@ -61,20 +52,11 @@ def save_campaign(campaign: Campaign) -> list[Path]:
         "outcomes.csv": outcomes(campaign.table, campaign.case_names),
         "convergence.csv": campaign.convergence,
     }
-    figures = campaign.plot()
-    paths: list[Path] = []
-    with atomic_files() as file:
-
-        def place(name: str) -> Path:
-            paths.append(campaign.folder / name)
-            return file(paths[-1])
-
-        for name, table in tables.items():
-            table.to_csv(place(name), index=False)
-        for name, figure in figures.items():
-            figure.savefig(place(f"{name}.png"))
-        place("report.html").write_text(campaign_page(campaign, tables, figures), encoding="utf-8")
-    return paths
+    figures = plot_campaign(campaign)
+    files: dict[str, Write] = {name: partial(table.to_csv, index=False) for name, table in tables.items()}
+    files |= {f"{name}.png": figure.savefig for name, figure in figures.items()}
+    files["report.html"] = lambda path: path.write_text(campaign_page(campaign, tables, figures), encoding="utf-8")
+    return files
 
 
 def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame], figures: dict[str, Figure]) -> str:
@@ -82,7 +64,7 @@ def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame], figures: 
     import yaml
     from jinja2 import Environment, PackageLoader
 
-    from truenorth import __version__
+    from truenorth.core.version import __version__
 
     environment = Environment(
         loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True

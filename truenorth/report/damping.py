@@ -12,7 +12,7 @@ from truenorth.figures.style import COLOURS
 from truenorth.report.charts import new_chart, single
 
 if TYPE_CHECKING:
-    from truenorth.damping.navigation import Damping
+    from truenorth.damping.result import Damping
 
 SHORTEST_PERIOD = 120.0  # s, that is drawn
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.atomic import atomic_files, writable_folder
 from truenorth.figures.navigation import ellipses, track_unit
 from truenorth.figures.style import COLOURS, evenly
-from truenorth.navigation.export import geojson
 from truenorth.navigation.result import mean_nis
 from truenorth.report.charts import POINTS, band_trace, bound, line, new_chart, single
 from truenorth.report.damping import damping_charts, damping_facts
@@ -25,29 +20,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FILES = ("summary.json", "track.parquet", "innovations.parquet", "track.geojson", "report.html")
 VERDICTS = {"navigated": ("good", "Navigated"), "inconsistent": ("bad", "The measurements contradict the track")}
 UNITS = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}
-
-
-def save_navigation(result: Navigation, folder: str | PathLike[str]) -> list[Path]:
-    """Write the files of a navigation; all are written before the first takes its name.
-
-    Raises
-    ------
-    UsageError
-        The folder cannot be written to.
-    """
-    target = writable_folder(folder)
-    paths = [target / name for name in FILES]
-    with atomic_files() as file:
-        summary, track, innovations, line_file, report = (file(path) for path in paths)
-        summary.write_text(json.dumps(result.summary(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        result.to_frame().to_parquet(track)
-        result.innovations().to_parquet(innovations)
-        line_file.write_text(geojson(result), encoding="utf-8")
-        report.write_text(navigation_page(result), encoding="utf-8")
-    return paths
 
 
 def navigation_page(result: Navigation) -> str:
@@ -55,7 +29,7 @@ def navigation_page(result: Navigation) -> str:
     from jinja2 import Environment, PackageLoader
     from plotly.offline import get_plotlyjs
 
-    from truenorth import __version__
+    from truenorth.core.version import __version__
 
     environment = Environment(
         loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truenorth.core.attitude import UNIFORM_SIGMA
+from truenorth.core.attitude import angle_text
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G, parse_unit
 from truenorth.report.charts import charts
 
@@ -44,7 +44,7 @@ def alignment_page(result: Alignment) -> str:
         (title, caption, figure.to_html(full_html=False, include_plotlyjs=False, config=CHART_OPTIONS))
         for title, caption, figure in charts(result)
     ]
-    from truenorth import __version__
+    from truenorth.core.version import __version__
 
     mood, verdict = VERDICTS[result.status]
     return environment.get_template("alignment.html").render(
@@ -70,8 +70,8 @@ def _numbers(result: Alignment) -> list[dict[str, str]]:
             {
                 "name": name,
                 "value": f"{np.degrees(result.euler[i]):.4f}°" if known else "refused",
-                "sigma": _angle(float(result.euler_sigma[i])),
-                "floor": _angle(float(result.euler_sigma_floor[i])),
+                "sigma": angle_text(float(result.euler_sigma[i])),
+                "floor": angle_text(float(result.euler_sigma_floor[i])),
             }
         )
     if result.near_vertical:
@@ -81,18 +81,11 @@ def _numbers(result: Alignment) -> list[dict[str, str]]:
             {
                 "name": name.replace("_", " ").capitalize(),
                 "value": f"{np.degrees(value):.4f}°" if result.heading_known else "refused",
-                "sigma": _angle(sigma),
-                "floor": _angle(float(np.sqrt(result.phi_floor[2, 2]))),
+                "sigma": angle_text(sigma),
+                "floor": angle_text(float(np.sqrt(result.phi_floor[2, 2]))),
             },
         )
     return rows
-
-
-def _angle(x: float) -> str:
-    if x > 0.99 * UNIFORM_SIGMA:
-        return "unknown"
-    degrees = float(np.degrees(x))
-    return f"{degrees:.2f}°" if degrees >= 1.0 else f"{degrees:.4f}° ({degrees * 60:.2f}′)"
 
 
 def short(x: float) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from truenorth.records.flexure import FlexureSpec
+from truenorth.records.motion import MotionStates
 from truenorth.simulation.aiding import Aided
 from truenorth.simulation.axis_angles import Spin, Steps, Swing, scheme, steps
 from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
-from truenorth.simulation.flexure import Flexed, FlexureSpec
+from truenorth.simulation.flexure import Flexed
 from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
 from truenorth.simulation.ideal import IdealLog, ideal_log
-from truenorth.simulation.indexer import Axis, C_bs_from_angles, Indexed, Indexer
+from truenorth.simulation.indexer import Axis, Indexed, Indexer
 from truenorth.simulation.master import MasterSpec, simulate_master
-from truenorth.simulation.motion import Motion, MotionStates
+from truenorth.simulation.motion import Motion
 from truenorth.simulation.odometer import OdometerSpec, simulate_odometer
 from truenorth.simulation.runs import Simulation, simulate, simulate_runs
 from truenorth.simulation.sway import Disturbed, Sway, rest
@@ -21,7 +23,6 @@ from truenorth.simulation.velocity_log import VelocityLogSpec, simulate_velocity
 __all__ = [
     "Aided",
     "Axis",
-    "C_bs_from_angles",
     "Disturbed",
     "EncoderSpec",
     "Flexed",

@@ -19,9 +19,9 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import earth_rate_n
 from truenorth.core.errors import UsageError
 from truenorth.records import Record
-from truenorth.simulation.motion import MotionStates
+from truenorth.records.motion import MotionStates
+from truenorth.records.unit_spec import UnitSpec, value
 from truenorth.simulation.streams import stream
-from truenorth.simulation.unit_spec import UnitSpec, value
 
 Array = NDArray[np.float64]
 R = TypeVar("R", bound=Record)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.records.encoder import EncoderRecord
+from truenorth.records.unit_spec import value
 from truenorth.simulation.aiding import Aided, AidingSpec, Draws, sample_times
 from truenorth.simulation.indexer import Indexer
-from truenorth.simulation.unit_spec import value
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ through angle and rate, which for a process driven by white angular acceleration
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,36 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
+from truenorth.records.flexure import FlexureSpec
+from truenorth.records.motion import MotionStates, Moving
 from truenorth.simulation.aiding import Draws
-from truenorth.simulation.motion import MotionStates, body_rates
+from truenorth.simulation.motion import body_rates
 from truenorth.simulation.processes import second_order_gauss_markov
-from truenorth.simulation.sensing import Moving
-from truenorth.simulation.unit_spec import UnitSpec, value
 
 Array = NDArray[np.float64]
-DECAY = 2.146193  # (1 + x) exp(-x) = 1/e: correlation time times beta
 KNOT = 0.1  # of 1/beta
-
-
-@dataclass(frozen=True, kw_only=True)
-class FlexureSpec(UnitSpec):
-    """How much a structure bends, and how fast.
-
-    Attributes
-    ----------
-    sigma : (3,) floats, rad
-        Of the slave's heading, pitch and roll relative to the rigid body.
-    correlation_time : float, s
-        After which the autocorrelation ``(1 + beta t) exp(-beta t)`` is 1/e, ``beta = 2.146 / correlation_time``.
-    """
-
-    sigma: tuple[float, float, float] = value("angle angle angle", "arcmin arcmin arcmin", (0.0, 0.0, 0.0))
-    correlation_time: float = value("time", "s", 5.0, sign="positive")
-
-    @property
-    def beta(self) -> float:
-        """Natural frequency of the critically damped process, rad/s."""
-        return DECAY / self.correlation_time
 
 
 class Flexed:

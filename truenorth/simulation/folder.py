@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from truenorth import __version__, write_imu, write_record
 from truenorth.core.atomic import atomic_files, writable_folder
+from truenorth.core.version import __version__
+from truenorth.formats import write_imu, write_record
 
 if TYPE_CHECKING:
     from truenorth.simulation.aiding import Aided
@@ -79,7 +80,7 @@ def save_run(
         if plot:
             paths.append(target / "figure.png")
             title = f"{scenario.name}, run {run}, seed {seed}, IMU: {scenario.imu_spec.name}"
-            simulation.plot(title, aiding).savefig(file(paths[-1]))
+            simulation.plot(title=title, aiding=aiding).savefig(file(paths[-1]))
     return paths
 
 

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import earth_rate_n, radii, transport_rate_n
 from truenorth.records import GnssRecord, HeightRecord
+from truenorth.records.motion import MotionStates, Moving
+from truenorth.records.unit_spec import value
 from truenorth.simulation.aiding import Aided, Draws, OutlyingSpec, kept, outliers, sample_times
-from truenorth.simulation.motion import MotionStates, displaced
+from truenorth.simulation.motion import displaced
 from truenorth.simulation.processes import gauss_markov
-from truenorth.simulation.sensing import NODES, WEIGHTS, Moving
-from truenorth.simulation.unit_spec import value
+from truenorth.simulation.sensing import NODES, WEIGHTS
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.simulation.sensing import Moving, acceleration_gain, increments, leverage
+from truenorth.records.motion import Moving
+from truenorth.simulation.sensing import acceleration_gain, increments, leverage
 
 Array = NDArray[np.float64]
 

@@ -13,21 +13,19 @@ lever arm ends. With ``R = exp(angle [axis x])`` from the child frame of an axis
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.attitude import dcm_from_rotation_vector, skew
+from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.errors import UsageError
+from truenorth.core.indexing import DIRECTIONS, axis_rotation, chained
+from truenorth.records.motion import MotionStates, Moving
 from truenorth.simulation.axis_angles import Turning
-from truenorth.simulation.motion import MotionStates
-from truenorth.simulation.sensing import Moving
 
 Array = NDArray[np.float64]
-DIRECTIONS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ class Indexer:
 
     def C_bs(self, t: ArrayLike) -> Array:
         """(..., 3, 3) true attitude of the IMU in the body."""
-        return _chain([axis.real_direction for axis in self.axes], self.angles(t))
+        return chained([axis.real_direction for axis in self.axes], self.angles(t))
 
 
 @dataclass(frozen=True)
@@ -119,41 +117,12 @@ class Indexed:
         for axis in self.indexer.axes:
             angle, rate, acceleration = (x[..., None] for x in axis.angle(body.time))
             e = axis.real_direction
-            R = _rotation(e, angle[..., 0])
+            R = axis_rotation(e, angle[..., 0])
             w, dw, f = (_turned_back(R, x) for x in (w, dw, f))
             dw = dw + acceleration * e - rate * np.cross(e, w)
             w = w + rate * e
             C = C @ R
         return MotionStates(body.time, C, body.v_n, body.lat, body.lon, body.alt, w, f, dw)
-
-
-def C_bs_from_angles(axes: Sequence[str], angles: ArrayLike) -> Array:
-    """Attitude of the IMU in the body as an encoder tells it, (..., 3, 3).
-
-    Parameters
-    ----------
-    axes : sequence of {"x", "y", "z"}
-        As designed, the outermost first.
-    angles : (..., A) array, rad
-
-    Returns
-    -------
-    (..., 3, 3) array
-    """
-    return _chain([np.array(DIRECTIONS[axis]) for axis in axes], np.asarray(angles, dtype=np.float64))
-
-
-def _chain(directions: Sequence[Array], angles: Array) -> Array:
-    C = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
-    for i, direction in enumerate(directions):
-        C = C @ _rotation(direction, angles[..., i])
-    return C
-
-
-def _rotation(axis: Array, angle: Array) -> Array:
-    """``exp(angle [axis x])``, (..., 3, 3)."""
-    K = skew(axis)
-    return np.eye(3) + np.sin(angle)[..., None, None] * K + (1.0 - np.cos(angle))[..., None, None] * (K @ K)
 
 
 def _turned_back(R: Array, x: Array) -> Array:

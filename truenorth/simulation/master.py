@@ -18,12 +18,12 @@ from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.earth import normal_gravity, radii
 from truenorth.core.errors import UsageError
 from truenorth.records import MasterRecord
+from truenorth.records.motion import MotionStates, Moving
+from truenorth.records.unit_spec import value
 from truenorth.simulation.aiding import Aided, Draws, DroppingSpec, kept, sample_times
 from truenorth.simulation.gnss import moved, place_of
-from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.processes import gauss_markov
-from truenorth.simulation.sensing import Moving, acceleration_gain
-from truenorth.simulation.unit_spec import value
+from truenorth.simulation.sensing import acceleration_gain
 
 Array = NDArray[np.float64]
 THREE = (0.0, 0.0, 0.0)

@@ -14,40 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.earth import earth_rate_n, gravity_n, radii, transport_rate_n
-from truenorth.records import Trajectory
+from truenorth.records.motion import MotionStates
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class MotionStates:
-    """True motion at a set of times, any leading shape.
-
-    Attributes
-    ----------
-    time : (...) array, s
-    C_nb : (..., 3, 3) array
-    v_n : (..., 3) array, m/s
-    lat, lon, alt : (...) arrays, rad and m
-    w_ib_b : (..., 3) array, rad/s
-    f_b : (..., 3) array, m/s^2
-    dw_ib_b : (..., 3) array, rad/s^2
-        Angular acceleration.
-    """
-
-    time: Array
-    C_nb: Array
-    v_n: Array
-    lat: Array
-    lon: Array
-    alt: Array
-    w_ib_b: Array
-    f_b: Array
-    dw_ib_b: Array
-
-    def trajectory(self) -> Trajectory:
-        """Attitude, velocity and position as a record; times (N,)."""
-        return Trajectory(self.time, self.C_nb, self.v_n, self.lat, self.lon, self.alt, "truth")
 
 
 @dataclass(frozen=True)

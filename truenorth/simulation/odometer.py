@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
 from truenorth.records import OdometerRecord
+from truenorth.records.motion import MotionStates, Moving
+from truenorth.records.unit_spec import value
 from truenorth.simulation.aiding import (
     Aided,
     Draws,
@@ -27,9 +29,7 @@ from truenorth.simulation.aiding import (
     sample_times,
     velocity_b,
 )
-from truenorth.simulation.motion import MotionStates
-from truenorth.simulation.sensing import Moving, integrals
-from truenorth.simulation.unit_spec import value
+from truenorth.simulation.sensing import integrals
 
 Array = NDArray[np.float64]
 

@@ -8,27 +8,25 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
 from truenorth.core.errors import UsageError
+from truenorth.core.shown import Shown
 from truenorth.records import ImuRecord
+from truenorth.records.motion import MotionStates, Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.ideal import IdealLog, ideal_log
 from truenorth.simulation.imu_errors import apply_errors, size_effect
-from truenorth.simulation.motion import MotionStates
-from truenorth.simulation.sensing import Moving
 from truenorth.simulation.true_errors import TrueErrors
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from truenorth.simulation.aiding import Aided
+    import pandas as pd
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Shown):
     """A simulated log beside its truth.
 
     Attributes
@@ -48,18 +46,18 @@ class Simulation:
         """The true motion of the IMU at the sample times."""
         return self.motion.states(self.record.time)
 
-    def plot(self, title: str = "", aiding: Mapping[str, Aided[Any]] | None = None) -> Figure:
-        """Track, speed and height, attitude and sensor signals on one page; see :func:`plot_simulation`.
+    def in_brief(self) -> dict[str, str]:
+        """Length, rate and kind of the log."""
+        r = self.record
+        return {
+            "samples": str(len(r)),
+            "span": f"{r.time[0]:.3f} to {r.time[-1]:.3f} s",
+            "rate": f"{1.0 / r.interval:.4g} Hz",
+        }
 
-        Parameters
-        ----------
-        title : str
-        aiding : mapping of name to Aided, optional
-            Logs of aiding sensors, drawn as dots.
-        """
-        from truenorth.figures.simulation import plot_simulation
-
-        return plot_simulation(self, title, aiding)
+    def to_frame(self) -> pd.DataFrame:
+        """The log and the truth at its times side by side, index ``time``."""
+        return self.record.to_frame().join(self.truth.trajectory().to_frame())
 
 
 def simulate(

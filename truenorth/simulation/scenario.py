@@ -26,19 +26,20 @@ from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.core.position import Position
 from truenorth.core.schema import Angle, Frequency, Length, Strict, Time, validated
 from truenorth.core.yaml_file import read_mapping
+from truenorth.records.flexure import FlexureSpec
+from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.records.unit_spec import UnitSpec
 from truenorth.simulation import IdealLog, Simulation, given_errors, ideal_log, simulate
 from truenorth.simulation.aiding import Aided
 from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
-from truenorth.simulation.flexure import Flexed, FlexureSpec
+from truenorth.simulation.flexure import Flexed
 from truenorth.simulation.indexer import Indexed
 from truenorth.simulation.motion import Motion
 from truenorth.simulation.scenario_courses import RouteMotion
 from truenorth.simulation.scenario_motion import Disturbance, MotionModel, disturbed
 from truenorth.simulation.scenario_sensors import AIDING, IndexerModel
-from truenorth.simulation.sensing import Moving
 from truenorth.simulation.streams import stream
-from truenorth.simulation.unit_spec import UnitSpec
 
 MOTION_STREAM = 200  # of the motion's own draws, and one more for each disturbance
 SHIPPED = resources.files("truenorth.simulation") / "scenarios"

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from truenorth.core.errors import UsageError
 from truenorth.core.schema import Angle, AngularRate, Strict, Time
+from truenorth.records.unit_spec import UnitSpec
 from truenorth.simulation.axis_angles import SCHEMES, Spin, Swing, Turning, scheme
 from truenorth.simulation.encoder import EncoderSpec
 from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
@@ -16,7 +17,6 @@ from truenorth.simulation.indexer import Axis, Indexer
 from truenorth.simulation.master import MasterSpec, simulate_master
 from truenorth.simulation.odometer import OdometerSpec, simulate_odometer
 from truenorth.simulation.tones import Tone
-from truenorth.simulation.unit_spec import UnitSpec
 from truenorth.simulation.velocity_log import VelocityLogSpec, simulate_velocity
 
 # Key in a scenario: the specification that its mapping is, and what makes the log.

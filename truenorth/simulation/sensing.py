@@ -8,32 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from truenorth.core.attitude import skew
-from truenorth.simulation.motion import MotionStates
+from truenorth.records.motion import MotionStates, Moving
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 BLOCK = 4096  # intervals at once: keeps the work arrays in the cache
-
-
-class Moving(Protocol):
-    """Whatever an IMU can sit on: a motion, or an indexer on one."""
-
-    @property
-    def breaks(self) -> Array:
-        """Times where a higher derivative jumps, s."""
-
-    @property
-    def shortest_period(self) -> float:
-        """Of the fastest oscillation, s."""
-
-    def states(self, t: ArrayLike) -> MotionStates:
-        """The true motion of the IMU at any times (s)."""
 
 
 def increments(moving: Moving, edges: Array) -> tuple[Array, Array]:

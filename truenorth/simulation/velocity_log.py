@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.records import VelocityRecord
+from truenorth.records.motion import Moving
+from truenorth.records.unit_spec import value
 from truenorth.simulation.aiding import (
     Aided,
     Draws,
@@ -21,8 +23,6 @@ from truenorth.simulation.aiding import (
     velocity_b,
 )
 from truenorth.simulation.processes import gauss_markov
-from truenorth.simulation.sensing import Moving
-from truenorth.simulation.unit_spec import value
 
 Array = NDArray[np.float64]
 MEASURED = {"forward": [False, True, False], "level": [True, True, False], "all": [True, True, True]}

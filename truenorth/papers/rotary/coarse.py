@@ -11,9 +11,9 @@ from truenorth.alignment.rotary import angles_at
 from truenorth.coarse.lever_arm import RateSource, arm_velocity
 from truenorth.coarse.wahba import q_method, triad
 from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES, Run
 from truenorth.records import ImuRecord
-from truenorth.simulation.indexer import C_bs_from_angles
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES
-from truenorth.simulation.indexer import C_bs_from_angles
 
 Array = NDArray[np.float64]
 ARCMIN = np.radians(1.0) / 60.0

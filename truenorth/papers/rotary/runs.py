@@ -18,12 +18,12 @@ from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.filters import Estimates, LinearSystem, kalman
 from truenorth.filters.fading import fading
 from truenorth.models.rotary import BA, BG, DV, PHI, RotaryModel, earth_axes
 from truenorth.papers.rotary.coarse import LAST, SOURCES, coarse_errors, misalignment, sample
 from truenorth.papers.rotary.truth import AXES, Noise, Run, simulate_run
-from truenorth.simulation.indexer import C_bs_from_angles
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]

@@ -24,9 +24,9 @@ from truenorth.core.earth import ecef_axes
 from truenorth.core.position import Position
 from truenorth.core.yaml_file import read_mapping
 from truenorth.records import EncoderRecord, ImuRecord
+from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation.scenario import Scenario, read_scenario
-from truenorth.simulation.sensing import Moving
 from truenorth.simulation.streams import stream
 
 Array = NDArray[np.float64]

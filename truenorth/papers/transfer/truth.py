@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.motion import MotionStates
 from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_master
-from truenorth.simulation.motion import MotionStates
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
 

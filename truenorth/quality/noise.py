@@ -20,7 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.analysis.allan import SHORTEST_RECORD, AllanDeviation, fit_shapes, overlapping_adev
+from truenorth.analysis.allan import (
+    SHORTEST_RECORD,
+    AllanDeviation,
+    NoiseCoefficients,
+    fit_noise,
+    fit_shapes,
+    overlapping_adev,
+)
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -67,6 +74,35 @@ def gauss_markov_variance(tau: ArrayLike, correlation_time: float) -> Array:
     safe = np.where(small, 1.0, x)
     closed = 2.0 / safe * (1.0 - (3.0 - 4.0 * np.exp(-safe) + np.exp(-2.0 * safe)) / (2.0 * safe))
     return np.where(small, x * (2.0 / 3.0 - x / 2.0 + 7.0 * x**2 / 30.0), closed)
+
+
+def noise_coefficients(record: ImuRecord) -> tuple[NoiseCoefficients, NoiseCoefficients]:
+    """Noise coefficients of the gyros and of the accelerometers of a record at rest.
+
+    The Allan variance at octave averaging times is fitted by the sum of the quantisation, random walk, bias
+    instability and rate random walk terms (IEEE Std 952-1997, C.1), by weighted least squares, with no
+    coefficient below zero and none that the data do not ask for. A record in motion gives the noise of the
+    motion. The sigma of the random walk is honest on white noise (z-scores of RMS 0.95 over 900 simulated
+    channels); that of the rate random walk, carried by few degrees of freedom, is optimistic by about 1.6.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        At rest, evenly sampled.
+
+    Returns
+    -------
+    gyro, accel : NoiseCoefficients
+
+    Raises
+    ------
+    UsageError
+        Fewer than 20 rows.
+    """
+    if len(record) < SHORTEST_RECORD:
+        raise UsageError(f"{record.source}: {len(record)} rows; noise coefficients need at least {SHORTEST_RECORD}")
+    gyro, accel = (fit_noise(data, record.interval, record.kind) for data in (record.gyro, record.accel))
+    return gyro, accel
 
 
 def noise_from_log(

@@ -14,15 +14,16 @@ from truenorth.alignment.transfer_start import Assumed, bias_sigmas, model_from_
 from truenorth.alignment.transfer_system import system_of_motion
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
+from truenorth.core.shown import Shown
 from truenorth.filters import kalman
 from truenorth.models.transfer import PHI
+from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, s_turn, straight, turn, wing_rock
-from truenorth.simulation.sensing import Moving
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -33,8 +34,8 @@ GAIN, ACCELERATION = 0.25, 2.0  # change of speed, as a part of it, and m/s^2
 ROCK, PERIOD, ROCKING = math.radians(20.0), 4.0, 30.0  # amplitude, s, s
 
 
-@dataclass(frozen=True)
-class ManoeuvreAdvice:
+@dataclass(frozen=True, repr=False)
+class ManoeuvreAdvice(Shown):
     """Heading's one-sigma over time in each manoeuvre, and which is first below the wanted one.
 
     Attributes
@@ -44,12 +45,15 @@ class ManoeuvreAdvice:
     wanted : float, rad
     reached : mapping of manoeuvre to s
         Infinite: not in the time considered.
+    begun : float, s
+        When each manoeuvre begins.
     """
 
     time: Array
     heading_sigma: dict[str, Array]
     wanted: float
     reached: dict[str, float]
+    begun: float = BEFORE
 
     @property
     def best(self) -> str | None:
@@ -61,6 +65,17 @@ class ManoeuvreAdvice:
     def words(self) -> tuple[str, ...]:
         """The answer."""
         return (str(self),)
+
+    def in_brief(self) -> dict[str, str]:
+        """The answer."""
+        return {"answer": str(self)}
+
+    def to_frame(self) -> pd.DataFrame:
+        """One-sigma of heading (deg) of each manoeuvre, index ``time``."""
+        import pandas as pd
+
+        columns = {name: np.degrees(sigma) for name, sigma in self.heading_sigma.items()}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
     def summary(self) -> dict[str, Any]:
         """The answer as plain numbers: deg and s, None where it is out of reach."""
@@ -91,23 +106,6 @@ class ManoeuvreAdvice:
             if name != self.best
         )
         return f"{self.best} brings heading to {wanted} after {self.reached[self.best]:.0f} s ({others})"
-
-    def plot(self) -> Figure:
-        """Heading's sigma over time in each manoeuvre, and the wanted one."""
-        from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
-
-        with style():
-            figure = new_figure(8.0, 4.5)
-            ax = figure.subplots()
-            for (name, sigma), colour in zip(self.heading_sigma.items(), COLOURS * 2):
-                ax.plot(self.time, 60 * np.degrees(sigma), color=colour, label=name)
-            ax.axhline(60 * math.degrees(self.wanted), color=REFERENCE, linestyle="--", label="wanted")
-            ax.axvline(BEFORE, color=REFERENCE, linestyle=":", linewidth=1.0)
-            ax.set(yscale="log", xlabel="time, s", ylabel="heading, one sigma, arcmin")
-            ax.set_title(f"Heading by transfer alignment; each manoeuvre begins at {BEFORE:.0f} s")
-            ax.margins(x=0.0)
-            figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        return figure
 
 
 def advise_manoeuvre(

@@ -23,17 +23,18 @@ from truenorth.analysis.error_budget import Source, error_budget
 from truenorth.core.earth import DEFLECTION
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
+from truenorth.core.shown import Shown
 from truenorth.filters import LinearSystem, kalman
 from truenorth.models import turntable
 from truenorth.models.static import BA, BG, DV, PHI, StaticModel
 from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX
+from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
-from truenorth.simulation.sensing import Moving
 from truenorth.strapdown.inertial import earth_rotation, integrate
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -80,8 +81,8 @@ class SchemeAdvice:
         return float(self.time[k]), float(self.sigma[k])
 
 
-@dataclass(frozen=True)
-class Advice:
+@dataclass(frozen=True, repr=False)
+class Advice(Shown):
     """How to reach a heading.
 
     Attributes
@@ -130,6 +131,18 @@ class Advice:
             )
         return tuple(lines)
 
+    def in_brief(self) -> dict[str, str]:
+        """The answer, then scheme by scheme."""
+        answer, *each = self.words
+        return {"answer": answer} | dict(line.split(": ", 1) for line in each)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One-sigma of heading (deg) over the length of data: scheme, time_s, heading_sigma_deg."""
+        import pandas as pd
+
+        rows = [(s.name, t, math.degrees(x)) for s in self.schemes for t, x in zip(s.time, s.sigma, strict=True)]
+        return pd.DataFrame(rows, columns=["scheme", "time_s", "heading_sigma_deg"])
+
     def summary(self) -> dict[str, Any]:
         """One dictionary in datasheet units, ready for JSON."""
         return {
@@ -150,12 +163,6 @@ class Advice:
                 for scheme in self.schemes
             ],
         }
-
-    def plot(self) -> Figure:
-        """Sigma of heading over the length of data in each scheme, and what it is made of."""
-        from truenorth.figures.advice import plot_advice
-
-        return plot_advice(self)
 
 
 def advise(

@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from truenorth.alignment.inference import noise_of
-from truenorth.analysis.log_noise import gauss_markov_variance, noise_from_log
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.units import parse
+from truenorth.quality.noise import gauss_markov_variance, noise_from_log
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import rest, simulate

@@ -1,0 +1,100 @@
+"""The house: who may import whom, no circles, no function over 120 lines. Imports for type checkers count."""
+
+import ast
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1] / "truenorth"
+FLOORS = [
+    ["core"],
+    ["filters", "analysis"],
+    ["records"],
+    ["formats"],
+    ["state", "strapdown"],
+    ["errors", "aiding", "models"],
+    ["estimate", "coarse", "quality"],
+    ["alignment", "navigation", "damping"],
+    ["advice"],
+    ["live", "campaign", "figures", "report"],
+    ["papers"],
+    ["cli"],
+]
+FLOOR = {folder: number for number, folders in enumerate(FLOORS) for folder in folders}
+FLOOR["simulation"] = FLOOR["state"] + 0.5  # it stands aside: on floors up to the strapdown algorithms
+SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
+LONGEST = 120
+LONG = {  # known ones; each goes when its file is rebuilt
+    "truenorth.alignment.transfer:align_transfer",
+    "truenorth.alignment.transfer_loop:run",
+    "truenorth.cli.align:align",
+    "truenorth.cli.navigate:navigate",
+    "truenorth.navigation.kernel:run",
+    "truenorth.navigation.procedure:navigate",
+}
+
+FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
+TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
+
+
+def imports(name: str) -> set[str]:
+    """Files that a file imports: a name that is a file itself, or the file in which the name stands."""
+    found = set()
+    for node in ast.walk(TREES[name]):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {
+                f"{node.module}.{a.name}" if f"{node.module}.{a.name}" in FILES else node.module for a in node.names
+            }
+    return {f for f in found if f.split(".")[0] == "truenorth"}
+
+
+def folder(name: str) -> str:
+    parts = name.split(".")
+    return parts[1] if len(parts) > 2 or (len(parts) == 2 and (ROOT / parts[1]).is_dir()) else ""
+
+
+def test_every_folder_has_its_floor():
+    assert {p.name for p in ROOT.iterdir() if (p / "__init__.py").exists()} <= FLOOR.keys()
+
+
+def test_no_circles():
+    graph = {name: {f for f in imports(name) if f in FILES and f != name} for name in FILES}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(reversed(error.args[1])))
+
+
+def test_no_floor_imports_a_higher_one():
+    wrong = [
+        f"{name}: {other}"
+        for name in FILES
+        if folder(name)
+        for other in imports(name)
+        if FLOOR.get(folder(other), 99.0) > FLOOR[folder(name)]
+    ]
+    assert wrong == []
+
+
+def test_no_procedure_imports_the_simulator():
+    wrong = [
+        f"{name}: {other}"
+        for name in FILES
+        if folder(name) not in SIMULATES
+        for other in imports(name)
+        if folder(other) == "simulation" and folder(name)
+    ]
+    assert wrong == []
+
+
+def test_no_long_functions():
+    wrong = [
+        f"{name}:{node.name}"
+        for name, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno + 1 > LONGEST
+    ]
+    assert set(wrong) <= LONG

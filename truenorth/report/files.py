@@ -1,0 +1,67 @@
+"""The files that each type of result is written to: name and writer; :func:`truenorth.save` puts them in place."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from truenorth.core.shown import Write
+from truenorth.navigation.export import geojson
+from truenorth.navigation.start import navigation_block
+
+if TYPE_CHECKING:
+    from truenorth.alignment import Alignment
+    from truenorth.campaign.tuning import Tuned
+    from truenorth.navigation import Navigation
+    from truenorth.quality import Inspection
+    from truenorth.simulation import Simulation
+
+
+def alignment_files(result: Alignment) -> dict[str, Write | None]:
+    """summary.json, and history.parquet where there is a history."""
+    summary = result.summary() | {"navigation": navigation_block(result)}  # from which navigation goes on
+    history: Write | None = None if result.history is None else lambda path: result.to_frame().to_parquet(path)
+    return {"summary.json": _json(summary), "history.parquet": history}
+
+
+def navigation_files(result: Navigation) -> dict[str, Write]:
+    """summary.json, track.parquet, innovations.parquet and track.geojson."""
+    return {
+        "summary.json": _json(result.summary()),
+        "track.parquet": lambda path: result.to_frame().to_parquet(path),
+        "innovations.parquet": lambda path: result.innovations().to_parquet(path),
+        "track.geojson": lambda path: path.write_text(geojson(result), encoding="utf-8"),
+    }
+
+
+def inspection_files(result: Inspection) -> dict[str, Write]:
+    """summary.json."""
+    return {"summary.json": _json(result.to_dict())}
+
+
+def summary_file(result: Any) -> dict[str, Write]:
+    """summary.json of a result that has a `summary`."""
+    return {"summary.json": _json(result.summary())}
+
+
+def simulation_files(result: Simulation) -> dict[str, Write]:
+    """imu.parquet and truth.parquet, which the readers of logs read."""
+    from truenorth.formats import write_imu, write_record
+
+    return {
+        "imu.parquet": lambda path: write_imu(result.record, path),
+        "truth.parquet": lambda path: write_record(result.truth.trajectory(), path),
+    }
+
+
+def tuned_files(result: Tuned) -> dict[str, Write]:
+    """tuned.yaml (the specification), trials.csv and judged.csv."""
+    return {
+        "tuned.yaml": result.spec.to_yaml,
+        "trials.csv": lambda path: result.trials.to_csv(path, index=False),
+        "judged.csv": lambda path: result.judged.to_csv(path, index=False),
+    }
+
+
+def _json(content: dict[str, Any]) -> Write:
+    return lambda path: path.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
