@@ -30,7 +30,7 @@ LONG = {  # known ones; each goes when its file is rebuilt
     "truenorth.alignment.transfer_loop:run",
     "truenorth.cli.align:align",
     "truenorth.cli.navigate:navigate",
-    "truenorth.navigation.kernel:run",
+    "truenorth.estimate.loop:run",
     "truenorth.navigation.procedure:navigate",
 }
 

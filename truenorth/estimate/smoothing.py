@@ -7,7 +7,7 @@ Corrections fed back make the loop's errors those of a linear filter less what i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,23 @@ from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
 from truenorth.strapdown import wander
 
-if TYPE_CHECKING:
-    from truenorth.estimate.run import Timeline
-
 Array = NDArray[np.float64]
+
+
+class Timeline(Protocol):
+    """Events in order."""
+
+    @property
+    def source(self) -> NDArray[np.int64]:
+        """(K,) of each event; negative: none."""
+
+    @property
+    def output(self) -> NDArray[np.bool_]:
+        """(K,) whether the state is put out there."""
+
+    @property
+    def variance(self) -> Array:
+        """(K, 3) of what was measured."""
 
 
 def smoothed(plan: Timeline, kept: kernel.Kept, P0: Array) -> tuple[Array, Array, Array]:
