@@ -51,13 +51,13 @@ def test_the_accelerometer_form_tells_what_an_error_does_to_the_log():
     C = rest(PLACE, 0.6, 0.02, -0.01).states(np.array(0.0)).C_nb
     clean = integrate(record, 1.0)
     core = StaticModel(1e-7, 1e-5).linearise(clean, C, PLACE.lat, PLACE.alt, np.eye(STATES), np.ones(3))
-    system = force_system(core, clean, C, PLACE.lat, PLACE.alt, np.full(3, 1e-8))
+    system = force_system(core, clean, C, PLACE.lat, PLACE.alt)
     T = record.interval
     for state, size in ((BG.start, 1e-6), (BG.start + 2, 1e-6), (BA.start, 1e-4), (BA.start + 1, 1e-4)):
         dtheta, dvel = record.gyro.copy(), record.accel.copy()
         (dtheta if state < BA.start else dvel)[:, state % 3] += size * T
         wrong = integrate(ImuRecord(record.time, dtheta, dvel, "increments"), 1.0)
-        seen = force_system(core, wrong, C, PLACE.lat, PLACE.alt, np.full(3, 1e-8)).z - system.z
+        seen = force_system(core, wrong, C, PLACE.lat, PLACE.alt).z - system.z
         x, expected = np.zeros(STATES), []
         x[state] = size
         for Phi, H in zip(system.Phi, system.H, strict=True):

@@ -155,7 +155,7 @@ for system in (random_system(), random_system(n=12, runs=(2,)), read_only):
         kalman(system, history=history)
         kalman(system, kalman(system).state, joseph=False, innovations=True, workers=2)
     smoother(system)
-for module, kernel in (("kalman", "kalman_runs"), ("smoother", "smooth_runs")):
+for module, kernel in (("linear", "linear_runs"), ("smoother", "smooth_runs")):
     stats = getattr(sys.modules["truenorth.filters." + module], kernel).stats
     print(sum(stats.cache_misses.values()), sum(stats.cache_hits.values()))
 """

@@ -12,7 +12,7 @@ from truenorth.core.position import Position
 from truenorth.models.disturbance import AxisMotion, Oscillator
 from truenorth.models.rotary import BA, BG, DV, PHI, RotaryModel, earth_axes
 from truenorth.models.static import StaticModel
-from truenorth.models.swaying import ARM, SWAYING_STATES, arm_rows, with_arm, with_motion, without_sway
+from truenorth.models.swaying import arm_rows, with_arm, with_motion, without_sway
 from truenorth.papers.rotary.drawings import modulated
 from truenorth.papers.rotary.truth import INDEXER_RATES
 from truenorth.records import ImuRecord
@@ -115,7 +115,7 @@ def test_rows_of_the_arm_explain_all_of_its_velocity(ship):
     model = StaticModel(0.0, 0.0)
     plain = model.linearise(integrals, C, PLACE.lat, PLACE.alt, np.eye(12), np.zeros(3))
     rows = arm_rows(integrals, C, PLACE.lat)
-    system = with_arm(plain, rows, np.array(SHIP.lever_arm, dtype=float), np.eye(3))
+    system = with_arm(plain, rows, np.array(SHIP.lever_arm, dtype=float))
     # The arm's velocity at the first instant is a state, which turns with the earth: smooth, and no part of this.
     rest, t = system.z, np.arange(60.0)
     rest = rest - np.polynomial.polynomial.polyval(t, np.polynomial.polynomial.polyfit(t, rest, 2)).T
@@ -128,12 +128,13 @@ def test_states_of_arm_and_motion(ship):
     C = SHIP.states(np.array(0.0)).C_nb
     integrals = integrate(ship, 1.0)
     plain = StaticModel(1e-7, 1e-5).linearise(integrals, C, PLACE.lat, PLACE.alt, np.eye(12), np.zeros(3))
-    system = with_arm(plain, arm_rows(integrals, C, PLACE.lat), np.zeros(3), 4.0 * np.eye(3))
+    system = with_arm(plain, arm_rows(integrals, C, PLACE.lat), np.zeros(3))
+    system.P0[12:15, 12:15] = 4.0 * np.eye(3)
     motion = (AxisMotion(1e-3, (Oscillator(2, 0.1, 1.0, 0.1),)), AxisMotion(2e-3), AxisMotion(3e-3))
     full = with_motion(system, 1.0, motion)
-    assert full.states == SWAYING_STATES
+    assert full.states == 39
     np.testing.assert_array_equal(full.H[:, :, :15], system.H)
-    np.testing.assert_array_equal(np.diag(full.P0)[ARM], 4.0)
+    np.testing.assert_array_equal(np.diag(full.P0)[12:15], 4.0)
     assert math.sqrt(full.H[0, 0, 15:] @ full.P0[15:, 15:] @ full.H[0, 0, 15:]) == pytest.approx(0.1)
     np.testing.assert_allclose((full.R - system.R)[:, [0, 1, 2], [0, 1, 2]], np.square([[1e-3, 2e-3, 3e-3]] * 60))
     assert not full.P0[19:, 19:].any()

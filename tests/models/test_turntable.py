@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from truenorth.core.position import Position
-from truenorth.models import turntable
+from truenorth.estimate.staying import StayingLog, prior_of
+from truenorth.models.matrices import without_errors
 from truenorth.models.static import StaticModel
-from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX, STATES
 from truenorth.records import ImuRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
-from truenorth.strapdown.inertial import integrate
 
 LAT = math.radians(45.0)
+PRIOR = prior_of(np.eye(6), spec=imu_spec("consumer"), arm=np.zeros(3), arm_sigma=1.0)
+GYRO_MATRIX, ACCEL_MATRIX, ARM = slice(12, 21), slice(21, 30), PRIOR.groups["arm"]
+STATES = len(PRIOR.mean)
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +30,7 @@ def ideal():
 
 def _velocity(record, C):
     """Mean velocity of each interval in n, as measured, and the system."""
-    integrals = integrate(record, 1.0)
-    P0, R = np.eye(STATES), np.full((30, 3), 1e-6)
-    system = turntable.linearise(StaticModel(1e-7, 1e-5), record, integrals, C, LAT, 0.0, P0, R, np.zeros(STATES))
-    return system
+    return StayingLog(record, C, Position(LAT), StaticModel(1e-7, 1e-5), PRIOR, 1.0).linearise()
 
 
 @pytest.mark.parametrize("state", [6, 7, 8, 9, 10, 11, *range(12, 30)])
@@ -77,6 +77,6 @@ def test_errors_are_taken_off(ideal):
     wrong = ImuRecord(
         record.time, record.gyro @ M_g.T + T * bias[:3], record.accel @ M_a.T + T * bias[3:], "increments"
     )
-    back = turntable.without_errors(wrong, bias, M_g - np.eye(3), M_a - np.eye(3))
+    back = without_errors(wrong, bias, M_g - np.eye(3), M_a - np.eye(3))
     np.testing.assert_allclose(back.gyro, record.gyro, atol=1e-15)
     np.testing.assert_allclose(back.accel, record.accel, atol=1e-14)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +24,9 @@ from truenorth.core.earth import DEFLECTION
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import Shown
+from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.models import turntable
 from truenorth.models.static import BA, BG, DV, PHI, StaticModel
-from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX
 from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
@@ -236,17 +235,20 @@ class _Scheme:
         self, spec: ImuSpec, position: Position, turns: Sequence[float], T: float, disturbance: float, arm_sigma: float
     ) -> None:
         self.position, self.T = position, T
-        self.P0 = prior_covariance(spec, position, arm_sigma)
+        P_bias = prior_covariance(spec, position)
+        self.prior = prior_of(P_bias, spec=spec, arm=np.zeros(3), arm_sigma=arm_sigma)
         self.model = noise_of(spec)
         self.record = simulate(_motion(position, turns, T), rate=IDEAL_RATE, duration=T).record
-        self.integrals = integrate(self.record, max(1.0, T / EPOCHS))
-        self.base = np.tile((disturbance**2 / self.integrals.intervals)[:, None], (1, 3))
+        self.interval = max(1.0, T / EPOCHS)
+        self.integrals = integrate(self.record, self.interval)
+        self.base = (disturbance**2 / self.integrals.intervals)[:, None, None] * np.eye(3)
 
     def system(self, model: StaticModel) -> LinearSystem:
         """With some noise of the sensors."""
-        C, lat, alt = rest(self.position).states(np.array(0.0)).C_nb, self.position.lat, self.position.alt
-        x0 = np.zeros(turntable.STATES)
-        return turntable.linearise(model, self.record, self.integrals, C, lat, alt, self.P0, self.base, x0)
+        C = rest(self.position).states(np.array(0.0)).C_nb
+        log = StayingLog(self.record, C, self.position, model, self.prior, self.interval, integrals=self.integrals)
+        system = log.linearise()
+        return replace(system, R=system.R + self.base)
 
     def heading_variance(self) -> float:
         """At the end, deflection of the vertical included, rad^2."""
@@ -263,21 +265,22 @@ class _Scheme:
 
     def sources(self) -> dict[str, Source]:
         """What the model is made of."""
+        matrices, arm = self.prior.groups["matrices"], self.prior.groups["arm"]
+        middle = (matrices.start + matrices.stop) // 2
         parts = {
             "initial attitude and velocity": (PHI, DV),
             "gyro bias": (BG,),
             "accelerometer bias": (BA,),
-            "gyro scale factors and misalignments": (GYRO_MATRIX,),
-            "accelerometer scale factors and misalignments": (ACCEL_MATRIX,),
-            "lever arm": (ARM,),
+            "gyro scale factors and misalignments": (slice(matrices.start, middle),),
+            "accelerometer scale factors and misalignments": (slice(middle, matrices.stop),),
+            "lever arm": (arm,),
         }
-        sources = {name: Source(P0=_part(self.P0, slices)) for name, slices in parts.items()}
+        sources = {name: Source(P0=_part(self.prior.P, slices)) for name, slices in parts.items()}
         names = ("gyro noise", "accelerometer noise", "gyro bias instability", "accelerometer bias instability")
-        base = self.base[:, None] * np.eye(3)
         for name, which, walk in zip(names, np.eye(4), astuple(self.model), strict=True):
             one = self.system(StaticModel(*(walk * which).tolist()))
-            sources[name] = Source(Q=one.Q, R=one.R - base, S=one.S)
-        sources["motion of the base"] = Source(R=base)
+            sources[name] = Source(Q=one.Q, R=one.R - self.base, S=one.S)
+        sources["motion of the base"] = Source(R=self.base)
         return sources
 
     def about_vertical(self, P: Array) -> float:

@@ -14,11 +14,12 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.fine import fine_align, white_variance
+from truenorth.alignment.fine import fine_align
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import Means
 from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.estimate.base_motion import white_variance
 from truenorth.filters import LinearSystem
 from truenorth.models.static import StaticModel, mean_velocity
 from truenorth.quality.regimes import MotionSummary

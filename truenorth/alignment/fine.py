@@ -1,43 +1,35 @@
 """Fine alignment: a Kalman filter on the base's mean velocity, re-linearised until it stands still.
 
 From a coarse attitude the log is integrated, linearised about it and filtered; attitude and biases are corrected and
-the log is integrated again (Gauss-Newton on the whole log). The velocity of the base is measurement noise: how large
+the log is integrated again (:mod:`truenorth.estimate.batch`). The velocity of the base is measurement noise: how large
 it is, is read from the log itself, axis by axis, by making the innovations as large as the filter expects them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
-from truenorth.alignment.form import Form
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
-from truenorth.filters import Estimates, LinearSystem, kalman
+from truenorth.estimate.base_motion import VelocityNoise, white_variance
+from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, settle
+from truenorth.estimate.staying import StayingLog, prior_of
+from truenorth.filters import Estimates, LinearSystem
 from truenorth.filters.gains import Gains, filter_gains, initial_part
-from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
-from truenorth.models.static_force import force_system, gained_velocity
+from truenorth.models.static import BA, BG, PHI, STATES, StaticModel, mean_velocity
+from truenorth.models.static_force import Form, gained_velocity
 from truenorth.records import ImuRecord
-from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
 
 MAX_PASSES = 8
 MAX_NOISE_PASSES = 6
-SAME_NOISE = 0.1  # of the expected innovation variance
-CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sigma is the last
-ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
-LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
-HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
-VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
-QUIETEST_BASE = 1e-6  # m/s: keeps R positive on a base of stone and an IMU without noise
 SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at least
-COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
-COLOUR_ALARM = 1e-3  # rate at which white innovations pass for coloured
-COLOUR_RUNS = 5  # fewer blocks than this say nothing of it
 
 
 @dataclass(frozen=True)
@@ -77,7 +69,29 @@ class FineAlignment:
     disturbance: Array
     passes: int
     settled: bool
-    form: Form = field(default="velocity", kw_only=True)
+    form: Form
+
+    @classmethod
+    def of(cls, log: StayingLog, last: Settled[Filtered], kept: slice, disturbance: Array, **more: Any) -> Self:
+        """What the last pass over a log left; `kept` are the states whose prior makes the floor, `more` a subclass's own."""
+        system, estimates = last.found.system, last.found.estimates
+        gains = filter_gains(system, estimates)
+        P0 = np.zeros((system.states, system.states))
+        P0[kept, kept] = log.prior.P[kept, kept]
+        return cls(
+            integrals=log.integrals,
+            C_n0_i=log.C_n0_i,
+            nominal_bias=log.bias,
+            system=system,
+            estimates=estimates,
+            gains=gains,
+            floor=initial_part(gains.step, P0),
+            disturbance=disturbance,
+            passes=last.passes,
+            settled=last.moved < ROUGHLY,
+            form=log.form,
+            **more,
+        )
 
     @property
     def x(self) -> Array:
@@ -181,101 +195,18 @@ def fine_align(
     -------
     FineAlignment
     """
-    lat, alt = position.lat, position.alt
-    rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
-    bias = np.zeros(6)
-    P0 = np.zeros((STATES, STATES))
-    P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
-    P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
-    P0[6:, 6:] = P_bias
-
-    if integrals is None:
-        integrals = integrate(record, interval, rows_at=rows)
+    prior = prior_of(P_bias)
+    log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)
     if form == "velocity":
-        R = white_variance(mean_velocity(integrals, C_n0_i, lat, alt))
+        R = white_variance(mean_velocity(log.integrals, C_n0_i, position.lat, position.alt))
     else:
         expected = model.accel_random_walk**2 * interval
-        R = np.maximum(white_variance(gained_velocity(integrals, C_n0_i, lat, alt)) - expected, SLIGHT * expected)
-
-    for passes in range(1, MAX_PASSES + 1):
-        x0 = np.zeros(STATES)
-        x0[6:] = -bias
-        system = model.linearise(integrals, C_n0_i, lat, alt, P0, R, x0)
-        if form == "force":
-            system = force_system(system, integrals, C_n0_i, lat, alt, R)
-        system, estimates, R = _with_base_variance(system, R)
-        x, P = estimates.x[-1], estimates.P[-1]
-        moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
-        if moved < CONVERGED or passes == MAX_PASSES:
-            break
-        # Back to the start: phi(0) = phi(end) + int C_n0_b (eps - nominal); then everything anew about the estimate.
-        turned = np.einsum("k,kab->ab", integrals.intervals, C_n0_i @ integrals.C_mean)
-        C_n0_i = dcm_from_rotation_vector(x[PHI] + turned @ x[BG]) @ C_n0_i
-        bias = bias + np.concatenate([x[BG], x[BA]])
-        integrals = integrate(record, interval, bias[:3], bias[3:], rows)
-
-    gains = filter_gains(system, estimates)
-    P0_bias = np.zeros((STATES, STATES))
-    P0_bias[6:, 6:] = P_bias
-    return FineAlignment(
-        integrals=integrals,
-        C_n0_i=C_n0_i,
-        nominal_bias=bias,
-        system=system,
-        estimates=estimates,
-        gains=gains,
-        floor=initial_part(gains.step, P0_bias),
-        disturbance=np.sqrt(R),
-        passes=passes,
-        settled=moved < ROUGHLY,
-        form=form,
-    )
-
-
-def _with_base_variance(system: LinearSystem, R: Array) -> tuple[LinearSystem, Estimates, Array]:
-    """Filter with the variance of the base's velocity that the innovations ask for: first as white, then for its colour."""
-    estimates = kalman(system, history="full")
-    for colour in (False, True):
-        for _ in range(MAX_NOISE_PASSES):
-            R_next, expected = base_variance(estimates, R, colour)
-            if np.all(np.abs(R_next - R)[:2] < SAME_NOISE * expected[:2]):  # the vertical carries no attitude
-                break
-            system = replace(system, R=system.R + np.diag(R_next - R))
-            R = R_next
-            estimates = kalman(system, history="full")
-    return system, estimates, R
-
-
-def white_variance(velocity: Array) -> Array:
-    """Variance (3,) of what is white in a velocity (K, 3): half the variance of its differences.
-
-    A start for the variance of the base's motion that slow errors of the INS do not enter; a bias of 100 ug is a difference of
-    a mm/s every second.
-    """
-    return np.maximum(0.5 * np.var(np.diff(velocity, axis=0), axis=0), QUIETEST_BASE**2)
-
-
-def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:
-    """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
-
-    Returns it with the mean expected variance of the innovations.
-    """
-    skip = min(5, len(estimates.innovation) // 5)
-    nu = estimates.innovation[skip:]
-    expected = np.einsum("kii->ki", estimates.innovation_covariance[skip:])
-    ratio = np.mean(nu**2 / expected, axis=0)
-    # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
-    # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
-    blocks = len(nu) // COLOUR_BLOCK
-    if colour and blocks >= COLOUR_RUNS:
-        e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
-        low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
-        chance = chdtri(blocks, COLOUR_ALARM) / blocks  # what white noise itself may give
-        # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
-        coloured = low > chance * ratio
-        ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)
-    mean = expected.mean(axis=0)
-    return np.maximum(R + (ratio - 1.0) * mean, QUIETEST_BASE**2), mean
+        gained = gained_velocity(log.integrals, C_n0_i, position.lat, position.alt)
+        R = np.maximum(white_variance(gained) - expected, SLIGHT * expected)
+    everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
+    noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+    last = settle(log, noise, in_sigmas(PHI), most=MAX_PASSES)
+    return FineAlignment.of(log, last, prior.sensors, np.sqrt(noise.R[0]))
 
 
 def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:

@@ -9,15 +9,13 @@ Source: G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time series mo
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.models.static_force import Form
 from truenorth.quality.regimes import MotionSummary
 
 Array = NDArray[np.float64]
-Form = Literal["velocity", "force"]
 
 LAGS = 10
 WHITE = 45.3  # chi-square of 2 x 10 degrees of freedom exceeds it in 1 of 1000 logs of white noise

@@ -14,7 +14,7 @@ from dataclasses import astuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.fine import base_variance
+from truenorth.estimate.base_motion import base_variance
 from truenorth.filters import LinearSystem, kalman
 from truenorth.models.static import StaticModel
 

@@ -1,6 +1,6 @@
 """`align_positions`: from the log of a turntable that takes an IMU from position to position to attitude, biases and a verdict.
 
-One filter goes through the whole log, turns included (:mod:`truenorth.models.turntable`), re-linearised until it stands still.
+One filter goes through the whole log, turns included (:mod:`truenorth.models.matrices`), re-linearised until it stands still.
 The table's angles are not asked for: the gyros measure each turn, and their scale factors and misalignments are states.
 """
 
@@ -17,18 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.answer import at_epoch, without_heading
 from truenorth.alignment.check import LogCheck, check_means, is_blind
-from truenorth.alignment.fine import (
-    CONVERGED,
-    HEADING_PRIOR,
-    LEVEL_PRIOR,
-    MAX_PASSES,
-    ROUGHLY,
-    VELOCITY_PRIOR,
-    FineAlignment,
-    attitude_history,
-    base_variance,
-    white_variance,
-)
+from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.inference import infer_spec, noise_of
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.table import TablePosition, TurntableErrors
@@ -40,32 +29,29 @@ from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_fr
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.filters import Estimates, LinearSystem, kalman
-from truenorth.filters.gains import filter_gains, initial_part
-from truenorth.models import turntable
-from truenorth.models.static import DV, PHI, StaticModel, mean_velocity
-from truenorth.models.turntable import ACCEL_MATRIX, ARM, GYRO_MATRIX, matrices, without_errors
+from truenorth.estimate.base_motion import VelocityNoise, white_variance
+from truenorth.estimate.batch import in_sigmas, settle
+from truenorth.estimate.staying import BIASES, Prior, StayingLog, prior_of
+from truenorth.models.matrices import matrices_of
+from truenorth.models.static import PHI, StaticModel, mean_velocity
 from truenorth.quality.noise import noise_coefficients
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
-from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity, integrate
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity
 
 Array = NDArray[np.float64]
 
 HEADING_LIMIT = math.radians(5.0)
 SLEW_RATE = math.radians(0.2)  # rad/s: a table that turns faster is between positions
 SHORTEST_POSITION = 5.0  # s
+MAX_PASSES = 8
 NOISE_PASSES = 4
-SAME_NOISE = 0.1
 FEWEST = 5  # intervals that a variance is fitted to
 ARM_SIGMA = 0.05  # m: of the IMU from the table's axes
 WIDER = 4.0  # steps in which an inferred accelerometer bias is tried wider, ...
 WORTH = 4.0  # ... as long as the log-likelihood grows by more than this
-BIASES = slice(6, 12)
-SENSORS = slice(6, 30)  # errors that can be taken off a record
-PARAMETERS = slice(6, turntable.STATES)
 
 
 def align_positions(
@@ -139,10 +125,10 @@ def align_positions(
 
     tell(f"aligning over {len(stretches)} positions")
     rest = still if blind else None
-    fine, x = _fine(task, stretches, used, rest, arm_sigma)
+    fine, x, prior = _fine(task, stretches, used, rest, arm_sigma)
     while spec is None:  # level biases show in no single position: only turns say how large they are
         wider = replace(used, accel_bias=WIDER * used.accel_bias)
-        again, x_again = _fine(task, stretches, wider, rest, arm_sigma)
+        again, x_again, _ = _fine(task, stretches, wider, rest, arm_sigma)
         if not again.estimates.log_likelihood > fine.estimates.log_likelihood + WORTH:
             break
         used, fine, x = wider, again, x_again
@@ -165,7 +151,7 @@ def align_positions(
         accel_bias_sigma=sigma[9:12],
         disturbance=fine.disturbance,
         history=_history(task, fine),
-        table=_errors(found, touch, x, fine.P),
+        table=_errors(found, touch, prior, x, fine.P),
     )
     status, reasons = judge(
         answer, Circumstances(heading_limit, check, _leaves(task.motion, stretches), fine.settled, None)
@@ -210,75 +196,38 @@ def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:
     )
 
 
-def prior_covariance(spec: ImuSpec, position: Position, arm_sigma: float) -> Array:
-    """(33, 33) covariance before the first interval."""
-    sigma = np.zeros(turntable.STATES)
-    sigma[PHI] = LEVEL_PRIOR, LEVEL_PRIOR, HEADING_PRIOR
-    sigma[DV] = VELOCITY_PRIOR
-    sigma[BIASES] = np.sqrt(spec.bias_variance)
+def prior_covariance(spec: ImuSpec, position: Position) -> Array:
+    """(6, 6) covariance of the biases before the log, with what an error of height makes of gravity."""
     slope = float(normal_gravity(position.lat, position.alt + 1.0) - normal_gravity(position.lat, position.alt))
-    sigma[9:12] = np.hypot(sigma[9:12], slope * position.vertical_sigma)
-    sigma[GYRO_MATRIX] = np.where(np.eye(3), spec.gyro_scale_factor, spec.gyro_misalignment).ravel()
-    sigma[ACCEL_MATRIX] = np.where(np.eye(3), spec.accel_scale_factor, spec.accel_misalignment).ravel()
-    sigma[ARM] = arm_sigma
-    return np.diag(sigma**2)
+    return np.diag(spec.bias_variance + (np.arange(6) >= 3) * (slope * position.vertical_sigma) ** 2)
 
 
 def _fine(
     task: Task, stretches: list[tuple[float, float]], spec: ImuSpec, rest: Means | None, arm_sigma: float
-) -> tuple[FineAlignment, Array]:
-    """Gauss-Newton over the whole log; the last pass, and the sensors' errors in all (33,).
+) -> tuple[FineAlignment, Array, Prior]:
+    """Gauss-Newton over the whole log; the last pass, the errors of sensors and arm in all (n,), and their prior.
 
-    `rest` are the means of a position of an IMU whose gyros do not see the earth turn: they tell the gyros' biases at once.
+    `rest` are the means of a position of an IMU whose gyros do not see the earth turn: they show the gyros' biases at once.
     """
     lat, alt = task.position.lat, task.position.alt
-    model: StaticModel = noise_of(spec)
-    rows = np.array([task.epoch.row])
-    P0 = prior_covariance(spec, task.position, arm_sigma)
-    expected = np.zeros(turntable.STATES)
+    P_bias, bias = prior_covariance(spec, task.position), np.zeros(6)
     if rest is not None:
-        expected[6:9], P0[6:9, 6:9] = _bias_at_rest(rest, lat)
-    total = expected.copy()  # nominal errors, those that are taken off the record
-    record = without_errors(task.record, total[BIASES], *matrices(total))
-    integrals = integrate(record, task.interval, rows_at=rows)
-    rests = _resting(integrals, stretches)
+        bias[:3], P_bias[:3, :3] = _bias_at_rest(rest, lat)
+    prior = prior_of(P_bias, bias=bias, spec=spec, arm=np.zeros(3), arm_sigma=arm_sigma)
+    rows = np.array([task.epoch.row])
+    log = StayingLog(task.record, np.eye(3), task.position, noise_of(spec), prior, task.interval, rows)
+    rests = _resting(log.integrals, stretches)
     if rest is not None:  # no north to be found: i is the body at the first sample
-        C_n0_i = level_of(integrals.mean_force[np.flatnonzero(rests)[0]])
+        log.C_n0_i = level_of(log.integrals.mean_force[np.flatnonzero(rests)[0]])
     else:
-        C_n0_i = oba(integrals, lat, alt).C_n0_i
+        log.C_n0_i = oba(log.integrals, lat, alt).C_n0_i
     parts = [part for part in (rests, ~rests) if np.count_nonzero(part) >= FEWEST]
-    velocity = mean_velocity(integrals, C_n0_i, lat, alt)
-    R = np.tile(white_variance(velocity[rests]), (len(velocity), 1))
-
-    for passes in range(1, MAX_PASSES + 1):
-        x0 = expected - total
-        estimates, system, R = _filtered(model, record, integrals, C_n0_i, task.position, P0, R, x0, parts)
-        x, P = estimates.x[-1], estimates.P[-1]
-        moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
-        if moved < CONVERGED or passes == MAX_PASSES:
-            break
-        back = np.einsum("kij,j->i", system.Phi[:, PHI, PARAMETERS], x[PARAMETERS])
-        C_n0_i = dcm_from_rotation_vector(x[PHI] - back) @ C_n0_i
-        total[SENSORS] += x[SENSORS]
-        record = without_errors(task.record, total[BIASES], *matrices(total))
-        integrals = integrate(record, task.interval, rows_at=rows)
-
-    gains = filter_gains(system, estimates)
-    P0_sensors = np.zeros_like(P0)
-    P0_sensors[PARAMETERS, PARAMETERS] = P0[PARAMETERS, PARAMETERS]
-    fine = FineAlignment(
-        integrals=integrals,
-        C_n0_i=C_n0_i,
-        nominal_bias=total[BIASES],
-        system=system,
-        estimates=estimates,
-        gains=gains,
-        floor=initial_part(gains.step, P0_sensors),
-        disturbance=np.sqrt(R[rests][0]),
-        passes=passes,
-        settled=moved < ROUGHLY,
-    )
-    return fine, total + x
+    velocity = mean_velocity(log.integrals, log.C_n0_i, lat, alt)
+    noise = VelocityNoise(np.tile(white_variance(velocity[rests]), (len(velocity), 1)), parts, NOISE_PASSES)
+    last = settle(log, noise, in_sigmas(PHI), most=MAX_PASSES)
+    parameters = slice(BIASES.start, len(log.taken))
+    fine = FineAlignment.of(log, last, parameters, np.sqrt(noise.R[rests][0]))
+    return fine, log.taken + fine.x, prior
 
 
 def _bias_at_rest(rest: Means, lat: float) -> tuple[Array, Array]:
@@ -286,43 +235,6 @@ def _bias_at_rest(rest: Means, lat: float) -> tuple[Array, Array]:
     up = rest.f_b / np.linalg.norm(rest.f_b)
     level = 0.5 * (EARTH_RATE * math.cos(lat)) ** 2 * (np.eye(3) - np.outer(up, up))
     return rest.w_ib_b - EARTH_RATE * math.sin(lat) * up, rest.w_covariance + level
-
-
-def _filtered(
-    model: StaticModel,
-    record: ImuRecord,
-    integrals: InertialIntegrals,
-    C_n0_i: Array,
-    position: Position,
-    P0: Array,
-    R: Array,
-    x0: Array,
-    parts: list[NDArray[np.bool_]],
-) -> tuple[Estimates, LinearSystem, Array]:
-    """Filter with the variances of the base's velocity that the innovations ask for: in positions, and on the way.
-
-    `R` (K, 3) holds them for each interval; `parts` are the intervals that share one.
-    """
-    system = turntable.linearise(model, record, integrals, C_n0_i, position.lat, position.alt, P0, R, x0)
-    estimates = kalman(system, history="full")
-    for colour in (False, True):
-        for _ in range(NOISE_PASSES):
-            R_next, same = R.copy(), True
-            for part in parts:
-                seen = replace(
-                    estimates,
-                    innovation=estimates.innovation[part],
-                    innovation_covariance=estimates.innovation_covariance[part],
-                )
-                before = R[part][0]
-                R_next[part], expected = base_variance(seen, before, colour)
-                same &= bool(np.all(np.abs(R_next[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
-            if same:
-                break
-            system = replace(system, R=system.R + (R_next - R)[:, None] * np.eye(3))
-            R = R_next
-            estimates = kalman(system, history="full")
-    return estimates, system, R
 
 
 def _resting(integrals: InertialIntegrals, stretches: list[tuple[float, float]]) -> NDArray[np.bool_]:
@@ -361,10 +273,11 @@ def _positions(fine: FineAlignment, stretches: list[tuple[float, float]], lat: f
     return tuple(found)
 
 
-def _errors(found: tuple[TablePosition, ...], touch: Touch | None, x: Array, P: Array) -> TurntableErrors:
-    (gyro, accel), sigma = matrices(x), np.sqrt(np.diag(P))
-    gyro_sigma, accel_sigma = matrices(sigma)
-    return TurntableErrors(found, touch, gyro, gyro_sigma, accel, accel_sigma, x[ARM], sigma[ARM])
+def _errors(found: tuple[TablePosition, ...], touch: Touch | None, prior: Prior, x: Array, P: Array) -> TurntableErrors:
+    matrices, arm = prior.groups["matrices"], prior.groups["arm"]
+    sigma = np.sqrt(np.diag(P))
+    (gyro, accel), (gyro_sigma, accel_sigma) = matrices_of(x[matrices]), matrices_of(sigma[matrices])
+    return TurntableErrors(found, touch, gyro, gyro_sigma, accel, accel_sigma, x[arm], sigma[arm])
 
 
 def _history(task: Task, fine: FineAlignment) -> History:
@@ -373,7 +286,8 @@ def _history(task: Task, fine: FineAlignment) -> History:
     e = fine.estimates
     sigma = np.sqrt(np.einsum("kii->ki", e.P))
     # The final answer carried back: phi(t) = phi_end - int_t^end (what the sensors' errors turn).
-    turns = np.einsum("kij,j->ki", fine.system.Phi[:, PHI, PARAMETERS], fine.x[PARAMETERS])
+    parameters = slice(BIASES.start, None)
+    turns = np.einsum("kij,j->ki", fine.system.Phi[:, PHI, parameters], fine.x[parameters])
     after = np.concatenate([np.cumsum(turns[:0:-1], axis=0)[::-1], np.zeros((1, 3))])
     C_n_n0 = np.swapaxes(earth_rotation(fine.integrals.time[1:], task.position.lat), 1, 2)
     departure = np.einsum("kij,kj->ki", C_n_n0, fine.x[PHI] - after - e.x[:, PHI])

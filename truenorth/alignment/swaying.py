@@ -10,38 +10,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from truenorth.alignment.fine import (
-    CONVERGED,
-    HEADING_PRIOR,
-    LEVEL_PRIOR,
-    QUIETEST_BASE,
-    ROUGHLY,
-    VELOCITY_PRIOR,
-    FineAlignment,
-)
+from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import windowed_fit
-from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import normal_gravity
 from truenorth.core.position import Position
+from truenorth.estimate.base_motion import QUIETEST_BASE
+from truenorth.estimate.batch import Filtered, in_sigmas, settle
+from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.filters.gains import filter_gains, initial_part
 from truenorth.models.disturbance import AxisMotion
-from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel
-from truenorth.models.swaying import (
-    ARM,
-    MOST_OSCILLATORS,
-    SWAYING_STATES,
-    arm_rows,
-    with_arm,
-    with_motion,
-    without_sway,
-)
+from truenorth.models.static import PHI, StaticModel
+from truenorth.models.swaying import MOST_OSCILLATORS, with_motion
 from truenorth.records import ImuRecord
-from truenorth.strapdown.inertial import InertialIntegrals, integrate
+from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
 
@@ -89,49 +74,27 @@ class SwayAlignment(FineAlignment):
     arm_sigma: Array
 
 
-class _Nominal:
-    """What the log is linearised about, and the system about it."""
+@dataclass(frozen=True)
+class _Fitted:
+    """A windowed fit: errors at the last epoch, and what it leaves of the measurements."""
 
-    def __init__(
-        self, record: ImuRecord, C_n0_i: Array, position: Position, model: StaticModel, mount: Mount, P_bias: Array
-    ) -> None:
-        self.record, self.position, self.model, self.mount = record, position, model, mount
-        self.P0 = np.zeros((ARM.stop, ARM.stop))
-        self.P0[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
-        self.P0[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
-        self.P0[6:STATES, 6:STATES] = P_bias
-        self.P0[ARM, ARM] = mount.arm_sigma**2 * np.eye(3)
-        self.C_n0_i, self.bias, self.arm = C_n0_i, np.zeros(6), mount.arm
-        self.integrals: InertialIntegrals
+    end: Array
+    residual: Array
 
-    def integrate(self, interval: float, rows: ArrayLike) -> None:
-        """Anew, the biases taken off."""
-        self.integrals = integrate(self.record, interval, self.bias[:3], self.bias[3:], rows)
 
-    def system(self) -> LinearSystem:
-        """Of 15 states, without the base's motion."""
-        place = self.position
-        system = self.model.linearise(
-            without_sway(self.integrals, self.mount.C_sb),
-            self.C_n0_i,
-            place.lat,
-            place.alt,
-            self.P0[:STATES, :STATES],
-            np.zeros(3),
-        )
-        x0 = np.zeros(STATES)
-        x0[6:] = -self.bias
-        rows = arm_rows(self.integrals, self.C_n0_i, place.lat, self.mount.C_sb)
-        system = with_arm(replace(system, x0=x0), rows, self.arm, self.P0[ARM, ARM])
-        system.x0[ARM] = self.arm - self.mount.arm
-        return system
+class _MotionFilter:
+    """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answer."""
 
-    def correct(self, x: Array) -> None:
-        """Take the state at the last epoch off: attitude back at the start, biases, arm."""
-        turned = np.einsum("k,kab->ab", self.integrals.intervals, self.C_n0_i @ self.integrals.C_mean)
-        self.C_n0_i = dcm_from_rotation_vector(x[PHI] + turned @ x[BG]) @ self.C_n0_i
-        self.bias = self.bias + np.concatenate([x[BG], x[BA]])
-        self.arm = self.arm - x[ARM]
+    def __init__(self, residual: Array, interval: float, walks: Walks) -> None:
+        self.interval, self.walks, self.passes = interval, walks, 0
+        self.motion = _fit(residual, interval, walks)
+
+    def __call__(self, system: LinearSystem) -> Filtered:
+        self.passes += 1
+        if self.passes == 2:  # about a good attitude: what was in the first residual besides the motion is gone
+            self.motion = _fit(system.z, self.interval, self.walks, self.motion)
+        full = with_motion(system, self.interval, self.motion)
+        return Filtered(full, kalman(full, history="full"))
 
 
 def sway_align(
@@ -156,42 +119,20 @@ def sway_align(
     -------
     SwayAlignment
     """
-    rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
-    nominal = _Nominal(record, C_n0_i, position, model, mount, P_bias)
-    system, residual = _settle(nominal, interval, rows)
-    step = float(np.mean(nominal.integrals.intervals))
+    log, residual = _settled(record, C_n0_i, position, model, P_bias, interval, rows_at, mount)
+    step = float(np.mean(log.integrals.intervals))
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
-    motion = _fit(residual, step, walks)
-    for passes in range(1, FILTER_PASSES + 1):
-        full = with_motion(system, step, motion)
-        estimates = kalman(full, history="full")
-        x, P = estimates.x[-1], estimates.P[-1]
-        moved = float(np.max(np.abs(x[PHI]) / np.sqrt(np.diag(P)[PHI])))
-        if passes == FILTER_PASSES or (passes > 1 and moved < CONVERGED):
-            break
-        nominal.correct(x)
-        nominal.integrate(interval, rows)
-        system = nominal.system()
-        if passes == 1:  # about a good attitude: what was in the first residual besides the motion is gone
-            motion = _fit(system.z, step, walks, motion)
-
-    gains = filter_gains(full, estimates)
-    P0_bias = np.zeros((SWAYING_STATES, SWAYING_STATES))
-    P0_bias[6:STATES, 6:STATES] = P_bias
-    return SwayAlignment(
-        integrals=nominal.integrals,
-        C_n0_i=nominal.C_n0_i,
-        nominal_bias=nominal.bias,
-        system=full,
-        estimates=estimates,
-        gains=gains,
-        floor=initial_part(gains.step, P0_bias),
-        disturbance=np.array([item.sigma for item in motion]),
-        passes=passes,
-        settled=moved < ROUGHLY,
-        motion=motion,
-        arm=nominal.arm - x[ARM],
-        arm_sigma=np.sqrt(np.diag(P)[ARM]),
+    estimator = _MotionFilter(residual, step, walks)
+    last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
+    arm = log.prior.groups["arm"]
+    return SwayAlignment.of(
+        log,
+        last,
+        log.prior.sensors,
+        np.array([item.sigma for item in estimator.motion]),
+        motion=estimator.motion,
+        arm=log.taken[arm] + last.found.end[arm],
+        arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
     )
 
 
@@ -213,27 +154,38 @@ def windowed_align(
     integrals : InertialIntegrals
         With the estimated biases taken off: ``C_n0_i @ integrals.C_ib`` is the attitude at their times.
     """
-    nominal = _Nominal(record, C_n0_i, position, model, mount, P_bias)
-    _settle(nominal, interval, np.zeros(0, dtype=np.int64))
-    return nominal.C_n0_i, nominal.integrals
+    log, _ = _settled(record, C_n0_i, position, model, P_bias, interval, None, mount)
+    return log.C_n0_i, log.integrals
 
 
-def _settle(nominal: _Nominal, interval: float, rows: ArrayLike) -> tuple[LinearSystem, Array]:
-    """Windowed fits until the attitude stands still; the last system, and what the fit leaves of its measurements."""
-    for _ in range(WINDOWED_PASSES):
-        nominal.integrate(interval, rows)
-        system = nominal.system()
-        fit = windowed_fit(system)
-        if np.max(np.abs(fit.x[PHI])) < SMALL_TURN:
-            break
-        nominal.correct(fit.x)
-    return system, fit.residual
+def _settled(
+    record: ImuRecord,
+    C_n0_i: Array,
+    position: Position,
+    model: StaticModel,
+    P_bias: Array,
+    interval: float,
+    rows_at: Array | None,
+    mount: Mount,
+) -> tuple[StayingLog, Array]:
+    """A log about windowed fits until the attitude stands still, and what the last fit leaves of its measurements."""
+    prior = prior_of(P_bias, arm=mount.arm, arm_sigma=mount.arm_sigma)
+    log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, sways=True, C_sb=mount.C_sb)
+
+    def fit(system: LinearSystem) -> _Fitted:
+        found = windowed_fit(system)
+        return _Fitted(found.x, found.residual)
+
+    def turn(found: _Fitted) -> float:
+        return float(np.max(np.abs(found.end[PHI])))
+
+    return log, settle(log, fit, turn, enough=SMALL_TURN, most=WINDOWED_PASSES).found.residual
 
 
 def _fit(
     residual: Array, interval: float, walks: Walks, start: tuple[AxisMotion, ...] | None = None
 ) -> tuple[AxisMotion, ...]:
-    """Motion along E, N, U; no quieter than a base of stone."""
+    """Motion along E, N, U; no quieter than bedrock."""
     fits = []
     for axis in range(3):
         # The vertical carries no attitude: its strongest motion is enough.

@@ -23,6 +23,7 @@ from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
+STEPS = "compiled_steps"  # attribute of a class: functions by name that a kernel takes for arguments of this class
 CONFIG: Any = numba.config
 TOOLS = repr((
     *(sys.implementation.name, sys.version_info[:2], numba.__version__, llvmlite.__version__, np.__version__),
@@ -130,7 +131,9 @@ class _Sources:
     def _of_class(self, kind: type, names: set[str]) -> str:
         if issubclass(kind, Enum):
             return f"{_name(kind)}({', '.join(f'{m.name}={self.of(m.value, names)}' for m in kind)})"
-        return f"{_name(kind)}{getattr(kind, '_fields', '')}"
+        steps = getattr(kind, STEPS, {})
+        chosen = [f"{name}={self.of(steps[name], names)}" for name in sorted(steps)]
+        return f"{_name(kind)}{getattr(kind, '_fields', '')}{chosen or ''}"
 
     def _of_module(self, module: ModuleType, names: set[str]) -> str:
         if module.__name__.split(".")[0] in FOREIGN:

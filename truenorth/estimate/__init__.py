@@ -1,1 +1,1 @@
-"""Estimators: the closed loop with its events, and its smoother."""
+"""Estimators: the closed loop with its events, its smoother, and whole logs linearised until they settle."""

@@ -1,5 +1,6 @@
 """Filters and smoothers for linear and nonlinear systems; they know nothing of navigation."""
 
+from truenorth.filters.drive import History, NoFilterError, Running
 from truenorth.filters.extended import extended, iterated
 from truenorth.filters.fading import fading
 from truenorth.filters.feedback import feedback
@@ -26,6 +27,7 @@ from truenorth.filters.information import (
 from truenorth.filters.innovation_adaptive import innovation_adaptive
 from truenorth.filters.jacobians import JacobianCheck, check_jacobians
 from truenorth.filters.kalman import kalman
+from truenorth.filters.nonlinear import Guarded
 from truenorth.filters.nonlinear_system import NonlinearSystem, matrix_function, vector_function
 from truenorth.filters.particle import cloud_in, particle
 from truenorth.filters.robust import Gate, gated, robust
@@ -46,12 +48,16 @@ __all__ = [
     "Gains",
     "Gate",
     "GaussianSum",
+    "Guarded",
+    "History",
     "Hypotheses",
     "InformationEstimates",
     "InformationState",
     "JacobianCheck",
     "LinearSystem",
+    "NoFilterError",
     "NonlinearSystem",
+    "Running",
     "Smoothed",
     "SteadyState",
     "StrongTracking",

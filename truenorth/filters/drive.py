@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, TypedDict, TypeVar, get_args
 
 import numpy as np
 
@@ -17,6 +17,24 @@ from truenorth.filters.system import Estimates, FilterState, runs_of
 
 History = Literal["last", "sigma", "full"]
 T = TypeVar("T", bound=tuple[Any, ...])
+
+
+class Running(TypedDict, total=False):
+    """How a filter is run; options that all filters take.
+
+    Attributes
+    ----------
+    history : "last", "sigma" or "full"
+        Keep the last epoch only (the default), also x and sigma of every epoch, or also P of every epoch.
+    innovations : bool or None
+        Keep innovations, their covariances and NIS of every epoch; None, the default: where a history is kept.
+    workers : int
+        Threads that share the runs, 1 by default; the bits do not depend on it.
+    """
+
+    history: History
+    innovations: bool | None
+    workers: int
 
 
 class NoFilterError(DataError):
@@ -32,9 +50,9 @@ def drive(
     system: System,
     state: FilterState | None,
     *,
-    history: History,
-    innovations: bool | None,
-    workers: int,
+    history: History = "last",
+    innovations: bool | None = None,
+    workers: int = 1,
     memory: Array | None = None,
     adaptation: int = 0,
     flatten: Flatten = runs_of,
@@ -45,8 +63,10 @@ def drive(
     ----------
     kernel : callable
         ``kernel(size, runs, epochs, histories)``.
-    system, state, history, innovations, workers
+    system, state
         As in :func:`truenorth.filters.kalman`.
+    history, innovations, workers
+        See :class:`Running`.
     memory : (a,) array, optional
         What an adaptive filter begins with, where no `state` says better.
     adaptation : int

@@ -7,27 +7,23 @@ invariant extended Kalman filter as a stable observer, IEEE Trans. Autom. Contro
 
 from __future__ import annotations
 
+from typing import Unpack
+
 import numpy as np
 
 from truenorth.core.errors import UsageError
-from truenorth.filters.drive import History
+from truenorth.filters.drive import Running
 from truenorth.filters.linearisation import NO_RULE
-from truenorth.filters.nonlinear import run_nonlinear
+from truenorth.filters.nonlinear import Guarded, run_nonlinear
 from truenorth.filters.nonlinear_system import NonlinearSystem, require_jacobians, require_vector_space
 from truenorth.filters.robust import Gate
-from truenorth.filters.strong_tracking import StrongTracking
 from truenorth.filters.system import Estimates, FilterState
 
 
 def extended(
     system: NonlinearSystem,
     state: FilterState | None = None,
-    *,
-    tracking: StrongTracking | None = None,
-    gate: Gate | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Guarded],
 ) -> Estimates:
     """Extended Kalman filter.
 
@@ -40,18 +36,12 @@ def extended(
         With both Jacobians.
     state : FilterState, optional
         From an earlier call with the same options, to go on from.
-    tracking : StrongTracking, optional
-        Fade the predicted covariance where innovations are larger than expected.
-    gate : Gate, optional
-        Leave out measurements whose innovation is not to be believed.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
 
     Returns
     -------
     Estimates
-        `adaptation` holds the factor of strong tracking, then each row's weight (1 taken, 0 rejected, NaN absent), as
-        far as asked for. With a gate, `nis` is of all rows present and `log_likelihood` of those taken.
 
     Raises
     ------
@@ -61,17 +51,7 @@ def extended(
         The filter broke down, naming run and epoch.
     """
     require_jacobians(system, "the extended Kalman filter")
-    return run_nonlinear(
-        system,
-        state,
-        NO_RULE,
-        np.zeros(0, np.int64),
-        tracking=tracking,
-        gate=gate,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-    )
+    return run_nonlinear(system, state, NO_RULE, np.zeros(0, np.int64), **running)
 
 
 def iterated(
@@ -81,9 +61,7 @@ def iterated(
     iterations: int = 10,
     tolerance: float = 1e-6,
     gate: Gate | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Iterated extended Kalman filter: each measurement is linearised again where the update has led.
 
@@ -101,8 +79,8 @@ def iterated(
         Stop where no state moves by more than this part of its sigma.
     gate : Gate, optional
         Leave out measurements whose innovation is not to be believed; they are judged before the iteration.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -127,11 +105,8 @@ def iterated(
         state,
         NO_RULE,
         np.zeros(0, np.int64),
-        tracking=None,
         gate=gate,
-        history=history,
-        innovations=innovations,
-        workers=workers,
         iterations=iterations,
         tolerance=tolerance,
+        **running,
     )

@@ -23,31 +23,37 @@ kind; for the multiple one N and J leave Q out, as its eq. 37 does, or the facto
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, mirror, propagate_covariance, transposed_times
-from truenorth.filters.drive import History, drive
-from truenorth.filters.recursion import (
-    Histories,
-    Workspace,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict_state,
-    update,
-    workspace,
-)
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import Workspace, predict_state
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 Fading = Literal["single", "noise", "multiple", "improved"]
 SINGLE, NOISE, MULTIPLE, IMPROVED = range(4)
+
+
+class FadingOptions(NamedTuple):
+    """Options of the fading and of the strong tracking filter."""
+
+    kind: int
+    rho: float
+    softening: float
+    cap: float
+
+
+class Factors(NamedTuple):
+    """Of an epoch: of the rows or, in front, of all; of the states; and zeros in the place of Q."""
+
+    of_rows: Array
+    of_states: Array
+    no_noise: Array
 
 
 @compiled(forceinline=True)
@@ -122,32 +128,30 @@ def fade(size: Size, w: Workspace, kind: int, softening: float, cap: float, V: A
     mirror(size, w.P)
 
 
-@compiled
-def fading_runs(
-    size: Size, system: Runs, epochs: int, kind: int, rho: float, softening: float, cap: float, out: Histories
-) -> None:
-    """Fading filter of each run."""
-    N, rows = len(size), system.z.shape[2]
-    w = workspace(size, rows)
-    nothing, Lam, lam = np.zeros((N, N)), np.ones(N), np.ones(max(rows, 1))
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict_state(size, w)
-            propagate_covariance(size, w.Phi, w.Phi_t, nothing, w.P, w.temporary)
-            present, correlated = load_measurement(size, system, run, epoch, w)
-            remember(size, w, rho, out.memory[run])
-            fade(size, w, kind, softening, cap, out.memory[run], lam, Lam)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-                for i in range(out.adaptation.shape[2]):
-                    out.adaptation[run, epoch, i] = lam[i]
-            if present > 0:
-                failure, nis, log_likelihood = update(size, w, correlated, True)
-                if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                    break
-            keep(out, run, epoch, epochs - 1, w)
+def room(size: Size, rows: int, options: FadingOptions) -> Factors:
+    """Factors of one."""
+    return Factors(np.ones(max(rows, 1)), np.ones(len(size)), np.zeros((len(size), len(size))))
+
+
+def predict(size: Size, w: Workspace, options: FadingOptions, own: Factors) -> None:
+    """``x = Phi x + u``, ``P = Phi P Phi'``: Q follows when the factors are known."""
+    predict_state(size, w)
+    propagate_covariance(size, w.Phi, w.Phi_t, own.no_noise, w.P, w.temporary)
+
+
+def adapt(size: Size, w: Workspace, options: FadingOptions, own: Factors, memory: Array) -> None:
+    """Remember the innovations, and fade the past."""
+    remember(size, w, options.rho, memory)
+    fade(size, w, options.kind, options.softening, options.cap, memory, own.of_rows, own.of_states)
+
+
+def report(size: Size, w: Workspace, options: FadingOptions, own: Factors, memory: Array, figures: Array) -> None:
+    """The factors."""
+    for i in range(len(figures)):
+        figures[i] = own.of_rows[i]
+
+
+variant(FadingOptions, room=room, predict=predict, adapt=adapt, report=report)
 
 
 def fading(
@@ -157,9 +161,7 @@ def fading(
     kind: Fading,
     rho: float = 0.95,
     cap: float = np.inf,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Fading Kalman filter; the kinds are those of the table above.
 
@@ -175,8 +177,8 @@ def fading(
         Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
     cap : float
         Largest factor.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -195,35 +197,21 @@ def fading(
     number = get_args(Fading).index(kind)
     if number in (MULTIPLE, IMPROVED):
         _check_rows(system.H)
-    return faded(system, state, number, rho, 1.0, cap, history, innovations, workers)
+    return faded(system, state, FadingOptions(number, float(rho), 1.0, float(cap)), **running)
 
 
 def faded(
-    system: LinearSystem,
-    state: FilterState | None,
-    kind: int,
-    rho: float,
-    softening: float,
-    cap: float,
-    history: History,
-    innovations: bool | None,
-    workers: int,
+    system: LinearSystem, state: FilterState | None, options: FadingOptions, **running: Unpack[Running]
 ) -> Estimates:
-    """Run the fading kernel, its options checked."""
-    check_factor_options(rho, softening, cap)
-
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        fading_runs(size, runs, epochs, kind, float(rho), float(softening), float(cap), out)
-
-    return drive(
-        kernel,
+    """Run the fading filter with options that are checked here."""
+    check_factor_options(options.rho, options.softening, options.cap)
+    return run_linear(
+        options,
         system,
         state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
         memory=np.full(system.rows, np.nan),
-        adaptation=system.rows if kind in (MULTIPLE, IMPROVED) else 1,
+        adaptation=system.rows if options.kind in (MULTIPLE, IMPROVED) else 1,
+        **running,
     )
 
 

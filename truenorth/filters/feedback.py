@@ -10,6 +10,7 @@ Source: P. S. Maybeck, *Stochastic Models, Estimation and Control*, vol. 1, 1979
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Size, dot, transposed_times
-from truenorth.filters.drive import History, drive
+from truenorth.filters.drive import Running, drive
 from truenorth.filters.recursion import (
     Histories,
     begin,
@@ -85,9 +86,7 @@ def feedback(
     state: FilterState | None = None,
     *,
     states: slice | Sequence[int] = slice(None),
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter in a closed loop.
 
@@ -98,8 +97,8 @@ def feedback(
         From an earlier call, to go on from; its `memory` is the nominal state.
     states : slice or indices
         Fed back after each measurement; the others stay in the filter.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -126,9 +125,7 @@ def feedback(
         kernel,
         system,
         state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
         memory=np.full(system.states, np.nan),
         adaptation=system.states,
+        **running,
     )

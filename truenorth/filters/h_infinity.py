@@ -12,31 +12,27 @@ Source: B. Hassibi, A. H. Sayed, T. Kailath, Linear estimation in Krein spaces, 
 
 from __future__ import annotations
 
+from typing import NamedTuple, Unpack
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, padded, take_off, transposed_times
-from truenorth.filters.drive import History, NoFilterError, drive
-from truenorth.filters.recursion import (
-    NO_FILTER,
-    SOUND,
-    Histories,
-    Workspace,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
-    update,
-    workspace,
-)
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.filters.drive import NoFilterError, Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import NO_FILTER, SOUND, Workspace, update
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 TINY = 1e-150  # its square is still a number
+
+
+class HInfinity(NamedTuple):
+    """Options of :func:`h_infinity`: ``L`` padded (rows, N), and ``1 / g^2``."""
+
+    L: Array
+    theta: float
 
 
 @compiled(forceinline=True)
@@ -53,30 +49,31 @@ def distrust(size: Size, w: Workspace, L: Array, theta: float) -> float:
     return margin
 
 
-@compiled
-def h_infinity_runs(size: Size, system: Runs, epochs: int, L: Array, theta: float, out: Histories) -> None:
-    """H-infinity filter of each run; `L` is padded (rows, N)."""
-    w = workspace(size, system.z.shape[2])
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict(size, w)
-            present, correlated = load_measurement(size, system, run, epoch, w)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-            failure, nis, log_likelihood = SOUND, 0.0, 0.0
-            if present > 0:
-                failure, nis, log_likelihood = update(size, w, correlated, True)
-            margin = distrust(size, w, L, theta)
-            if out.innovation.shape[1] > 0:
-                out.adaptation[run, epoch, 0] = margin
-            out.memory[run, 0] = min(out.memory[run, 0], margin)
-            if failure == SOUND and not margin > 0.0:
-                failure = NO_FILTER
-            if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                break
-            keep(out, run, epoch, epochs - 1, w)
+def room(size: Size, rows: int, options: HInfinity) -> Array:
+    """For the margin of an epoch."""
+    return np.ones(1)
+
+
+def condition(
+    size: Size, w: Workspace, options: HInfinity, own: Array, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """On the rows present, then on ``L x`` with its negative variance."""
+    failure, nis, log_likelihood = SOUND, 0.0, 0.0
+    if present > 0:
+        failure, nis, log_likelihood = update(size, w, correlated, True)
+    own[0] = distrust(size, w, options.L, options.theta)
+    memory[0] = min(memory[0], own[0])
+    if failure == SOUND and not own[0] > 0.0:
+        failure = NO_FILTER
+    return failure, nis, log_likelihood
+
+
+def report(size: Size, w: Workspace, options: HInfinity, own: Array, memory: Array, figures: Array) -> None:
+    """The margin."""
+    figures[0] = own[0]
+
+
+variant(HInfinity, room=room, condition=condition, report=report)
 
 
 def h_infinity(
@@ -85,9 +82,7 @@ def h_infinity(
     *,
     bound: float,
     L: ArrayLike | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """H-infinity filter.
 
@@ -101,8 +96,8 @@ def h_infinity(
         growing bound the filter becomes the Kalman filter.
     L : (p, n) array, optional
         What of the state is to be estimated; all of it as a rule.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -127,21 +122,8 @@ def h_infinity(
         raise UsageError(f"L has shape {wanted.shape}, expected (p, n) finite numbers with n = {system.states}")
     rows = np.zeros((len(wanted), len(padded(system.states))))
     rows[:, : system.states] = wanted
-    theta = 1.0 / float(bound) ** 2
-
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        h_infinity_runs(size, runs, epochs, rows, theta, out)
-
-    return drive(
-        kernel,
-        system,
-        state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-        memory=np.ones(1),
-        adaptation=1,
-    )
+    options = HInfinity(rows, 1.0 / float(bound) ** 2)
+    return run_linear(options, system, state, memory=np.ones(1), adaptation=1, **running)
 
 
 def smallest_bound(system: LinearSystem, *, L: ArrayLike | None = None, tolerance: float = 1e-6) -> float:

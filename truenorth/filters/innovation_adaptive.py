@@ -15,31 +15,29 @@ Sources: R. K. Mehra, On the identification of variances and adaptive Kalman fil
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Any, Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, transposed_times
-from truenorth.filters.drive import History, drive
-from truenorth.filters.recursion import (
-    Histories,
-    Workspace,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
-    update,
-    workspace,
-)
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import SOUND, Workspace, update
 from truenorth.filters.sage_husa import check_independent_rows
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 AdaptiveKind = Literal["innovation", "residual"]
+
+
+class InnovationAdaptive(NamedTuple):
+    """Options of :func:`innovation_adaptive`; `before`: by innovations, else by residuals."""
+
+    length: int
+    before: bool
+    smallest: float
+    largest: float
 
 
 @compiled(forceinline=True)
@@ -67,35 +65,35 @@ def take_noise(w: Workspace, window: Array, seen: Array, smallest: float, larges
         w.R[row, row] = min(max(total / length, smallest * given), largest * given)
 
 
-@compiled
-def innovation_adaptive_runs(
-    size: Size, system: Runs, epochs: int, length: int, before: bool, smallest: float, largest: float, out: Histories
-) -> None:
-    """Filter of each run; `before`: by innovations, else by residuals."""
-    rows = system.z.shape[2]
-    w = workspace(size, rows)
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        seen = out.memory[run, :rows]
-        window = out.memory[run, rows:].reshape(rows, length)
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict(size, w)
-            present, correlated = load_measurement(size, system, run, epoch, w)
-            if before:
-                observe(size, w, window, seen, -1.0)
-            take_noise(w, window, seen, smallest, largest)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-                for row in range(rows):
-                    out.adaptation[run, epoch, row] = w.R[row, row]
-            if present > 0:
-                failure, nis, log_likelihood = update(size, w, correlated, True)
-                if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                    break
-                if not before:
-                    observe(size, w, window, seen, 1.0)
-            keep(out, run, epoch, epochs - 1, w)
+def adapt(size: Size, w: Workspace, options: InnovationAdaptive, own: Any, memory: Array) -> None:
+    """R from the windows; the memory holds how many each row has seen, then the windows."""
+    rows = w.z.shape[0]
+    window = memory[rows:].reshape(rows, options.length)
+    if options.before:
+        observe(size, w, window, memory[:rows], -1.0)
+    take_noise(w, window, memory[:rows], options.smallest, options.largest)
+
+
+def condition(
+    size: Size, w: Workspace, options: InnovationAdaptive, own: Any, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """On the rows present, then look at the residuals."""
+    if present == 0:
+        return SOUND, 0.0, 0.0
+    failure, nis, log_likelihood = update(size, w, correlated, True)
+    rows = w.z.shape[0]
+    if not options.before:
+        observe(size, w, memory[rows:].reshape(rows, options.length), memory[:rows], 1.0)
+    return failure, nis, log_likelihood
+
+
+def report(size: Size, w: Workspace, options: InnovationAdaptive, own: Any, memory: Array, figures: Array) -> None:
+    """The variances."""
+    for row in range(len(figures)):
+        figures[row] = w.R[row, row]
+
+
+variant(InnovationAdaptive, adapt=adapt, condition=condition, report=report)
 
 
 def innovation_adaptive(
@@ -106,9 +104,7 @@ def innovation_adaptive(
     window: int = 50,
     smallest: float = 1e-2,
     largest: float = 1e4,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter that takes the measurement noise from a window of innovations or residuals.
 
@@ -123,8 +119,8 @@ def innovation_adaptive(
         Measurements of a row that count; the variance scatters by ``sqrt(2 / window)`` and more.
     smallest, largest : float
         Limits of the estimated variance, in units of the given one.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -146,18 +142,6 @@ def innovation_adaptive(
         raise UsageError(f"smallest is {smallest} and largest {largest}, expected 0 < smallest <= 1 <= largest")
     check_independent_rows(system)
 
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        innovation_adaptive_runs(
-            size, runs, epochs, int(window), kind == "innovation", float(smallest), float(largest), out
-        )
-
-    return drive(
-        kernel,
-        system,
-        state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-        memory=np.zeros(system.rows * (1 + window)),
-        adaptation=system.rows,
-    )
+    options = InnovationAdaptive(int(window), kind == "innovation", float(smallest), float(largest))
+    memory = np.zeros(system.rows * (1 + window))
+    return run_linear(options, system, state, memory=memory, adaptation=system.rows, **running)

@@ -7,51 +7,35 @@ to Guidance*, 1968; rows one by one and correlated noise: D. Simon, *Optimal Sta
 
 from __future__ import annotations
 
-from truenorth.core.compiled import compiled
-from truenorth.core.linalg import Size
-from truenorth.filters.drive import History, drive
-from truenorth.filters.recursion import (
-    Histories,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
-    update,
-    workspace,
-)
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from typing import Any, NamedTuple, Unpack
+
+from truenorth.core.linalg import Array, Size
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import SOUND, Workspace, update
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 
-@compiled
-def kalman_runs(size: Size, system: Runs, epochs: int, joseph: bool, out: Histories) -> None:
-    """Kalman filter of each run."""
-    w = workspace(size, system.z.shape[2])
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict(size, w)
-            present, correlated = load_measurement(size, system, run, epoch, w)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-            if present > 0:
-                failure, nis, log_likelihood = update(size, w, correlated, joseph)
-                if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                    break
-            keep(out, run, epoch, epochs - 1, w)
+class Kalman(NamedTuple):
+    """Options of :func:`kalman`."""
+
+    joseph: bool
+
+
+def condition(
+    size: Size, w: Workspace, options: Kalman, own: Any, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """In Joseph's form or in the plain one."""
+    if present == 0:
+        return SOUND, 0.0, 0.0
+    return update(size, w, correlated, options.joseph)
+
+
+variant(Kalman, condition=condition)
 
 
 def kalman(
-    system: LinearSystem,
-    state: FilterState | None = None,
-    *,
-    history: History = "last",
-    innovations: bool | None = None,
-    joseph: bool = True,
-    workers: int = 1,
+    system: LinearSystem, state: FilterState | None = None, *, joseph: bool = True, **running: Unpack[Running]
 ) -> Estimates:
     """Kalman filter.
 
@@ -62,16 +46,12 @@ def kalman(
     system : LinearSystem
     state : FilterState, optional
         From an earlier call, to go on from; replaces ``x0, P0``. Chunks give the bits of one batch.
-    history : "last", "sigma" or "full"
-        Keep the last epoch only, also x and sigma of every epoch, or also P of every epoch.
-    innovations : bool, optional
-        Keep innovations, their covariances and NIS of every epoch; as a rule where a history is kept.
     joseph : bool
         Update the covariance in Joseph's form, which survives precise measurements of what was unknown; the plain
         form takes two thirds of the time of an update. Where P cannot hold what a row tells in either form (rows that mix
         states with a prior some 1e16 times R), the filter stops and says so; :func:`truenorth.filters.square_root` goes on.
-    workers : int
-        Threads that share the runs; the bits do not depend on it.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -83,8 +63,4 @@ def kalman(
         The variance of an innovation or of a state is not positive, or there is nothing but rounding left in P, naming run
         and epoch.
     """
-
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        kalman_runs(size, runs, epochs, joseph, out)
-
-    return drive(kernel, system, state, history=history, innovations=innovations, workers=workers)
+    return run_linear(Kalman(joseph), system, state, **running)

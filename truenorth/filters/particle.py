@@ -13,7 +13,7 @@ state-space models, IEEE Trans. Signal Process. 53, 2005; G. Kitagawa, J. Comput
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, load
-from truenorth.filters.drive import History, drive
+from truenorth.filters.drive import Running, drive
 from truenorth.filters.linearisation import (
     Points,
     decompose,
@@ -388,9 +388,7 @@ def particle(
     particles: int = 1000,
     nonlinear: Sequence[int] | None = None,
     threshold: float = 0.5,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Particle filter.
 
@@ -411,8 +409,8 @@ def particle(
         The states to be drawn; all of them, if not given. The model must be linear in the others once these are given.
     threshold : float
         Resample where the effective sample size falls below this part of the particles.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -457,12 +455,10 @@ def particle(
         kernel,
         system,
         state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
         memory=np.full(particles * (1 + n + (n * n if linear else 0)), np.nan),
         adaptation=1,
         flatten=flatten,
+        **running,
     )
 
 

@@ -20,37 +20,48 @@ T. Xu, Robust estimator for correlated observations based on bifactor equivalent
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size
-from truenorth.filters.drive import History, drive
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
 from truenorth.filters.recursion import (
     LOG_2PI,
     NO_INNOVATION_VARIANCE,
     NOT_POSITIVE,
     SOUND,
-    Histories,
     Workspace,
-    begin,
-    conclude,
     innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
     row_variance,
     still_positive,
     update_by_row,
-    workspace,
 )
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 Weighting = Literal["huber", "igg3"]
 GATE_ROWS, GATE_EPOCHS, HUBER, IGG3 = range(4)
+
+
+class Rule(NamedTuple):
+    """How rows are judged; `largest_nis` by the number of rows present."""
+
+    kind: int
+    k0: float
+    k1: float
+    patience: int
+    largest_nis: Array
+
+
+class Judged(NamedTuple):
+    """Innovations of an epoch, their covariance, and the weights of its rows."""
+
+    nu: Array
+    W: Array
+    weights: Array
 
 
 @dataclass(frozen=True)
@@ -166,50 +177,38 @@ def judge_and_update(
     return SOUND, log_likelihood
 
 
-@compiled
-def robust_runs(
-    size: Size,
-    system: Runs,
-    epochs: int,
-    rule: int,
-    k0: float,
-    k1: float,
-    patience: int,
-    largest_nis: Array,
-    out: Histories,
-) -> None:
-    """Gated or robust filter of each run; `largest_nis` by the number of rows present."""
-    rows = system.z.shape[2]
-    w = workspace(size, rows)
-    nu, W, weights = np.zeros(rows), np.zeros((rows, rows)), np.zeros(rows)
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        rejected = out.memory[run]
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict(size, w)
-            _, correlated = load_measurement(size, system, run, epoch, w)
-            innovate(size, w, nu, W)
-            if out.innovation.shape[1] > 0:
-                for i in range(rows):
-                    out.innovation[run, epoch, i] = nu[i]
-                    for j in range(rows):
-                        out.innovation_covariance[run, epoch, i, j] = W[i, j]
-            nis, present = squared(nu, W)
-            for row in range(rows):
-                weights[row] = np.nan
-            if rule == GATE_EPOCHS and present > 0:
-                taken = nis <= largest_nis[present] or rejected[0] >= patience
-                rejected[0] = 0.0 if taken else rejected[0] + 1.0
-                for row in range(rows):
-                    weights[row] = 1.0 if taken else 0.0
-            failure, log_likelihood = judge_and_update(size, w, correlated, rule, k0, k1, patience, rejected, weights)
-            if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                break
-            if out.innovation.shape[1] > 0:
-                for row in range(rows):
-                    out.adaptation[run, epoch, row] = np.nan if np.isnan(w.z[row]) else weights[row]
-            keep(out, run, epoch, epochs - 1, w)
+def room(size: Size, rows: int, options: Rule) -> Judged:
+    """For one epoch."""
+    return Judged(np.zeros(rows), np.zeros((rows, rows)), np.zeros(rows))
+
+
+def condition(
+    size: Size, w: Workspace, options: Rule, own: Judged, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """On the rows present, each with its weight; the memory counts rejections in a row."""
+    rows = w.z.shape[0]
+    innovate(size, w, own.nu, own.W)
+    nis, _ = squared(own.nu, own.W)
+    for row in range(rows):
+        own.weights[row] = np.nan
+    if options.kind == GATE_EPOCHS and present > 0:
+        taken = nis <= options.largest_nis[present] or memory[0] >= options.patience
+        memory[0] = 0.0 if taken else memory[0] + 1.0
+        for row in range(rows):
+            own.weights[row] = 1.0 if taken else 0.0
+    failure, log_likelihood = judge_and_update(
+        size, w, correlated, options.kind, options.k0, options.k1, options.patience, memory, own.weights
+    )
+    return failure, nis, log_likelihood
+
+
+def report(size: Size, w: Workspace, options: Rule, own: Judged, memory: Array, figures: Array) -> None:
+    """The weights."""
+    for row in range(len(figures)):
+        figures[row] = np.nan if np.isnan(w.z[row]) else own.weights[row]
+
+
+variant(Rule, room=room, condition=condition, report=report)
 
 
 def gated(
@@ -219,9 +218,7 @@ def gated(
     probability: float = 0.999,
     by: Literal["row", "epoch"] = "row",
     patience: int | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter with a chi-square gate.
 
@@ -236,8 +233,8 @@ def gated(
         Judge each row, given those before it, or all rows of an epoch together.
     patience : int, optional
         After so many rejections in a row the next one is believed: a filter that is wrong itself finds back.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -252,9 +249,8 @@ def gated(
     DataError
         As :func:`truenorth.filters.kalman`.
     """
-    gate = Gate(probability, by, patience)
-    rule, k0, believed, quantiles = gate.limits(system.rows)
-    return _robust(system, state, rule, k0, k0, believed, quantiles, history, innovations, workers)
+    kind, k0, believed, quantiles = Gate(probability, by, patience).limits(system.rows)
+    return _robust(system, state, Rule(kind, k0, k0, believed, quantiles), **running)
 
 
 def robust(
@@ -264,9 +260,7 @@ def robust(
     weighting: Weighting = "huber",
     k0: float | None = None,
     k1: float = 4.0,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter with robust weights.
 
@@ -280,8 +274,8 @@ def robust(
         Innovation in sigma up to which a row has full weight; 1.345 (Huber), 1.5 (IGG III) as a rule.
     k1 : float
         Innovation in sigma from which a row has none (IGG III).
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -304,32 +298,10 @@ def robust(
         raise UsageError(f"k0 is {full}, expected a positive number")
     if rule == IGG3 and not k1 > full:
         raise UsageError(f"k1 is {k1}, expected more than k0 = {full}")
-    none = np.zeros(system.rows + 1)
-    return _robust(system, state, rule, full, float(k1), np.iinfo(np.int64).max, none, history, innovations, workers)
+    no_limit = np.zeros(system.rows + 1)
+    return _robust(system, state, Rule(rule, full, float(k1), np.iinfo(np.int64).max, no_limit), **running)
 
 
-def _robust(
-    system: LinearSystem,
-    state: FilterState | None,
-    rule: int,
-    k0: float,
-    k1: float,
-    patience: int,
-    largest_nis: Array,
-    history: History,
-    innovations: bool | None,
-    workers: int,
-) -> Estimates:
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        robust_runs(size, runs, epochs, rule, k0, k1, patience, largest_nis, out)
-
-    return drive(
-        kernel,
-        system,
-        state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-        memory=np.zeros(max(system.rows, 1)),
-        adaptation=system.rows,
-    )
+def _robust(system: LinearSystem, state: FilterState | None, rule: Rule, **running: Unpack[Running]) -> Estimates:
+    memory = np.zeros(max(system.rows, 1))
+    return run_linear(rule, system, state, memory=memory, adaptation=system.rows, **running)

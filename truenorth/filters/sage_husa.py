@@ -12,26 +12,25 @@ R. K. Mehra, Approaches to adaptive filtering, IEEE Trans. Autom. Control 17, 19
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple, Unpack
+
 import numpy as np
 
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, transposed_times
-from truenorth.filters.drive import History, drive
-from truenorth.filters.recursion import (
-    Histories,
-    Workspace,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
-    update,
-    workspace,
-)
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import Workspace
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
+
+
+class SageHusa(NamedTuple):
+    """Options of :func:`sage_husa`."""
+
+    b: float
+    smallest: float
+    largest: float
 
 
 @compiled(forceinline=True)
@@ -51,30 +50,19 @@ def estimate_noise(size: Size, w: Workspace, b: float, smallest: float, largest:
         w.R[row, row] = r[row]
 
 
-@compiled
-def sage_husa_runs(
-    size: Size, system: Runs, epochs: int, b: float, smallest: float, largest: float, out: Histories
-) -> None:
-    """Sage-Husa filter of each run."""
-    rows = system.z.shape[2]
-    w = workspace(size, rows)
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        r, fade = out.memory[run, :rows], out.memory[run, rows:]
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict(size, w)
-            present, correlated = load_measurement(size, system, run, epoch, w)
-            estimate_noise(size, w, b, smallest, largest, r, fade)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-                for row in range(rows):
-                    out.adaptation[run, epoch, row] = r[row]
-            if present > 0:
-                failure, nis, log_likelihood = update(size, w, correlated, True)
-                if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                    break
-            keep(out, run, epoch, epochs - 1, w)
+def adapt(size: Size, w: Workspace, options: SageHusa, own: Any, memory: Array) -> None:
+    """R by the estimate; the memory holds the variances, then ``b^k``."""
+    rows = w.z.shape[0]
+    estimate_noise(size, w, options.b, options.smallest, options.largest, memory[:rows], memory[rows:])
+
+
+def report(size: Size, w: Workspace, options: SageHusa, own: Any, memory: Array, figures: Array) -> None:
+    """The variances."""
+    for row in range(len(figures)):
+        figures[row] = memory[row]
+
+
+variant(SageHusa, adapt=adapt, report=report)
 
 
 def sage_husa(
@@ -84,9 +72,7 @@ def sage_husa(
     b: float = 0.99,
     smallest: float = 1e-2,
     largest: float = 1e4,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter that estimates the measurement noise (Sage and Husa).
 
@@ -100,8 +86,8 @@ def sage_husa(
         Forgetting factor; the memory is ``1 / (1 - b)`` measurements.
     smallest, largest : float
         Limits of the estimated variance, in units of the given one.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -121,19 +107,9 @@ def sage_husa(
         raise UsageError(f"smallest is {smallest} and largest {largest}, expected 0 < smallest <= 1 <= largest")
     check_independent_rows(system)
 
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        sage_husa_runs(size, runs, epochs, float(b), float(smallest), float(largest), out)
-
-    return drive(
-        kernel,
-        system,
-        state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-        memory=np.concatenate([np.full(system.rows, np.nan), np.ones(system.rows)]),
-        adaptation=system.rows,
-    )
+    memory = np.concatenate([np.full(system.rows, np.nan), np.ones(system.rows)])
+    options = SageHusa(float(b), float(smallest), float(largest))
+    return run_linear(options, system, state, memory=memory, adaptation=system.rows, **running)
 
 
 def check_independent_rows(system: LinearSystem) -> None:

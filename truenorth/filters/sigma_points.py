@@ -8,17 +8,15 @@ them only, which is what makes high orders affordable, and the rest is in closed
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.filters.drive import History
-from truenorth.filters.nonlinear import run_nonlinear
+from truenorth.filters.nonlinear import Guarded, run_nonlinear
 from truenorth.filters.nonlinear_system import NonlinearSystem, require_jacobians, require_vector_space
 from truenorth.filters.quadrature import QuadratureRule, cubature_rule, gauss_hermite_rule, unscented_rule
-from truenorth.filters.robust import Gate
-from truenorth.filters.strong_tracking import StrongTracking
 from truenorth.filters.system import Estimates, FilterState
 
 
@@ -30,11 +28,7 @@ def unscented(
     beta: float,
     kappa: float,
     nonlinear: Sequence[int] | None = None,
-    tracking: StrongTracking | None = None,
-    gate: Gate | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Guarded],
 ) -> Estimates:
     """Unscented Kalman filter.
 
@@ -46,15 +40,14 @@ def unscented(
         From an earlier call with the same options, to go on from.
     alpha, beta, kappa : float
         As in :func:`truenorth.filters.quadrature.unscented_rule`, in as many dimensions as there are nonlinear states.
-    nonlinear, tracking, gate
+    nonlinear
         As in :func:`gauss_hermite`.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
 
     Returns
     -------
     Estimates
-        As :func:`gauss_hermite`.
 
     Raises
     ------
@@ -63,7 +56,7 @@ def unscented(
     """
     order = cholesky_order(system, nonlinear)
     rule = unscented_rule(len(order), alpha=alpha, beta=beta, kappa=kappa)
-    return _by_nodes(system, state, rule, order, tracking, gate, history, innovations, workers)
+    return _by_nodes(system, state, rule, order, **running)
 
 
 def cubature(
@@ -71,11 +64,7 @@ def cubature(
     state: FilterState | None = None,
     *,
     nonlinear: Sequence[int] | None = None,
-    tracking: StrongTracking | None = None,
-    gate: Gate | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Guarded],
 ) -> Estimates:
     """Cubature Kalman filter, of third degree.
 
@@ -85,15 +74,14 @@ def cubature(
         Without retraction.
     state : FilterState, optional
         From an earlier call with the same options, to go on from.
-    nonlinear, tracking, gate
+    nonlinear
         As in :func:`gauss_hermite`.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
 
     Returns
     -------
     Estimates
-        As :func:`gauss_hermite`.
 
     Raises
     ------
@@ -102,7 +90,7 @@ def cubature(
     """
     order = cholesky_order(system, nonlinear)
     rule = cubature_rule(len(order))
-    return _by_nodes(system, state, rule, order, tracking, gate, history, innovations, workers)
+    return _by_nodes(system, state, rule, order, **running)
 
 
 def gauss_hermite(
@@ -111,11 +99,7 @@ def gauss_hermite(
     *,
     order: int,
     nonlinear: Sequence[int] | None = None,
-    tracking: StrongTracking | None = None,
-    gate: Gate | None = None,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Guarded],
 ) -> Estimates:
     """Gauss-Hermite filter.
 
@@ -130,19 +114,12 @@ def gauss_hermite(
     nonlinear : sequence of int, optional
         The states in which transition and measurement are not linear; all of them, if not given. The model must be
         linear in the other states once these are given (:func:`truenorth.filters.check_jacobians` tests that).
-    tracking : StrongTracking, optional
-        Fade the predicted covariance where innovations are larger than expected (with the regression's noise among
-        what is expected); nodes are then drawn from the faded one.
-    gate : Gate, optional
-        Leave out measurements whose innovation is not to be believed.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
 
     Returns
     -------
     Estimates
-        `adaptation` holds the factor of strong tracking, then each row's weight (1 taken, 0 rejected, NaN absent), as
-        far as asked for. With a gate, `nis` is of all rows present and `log_likelihood` of those taken.
 
     Raises
     ------
@@ -153,7 +130,7 @@ def gauss_hermite(
     """
     first = cholesky_order(system, nonlinear)
     rule = gauss_hermite_rule(len(first), order)
-    return _by_nodes(system, state, rule, first, tracking, gate, history, innovations, workers)
+    return _by_nodes(system, state, rule, first, **running)
 
 
 def cholesky_order(system: NonlinearSystem, nonlinear: Sequence[int] | None) -> NDArray[np.int64]:
@@ -180,23 +157,9 @@ def _by_nodes(
     state: FilterState | None,
     rule: QuadratureRule,
     order: NDArray[np.int64],
-    tracking: StrongTracking | None,
-    gate: Gate | None,
-    history: History,
-    innovations: bool | None,
-    workers: int,
+    **running: Unpack[Guarded],
 ) -> Estimates:
     require_vector_space(system, "a filter by nodes")
     if len(order) < system.states:
         require_jacobians(system, "a filter with nodes in the nonlinear states only")
-    return run_nonlinear(
-        system,
-        state,
-        rule,
-        order,
-        tracking=tracking,
-        gate=gate,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-    )
+    return run_nonlinear(system, state, rule, order, **running)

@@ -14,13 +14,13 @@ Source: T. Kailath, A. H. Sayed, B. Hassibi, *Linear Estimation*, 2000, sections
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 
 from truenorth.core.compiled import compiled
 from truenorth.core.linalg import Array, Size, dot, multiply
-from truenorth.filters.drive import History, drive
+from truenorth.filters.drive import Running, drive
 from truenorth.filters.recursion import (
     LOG_2PI,
     NO_INNOVATION_VARIANCE,
@@ -233,10 +233,7 @@ def square_root_runs(size: Size, system: Runs, epochs: int, out: Histories) -> N
 def square_root(
     system: LinearSystem,
     state: FilterState | None = None,
-    *,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Square-root Kalman filter; exact for any ``R`` and ``S`` like :func:`truenorth.filters.kalman`.
 
@@ -245,8 +242,8 @@ def square_root(
     system : LinearSystem
     state : FilterState, optional
         From an earlier call, to go on from; its `memory` is the factor.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -257,12 +254,4 @@ def square_root(
     DataError
         The variance of an innovation is zero, naming run and epoch.
     """
-    return drive(
-        square_root_runs,
-        system,
-        state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-        memory=np.full(system.states**2, np.nan),
-    )
+    return drive(square_root_runs, system, state, memory=np.full(system.states**2, np.nan), **running)

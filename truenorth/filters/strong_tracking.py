@@ -8,11 +8,12 @@ noise, Int. J. Control 65, 1996: ``lam = max(1, tr(V - beta R - H Q H') / tr(H P
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 
-from truenorth.filters.drive import History
-from truenorth.filters.fading import SINGLE, check_factor_options, faded
+from truenorth.filters.drive import Running
+from truenorth.filters.fading import SINGLE, FadingOptions, check_factor_options, faded
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 
@@ -47,9 +48,7 @@ def strong_tracking(
     softening: float = 1.0,
     rho: float = 0.95,
     cap: float = np.inf,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Strong tracking filter.
 
@@ -65,8 +64,8 @@ def strong_tracking(
         Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
     cap : float
         Largest factor.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -80,4 +79,4 @@ def strong_tracking(
     DataError
         As :func:`truenorth.filters.kalman`.
     """
-    return faded(system, state, SINGLE, rho, softening, cap, history, innovations, workers)
+    return faded(system, state, FadingOptions(SINGLE, float(rho), float(softening), float(cap)), **running)

@@ -12,28 +12,34 @@ IEEE Trans. Autom. Control 54, 2009.
 
 from __future__ import annotations
 
+from typing import NamedTuple, Unpack
+
 import numpy as np
 
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, load, transposed_times
-from truenorth.filters.drive import History, drive
-from truenorth.filters.recursion import (
-    SOUND,
-    Histories,
-    Workspace,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
-    update,
-    workspace,
-)
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import SOUND, Workspace, update
 from truenorth.filters.sage_husa import check_independent_rows
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
+
+
+class Variational(NamedTuple):
+    """Options of :func:`variational`."""
+
+    rho: float
+    worth: float
+    iterations: int
+
+
+class Predicted(NamedTuple):
+    """The predicted state, from which each turn of an epoch begins, and `beta` before the epoch's rows."""
+
+    x: Array
+    P: Array
+    beta: Array
 
 
 @compiled(forceinline=True)
@@ -54,50 +60,54 @@ def blame(size: Size, w: Workspace, before: Array, beta: Array) -> None:
         beta[row] = before[row] + 0.5 * residual * residual + 0.5 * dot(size, w.a, w.H[row])
 
 
-@compiled
-def variational_runs(
-    size: Size, system: Runs, epochs: int, rho: float, worth: float, iterations: int, out: Histories
-) -> None:
-    """Variational Bayes filter of each run."""
-    N, rows = len(size), system.z.shape[2]
-    w = workspace(size, rows)
-    x, P, before = np.zeros(N), np.zeros((N, N)), np.zeros(rows)
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        alpha, beta = out.memory[run, :rows], out.memory[run, rows:]
-        for epoch in range(epochs):
-            load_process(size, system, run, epoch, w)
-            predict(size, w)
-            present, _ = load_measurement(size, system, run, epoch, w)
-            for row in range(rows):
-                if np.isnan(alpha[row]):
-                    alpha[row], beta[row] = 0.5 * worth, 0.5 * worth * w.R[row, row]
-                alpha[row], beta[row] = rho * alpha[row], rho * beta[row]
-                before[row] = beta[row]
-                if not np.isnan(w.z[row]):
-                    alpha[row] += 0.5
-            set_noise(w, alpha, beta)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-            x[:] = w.x
-            load(size, w.P, P)
-            failure, nis, log_likelihood = SOUND, 0.0, 0.0
-            for turn in range(iterations):
-                if present == 0 or failure != SOUND:
-                    break
-                w.x[:] = x
-                load(size, P, w.P)
-                set_noise(w, alpha, beta)
-                failure, turn_nis, turn_log_likelihood = update(size, w, False, True)
-                if turn == 0:
-                    nis, log_likelihood = turn_nis, turn_log_likelihood
-                blame(size, w, before, beta)
-            if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                break
-            if out.innovation.shape[1] > 0:
-                for row in range(rows):
-                    out.adaptation[run, epoch, row] = beta[row] / alpha[row]
-            keep(out, run, epoch, epochs - 1, w)
+def room(size: Size, rows: int, options: Variational) -> Predicted:
+    """For the predicted state."""
+    return Predicted(np.zeros(len(size)), np.zeros((len(size), len(size))), np.zeros(rows))
+
+
+def adapt(size: Size, w: Workspace, options: Variational, own: Predicted, memory: Array) -> None:
+    """Forget; the memory holds alpha, then beta."""
+    rows = w.z.shape[0]
+    alpha, beta = memory[:rows], memory[rows:]
+    for row in range(rows):
+        if np.isnan(alpha[row]):
+            alpha[row], beta[row] = 0.5 * options.worth, 0.5 * options.worth * w.R[row, row]
+        alpha[row], beta[row] = options.rho * alpha[row], options.rho * beta[row]
+        own.beta[row] = beta[row]
+        if not np.isnan(w.z[row]):
+            alpha[row] += 0.5
+    set_noise(w, alpha, beta)
+    own.x[:] = w.x
+    load(size, w.P, own.P)
+
+
+def condition(
+    size: Size, w: Workspace, options: Variational, own: Predicted, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """State and noise by turns; NIS and log-likelihood are of the first."""
+    rows = w.z.shape[0]
+    alpha, beta = memory[:rows], memory[rows:]
+    failure, nis, log_likelihood = SOUND, 0.0, 0.0
+    for turn in range(options.iterations):
+        if present == 0 or failure != SOUND:
+            break
+        w.x[:] = own.x
+        load(size, own.P, w.P)
+        set_noise(w, alpha, beta)
+        failure, turn_nis, turn_log_likelihood = update(size, w, False, True)
+        if turn == 0:
+            nis, log_likelihood = turn_nis, turn_log_likelihood
+        blame(size, w, own.beta, beta)
+    return failure, nis, log_likelihood
+
+
+def report(size: Size, w: Workspace, options: Variational, own: Predicted, memory: Array, figures: Array) -> None:
+    """The variances."""
+    for row in range(len(figures)):
+        figures[row] = memory[len(figures) + row] / memory[row]
+
+
+variant(Variational, room=room, adapt=adapt, condition=condition, report=report)
 
 
 def variational(
@@ -107,9 +117,7 @@ def variational(
     rho: float = 0.99,
     worth: float = 10.0,
     iterations: int = 3,
-    history: History = "last",
-    innovations: bool | None = None,
-    workers: int = 1,
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter that estimates the measurement noise by variational Bayes.
 
@@ -125,8 +133,8 @@ def variational(
         How many measurements the given R is worth.
     iterations : int
         Turns an epoch.
-    history, innovations, workers
-        As in :func:`truenorth.filters.kalman`.
+    **running
+        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
@@ -151,16 +159,6 @@ def variational(
     if (np.diagonal(system.R, axis1=-2, axis2=-1) == 0.0).any():
         raise UsageError("R has a zero on its diagonal: expected a guess of each row's variance")
 
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        variational_runs(size, runs, epochs, float(rho), float(worth), iterations, out)
-
-    return drive(
-        kernel,
-        system,
-        state,
-        history=history,
-        innovations=innovations,
-        workers=workers,
-        memory=np.full(2 * system.rows, np.nan),
-        adaptation=system.rows,
-    )
+    options = Variational(float(rho), float(worth), iterations)
+    memory = np.full(2 * system.rows, np.nan)
+    return run_linear(options, system, state, memory=memory, adaptation=system.rows, **running)

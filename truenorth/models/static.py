@@ -150,3 +150,16 @@ def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: 
     """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
     p = integrals.position @ C_n0_i.T + gravity_position(integrals.time, lat, alt)
     return np.diff(p, axis=0) / integrals.intervals[:, None]
+
+
+def grown(system: LinearSystem, n: int) -> dict[str, Array]:
+    """Arrays of a system with more states behind its own, zero so far."""
+    K, old, rows = len(system.z), system.states, system.rows
+    shapes = {"Phi": (K, n, n), "Q": (K, n, n), "H": (K, rows, n), "S": (K, n, rows), "P0": (n, n), "x0": (n,)}
+    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
+    own = slice(0, old)
+    arrays["Phi"][:, own, own], arrays["Q"][:, own, own], arrays["H"][:, :, own] = system.Phi, system.Q, system.H
+    arrays["P0"][own, own], arrays["x0"][own] = system.P0, system.x0
+    if system.S is not None:
+        arrays["S"][:, own] = system.S
+    return arrays

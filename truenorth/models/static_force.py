@@ -13,6 +13,7 @@ Source: system 4, "Kalman filters for static alignment": its eight states beside
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from truenorth.models.static import DV, STATES
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity
 
 Array = NDArray[np.float64]
+Form = Literal["velocity", "force"]
 
 
 def gained_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
@@ -30,7 +32,7 @@ def gained_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt
 
 
 def force_system(
-    core: LinearSystem, integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float, R: Array
+    core: LinearSystem, integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float
 ) -> LinearSystem:
     """A system of :meth:`truenorth.models.static.StaticModel.linearise` with the gained velocity as its measurement.
 
@@ -40,12 +42,11 @@ def force_system(
         Its measurement is left out.
     integrals, C_n0_i, lat, alt
         That it was linearised with.
-    R : (3,) array, (m/s)^2
-        Variance of what the base itself gains in an interval (E, N, U), white.
 
     Returns
     -------
     LinearSystem
+        Without the variance of what the base itself gains in an interval.
     """
     # z = J x_{k-1} + w_dv, and x_{k-1} = Phi^-1 (x_k - w): told by the state after the interval, as the filter has it.
     J = core.Phi[:, DV].copy()
@@ -60,7 +61,7 @@ def force_system(
     return replace(
         core,
         H=C @ back,
-        R=0.5 * (noise + np.swapaxes(noise, 1, 2)) + np.diag(R),
+        R=0.5 * (noise + np.swapaxes(noise, 1, 2)),
         S=core.Q @ np.swapaxes(own, 1, 2) @ C_t,
         z=z,
     )

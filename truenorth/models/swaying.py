@@ -2,10 +2,8 @@
 
 States behind the 12 of :mod:`truenorth.models.static`:
 
-| slice | state | unit |
-| --- | --- | --- |
-| ARM | error of the lever arm r from the base's centre to the IMU, base axes | m |
-| beyond | oscillators of the base's motion along E, N, U (:mod:`truenorth.models.disturbance`) | |
+* the lever arm r from the base's centre of rotation to the IMU, base axes: true minus nominal, m
+* oscillators of the base's motion along E, N, U (:mod:`truenorth.models.disturbance`)
 
 The velocity that the arm makes is a difference of attitudes, ``mean of v = (C_n0_b(t_k) - C_n0_b(t_{k-1})) r / T``: it needs
 no angular rate. In ``n0``, since the INS velocity is one in an inertial frame: what the earth's turn adds, ``w_ie x C r``, follows
@@ -25,15 +23,13 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.filters import LinearSystem
 from truenorth.models.disturbance import AxisMotion
-from truenorth.models.static import STATES
+from truenorth.models.static import grown
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
 
-ARM = slice(STATES, STATES + 3)
 MOST_OSCILLATORS = 2  # along an axis
 AXIS_STATES = 4 * MOST_OSCILLATORS
-SWAYING_STATES = STATES + 3 + 3 * AXIS_STATES
 
 
 def arm_rows(integrals: InertialIntegrals, C_n0_i: Array, lat: float, C_sb: Array | None = None) -> Array:
@@ -86,8 +82,8 @@ def _half_way(C: Array) -> Array:
     return dcm_from_rotation_vector(0.5 * step) @ C[:-1]
 
 
-def with_arm(system: LinearSystem, rows: Array, arm: Array, covariance: Array) -> LinearSystem:
-    """The system of a base that stays (12 states), with the lever arm as three more.
+def with_arm(system: LinearSystem, rows: Array, arm: Array) -> LinearSystem:
+    """The system of a base that stays, with the lever arm as three more states.
 
     Parameters
     ----------
@@ -95,20 +91,13 @@ def with_arm(system: LinearSystem, rows: Array, arm: Array, covariance: Array) -
     rows : (K, 3, 3) array
         Of :func:`arm_rows`.
     arm : (3,) array, m
-        Whose velocity is taken off z; the states are the error of it, arm minus true.
-    covariance : (3, 3) array, m^2
-        Of the arm before the log, about zero error; zero where the arm is known.
-
-    Returns
-    -------
-    LinearSystem
-        Of 15 states.
+        The nominal one, whose velocity is taken off z; the states are what the true one is beyond it.
     """
-    grown = _grown(system, ARM.stop)
-    grown["Phi"][:, ARM, ARM] = np.eye(3)
-    grown["H"][:, :, ARM] = -rows
-    grown["P0"][ARM, ARM] = covariance
-    return replace(system, **grown, z=system.z - rows @ arm)
+    n = system.states
+    bigger = grown(system, n + 3)
+    bigger["Phi"][:, n:, n:] = np.eye(3)
+    bigger["H"][:, :, n:] = rows
+    return replace(system, **bigger, z=system.z - rows @ arm)
 
 
 def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMotion]) -> LinearSystem:
@@ -117,7 +106,7 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     Parameters
     ----------
     system : LinearSystem
-        Of 15 states, without any variance of the base's motion in R.
+        Without any variance of the base's motion in R.
     interval : float, s
     motion : three AxisMotion
         Along E, N, U.
@@ -125,28 +114,16 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     Returns
     -------
     LinearSystem
-        Of 39 states.
+        Of 24 more states.
     """
-    grown = _grown(system, SWAYING_STATES)
+    n = system.states
+    bigger = grown(system, n + 3 * AXIS_STATES)
     white = np.zeros(3)
     for axis, item in enumerate(motion):
-        first = ARM.stop + axis * AXIS_STATES
+        first = n + axis * AXIS_STATES
         part = slice(first, first + item.states)
         Phi, Q, P, h = item.blocks(interval)
-        grown["Phi"][:, part, part], grown["Q"][:, part, part] = Phi, Q
-        grown["P0"][part, part], grown["H"][:, axis, part] = P, h
+        bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q
+        bigger["P0"][part, part], bigger["H"][:, axis, part] = P, h
         white[axis] = item.white
-    return replace(system, **grown, R=system.R + np.diag(white**2))
-
-
-def _grown(system: LinearSystem, n: int) -> dict[str, Array]:
-    """Arrays of a system with more states, zero so far."""
-    K, old, rows = len(system.z), system.states, system.rows
-    shapes = {"Phi": (K, n, n), "Q": (K, n, n), "H": (K, rows, n), "S": (K, n, rows), "P0": (n, n), "x0": (n,)}
-    arrays = {name: np.zeros(shape) for name, shape in shapes.items()}
-    own = slice(0, old)
-    arrays["Phi"][:, own, own], arrays["Q"][:, own, own], arrays["H"][:, :, own] = system.Phi, system.Q, system.H
-    arrays["P0"][own, own], arrays["x0"][own] = system.P0, system.x0
-    if system.S is not None:
-        arrays["S"][:, own] = system.S
-    return arrays
+    return replace(system, **bigger, R=system.R + np.diag(white**2))

@@ -1,0 +1,96 @@
+"""How much a base moves that stays where it is, as measurement noise: read from the innovations of the filter itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from truenorth.estimate.batch import Filtered
+from truenorth.filters import Estimates, LinearSystem, kalman
+
+Array = NDArray[np.float64]
+
+SAME_NOISE = 0.1  # of the expected innovation variance
+QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without noise
+COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
+COLOUR_ALARM = 1e-3  # rate at which white innovations pass for coloured
+COLOUR_RUNS = 5  # fewer blocks than this show nothing of it
+
+
+def white_variance(velocity: Array) -> Array:
+    """Variance (3,) of what is white in a velocity (K, 3): half the variance of its differences.
+
+    A start for the variance of the base's motion that slow errors of the INS do not enter; a bias of 100 ug is a difference of
+    a mm/s every second.
+    """
+    return np.maximum(0.5 * np.var(np.diff(velocity, axis=0), axis=0), QUIETEST_BASE**2)
+
+
+def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:
+    """Variance of the base's velocity that makes the innovations as large as expected, at low frequency too.
+
+    Returns it with the mean expected variance of the innovations.
+    """
+    skip = min(5, len(estimates.innovation) // 5)
+    nu = estimates.innovation[skip:]
+    expected = np.einsum("kii->ki", estimates.innovation_covariance[skip:])
+    ratio = np.mean(nu**2 / expected, axis=0)
+    # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
+    # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
+    blocks = len(nu) // COLOUR_BLOCK
+    if colour and blocks >= COLOUR_RUNS:
+        e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
+        low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
+        chance = chdtri(blocks, COLOUR_ALARM) / blocks  # what white noise itself may give
+        # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
+        coloured = low > chance * ratio
+        ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)
+    mean = expected.mean(axis=0)
+    return np.maximum(R + (ratio - 1.0) * mean, QUIETEST_BASE**2), mean
+
+
+class VelocityNoise:
+    """An estimator that filters with the variance of the base's velocity that the innovations ask for.
+
+    First as white, then for its colour. The variance is remembered from pass to pass.
+
+    Parameters
+    ----------
+    R : (K, 3) array, (m/s)^2
+        Variance of the base's mean velocity over each interval (E, N, U), to begin with.
+    parts : sequence of (K,) bool arrays
+        Intervals that share one variance.
+    most : int
+        Filter runs at the most, for white and for coloured motion each.
+    """
+
+    def __init__(self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int) -> None:
+        self.R, self.parts, self.most = R, parts, most
+
+    def __call__(self, system: LinearSystem) -> Filtered:
+        """Filter a system that holds no variance of the base's velocity yet."""
+        system = replace(system, R=system.R + self.R[:, None] * np.eye(3))
+        estimates = kalman(system, history="full")
+        for colour in (False, True):
+            for _ in range(self.most):
+                R, same = self.R.copy(), True
+                for part in self.parts:
+                    seen = replace(
+                        estimates,
+                        innovation=estimates.innovation[part],
+                        innovation_covariance=estimates.innovation_covariance[part],
+                    )
+                    before = self.R[part][0]
+                    R[part], expected = base_variance(seen, before, colour)
+                    # The vertical carries no attitude.
+                    same &= bool(np.all(np.abs(R[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
+                if same:
+                    break
+                system = replace(system, R=system.R + (R - self.R)[:, None] * np.eye(3))
+                self.R = R
+                estimates = kalman(system, history="full")
+        return Filtered(system, estimates)

@@ -1,0 +1,198 @@
+"""A log of a base that stays: what is taken off it, and the linear system of the errors that are left.
+
+States: misalignment, velocity error, gyro and accelerometer bias (:mod:`truenorth.models.static`), then groups by name:
+``matrices``, the scale factors and misalignments of the sensors, and ``arm``, the lever arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.position import Position
+from truenorth.filters import LinearSystem
+from truenorth.models.matrices import MATRICES, matrices_of, with_matrices, without_errors
+from truenorth.models.static import BG, DV, PHI, STATES, StaticModel
+from truenorth.models.static_force import Form, force_system
+from truenorth.models.swaying import arm_rows, with_arm, without_sway
+from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.inertial import InertialIntegrals, integrate
+
+Array = NDArray[np.float64]
+
+LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
+HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
+VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
+BIASES = slice(6, 12)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of attitude, velocity and sensors before the log.
+
+    Attributes
+    ----------
+    mean : (n,) array
+        Expected errors of the sensors and the arm; zero of misalignment and velocity.
+    P : (n, n) array
+    groups : mapping of str to slice
+        Where the states behind the first twelve stand.
+    """
+
+    mean: Array
+    P: Array
+    groups: Mapping[str, slice]
+
+    @property
+    def sensors(self) -> slice:
+        """Biases and, where they are states, the matrices: what can be taken off a record."""
+        return slice(BIASES.start, self.groups.get("matrices", BIASES).stop)
+
+
+def prior_of(
+    P_bias: Array,
+    *,
+    bias: ArrayLike = (0.0,) * 6,
+    spec: ImuSpec | None = None,
+    arm: ArrayLike | None = None,
+    arm_sigma: float = 0.0,
+) -> Prior:
+    """The prior of a base of whose attitude nothing is known but that it is about level.
+
+    Parameters
+    ----------
+    P_bias : (6, 6) array
+        Covariance of what acts as gyro and accelerometer bias.
+    bias : (6,) array
+        Its expectation.
+    spec : ImuSpec, optional
+        With it, the sensors' scale factors and misalignments are states, as large as it says.
+    arm : (3,) array, m, optional
+        With it, the lever arm from the base's centre of rotation to the IMU is a state.
+    arm_sigma : float, m
+        One sigma along each axis; zero where it is known.
+    """
+    means, blocks, groups = [np.zeros(6), np.asarray(bias, dtype=np.float64)], [P_bias], {}
+    size = STATES
+    if spec is not None:
+        one = np.eye(3, dtype=bool)
+        gyro = np.where(one, spec.gyro_scale_factor, spec.gyro_misalignment).ravel()
+        accel = np.where(one, spec.accel_scale_factor, spec.accel_misalignment).ravel()
+        groups["matrices"] = slice(size, size + MATRICES)
+        means.append(np.zeros(MATRICES))
+        blocks.append(np.diag(np.concatenate([gyro, accel]) ** 2))
+        size += MATRICES
+    if arm is not None:
+        groups["arm"] = slice(size, size + 3)
+        means.append(np.asarray(arm, dtype=np.float64))
+        blocks.append(arm_sigma**2 * np.eye(3))
+        size += 3
+    P = np.zeros((size, size))
+    P[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
+    P[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
+    at = BIASES.start
+    for block in blocks:
+        P[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    return Prior(np.concatenate(means), P, groups)
+
+
+class StayingLog:
+    """A log about a nominal attitude, with nominal errors of the sensors and a nominal arm taken off.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    C_n0_i : (3, 3) array
+        Attitude at the start, about.
+    position : Position
+    noise : StaticModel
+    prior : Prior
+    interval : float, s
+        Filter interval.
+    rows_at : (M,) int array
+        Rows after which the integrated attitude is wanted.
+    integrals : InertialIntegrals, optional
+        Of the log as it is, where they are known already.
+    sways : bool
+        Whether the sway is averaged out of the attitude by which biases act.
+    C_sb : (K+1, 3, 3) array, optional
+        Attitude of the base in the IMU at the ends of the intervals (an indexer's); the two are one when left out.
+    form : {"velocity", "force"}
+        Measure the mean velocity of each interval, or the velocity gained in it.
+
+    Attributes
+    ----------
+    C_n0_i : (3, 3) array
+    taken : (n,) array
+        Errors taken off; zero of misalignment and velocity.
+    integrals : InertialIntegrals
+        Of the record without them.
+    """
+
+    def __init__(
+        self,
+        record: ImuRecord,
+        C_n0_i: Array,
+        position: Position,
+        noise: StaticModel,
+        prior: Prior,
+        interval: float,
+        rows_at: Array | None = None,
+        *,
+        integrals: InertialIntegrals | None = None,
+        sways: bool = False,
+        C_sb: Array | None = None,
+        form: Form = "velocity",
+    ) -> None:
+        self.record, self.C_n0_i, self.position, self.noise = record, C_n0_i, position, noise
+        self.prior, self.interval, self.form, self.sways, self.C_sb = prior, interval, form, sways, C_sb
+        self.rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
+        self.taken, self._turns = prior.mean.copy(), np.zeros((0, 3, MATRICES))
+        self.integrals = self._integrated() if integrals is None else integrals
+
+    @property
+    def bias(self) -> Array:
+        """(6,) gyro and accelerometer bias taken off."""
+        return self.taken[BIASES]
+
+    def linearise(self) -> LinearSystem:
+        """The system of the errors that are left; without any variance of the base's own motion in R."""
+        lat, alt, groups = self.position.lat, self.position.alt, self.prior.groups
+        integrals = without_sway(self.integrals, self.C_sb) if self.sways else self.integrals
+        P0 = self.prior.P
+        system = self.noise.linearise(integrals, self.C_n0_i, lat, alt, P0[:STATES, :STATES], np.zeros(3))
+        if self.form == "force":
+            system = force_system(system, self.integrals, self.C_n0_i, lat, alt)
+        if "matrices" in groups:
+            system = with_matrices(system, self._without_errors(), self.integrals, self.C_n0_i, lat)
+            self._turns = system.Phi[:, PHI, groups["matrices"]]
+        if "arm" in groups:
+            rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)
+            system = with_arm(system, rows, self.taken[groups["arm"]])
+        return replace(system, x0=self.prior.mean - self.taken, P0=P0)
+
+    def correct(self, x: Array) -> None:
+        """Take the errors at the last epoch off: of attitude back at the start, of sensors and arm as they are."""
+        # phi(0) = phi(end) + int C_n0_b (eps + M_g w); then everything anew about the estimate.
+        back = x[PHI] + np.einsum("k,kab->ab", self.integrals.intervals, self.C_n0_i @ self.integrals.C_mean) @ x[BG]
+        matrices = self.prior.groups.get("matrices")
+        if matrices is not None:
+            back = back - np.einsum("kij,j->i", self._turns, x[matrices])
+        self.C_n0_i = dcm_from_rotation_vector(back) @ self.C_n0_i
+        behind = slice(BIASES.start, len(self.taken))
+        self.taken[behind] += x[behind]
+        self.integrals = self._integrated()
+
+    def _without_errors(self) -> ImuRecord:
+        return without_errors(self.record, self.bias, *matrices_of(self.taken[self.prior.groups["matrices"]]))
+
+    def _integrated(self) -> InertialIntegrals:
+        if "matrices" in self.prior.groups:
+            return integrate(self._without_errors(), self.interval, rows_at=self.rows)
+        return integrate(self.record, self.interval, self.bias[:3], self.bias[3:], self.rows)

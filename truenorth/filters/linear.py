@@ -1,0 +1,127 @@
+"""The epoch loop of the linear filters: one kernel; what a filter does in its own way is chosen by the type of its options.
+
+An epoch is predicted, its measurement is loaded, the filter adapts to the innovations, and the state is conditioned on the rows.
+A filter is a ``NamedTuple`` of options and those steps that it does otherwise than the Kalman filter; :func:`variant` takes
+both. The type is known when the kernel is compiled, so that the choice costs nothing when it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Unpack
+
+from numba.extending import overload
+
+from truenorth.core.compiled import OPTIONS, compiled
+from truenorth.core.fingerprint import STEPS
+from truenorth.core.linalg import Array, Size
+from truenorth.filters import recursion
+from truenorth.filters.drive import Running, drive
+from truenorth.filters.recursion import (
+    SOUND,
+    Histories,
+    Workspace,
+    begin,
+    conclude,
+    innovate,
+    keep,
+    load_measurement,
+    load_process,
+    update,
+    workspace,
+)
+from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+
+
+def room(size: Size, rows: int, options: Any) -> Any:
+    """Arrays that a filter works in; the Kalman filter needs none beside the workspace."""
+    return 0
+
+
+def predict(size: Size, w: Workspace, options: Any, own: Any) -> None:
+    """``x = Phi x + u``, ``P = Phi P Phi' + Q``."""
+    recursion.predict(size, w)
+
+
+def adapt(size: Size, w: Workspace, options: Any, own: Any, memory: Array) -> None:
+    """Change P or R by what the innovations of the predicted state show; the Kalman filter does not."""
+
+
+def condition(
+    size: Size, w: Workspace, options: Any, own: Any, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """Condition on the rows present: the failure if any, NIS and log-likelihood."""
+    if present == 0:
+        return SOUND, 0.0, 0.0
+    return update(size, w, correlated, True)
+
+
+def report(size: Size, w: Workspace, options: Any, own: Any, memory: Array, figures: Array) -> None:
+    """Write what the filter chose at this epoch; the Kalman filter chooses nothing."""
+
+
+def variant(options: type, **steps: Callable[..., Any]) -> None:
+    """Name the steps that a filter with options of this type does in its own way.
+
+    Parameters
+    ----------
+    options : type
+        A ``NamedTuple``.
+    **steps
+        Functions that stand for `room`, `predict`, `adapt`, `condition` or `report`, with the same names of arguments.
+    """
+    setattr(options, STEPS, steps)
+
+
+def _by_type(step: Callable[..., Any]) -> None:
+    """Let kernels call `step` as the type of its third argument, the options, has it; else as it stands."""
+
+    def chosen(*arguments: Any) -> Any:
+        return getattr(arguments[2].instance_class, STEPS).get(step.__name__, step)
+
+    inlined: Any = OPTIONS | {"forceinline": True}
+    overload(step, jit_options=inlined, strict=False)(chosen)
+
+
+for _step in (room, predict, adapt, condition, report):
+    _by_type(_step)
+
+
+@compiled
+def linear_runs(size: Size, system: Runs, epochs: int, options: Any, out: Histories) -> None:
+    """Filter each run."""
+    rows = system.z.shape[2]
+    w, own = workspace(size, rows), room(size, rows, options)
+    for run in range(out.x.shape[0]):
+        begin(size, system, run, w)
+        memory = out.memory[run]
+        for epoch in range(epochs):
+            load_process(size, system, run, epoch, w)
+            predict(size, w, options, own)
+            present, correlated = load_measurement(size, system, run, epoch, w)
+            adapt(size, w, options, own, memory)
+            if out.innovation.shape[1] > 0:
+                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
+            failure, nis, log_likelihood = condition(size, w, options, own, memory, present, correlated)
+            if not conclude(out, run, epoch, failure, nis, log_likelihood):
+                break
+            if out.innovation.shape[1] > 0:
+                report(size, w, options, own, memory, out.adaptation[run, epoch])
+            keep(out, run, epoch, epochs - 1, w)
+
+
+def run_linear(
+    options: Any,
+    system: LinearSystem,
+    state: FilterState | None,
+    *,
+    memory: Array | None = None,
+    adaptation: int = 0,
+    **running: Unpack[Running],
+) -> Estimates:
+    """Run the linear filter that has options of this type; parameters as in :func:`truenorth.filters.drive.drive`."""
+
+    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
+        linear_runs(size, runs, epochs, options, out)
+
+    return drive(kernel, system, state, memory=memory, adaptation=adaptation, **running)

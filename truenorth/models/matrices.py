@@ -1,0 +1,94 @@
+"""Scale factors and misalignments of the sensors of an INS on a base that stays: what a turn brings to light.
+
+    phi' = -C_n0_b (eps + M_g w),   dv' = -g_n0 x phi + C_n0_b (nabla + M_a f)
+
+Eighteen states, ``M_g`` by rows and then ``M_a``, measured minus true: ``w_hat = (I + M_g) w + eps``.
+
+Source: D. Goshen-Meskin, I. Y. Bar-Itzhack, Observability analysis of piece-wise constant systems, part II: application to
+inertial navigation in-flight alignment, IEEE Trans. Aerospace and Electronic Systems 28, 1992.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.filters import LinearSystem
+from truenorth.models.static import DV, PHI, grown
+from truenorth.records import ImuRecord
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
+from truenorth.strapdown.level import increments, inertial_integrals
+
+Array = NDArray[np.float64]
+
+MATRICES = 18
+
+
+def with_matrices(
+    system: LinearSystem, record: ImuRecord, integrals: InertialIntegrals, C_n0_i: Array, lat: float
+) -> LinearSystem:
+    """A system of :meth:`truenorth.models.static.StaticModel.linearise` with the matrices of both sensors as 18 more states.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    record : ImuRecord
+        As integrated: nominal errors taken off.
+    integrals : InertialIntegrals
+        Of that record.
+    C_n0_i : (3, 3) array
+    lat : float, rad
+    """
+    T = integrals.intervals[:, None, None]
+    gyro, accel = _moments(record, integrals)
+    C_n_n0 = np.swapaxes(earth_rotation((integrals.time[1:] + integrals.time[:-1]) / 2, lat), 1, 2)
+    force = system.Phi[:, DV, PHI] / T  # [f x], f the reaction to gravity
+    n, K = system.states, len(T)
+    bigger = grown(system, n + MATRICES)
+    M_g, M_a = slice(n, n + 9), slice(n + 9, n + 18)
+    Phi, H = bigger["Phi"], bigger["H"]
+    Phi[:, n:, n:] = np.eye(MATRICES)
+    g0, g1, g2 = (C_n0_i @ moment.reshape(K, 3, 9) for moment in gyro)
+    Phi[:, PHI, M_g] = -g0
+    Phi[:, DV, M_g] = -force @ (T * g0 - g1)
+    a0, a1 = (C_n0_i @ moment.reshape(K, 3, 9) for moment in accel)
+    Phi[:, DV, M_a] = a0
+    H[:, :, M_g] = C_n_n0 @ (-force @ g2 / (2 * T))
+    H[:, :, M_a] = C_n_n0 @ (-a1 / T)
+    return replace(system, **bigger)
+
+
+def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_matrix: Array) -> ImuRecord:
+    """A record with biases (6,) and matrices (3, 3) of the sensors taken off, as increments."""
+    dtheta, dvel = increments(record)
+    steps = record.steps[:, None]
+    gyro = (dtheta - steps * bias[:3]) @ np.asarray(np.linalg.inv(np.eye(3) + gyro_matrix)).T
+    accel = (dvel - steps * bias[3:]) @ np.asarray(np.linalg.inv(np.eye(3) + accel_matrix)).T
+    return replace(record, gyro=gyro, accel=accel, kind="increments")
+
+
+def matrices_of(x: Array) -> tuple[Array, Array]:
+    """``M_g``, ``M_a`` (3, 3) of 18 states."""
+    return x[:9].reshape(3, 3), x[9:].reshape(3, 3)
+
+
+def _moments(record: ImuRecord, integrals: InertialIntegrals) -> tuple[list[Array], list[Array]]:
+    """``int s^m C_ib e_i w_j ds`` of each interval for m = 0, 1, 2, and the same of the force; (K, 3, i, j) each."""
+    dtheta, dvel = increments(record)
+    steps = record.steps
+    edges = np.concatenate(([0.0], np.cumsum(steps)))
+    ends = np.searchsorted(edges, integrals.time - 0.5 * record.interval)
+    last = int(ends[-1])
+    C_after, _, _ = inertial_integrals(dtheta[:last], dvel[:last], steps[:last], np.arange(last + 1))
+    C = 0.5 * (C_after[:-1] + C_after[1:])
+    row = np.repeat(np.arange(len(ends) - 1), np.diff(ends))
+    s = (edges[:last] + edges[1 : last + 1]) / 2 - integrals.time[row]
+    starts = ends[:-1]
+
+    def of(increment: Array, order: int) -> Array:
+        weighted = increment[:last] * (s**order)[:, None]
+        return np.stack([np.add.reduceat(C * weighted[:, None, None, j], starts, axis=0) for j in range(3)], axis=-1)
+
+    return [of(dtheta, m) for m in range(3)], [of(dvel, m) for m in range(2)]
