@@ -19,7 +19,7 @@ BARS = {120.0: 0.35, 250.0: 0.1, 600.0: 0.03}
 
 @pytest.fixture(scope="module")
 def run_a():
-    return work("A", 11, "per_sample", ("coarse", "filters", "pipeline", "whole"), (250.0, 600.0), 0)
+    return work("A", 11, "per_sample", ("coarse", "filters", "sweeps", "pipeline", "whole"), (250.0, 600.0), 0)
 
 
 def phi(results, *key):
@@ -45,7 +45,7 @@ def test_what_the_filters_of_the_paper_do(run_a):
     makf, imakf = phi(run_a, "A", "makf", 600.0), phi(run_a, "A", "imakf", 600.0)
     np.testing.assert_allclose(makf, imakf, atol=1e-2)
     assert abs(imakf[2]) > 50 * abs(phi(run_a, "A", "kf", 600.0)[2])
-    ends = [phi(run_a, "A_large_R", method, 600.0) for method in FILTERS]
+    ends = [phi(run_a, "A_R_0.3", method, 600.0) for method in FILTERS]
     np.testing.assert_allclose(ends, [ends[0]] * len(ends), atol=1e-6)
 
 
@@ -102,7 +102,9 @@ def test_the_command(tmp_path):
     result = CliRunner().invoke(app, ["reproduce", "rotary", "--runs", "3", "-o", str(tmp_path)])
     assert result.exit_code == 0, result.output
     names = {path.name for path in tmp_path.iterdir()}
-    drawings = {"modulation.png", "figures_1_to_3.png", "figure_4.png", "honesty.png"}
+    drawings = {
+        f"{name}.png" for name in ("figures_1_to_3", "figure_4", "convergence", "modulation", "honesty", "open_choices")
+    }
     assert names == {"figures.csv", "claims.md", "report.html"} | drawings
     table = pd.read_csv(tmp_path / "figures.csv")
     expected = {"A", "A_max_start", "B", "C", "jonswap", "unrotated", "rotation_off", "lever_arm_at_t1_kept"}

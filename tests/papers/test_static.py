@@ -11,10 +11,9 @@ from truenorth.cli import app
 from truenorth.core.errors import UsageError
 from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
 from truenorth.papers import reproduce
-from truenorth.papers.claims import Claim, markdown
 from truenorth.papers.static.study import ACCEL_BIAS, GYRO_BIAS, LAT
 from truenorth.papers.static.truth import ARCMIN
-from truenorth.papers.table import STATISTICS, UNITS, Figure, figure
+from truenorth.papers.table import UNITS
 
 
 @pytest.fixture(scope="module")
@@ -172,34 +171,6 @@ def test_runs_do_not_depend_on_their_number():
 
     few, many = (_honest_truth(BASES["sway"], runs, 5) for runs in (2, 4))
     np.testing.assert_array_equal(few.velocity, many.velocity[:2])
-
-
-def test_words_of_the_table():
-    assert Figure._fields == (
-        "case",
-        "method",
-        "noise",
-        "window_start_s",
-        "time_s",
-        "quantity",
-        "statistic",
-        "value",
-        "ci_low",
-        "ci_high",
-        "unit",
-        "paper",
-        "runs",
-    )
-    assert "rms_over_sigma" in STATISTICS
-    assert "arcmin" in UNITS
-    with pytest.raises(ValueError, match="no figure"):
-        figure("a", "b", "c", "average", 1.0, "arcmin")
-
-
-def test_claims_in_markdown():
-    text = markdown("T", [Claim("x is y.", "does not hold", "Because.", 50, 1e-9)], ["A remark."])
-    assert "**Does not hold.** Because." in text
-    assert "50 runs, the same data for both; two-sided sign test p < 0.0001" in text
 
 
 def test_the_command(tmp_path):

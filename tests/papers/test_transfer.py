@@ -96,5 +96,10 @@ def test_the_whole_study():
     assert value("flat_turn_random", "states16", "lever_arm_y_and_speed_times_tau", "rms", 200.0) <= 0.5
     assert 0.8 <= value("flat_turn", "states16", "nees", "mean", 150.0) <= 1.25
     assert value("wing_rock", "states16_att", "level", "rms", 150.0) <= 0.36
-    assert {claim.verdict for claim in study.claims} == {"holds", "holds in part", "does not hold"}
+    verdicts = {claim.text: claim.verdict for claim in study.claims}
+    assert "too few runs" not in verdicts.values()
+    assert (
+        verdicts["With the space-time error modelled, the level misalignment fluctuates much less in the turn."]
+        == "holds"
+    )
     assert {"figure_1", "figure_2", "figure_3", "figure_4"} <= set(study.drawings)

@@ -32,8 +32,8 @@ from truenorth.strapdown.level import NavigationState, mechanise
 deg = np.radians
 ARCSEC = deg(1 / 3600)
 
-# System 1: 18 deg/s about z of the body, 3 deg/s about x.
-DUAL = Indexer((Axis("z", Spin(deg(18))), Axis("x", Spin(deg(3)))))
+# System 1: 6 deg/s about z of the body, 18 deg/s about x.
+DUAL = Indexer((Axis("z", Spin(deg(6))), Axis("x", Spin(deg(18)))))
 SLEWS = Indexer(tuple(Axis(a, s) for a, s in zip("zx", scheme("8", dwell=2.0, duration=60.0, rate=1.0), strict=True)))
 CROOKED = Indexer(
     (
@@ -84,7 +84,7 @@ def test_attitude_in_the_body_is_that_of_elementary_frame_rotations():
     """``C_sb = Rx(w1 t) Rz(w2 t)``."""
     t = np.array([0.0, 1.7, 55.0, 719.0])
     for k, C_bs in enumerate(DUAL.C_bs(t)):
-        np.testing.assert_allclose(C_bs.T, Rx(deg(3) * t[k]) @ Rz(deg(18) * t[k]), atol=1e-12)
+        np.testing.assert_allclose(C_bs.T, Rx(deg(18) * t[k]) @ Rz(deg(6) * t[k]), atol=1e-12)
     np.testing.assert_allclose(C_bs_from_angles("zx", DUAL.angles(t)), DUAL.C_bs(t), atol=1e-15)
     body, imu = SHIP.states(t), Indexed(SHIP, DUAL).states(t)
     np.testing.assert_allclose(imu.C_nb, body.C_nb @ DUAL.C_bs(t), atol=1e-14)
@@ -115,8 +115,8 @@ class OffCentre(Sway):
 
     def arm(self, t):
         C, r = DUAL.C_bs(t), np.array(self.place)
-        rates = np.array([deg(3), 0, 0]) + deg(18) * C[..., 2, :]  # row 2 of C_bs: the outer axis in s
-        change = np.cross([deg(3), 0, 0], deg(18) * C[..., 2, :])  # of w_bs_s: minus w_1 x the outer axis
+        rates = np.array([deg(18), 0, 0]) + deg(6) * C[..., 2, :]  # row 2 of C_bs: the outer axis in s
+        change = np.cross([deg(18), 0, 0], deg(6) * C[..., 2, :])  # of w_bs_s: minus w_1 x the outer axis
         inward = np.cross(rates, np.cross(rates, r)) - np.cross(change, r)
         fixed, still, _ = super().arm(t)
         return (
@@ -194,11 +194,11 @@ def encoder(spec=None, indexer=DUAL, **options):
 def test_a_perfect_encoder_tells_the_angles():
     log = encoder()
     record = log.record
-    np.testing.assert_allclose(record.angles, np.outer(record.time, [deg(18), deg(3)]), atol=1e-12)
+    np.testing.assert_allclose(record.angles, np.outer(record.time, [deg(6), deg(18)]), atol=1e-12)
     assert not log.errors["offset"].any()
     table = record.to_frame()
     assert list(table.columns) == ["angle_1", "angle_2"]
-    np.testing.assert_allclose(table["angle_2"], 3 * record.time, atol=1e-10)
+    np.testing.assert_allclose(table["angle_2"], 18 * record.time, atol=1e-10)
     single = encoder(indexer=Indexer((Axis("y", Spin(1.0)),))).record
     np.testing.assert_allclose(single.angles, single.time)
 

@@ -56,6 +56,11 @@ def rotation_vector_from_dcm(C: ArrayLike) -> Array:
     return rotation_vector_from_quaternion(quaternion_from_dcm(C))
 
 
+def misalignment(C_hat: ArrayLike, C: ArrayLike) -> Array:
+    """``phi`` (..., 3), rad, of a computed attitude: ``C_hat = (I - [phi x]) C``, the whole rotation vector where it is large."""
+    return -rotation_vector_from_dcm(np.asarray(C_hat) @ np.swapaxes(np.asarray(C), -1, -2))
+
+
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Rotation vector (..., 3), rad, of at most pi, of a unit quaternion (..., 4)."""
     q = np.asarray(q, dtype=np.float64)

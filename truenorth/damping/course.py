@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core import earth
-from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.errors import DataError
 from truenorth.models.marine import DV, PHI, MarineModel, position_in_angles
 
@@ -104,5 +104,5 @@ def errors_of(course: Course, truth: Course) -> Array:
     R_M, R_N = earth.radii(lat)
     away = (course.position[:, 1] - lon + np.pi) % (2.0 * np.pi) - np.pi
     dp = np.stack([away * (R_N + alt) * np.cos(lat), (course.position[:, 0] - lat) * (R_M + alt)], axis=1)
-    phi = -rotation_vector_from_dcm(course.C_nb @ np.swapaxes(truth.C_nb, 1, 2))
+    phi = misalignment(course.C_nb, truth.C_nb)
     return np.concatenate([dv, dp, phi], axis=1)

@@ -3,7 +3,8 @@
 Predict, linearise the measurement (by tangents or by nodes, see :mod:`truenorth.filters.linearisation`), and update as
 the Kalman filter does, row after row in Joseph's form. The update is that of the error: zero before it, and carried to
 the estimate by the system's retraction after it. On the way the predicted covariance may be faded (strong tracking),
-rows may be gated, and the linearisation may be repeated at the new estimate.
+rows may be gated (before fading, and what the gate rejects makes no factor), and the linearisation may be repeated at
+the new estimate.
 """
 
 from __future__ import annotations
@@ -208,6 +209,45 @@ def keep_point(out: Histories, run: int, epoch: int, last: int, X: Array, P: Arr
 
 
 @compiled
+def judge_epoch(nu: Array, W: Array, present: int, options: Options, rejected: Array, weights: Array) -> float:
+    """Weights of all rows by the NIS of the epoch where the gate judges epochs, else NaN: to be judged; and the NIS."""
+    nis, _ = squared(nu, W)
+    for i in range(len(weights)):
+        weights[i] = np.nan
+    if options.gate == GATE_EPOCHS:
+        taken = nis <= options.largest_nis[present] or rejected[0] >= options.patience
+        rejected[0] = 0.0 if taken else rejected[0] + 1.0
+        for i in range(len(weights)):
+            weights[i] = 1.0 if taken else 0.0
+    return nis
+
+
+@compiled
+def judge_before_fading(nu: Array, W: Array, present: int, options: Options, rejected: Array, weights: Array) -> None:
+    """Weights of all rows by what the filter expects of them without a fading factor, each given the rows taken before it.
+
+    A factor makes room for just what a gate is there to keep out: judged after it, little is ever rejected.
+    """
+    if options.gate == GATE_EPOCHS:
+        judge_epoch(nu, W, present, options, rejected, weights)
+        return
+    for j in range(len(nu)):
+        weights[j] = 1.0
+        if np.isnan(nu[j]):
+            continue
+        if abs(nu[j]) > options.k0 * np.sqrt(W[j, j]) and rejected[j] < options.patience:
+            weights[j] = 0.0
+            rejected[j] += 1.0
+            continue
+        rejected[j] = 0.0
+        for i in range(j + 1, len(nu)):
+            part = W[i, j] / W[j, j]
+            nu[i] -= part * nu[j]
+            for k in range(j + 1, len(nu)):
+                W[i, k] -= part * W[j, k]
+
+
+@compiled
 def correct(
     size: Size,
     w: Workspace,
@@ -222,14 +262,7 @@ def correct(
     correlated = are_correlated(w.R)
     if options.gate == NO_GATE:
         return update(size, w, correlated, True)
-    nis, _ = squared(nu, W)
-    for i in range(len(weights)):
-        weights[i] = np.nan
-    if options.gate == GATE_EPOCHS:
-        taken = nis <= options.largest_nis[present] or rejected[0] >= options.patience
-        rejected[0] = 0.0 if taken else rejected[0] + 1.0
-        for i in range(len(weights)):
-            weights[i] = 1.0 if taken else 0.0
+    nis = squared(nu, W)[0] if options.tracking else judge_epoch(nu, W, present, options, rejected, weights)
     failure, log_likelihood = judge_and_update(
         size, w, correlated, options.gate, options.k0, options.k0, options.patience, rejected, weights
     )
@@ -257,7 +290,7 @@ def nonlinear_runs(
     N, rows, n = len(size), system.z.shape[2], system.P0.shape[1]
     w, s = workspace(size, rows), points(size, system, rule)
     P, X, dx = np.zeros((N, N)), np.zeros(system.x0.shape[1]), np.zeros(n)
-    nu, W, weights = np.zeros(rows), np.zeros((rows, rows)), np.ones(rows)
+    nu, W, weights, z = np.zeros(rows), np.zeros((rows, rows)), np.ones(rows), np.zeros(rows)
     lam, Lam, before = np.ones(max(rows, 1)), np.ones(N), np.zeros(N)
     first = 1 if options.tracking else 0
     for run in range(out.x.shape[0]):
@@ -277,9 +310,18 @@ def nonlinear_runs(
             if present > 0 or out.innovation.shape[1] > 0:
                 failure = measure_point(size, functions, rule, order, w, s)
                 if options.tracking and failure == SOUND:
+                    if options.gate != NO_GATE:
+                        innovate(size, w, nu, W)
+                        judge_before_fading(nu, W, present, options, rejected, weights)
+                    for i in range(rows):
+                        z[i] = w.z[i]
+                        if weights[i] == 0.0:  # what is not believed makes no factor
+                            w.z[i] = np.nan
                     remember(size, w, options.rho, V)
                     copy(size, P, w.P)
                     fade(size, w, SINGLE, options.softening, options.cap, V, lam, Lam)
+                    for i in range(rows):
+                        w.z[i] = z[i]
                     if lam[0] > 1.0 and len(rule.mean) > 0:  # the nodes lie further out
                         load_rows(size, system, run, epoch, w)
                         failure = measure_point(size, functions, rule, order, w, s)

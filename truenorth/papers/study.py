@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 from truenorth.core.atomic import atomic_files, writable_folder
 from truenorth.core.errors import UsageError
 from truenorth.papers.claims import Claim, markdown
-from truenorth.papers.table import Figure, to_frame, write_figures
+from truenorth.papers.table import Figure, Table, write_figures
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure as Drawing
 
 # Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, full, workers, progress) -> Study`.
@@ -38,21 +39,27 @@ class Study:
     Attributes
     ----------
     title : str
-    figures : sequence of Figure
+    table : Table
         Numbers, for figures.csv.
     claims : sequence of Claim
     drawings : mapping of name to matplotlib figure
+        Those of the paper's own figures and tables are named ``figure...`` and ``table...``.
     captions : mapping of name to str
         What a drawing shows, and what it does not.
     remarks : sequence of str
     """
 
     title: str
-    figures: Sequence[Figure]
+    table: Table
     claims: Sequence[Claim]
     drawings: Mapping[str, Drawing]
     captions: Mapping[str, str] = field(default_factory=dict)
     remarks: Sequence[str] = ()
+
+    @property
+    def figures(self) -> list[Figure]:
+        """Of the table."""
+        return self.table.figures
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write figures.csv, claims.md, each drawing as PNG, and report.html.
@@ -85,15 +92,28 @@ class Study:
         environment = Environment(
             loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True
         )
-        table = to_frame(self.figures).to_html(index=False, na_rep="", float_format="{:.4g}".format, border=0)
+
+        def shown(own: bool) -> list[tuple[str, str, str]]:
+            return [
+                (name.replace("_", " "), self.captions.get(name, ""), _inline(drawing))
+                for name, drawing in self.drawings.items()
+                if name.startswith(("figure", "table")) == own
+            ]
+
         return environment.get_template("study.html").render(
             study=self,
-            drawings=[
-                (name.replace("_", " "), self.captions.get(name, ""), _inline(d)) for name, d in self.drawings.items()
-            ],
-            table=table,
+            beside=_html(self._beside()),
+            of_paper=shown(True),
+            more=shown(False),
+            table=_html(self.table.to_frame()),
             version=html.escape(__version__),
         )
+
+    def _beside(self) -> pd.DataFrame:
+        """Every figure that the paper gives, ours next to it."""
+        frame = self.table.to_frame()
+        columns = ["case", "method", "quantity", "statistic", "time_s", "value", "paper", "unit", "runs"]
+        return frame.loc[frame["paper"].notna(), columns].rename(columns={"value": "ours", "paper": "the paper's"})
 
 
 def reproduce(
@@ -138,6 +158,10 @@ def reproduce(
         raise UsageError(f"workers {workers}; expected 1 or more")
     study: Study = import_module(STUDIES[name]).reproduce(runs, seed, full, workers, progress or (lambda stage: None))
     return study
+
+
+def _html(frame: pd.DataFrame) -> str:
+    return str(frame.to_html(index=False, na_rep="", float_format="{:.4g}".format, border=0))
 
 
 def _inline(drawing: Drawing) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -28,6 +28,7 @@ NAMES = {
     "filter2": "filter 2",
     "filter2_raw": "filter 2, raw reference",
     "fused": "fused",
+    "fused_tuned": "fused, tuned",
     "augmented": "15 states",
     "augmented_long": "15 states, long-run",
 }
@@ -65,34 +66,40 @@ def draw_errors(case: Case, kind: Literal["attitude", "position", "velocity"]) -
     return figure
 
 
-def draw_tables(
-    cases: Mapping[str, Case],
-    tables: Mapping[str, Mapping[float, Sequence[float]]],
-    reading: Callable[[Case, str], Array],
-) -> Figure:
-    """Errors at 20 h over the log's error, ours and the paper's."""
-    panels = ((6, 2, "heading, deg"), (2, 3, "latitude, deg"), (3, 4, "longitude, deg"), (1, 6, "v north, m/s"))
+def draw_tables(ours: Mapping[str, Array], theirs: Mapping[str, Array], logs: Sequence[float]) -> Figure:
+    """All seven columns of tables 1 and 2: errors (C, 7) at 20 h over the log's error, ours and the paper's."""
+    order = (
+        (4, "phi E, 1e-3 deg", 1e3),
+        (5, "phi N, 1e-3 deg", 1e3),
+        (6, "phi U (heading), deg", 1.0),
+        (2, "latitude, deg", 1.0),
+        (3, "longitude, deg", 1.0),
+        (0, "v east, m/s", 1.0),
+        (1, "v north, m/s", 1.0),
+    )
     with style():
-        figure = new_figure(11.0, 3.4)
-        axes = figure.subplots(1, len(panels))
-        for (column, paper, label), ax in zip(panels, axes, strict=True):
-            for number, (method, table) in enumerate(tables.items()):
-                c = list(table)
-                ours = [reading(cases[f"c{x:g}"], method)[column] for x in c]
-                ax.plot(c, ours, "o-", markersize=4, color=COLOURS[number], label=f"{NAMES[method]}, ours")
-                theirs = [table[x][paper] for x in c]
-                ax.plot(
-                    c,
-                    theirs,
-                    "x--",
-                    markersize=5,
-                    linewidth=0.8,
-                    color=COLOURS[number],
-                    label=f"{NAMES[method]}, paper",
-                )
-            ax.set(title=label, xlabel="log error, m/s")
+        figure = new_figure(12.0, 6.2)
+        axes = figure.subplots(2, 4, sharex=True).ravel()
+        for ax, (column, label, scale) in zip(axes, order, strict=False):
+            for number, method in enumerate(ours):
+                for values, mark, whose in ((ours, "o-", "ours"), (theirs, "x--", "paper")):
+                    ax.plot(
+                        logs,
+                        scale * values[method][:, column],
+                        mark,
+                        markersize=5,
+                        linewidth=1.0 if whose == "ours" else 0.8,
+                        color=COLOURS[number],
+                        label=f"{NAMES[method]}, {whose}",
+                    )
+            ax.set_title(label)
             ax.margins(x=0.06)
+        for ax in axes[3:7]:
+            ax.set_xlabel("log error, m/s")
+            ax.tick_params(labelbottom=True)
+        axes[7].set_visible(False)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
+        figure.suptitle("Tables 1 and 2: errors at 20 h", ha="left", x=0.01, fontsize=11)
     return figure
 
 
@@ -103,7 +110,9 @@ def draw_windows(signs: Signs, runs: int) -> Figure:
         axes = figure.subplots(1, 2)
         edges = np.arange(3, 49)
         for ax, (column, label) in zip(axes, ((6, "heading, deg"), (2, "latitude, deg")), strict=True):
-            for number, method in enumerate(("filter1", "filter2", "fused", "augmented", "augmented_long")):
+            for number, method in enumerate(
+                ("filter1", "filter2", "fused", "fused_tuned", "augmented", "augmented_long")
+            ):
                 rms = []
                 for hour in edges[:-1]:
                     window = (signs.time >= hour * HOUR) & (signs.time < (hour + 1) * HOUR)

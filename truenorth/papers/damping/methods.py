@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 SWITCH = 2.5 * HOUR
 WINDOW = 5.0  # s, the paper's T
-R2 = 0.001  # m/s^2
+R2, TUNED_R2 = 0.001, 1e-4  # m/s^2: the paper's, and that of the fusion tuned like the 15 states
 FUSION = Fusion()
 REFERENCE_PRIOR = 0.5  # m/s, of the 15-state filter beside the paper's P0
 LONG_REFERENCE_PRIOR = 0.3  # m/s, of its long-run tuning
@@ -96,6 +96,7 @@ def run_all(
     kinds = filters_of(voyage, course, raw=raw)
     found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
     found["fused"] = FUSION(found["filter1"], found["filter2"], course.interval)
+    found["fused_tuned"] = tuned_fusion(voyage, course, reference, workers)
     corrections = {"undamped": np.zeros((course.epochs + 1, 7))}
     if networks:
         corrections["network_internal"] = network_correction(course, NETWORK, start=SWITCH, ramp=HOUR)
@@ -111,6 +112,18 @@ def run_all(
         left[:, DP] = voyage.truth.in_angles(left[:, DP])
         errors[name] = left
     return Case(course, course.time, errors, found, kinds, runtime)
+
+
+def tuned_fusion(voyage: Voyage, course: Course, reference: Array, workers: int) -> Estimate:
+    """The fusion with what the long-run 15-state filter has: the same P0 and Q, and the R2 that suits them."""
+    start, model = round(SWITCH / course.interval), replace(LONG, with_reference=False)
+    P0 = carried_prior(course, start, model, np.diag(voyage.paper_errors() ** 2))
+    kinds = {
+        "filter1": Filter(model, P0, LOG_NOISE / np.sqrt(course.interval)),
+        "filter2": Filter(model, P0, TUNED_R2, window=WINDOW),
+    }
+    found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
+    return FUSION(found["filter1"], found["filter2"], course.interval)
 
 
 def without_overlap(voyage: Voyage, case: Case, reference: Array) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.consistency import nees
 from truenorth.damping.course import errors_of
 from truenorth.damping.filters import run_filters
 from truenorth.models.marine import REF
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 SPEC = ImuSpec(
     gyro_random_walk=LONG.gyro_random_walk, accel_random_walk=LONG.accel_random_walk, name="what the filter is told"
 )
-COMPARED = ("filter1", "filter2", "fused", "augmented", "augmented_long")
+COMPARED = ("filter1", "filter2", "fused", "fused_tuned", "augmented", "augmented_long")
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def consistency(voyage: Voyage, runs: int, seed: int, progress: Callable[[str], 
 
     Errors, biases and the log's error are drawn from what the filter is told, the IMU has its random walks.
     """
-    nees, heading = [], []
+    squares, heading = [], []
     for run in range(runs):
         progress(f"consistency: voyage {run + 1} of {runs}")
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5, run)))
@@ -102,6 +103,6 @@ def consistency(voyage: Voyage, runs: int, seed: int, progress: Callable[[str], 
         found = run_filters(course, own.reference(c), start=start, kinds=kinds)["augmented_long"]
         error = np.concatenate([errors_of(course, own.truth)[-1], x0[7:], c]) - found.x[-1]
         assert error[REF].shape == (2,)
-        nees.append(error @ np.linalg.solve(found.P, error) / len(error))
+        squares.append(float(nees(error, found.P)) / len(error))
         heading.append(error[6] / found.sigma[-1, 6])
-    return np.array(nees), np.array(heading)
+    return np.array(squares), np.array(heading)

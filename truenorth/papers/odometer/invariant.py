@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.sensors import from_odometer
 from truenorth.coarse.odometer import odometer_alignment
-from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.attitude import misalignment
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.models.in_motion_azimuth import STATES, correction
@@ -61,14 +61,18 @@ def run_invariant(
             every=round(1.0 / INTERVAL),
             invariant=invariant,
         )
-        kept["phi"].append(rotation_vector_from_dcm(drives.C_nb[1:] @ np.swapaxes(track.C_nb[1:], 1, 2)))
+        kept["phi"].append(misalignment(track.C_nb[1:], drives.C_nb[1:]))
         kept["velocity"].append(track.v_n[1:] - drives.v_n[1:])
         kept["gyro_bias"].append(track.gyro_bias[1:] - drives.gyro_bias[run])
         kept["accel_bias"].append(track.accel_bias[1:] - drives.accel_bias[run])
         kept["sigma"].append(track.sigma[1:, PHI])
         kept["C_nb"].append(track.C_nb[-1])
+    stacked = {name: np.stack(value) for name, value in kept.items()}
     return Errors(
-        drives.time, lost=np.zeros(len(which), dtype=bool), **{name: np.stack(value) for name, value in kept.items()}
+        drives.time,
+        lost=np.zeros(len(which), dtype=bool),
+        acted=np.zeros(len(which)),
+        **stacked,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_quaternion, misalignment, quaternion_from_dcm, skew
 from truenorth.filters import (
     Estimates,
     Gate,
@@ -34,6 +34,7 @@ LEVEL_SIGMA = np.radians(0.2)
 VELOCITY_SIGMA = 0.05  # m/s, at a start from rest
 POSITION_SIGMA = 1.0  # m
 LOST = 0.5  # rad of tilt, by which the model has lost its meaning and the run is given up
+CAP = 1.2  # of the factor of sgkf3_capped
 GATE = Gate(0.9999, by="epoch", patience=20)
 
 
@@ -44,17 +45,21 @@ class Method:
     Attributes
     ----------
     run : callable
-        ``run(system, state) -> Estimates``.
+        ``run(system, state, gate) -> Estimates``.
+    tracking : bool
+        Its adaptation begins with the factor of strong tracking.
     """
 
     run: Callable[[NonlinearSystem, FilterState | None, Gate | None], Estimates]
+    tracking: bool = False
 
 
 def _reduced(order: int, tracking: StrongTracking | None = None) -> Method:
     return Method(
         lambda system, state, gate: gauss_hermite(
-            system, state, order=order, nonlinear=[AZIMUTH], tracking=tracking, gate=gate
-        )
+            system, state, order=order, nonlinear=[AZIMUTH], tracking=tracking, gate=gate, innovations=True
+        ),
+        tracking=tracking is not None,
     )
 
 
@@ -69,7 +74,22 @@ METHODS = {
     "gh7": _reduced(7),
     "sgkf3": _reduced(3, StrongTracking()),
     "sgkf7": _reduced(7, StrongTracking()),
+    "sgkf3_capped": _reduced(3, StrongTracking(cap=CAP)),
 }
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What a filter of the study believes, as factors on its covariances.
+
+    Attributes
+    ----------
+    P0, Q, R : float
+    """
+
+    P0: float = 1.0
+    Q: float = 1.0
+    R: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -87,6 +107,8 @@ class Errors:
         Computed attitude at the last epoch.
     lost : (B,) array of bool
         Given up: a tilt beyond half a radian, where the model has no meaning.
+    acted : (B,) array
+        Share of the epochs in which a factor of strong tracking was above 1.
     """
 
     time: Array
@@ -97,11 +119,10 @@ class Errors:
     sigma: Array
     C_nb: Array
     lost: NDArray[np.bool_]
+    acted: Array
 
-    def of(self, runs: slice | NDArray[np.int64]) -> Errors:
-        """Some of the runs."""
-        names = ("phi", "velocity", "gyro_bias", "accel_bias", "sigma", "C_nb", "lost")
-        return replace(self, **{name: getattr(self, name)[runs] for name in names})
+
+NOMINAL = Belief()
 
 
 def run_method(
@@ -112,6 +133,8 @@ def run_method(
     method: str,
     gated: bool = False,
     turned: bool = True,
+    belief: Belief = NOMINAL,
+    begin: int = 0,
 ) -> Errors:
     """Align B runs.
 
@@ -131,19 +154,27 @@ def run_method(
     turned : bool
         Turn the covariance of velocity with a correction of the azimuth; see
         :func:`truenorth.models.in_motion_azimuth.after_correction`.
+    belief : Belief
+    begin : int
+        Epoch to begin at, on the move: its velocity is then the odometer's, turned by the attitude that is off.
     """
     B, epochs = len(which), len(drives.time)
     x0 = np.zeros((B, STATES))
     x0[:, PHI] = phi0
-    s = np.stack([wander.state_at(C, np.zeros(3), *drives.place) for C in _off(x0) @ drives.C_nb[0]])
-    s[:, wander.LAST_ANGLE] = 2.0 * drives.dtheta[which, 0] - drives.dtheta[which, 1]
-    s[:, wander.LAST_VELOCITY] = 2.0 * drives.dvel[which, 0] - drives.dvel[which, 1]
+    off, v = _off(x0), drives.v_n[begin]
+    s = np.stack([wander.state_at(C @ drives.C_nb[begin], C @ v, *drives.places[begin]) for C in off])
+    first = drives.rows[begin]
+    s[:, wander.LAST_ANGLE] = 2.0 * drives.dtheta[which, first] - drives.dtheta[which, first + 1]
+    s[:, wander.LAST_VELOCITY] = 2.0 * drives.dvel[which, first] - drives.dvel[which, first + 1]
     spec = drives.spec
     sigma = np.zeros(STATES)
     sigma[PHI], sigma[DV], sigma[DP] = LEVEL_SIGMA, VELOCITY_SIGMA, POSITION_SIGMA
     sigma[BG], sigma[BA], sigma[DK] = spec.gyro_bias, spec.accel_bias, drives.scale_sigma
     P = np.tile(np.diag(sigma**2), (B, 1, 1))
     P[:, AZIMUTH, AZIMUTH] = azimuth_sigma**2
+    J = np.eye(STATES)
+    J[DV, PHI] = skew(v)  # dv = C v - v = v x phi
+    P = belief.P0 * (J @ P @ J.T)
     noise = np.zeros(STATES)
     noise[PHI], noise[DV] = spec.gyro_random_walk**2, spec.accel_random_walk**2
     start = P.copy()
@@ -152,7 +183,8 @@ def run_method(
     lost = np.zeros(B, dtype=bool)
     gate, state = GATE if gated else None, None
     system: NonlinearSystem | None = None
-    for k in range(epochs):
+    acted = np.zeros(B)
+    for k in range(begin, epochs):
         ends = drives.rows[k : k + 2]
         mechanise_interval(
             drives.steps, drives.dtheta, drives.dvel, drives.wheel, which, ends[0], ends[1], errors, s, p, z
@@ -161,8 +193,8 @@ def run_method(
             system = NonlinearSystem(
                 model.transition,
                 model.measurement,
-                Q=np.diag(noise * p[0, model.T])[None],
-                R=R_SIGMA**2 * np.eye(3)[None],
+                Q=belief.Q * np.diag(noise * p[0, model.T])[None],
+                R=belief.R * R_SIGMA**2 * np.eye(3)[None],
                 z=z[:, None, :],
                 x0=np.zeros(STATES),
                 P0=P,
@@ -173,6 +205,8 @@ def run_method(
         else:
             system = replace(system, z=z[:, None, :], p=p[:, None, :])
         found = METHODS[method].run(system, state, gate)
+        if METHODS[method].tracking:
+            acted += found.adaptation[:, -1, 0] > 1.0
         x = found.x[:, -1]
         P = model.after_correction(x, found.P[:, -1], velocity=turned)
         gone = ~(np.all(np.isfinite(x), axis=1) & (np.abs(x[:, :2]).max(axis=1) < LOST))
@@ -189,12 +223,13 @@ def run_method(
         errors[:, 6] += x[:, DK]
         state = FilterState(np.zeros((B, STATES)), P, found.state.log_likelihood, found.state.memory)
         C_nb, v_n, _, _ = wander.north(s)
-        kept["phi"][:, k] = rotation_vector_from_dcm(drives.C_nb[k + 1] @ np.swapaxes(C_nb, 1, 2))
+        kept["phi"][:, k] = misalignment(C_nb, drives.C_nb[k + 1])
         kept["velocity"][:, k] = v_n - drives.v_n[k + 1]
         kept["gyro_bias"][:, k] = errors[:, :3] - drives.gyro_bias[which]
         kept["accel_bias"][:, k] = errors[:, 3:6] - drives.accel_bias[which]
         kept["sigma"][:, k] = np.sqrt(np.einsum("bii->bi", P)[:, PHI])
-    return Errors(drives.time, C_nb=C_nb, lost=lost, **kept)
+    kept = {name: values[:, begin:] for name, values in kept.items()}
+    return Errors(drives.time[begin:], C_nb=C_nb, lost=lost, acted=acted / (epochs - begin), **kept)
 
 
 def _off(x: Array) -> Array:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import align
 from truenorth.core.attitude import euler_from_dcm
-from truenorth.papers.claims import Claim
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
 from truenorth.papers.odometer.loop import run_method
 from truenorth.papers.odometer.scenario import STOPPED, Drives, drive, with_stop
-from truenorth.papers.table import Figure, figure
+from truenorth.papers.table import Table
 
 Array = NDArray[np.float64]
 
@@ -27,15 +26,7 @@ PAPER = {
 CHAIN_SIGMA = math.radians(3.0)
 
 
-@dataclass(frozen=True)
-class Table:
-    """Figures of the table and what they say."""
-
-    figures: list[Figure]
-    claim: Claim
-
-
-def paper_table(runs: int, seed: int) -> Table:
+def add_paper_table(table: Table, runs: int, seed: int) -> None:
     """Drive, stop, align at rest for five minutes; compare the drive's alignment with that, and both with the truth."""
     scenario = with_stop()
     drives = drive(scenario, runs, seed, until=STOPPED)
@@ -47,39 +38,15 @@ def paper_table(runs: int, seed: int) -> Table:
     for method in PAPER:
         found[method] = _euler(run_method(drives, which, phi0, sigma, method).C_nb)
     found["invariant_ekf"] = _euler(run_invariant(drives, which, phi0, sigma).C_nb)
-    figures, spread, truth = [], {}, {}
+    common: dict[str, Any] = {"time": STOPPED, "noise": "random_walk"}
     for method, angles in found.items():
-        off = _difference(angles, true)
-        truth[method] = np.sqrt(np.mean(off**2, axis=0))
-        against = _difference(angles, found["static_reference"])
-        spread[method] = np.std(against, axis=0, ddof=1)
+        off, against = _difference(angles, true), _difference(angles, found["static_reference"])
         for i, name in enumerate(ANGLES):
-            common = {"time": STOPPED, "noise": "random_walk", "runs": runs}
-            figures.append(figure("paper_table", method, name, "rms", truth[method][i], "arcmin", **common))  # type: ignore[arg-type]
+            table.errors("paper_table", method, name, off[:, i], "arcmin", statistics=("rms",), **common)
             if method != "static_reference":
                 paper = PAPER.get(method, {}).get(name, math.nan)
-                figures.append(
-                    figure("paper_table", method, name, "value", spread[method][i], "arcmin", paper=paper, **common)  # type: ignore[arg-type]
-                )
-    reference, sgkf, ckf = truth["static_reference"], spread["sgkf3"], spread["ckf"]
-    claim = Claim(
-        "Table 1: alignment on the move is precise to 33.5 arcsec in level and 5.6 arcmin in heading.",
-        "does not hold",
-        "Done as in the paper (scatter about a static alignment of five minutes), SGKF3 scatters by "
-        f"{sgkf[1]:.2f}', {sgkf[2]:.2f}' and "
-        f"{sgkf[0]:.1f}' in pitch, roll, heading, CKF by {ckf[1]:.2f}', {ckf[2]:.2f}', {ckf[0]:.1f}' (paper: "
-        ".57', .56', 5.6' and .59', "
-        f".59', 5.7'). But the reference itself is off by {reference[1]:.2f}', {reference[2]:.2f}', "
-        f"{reference[0]:.1f}' RMS, as biases of 100 "
-        f"ug and .02 deg/h make it at rest; in truth SGKF3 is off by {truth['sgkf3'][1]:.3f}', {truth['sgkf3'][2]:.3f}', "
-        f"{truth['sgkf3'][0]:.1f}', CKF by {truth['ckf'][1]:.3f}', {truth['ckf'][2]:.3f}', "
-        f"{truth['ckf'][0]:.1f}', the invariant EKF by "
-        f"{truth['invariant_ekf'][1]:.3f}', {truth['invariant_ekf'][2]:.3f}', {truth['invariant_ekf'][0]:.1f}'. "
-        "The table measures the "
-        "reference: driving aligns better than standing, since turns tell the biases.",
-        runs,
-    )
-    return Table(figures, claim)
+                scatter = float(np.std(against[:, i], ddof=1))
+                table.value("paper_table", method, name, "value", scatter, "arcmin", paper=paper, runs=runs, **common)
 
 
 def _static(drives: Drives, seed: int) -> Array:

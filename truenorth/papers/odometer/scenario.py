@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 SLIPS, SLIP_TIME, SLIP_SIZE = 6, 1.5, 0.3
 STANDING = 300.0  # s of static alignment after the drive, the paper's reference
 STOPPED = 615.0  # s: the ring's drive and its stop have ended
+BIAS_STEP = 9.80665e-3  # m/s^2: 1 mg
 SLIP_STREAM, START_STREAM = 310, 311
 
 
@@ -78,8 +79,8 @@ class Drives:
     time : (K,) array, s
     C_nb, v_n : (K+1, 3, 3) and (K+1, 3) arrays
         True, the start first.
-    place : tuple
-        Latitude, longitude (rad), height (m) at the start.
+    places : (K+1, 3) array
+        Latitude, longitude (rad), height (m), as `C_nb`.
     gyro_bias, accel_bias : (R, 3) arrays
         True.
     """
@@ -95,7 +96,7 @@ class Drives:
     time: Array
     C_nb: Array
     v_n: Array
-    place: tuple[float, float, float]
+    places: Array
     gyro_bias: Array
     accel_bias: Array
 
@@ -113,6 +114,12 @@ class Drives:
     def position(self) -> Position:
         """At the start, known well: what the filters of the study are told."""
         return Position(*self.place)
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Of the start."""
+        lat, lon, alt = self.places[0].tolist()
+        return lat, lon, alt
 
 
 def drive(scenario: Scenario, runs: int, seed: int, *, until: float | None = None) -> Drives:
@@ -154,7 +161,7 @@ def drive(scenario: Scenario, runs: int, seed: int, *, until: float | None = Non
         edges[rows[1:]],
         truth.C_nb,
         truth.v_n,
-        (float(truth.lat[0]), float(truth.lon[0]), float(truth.alt[0])),
+        np.stack([truth.lat, truth.lon, truth.alt], axis=1),
         np.stack(gyro),
         np.stack(accel),
     )
@@ -171,6 +178,13 @@ def slipping(drives: Drives, seed: int) -> Drives:
         odometers.append(own.simulate_aiding(seed=seed, run=run)["odometer"].record)
     edges = np.append(0.0, np.cumsum(drives.steps))
     return replace(drives, odometers=odometers, wheel=_by_sample(odometers, edges))
+
+
+def stepping(drives: Drives) -> Drives:
+    """The same drives; the bias of the y accelerometer changes abruptly at half time."""
+    dvel, half = drives.dvel.copy(), len(drives.steps) // 2
+    dvel[:, half:, 1] += BIAS_STEP * drives.steps[half:]
+    return replace(drives, dvel=dvel)
 
 
 def _by_sample(odometers: list[OdometerRecord], edges: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.rotary import angles_at
 from truenorth.coarse.lever_arm import RateSource, arm_velocity
 from truenorth.coarse.wahba import q_method, triad
-from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.attitude import misalignment
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES, Run
 from truenorth.records import ImuRecord
@@ -83,7 +83,8 @@ def coarse_errors(run: Run, sampled: Sampled) -> dict[tuple[str, str], Array]:
         }
         for method, C_n0_i in found.items():
             C_hat = C_n_n0 @ C_n0_i @ integrals.C_ib[LAST]
-            errors[method, source] = misalignment(C_hat, C_true)
+            of = skew_part if method == "dual_vector" else misalignment
+            errors[method, source] = of(C_hat, C_true)
     return errors
 
 
@@ -94,10 +95,8 @@ def dual_vector_as_printed(b1: Array, b2: Array, r1: Array, r2: Array) -> Array:
     return C
 
 
-def misalignment(C_hat: Array, C_true: Array) -> Array:
-    """``phi`` of ``C_hat = (I - [phi x]) C``; of a matrix that is no rotation its skew part."""
-    E = C_hat @ C_true.T
-    if np.allclose(E @ E.T, np.eye(3), atol=1e-9):
-        return -rotation_vector_from_dcm(E)
+def skew_part(C_hat: Array, C: Array) -> Array:
+    """``phi`` of a computed matrix that is no rotation."""
+    E = C_hat @ C.T
     S = 0.5 * (E - E.T)
     return np.array([-S[2, 1], -S[0, 2], -S[1, 0]])

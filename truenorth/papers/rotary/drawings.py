@@ -10,11 +10,20 @@ from numpy.typing import NDArray
 
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.papers.drawing import marked
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES
 
 Array = NDArray[np.float64]
 ARCMIN = np.radians(1.0) / 60.0
 PHI_NAMES = ("phi E", "phi N", "phi U")
+COARSE_AXES = ((-0.3, 0.3), (-0.3, 0.3), (-6.0, 6.0))  # deg
+LABELS = {
+    "kf": "KF",
+    "sakf_r": "SAKF, factor on R (the paper's)",
+    "sakf": "SAKF, factor on P (ours)",
+    "makf": "MAKF",
+    "imakf": "IMAKF",
+}
 PAPER_COARSE = np.array([[0.0287, -0.0419, 0.1506], [0.0740, 0.1563, 1.4611], [-0.0986, -0.2668, -0.1044]])
 
 
@@ -25,8 +34,8 @@ def modulated(time: Array, bias: Array) -> Array:
 
 
 def draw_modulation() -> Figure:
-    """Gyro and accelerometer biases in the body over one turn of the slower axis, and their integrals."""
-    time = np.linspace(0.0, 240.0, 2401)
+    """Gyro and accelerometer biases in the body over two turns of the slower axis, and their integrals."""
+    time = np.linspace(0.0, 120.0, 1201)
     with style():
         figure = new_figure(10.0, 6.0)
         axes = figure.subplots(2, 2, sharex=True)
@@ -45,7 +54,7 @@ def draw_modulation() -> Figure:
             axes[1, column].set(title="its integral", ylabel=whole, xlabel="time, s")
         figure.legend(*axes[1, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
         figure.suptitle(
-            "Rotation modulation, w1 = 18 deg/s about z, w2 = 3 deg/s about x (eqs. 8, 9)",
+            "Rotation modulation, w1 = 18 deg/s about x, w2 = 6 deg/s about z (eqs. 8, 9)",
             ha="left",
             x=0.01,
             fontsize=11,
@@ -54,29 +63,31 @@ def draw_modulation() -> Figure:
 
 
 def draw_coarse(errors: Mapping[str, Array]) -> Figure:
-    """Misalignment at the end of coarse alignment by run (deg), beside the paper's mean and range."""
+    """Misalignment at the end of coarse alignment by run (deg), with the paper's mean and range; linear, as there."""
     with style():
         figure = new_figure(12.0, 4.2)
         axes = figure.subplots(1, 3)
         for axis, ax in enumerate(axes):
             for (method, phi), colour in zip(errors.items(), COLOURS, strict=False):
-                count = np.arange(1, len(phi) + 1)
+                count = np.arange(1.0, len(phi) + 1.0)
                 size, inside = (7, "none") if method == "dual_vector" else (3, colour)
-                ax.plot(
+                label = method.replace("_", " ")
+                options = {"markersize": size, "markerfacecolor": inside, "linestyle": "none"}
+                marked(
+                    ax,
                     count,
                     np.degrees(phi[:, axis]),
-                    "o",
-                    markersize=size,
+                    COARSE_AXES[axis],
+                    marker="o",
                     color=colour,
-                    markerfacecolor=inside,
-                    label=method.replace("_", " "),
+                    label=label,
+                    **options,
                 )
             ax.axhspan(
                 *sorted(PAPER_COARSE[1:, axis]), color=REFERENCE, alpha=0.15, linewidth=0, label="the paper's range"
             )
             ax.axhline(PAPER_COARSE[0, axis], color=REFERENCE, linestyle="--", label="the paper's mean")
             ax.set(title=f"{PHI_NAMES[axis]}, deg", xlabel="run")
-            ax.set_yscale("symlog", linthresh=0.01 if axis < 2 else 0.1)
             ax.set_xlim(0.0, len(count) + 1.0)
             ax.xaxis.get_major_locator().set_params(integer=True)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
@@ -85,6 +96,43 @@ def draw_coarse(errors: Mapping[str, Array]) -> Figure:
 
 
 def draw_filters(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str, str]) -> Figure:
+    """The paper's figure 4: signed errors (arcmin) of the first run; a row a start, a column an angle."""
+    cases = ("A", "A_max_start")
+    with style():
+        figure = new_figure(12.0, 6.5)
+        axes = figure.subplots(len(cases), 3, sharex=True)
+        for row, case in zip(axes, cases, strict=True):
+            for axis, ax in enumerate(row):
+                for (method, phi), colour in zip(curves[case].items(), COLOURS, strict=False):
+                    time = np.arange(1.0, phi.shape[1] + 1.0)
+                    dashed = "--" if method == "imakf" else "-"
+                    limits = (-5.0, 5.0) if axis < 2 else (-60.0, 60.0)
+                    marked(
+                        ax,
+                        time,
+                        phi[0, :, axis] / ARCMIN,
+                        limits,
+                        color=colour,
+                        linestyle=dashed,
+                        linewidth=1.0,
+                        label=LABELS[method],
+                    )
+                ax.axvline(250.0, color=REFERENCE, linewidth=0.8, linestyle=":")
+                ax.set_title(f"{PHI_NAMES[axis]}, {titles[case]}", fontsize=9)
+            row[0].set_ylabel("error, arcmin")
+        for ax in axes[-1]:
+            ax.set_xlabel("time of fine alignment, s")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
+        figure.suptitle(
+            "Fine alignment by the paper's filters, one run; dotted: the 250 s within which it says they converge",
+            ha="left",
+            x=0.01,
+            fontsize=11,
+        )
+    return figure
+
+
+def draw_convergence(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str, str]) -> Figure:
     """RMS over the runs of the misalignment (arcmin) against the time of fine alignment; a row a case, a column an angle."""
     with style():
         figure = new_figure(12.0, 2.9 * len(curves) + 0.7)
@@ -94,20 +142,16 @@ def draw_filters(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str,
                 for (method, phi), colour in zip(methods.items(), COLOURS, strict=False):
                     rms = np.sqrt(np.mean(phi[:, :, axis] ** 2, axis=0)) / ARCMIN
                     dashed = "--" if method == "imakf" else "-"
-                    ax.plot(np.arange(1, len(rms) + 1), rms, dashed, color=colour, linewidth=1.1, label=method.upper())
+                    ax.plot(np.arange(1, len(rms) + 1), rms, dashed, color=colour, linewidth=1.1, label=LABELS[method])
                 ax.axvline(250.0, color=REFERENCE, linewidth=0.8, linestyle=":")
                 ax.set_yscale("log")
                 ax.set_title(f"{PHI_NAMES[axis]}, {titles[case]}", fontsize=9)
             row[0].set_ylabel("RMS, arcmin")
         for ax in axes[-1]:
             ax.set_xlabel("time of fine alignment, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
-        figure.suptitle(
-            "Fine alignment by the paper's filters; dotted: the 250 s within which it says they converge",
-            ha="left",
-            x=0.01,
-            fontsize=11,
-        )
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
+        runs = len(next(iter(next(iter(curves.values())).values())))
+        figure.suptitle(f"Fine alignment by the paper's filters, RMS over {runs} runs", ha="left", x=0.01, fontsize=11)
     return figure
 
 

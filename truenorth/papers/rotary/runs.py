@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 from truenorth.alignment.inference import noise_of
 from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
+from truenorth.analysis.consistency import nees
 from truenorth.coarse import oba
-from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.indexing import C_bs_from_angles
-from truenorth.filters import Estimates, LinearSystem, kalman
-from truenorth.filters.fading import fading
-from truenorth.models.rotary import BA, BG, DV, PHI, RotaryModel, earth_axes
-from truenorth.papers.rotary.coarse import LAST, SOURCES, coarse_errors, misalignment, sample
+from truenorth.filters import LinearSystem, kalman
+from truenorth.filters.fading import Fading, fading
+from truenorth.models.rotary import BA, BG, PHI, RotaryModel, earth_axes
+from truenorth.papers.rotary.coarse import LAST, SOURCES, coarse_errors, sample
 from truenorth.papers.rotary.truth import AXES, Noise, Run, simulate_run
+from truenorth.papers.sweeps import Sweep
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
@@ -31,18 +33,23 @@ Array = NDArray[np.float64]
 TIMES = (120.0, 250.0, 600.0)  # s: of whole logs, coarse alignment included
 FILTER_TIMES = (250.0, 600.0)  # s since coarse alignment ended
 BASE_VELOCITY = 0.05  # m/s
-QUIET_R = 0.3  # m/s: a base velocity at which no fading factor ever fires
-LARGE_R = "A_large_R"
 MEAN_START = np.radians([0.0287, -0.0419, 0.1506])  # the paper's table 1
 MAX_START = np.radians([0.0740, 0.1563, 1.4611])
-P0_SIGMAS = ((DV, 0.1), (PHI, float(np.radians(1.0))))
-FILTERS: dict[str, Callable[..., Estimates]] = {
-    "kf": kalman,
-    "sakf": partial(fading, kind="single"),
-    "sakf_r": partial(fading, kind="noise"),
-    "makf": partial(fading, kind="multiple"),
-    "imakf": partial(fading, kind="improved"),
+START_SIGMA = {"velocity": 0.1, "angle": float(np.radians(1.0))}  # m/s, rad: P0, ours
+RHO = 0.95
+# Kind of fading of each filter. SAKF of the paper's introduction corrects the measurement noise; one factor on P is ours.
+FILTERS: dict[str, Fading | None] = {
+    "kf": None,
+    "sakf_r": "noise",
+    "sakf": "single",
+    "makf": "multiple",
+    "imakf": "improved",
 }
+SWEEPS = (
+    Sweep("A", "R", "base velocity in R, m/s", BASE_VELOCITY, (0.01, 0.02, 0.05, 0.1, 0.3, 1.0)),
+    Sweep("A", "P0", "angle in P0, deg", 1.0, (0.2, 0.5, 1.0, 2.0, 5.0)),
+    Sweep("A", "rho", "rho of eq. 50", RHO, (0.2, 0.5, 0.95, 5.0, 50.0)),
+)
 
 
 @dataclass(frozen=True)
@@ -77,30 +84,37 @@ class Results:
         By case, method and time.
     curves : dict
         (K, 3) misalignment at each second of fine alignment, by case and method.
+    acted : dict
+        Share of the epochs in which a fading factor was above 1, by case and method.
     """
 
     coarse: dict[tuple[str, str], Array] = field(default_factory=dict)
     found: dict[tuple[str, str, float], Found] = field(default_factory=dict)
     curves: dict[tuple[str, str], Array] = field(default_factory=dict)
+    acted: dict[tuple[str, str], float] = field(default_factory=dict)
 
 
 def work(case: str, seed: int, noise: Noise, parts: Sequence[str], times: Sequence[float], run: int) -> Results:
-    """One run; `parts` of coarse, filters (with their ablations), kf alone, pipeline, whole."""
+    """One run; `parts` of coarse, filters (with the first arm velocity kept too), sweeps, kf alone, pipeline, whole."""
     data = simulate_run(case, run, seed, noise)
     results = Results()
     if "coarse" in parts:
         results.coarse = coarse_errors(data, sample(data, data.record.between(None, LAST + 1.5), SOURCES))
-    if {"filters", "kf", "pipeline"} & set(parts):
+    if {"filters", "kf", "pipeline", "sweeps"} & set(parts):
         stage = _Stage(data)
         if "filters" in parts:
-            _filters(stage, case, results, MEAN_START, FILTERS)
-            _filters(stage, "A_max_start", results, MAX_START, FILTERS)
-            _filters(stage, "lever_arm_at_t1_kept", results, MEAN_START, FILTERS, keep_first=True)
-            _filters(stage, LARGE_R, results, MEAN_START, FILTERS, base_velocity=QUIET_R)
+            _filters(stage, case, results, MEAN_START)
+            _filters(stage, "A_max_start", results, MAX_START)
+            _filters(stage, "lever_arm_at_t1_kept", results, MEAN_START, keep_first=True)
         if "kf" in parts:
-            _filters(stage, case, results, MEAN_START, {"kf": kalman})
+            _filters(stage, case, results, MEAN_START, ("kf",))
+        if "sweeps" in parts:
+            for sweep in SWEEPS:
+                for value in sweep.values:
+                    options: dict[str, Any] = {sweep.name: np.radians(value) if sweep.name == "P0" else value}
+                    _filters(stage, sweep.case_of(value), results, MEAN_START, **options)
         if "pipeline" in parts:
-            _filters(stage, case, results, results.coarse["triad", "gyros"], {"kf_two_pass": kalman}, passes=2)
+            _filters(stage, case, results, results.coarse["triad", "gyros"], ("kf_two_pass",), passes=2)
     if "whole" in parts:
         _whole(data, case, results, times)
     return results
@@ -116,10 +130,11 @@ class _Stage:
         self.integrals = self.sampled.integrals
         self.truth = data.C_ns(self.integrals.start + self.integrals.time)
         self.C_ne = earth_axes(data.place.lat)
-        self.P0 = np.zeros((12, 12))
-        for part, sigma in P0_SIGMAS:
-            self.P0[part, part] = sigma**2 * np.eye(3)
-        self.P0[BG.start :, BG.start :] = np.diag(data.imu.bias_variance)
+
+    def prior(self, angle: float) -> Array:
+        """(12, 12) covariance at the start, of angles known to `angle` (rad)."""
+        variances = [START_SIGMA["velocity"] ** 2] * 3 + [angle**2] * 3
+        return np.diag([*variances, *self.data.imu.bias_variance])
 
     def again(self, bias: Array) -> InertialIntegrals:
         """The integrals with biases taken off."""
@@ -132,20 +147,28 @@ def _filters(
     case: str,
     results: Results,
     start: Array,
-    filters: dict[str, Callable[..., Estimates]],
+    filters: Sequence[str] = tuple(FILTERS),
     keep_first: bool = False,
-    base_velocity: float = BASE_VELOCITY,
     passes: int = 1,
+    R: float = BASE_VELOCITY,
+    P0: float = START_SIGMA["angle"],
+    rho: float = RHO,
 ) -> None:
     """12 states from the end of coarse alignment on, with its error at the start given."""
     place, C_ne, truth = stage.data.place, stage.C_ne, stage.truth
-    model = RotaryModel(noise_of(stage.data.imu), base_velocity)
-    for method, run_filter in filters.items():
+    model = RotaryModel(noise_of(stage.data.imu), R)
+    for method in filters:
+        kind = FILTERS.get(method)
         nominal, inside, bias = C_ne.T @ dcm_from_rotation_vector(-start) @ truth[0], stage.integrals, np.zeros(6)
         for left in reversed(range(passes)):
             arm = stage.sampled.arm["gyros"]
-            system = model.linearise(inside, nominal, place.lat, place.alt, stage.P0, arm, keep_first=keep_first)
-            estimates = run_filter(_about(system, bias), history="last" if left else "full", innovations=False)
+            system = model.linearise(inside, nominal, place.lat, place.alt, stage.prior(P0), arm, keep_first=keep_first)
+            about, history = _about(system, bias), "last" if left else "full"
+            if kind is None:
+                estimates = kalman(about, history=history, innovations=False)  # type: ignore[arg-type]
+            else:
+                estimates = fading(about, kind=kind, rho=rho, history=history, innovations=True)  # type: ignore[arg-type]
+                results.acted[case, method] = float(np.mean(np.any(estimates.adaptation > 1.0, axis=-1)))
             if left:  # back to the start, and everything anew about the estimate
                 x = estimates.x[-1]
                 turned = np.einsum("k,kab->ab", inside.intervals, nominal @ inside.C_mean)
@@ -154,7 +177,7 @@ def _filters(
                 inside = stage.again(bias)
         C_n_i = np.swapaxes(earth_rotation(inside.time[1:], place.lat), 1, 2) @ C_ne
         C_hat = C_n_i @ dcm_from_rotation_vector(estimates.x[:, PHI]) @ nominal @ inside.C_ib[1:]
-        phi = -rotation_vector_from_dcm(C_hat @ np.swapaxes(truth[1:], 1, 2))
+        phi = misalignment(C_hat, truth[1:])
         results.curves[case, method] = phi
         P = C_n_i @ estimates.P[:, PHI, PHI] @ np.swapaxes(C_n_i, 1, 2)
         for at in FILTER_TIMES:
@@ -196,7 +219,7 @@ def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> No
 
 
 def _found(phi: Array, P: Array) -> Found:
-    return Found(phi, np.sqrt(np.diag(P)), float(phi @ np.linalg.solve(P, phi)) / 3)
+    return Found(phi, np.sqrt(np.diag(P)), float(nees(phi, P)) / 3)
 
 
 def all_runs(

@@ -35,7 +35,7 @@ Noise = Literal["per_sample", "random_walk"]
 CASES = ("A", "B", "C", "jonswap", "unrotated", "rotation_off")
 NUMBERS = {"A": 0, "B": 1, "C": 2, "jonswap": 3, "unrotated": 1, "rotation_off": 0}  # alike: the same ship and IMU
 AXES = ("z", "x")  # of the indexer, the outermost first
-INDEXER_RATES = tuple(np.radians([18.0, 3.0]).tolist())  # rad/s
+INDEXER_RATES = tuple(np.radians([6.0, 18.0]).tolist())  # rad/s: the paper's w2 about z and w1 = 3 w2 about x
 DURATION = 720  # s: 120 of coarse, 600 of fine alignment
 DRAWS = 300  # stream of what a case draws
 BANDWIDTH = "15 %"

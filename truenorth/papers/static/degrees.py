@@ -8,7 +8,7 @@ from dataclasses import replace
 from truenorth.analysis.observability import Observability, observability
 from truenorth.filters import LinearSystem
 from truenorth.models.stationary import NAMES, STATE_UNITS
-from truenorth.papers.table import Figure, figure
+from truenorth.papers.table import Table
 
 # Quantities of the table for each state.
 QUANTITIES = (
@@ -31,16 +31,14 @@ def degrees_of(system: LinearSystem) -> Observability:
     return observability(replace(system, z=system.z[0]), NAMES[:n], STATE_UNITS[:n])
 
 
-def degree_figures(seen: Mapping[tuple[str, int], Observability]) -> list[Figure]:
+def add_degrees(table: Table, seen: Mapping[tuple[str, int], Observability]) -> None:
     """Singular values, greatest first, and the part of its prior sigma that each state keeps."""
-    figures = []
     for (case, states), result in seen.items():
         method = f"states{states}"
         for number, degree in enumerate(result.degrees, 1):
-            figures.append(figure(case, method, f"degree_{number}", "value", degree, "1"))
+            table.value(case, method, f"degree_{number}", "value", degree, "1")
         for quantity, kept in zip(QUANTITIES, result.sigma_ratio, strict=False):
-            figures.append(figure(case, method, quantity, "ratio", kept, "1"))
-    return figures
+            table.value(case, method, quantity, "ratio", kept, "1")
 
 
 def hardly_in_words(result: Observability) -> str:

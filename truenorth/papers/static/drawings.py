@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.analysis.observability import Observability
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.papers.drawing import marked
 from truenorth.papers.static.filtering import Errors
 from truenorth.papers.static.truth import ARCMIN, Truth
 
@@ -18,19 +19,18 @@ ANGLES = ("phi E (tilt)", "phi N (tilt)", "phi U (heading)")
 
 
 def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
-    """Estimates of the three angles in one run of the paper's scenario, ten states above, eight below."""
+    """Estimates of the three angles in one run of the paper's scenario, ten states above, eight below; signed, linear."""
     with style():
         figure = new_figure(12.0, 6.5)
         axes = figure.subplots(2, 3, sharex=True)
         for row, (states, (truth, x, sigma)) in zip(axes, literal.items(), strict=True):
             true = (truth.phi if states == 10 else truth.phi_platform)[0]
             for axis, ax in enumerate(row):
-                ax.plot(truth.time, x[:, axis] / ARCMIN, color=COLOURS[0], linewidth=0.8, label="estimate")
+                limits = (-30.0, 50.0) if axis < 2 else (-400.0, 400.0)
+                marked(
+                    ax, truth.time, x[0, :, axis] / ARCMIN, limits, color=COLOURS[0], linewidth=0.8, label="estimate"
+                )
                 ax.plot(truth.time, true[:, axis] / ARCMIN, "--", color=REFERENCE, label="truth")
-                if axis == 2:
-                    ax.set_yscale("symlog", linthresh=100.0)
-                else:
-                    ax.set_ylim(-30.0, 50.0)
                 own = f"its own sigma at the end: {np.degrees(sigma[-1, axis]):.0f} deg"
                 ax.text(
                     0.98,

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.consistency import nees
 from truenorth.filters import Estimates, FilterState, LinearSystem, kalman
 from truenorth.models.stationary import DV, PHI, StationaryModel
 from truenorth.papers.static.truth import Truth
@@ -71,7 +72,7 @@ def errors_at(
     estimate = run or (lambda part, state: kalman(part, state, innovations=False, workers=workers))
     true_phi = truth.phi if system.states == 10 else truth.phi_platform
     state: FilterState | None = None
-    error, sigma, nees, first = [], [], [], 0
+    error, sigma, square, first = [], [], [], 0
     for time in times:
         last = int(np.searchsorted(truth.time, time * (1 - 1e-9))) + 1
         state = estimate(system.between(first, last), state).state
@@ -80,5 +81,5 @@ def errors_at(
         P = np.broadcast_to(P, (len(e), *P.shape[-2:]))
         error.append(e)
         sigma.append(np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, :8]))
-        nees.append(np.einsum("ri,ri->r", e[:, PHI], np.linalg.solve(P[:, PHI, PHI], e[:, PHI, None])[..., 0]) / 3)
-    return Errors(np.asarray(times, dtype=np.float64), np.stack(error), np.stack(sigma), np.stack(nees))
+        square.append(nees(e[:, PHI], P[:, PHI, PHI]) / 3)
+    return Errors(np.asarray(times, dtype=np.float64), np.stack(error), np.stack(sigma), np.stack(square))

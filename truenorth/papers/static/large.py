@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import align
 from truenorth.coarse import oba
-from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, misalignment
 from truenorth.core.position import Position
 from truenorth.filters import (
     FilterState,
@@ -25,9 +26,8 @@ from truenorth.filters import (
 )
 from truenorth.models.large_azimuth import Form, attitude_error, large_azimuth_system
 from truenorth.models.stationary import StationaryModel
-from truenorth.papers.claims import Claim
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
-from truenorth.papers.table import Figure, figure, of_errors
+from truenorth.papers.table import Table
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import rest, simulate
@@ -175,79 +175,18 @@ def align_all(logs: Logs, setting: Setting, workers: int) -> Answers:
     return found
 
 
-def large_figures(found: Answers) -> list[Figure]:
-    """Errors of each method, and the share of runs that have not found north."""
-    figures = []
+def add_large(table: Table, found: Answers) -> None:
+    """Errors of each method, and which runs have not found north."""
     for method, (phi, sigma) in found.items():
-        parts = {"level": slice(0, 2), "heading": slice(2, 3)}
-        for quantity, part in parts.items():
-            error, claimed = (
-                None if x is None else _length(x[:, part]) / ARCMIN
-                for x in (phi, sigma if quantity == "heading" else None)
-            )
-            assert error is not None
-            figures += of_errors(
-                "large_180", method, quantity, error, claimed, "arcmin", time=DURATION, noise="random_walk"
-            )
-        heading = np.abs(phi[:, 2])
-        values = (
-            ("heading", "median", float(np.median(heading)) / ARCMIN, "arcmin"),
-            ("diverged", "value", float(np.mean(heading > FOUND)), "1"),
+        common: dict[str, Any] = {"time": DURATION, "noise": "random_walk"}
+        level = np.sqrt(np.mean(phi[:, :2] ** 2, axis=1)) / ARCMIN
+        table.errors("large_180", method, "level", level, "arcmin", **common)
+        heading, claimed = np.abs(phi[:, 2]) / ARCMIN, None if sigma is None else sigma[:, 2] / ARCMIN
+        table.errors(
+            "large_180", method, "heading", heading, "arcmin", claimed, statistics=("rms", "max", "median"), **common
         )
-        for quantity, statistic, value, unit in values:
-            figures.append(
-                figure(
-                    "large_180",
-                    method,
-                    quantity,
-                    statistic,
-                    value,
-                    unit,
-                    time=DURATION,
-                    noise="random_walk",
-                    runs=len(phi),
-                )
-            )
-    return figures
-
-
-def large_claims(found: Answers) -> list[Claim]:
-    """What the related work says of large misalignment."""
-    share = {method: float(np.mean(np.abs(phi[:, 2]) <= FOUND)) for method, (phi, _) in found.items()}
-    rms = {method: float(np.sqrt(np.mean(phi[:, 2] ** 2))) / ARCMIN for method, (phi, _) in found.items()}
-    runs = len(found["ekf"][0])
-    nonlinear = ("ukf", "ukf_rotation_vector", "ukf_quaternion", "particle")
-    words = ", ".join(f"{name} {share[name]:.0%}" for name in nonlinear)
-    others = ", ".join(
-        f"{name} {share[name]:.0%} ({rms[name]:.2f} arcmin)"
-        for name in ("oba", "ekf_passes", "gaussian_sum", "product")
-    )
-    return [
-        Claim(
-            "From a large azimuth error an unscented or a particle filter aligns where an extended one does not (related work).",
-            "holds in part" if max(share[name] for name in nonlinear) > share["ekf"] else "does not hold",
-            f"Runs below 1 deg of heading after 300 s, from any azimuth: ekf {share['ekf']:.0%}, {words}. What needs no start, "
-            f"goes over the log again, or takes {HYPOTHESES} starts: {others}. The classical loop with fixed gains: "
-            f"{share['gyrocompass_loop']:.0%}, RMS of these "
-            f"{_rms_found(found['gyrocompass_loop'][0]):.2f} arcmin.",
-            runs,
-        )
-    ]
-
-
-def _rms_found(phi: Array) -> float:
-    heading = phi[np.abs(phi[:, 2]) <= FOUND, 2]
-    return float(np.sqrt(np.mean(heading**2))) / ARCMIN
-
-
-def _length(x: Array) -> Array:
-    """RMS of the components, of each run."""
-    return np.asarray(np.sqrt(np.mean(x**2, axis=1)))
-
-
-def misalignment(C_nb: Array, truth: Array) -> Array:
-    """(runs, 3) phi of attitudes, ``C_nb = (I - [phi x]) truth`` where it is small."""
-    return -rotation_vector_from_dcm(C_nb @ np.swapaxes(truth, 1, 2))
+        lost = (np.abs(phi[:, 2]) > FOUND).astype(float)
+        table.errors("large_180", method, "diverged", lost, "1", statistics=("mean",), **common)
 
 
 def _corrected(C_n0_i: Array, x: Array, form: Form = "tilt_azimuth") -> Array:

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.observability import PiecewiseObservability, Segment, piecewise_observability
-from truenorth.campaign.comparison import paired
 from truenorth.core.units import parse
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
 from truenorth.models.stationary import DV, NAMES, STATE_UNITS, StationaryModel
-from truenorth.papers.claims import Claim
-from truenorth.papers.static.degrees import degree_figures, degrees_of, hardly_in_words
+from truenorth.papers.claims import settle
+from truenorth.papers.static.degrees import add_degrees, degrees_of, hardly_in_words
 from truenorth.papers.static.drawings import draw_convergence, draw_degrees, draw_large, draw_literal
 from truenorth.papers.static.filtering import Errors, errors_at, system_of
-from truenorth.papers.static.large import DURATION, align_all, large_claims, large_figures, make_setting, simulate_logs
+from truenorth.papers.static.large import DURATION, add_large, align_all, make_setting, simulate_logs
+from truenorth.papers.static.rules import RULES
 from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
-from truenorth.papers.table import Figure, figure, of_errors
+from truenorth.papers.table import Table
 from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
@@ -43,6 +43,7 @@ WRONG = 1e-4  # the share of the sway's variance that a badly tuned filter belie
 
 # The paper's own scenario: 1000 steps of .02 s.
 LITERAL_P0, LITERAL_R, LITERAL_TIME = 1e5, 1e-3, 20.0
+LITERAL_TIMES = (0.5, 2.0, 10.0, LITERAL_TIME)
 LITERAL_DRIFT = np.array([0.01, 0.01, 0.03]) * parse("1 deg/h", "angular_rate")
 
 BASES = {
@@ -57,47 +58,47 @@ BASES = {
 def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
     """Run the study; see :func:`truenorth.papers.reproduce`."""
     count = runs or RUNS
-    figures: list[Figure] = []
+    table = Table()
     found: dict[tuple[str, int], Errors] = {}
-    progress("the paper's own scenario")
-    literal = _literal(seed)
-    figures += _literal_figures(literal)
+    progress(f"the paper's own scenario: {count} runs")
+    literal = _literal(count, seed)
+    _add_literal(table, literal)
     for name, base in BASES.items():
         progress(f"{name}: {count} runs")
         truth = _honest_truth(base, count, seed)
         for states in (10, 8):
             errors = errors_at(_honest_system(truth, base, states), truth, TIMES, workers=workers)
             found[name, states] = errors
-            figures += _error_figures(name, f"states{states}", errors)
+            _add_errors(table, name, f"states{states}", errors)
         if name == "two_position":
             short = errors_at(_honest_system(truth, base, 10, complete=False), truth, TIMES[-1:])
         if name == "sway":
             progress("sway: H-infinity and the Kalman filter under wrong noise")
-            wrong = _wrong_noise(truth, base)
-            for method, errors in wrong.items():
-                figures += _error_figures(name, method, errors)
+            for method, errors in _wrong_noise(truth, base).items():
+                _add_errors(table, name, method, errors)
     progress("observability")
+    for quantity, limit in zip(("level", "heading"), StationaryModel(LAT).limits(GYRO_BIAS, ACCEL_BIAS), strict=True):
+        table.value("still", "limit", quantity, "value", limit / ARCMIN, "arcmin")
     seen = {
         (name, states): _observability(BASES[name], states) for name in ("still", "two_position") for states in (10, 8)
     }
     for (name, states), result in seen.items():
-        paper = {10: 7.0, 8: 5.0}[states] if name == "still" else math.nan
-        figures.append(figure(name, f"states{states}", "rank", "value", result.rank[-1], "1", paper=paper))
+        table.value(name, f"states{states}", "rank", "value", result.rank[-1], "1")
     degrees = {
         (name, states): degrees_of(_honest_system(truth, BASES[name], states))
         for name in ("still", "two_position")
         for truth in [_honest_truth(BASES[name], 1, seed)]
         for states in (10, 8)
     }
-    figures += degree_figures(degrees)
+    add_degrees(table, degrees)
     progress(f"any azimuth to start from: {count} runs")
     spec = ImuSpec(gyro_bias=GYRO_BIAS, gyro_random_walk=GYRO_WALK, accel_bias=ACCEL_BIAS, accel_random_walk=ACCEL_WALK)
     setting = make_setting(LAT, spec, float(PHI_SIGMA[0]), seed)
     large = align_all(simulate_logs(setting, count), setting, workers)
-    figures += large_figures(large)
+    add_large(table, large)
     progress("cost of a step")
-    figures += (cost := _cost(count, seed))
-    claims = [*_claims(literal, found, wrong, cost, count), _rank_claim(seen), *large_claims(large)]
+    _add_cost(table, seed)
+    claims = settle(RULES, table, {"entangled": "; ".join(map(str, seen["still", 10].entangled))})
     drawings = {
         "figures_1_to_6": draw_literal(literal),
         "convergence": draw_convergence(TIMES, found, count),
@@ -106,7 +107,8 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     }
     captions = {
         "figures_1_to_6": "The paper's figures 1 to 6: one run of 20 s with its P0, Q and R. Estimated misalignment and "
-        "truth. What they do not show: the filters' own sigmas, by which nothing has been estimated.",
+        "truth, signed, on a linear scale; triangles: beyond the axis. "
+        "What they do not show: the filters' own sigmas, by which nothing has been estimated.",
         "convergence": "RMS of heading and level over the runs, with noise that both filters know. Dashed: their own sigma.",
         "observability": "Degrees: the measurements' information on each direction of the state, in units of the prior (600 s). "
         "Below 1 a direction is hardly seen. Right: the part of its prior sigma that each state keeps.",
@@ -126,7 +128,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "Any azimuth: logs of a simulated IMU at 10 Hz, heading and azimuth error uniform on the circle, nonlinear filters every "
         "5 s. Their normal prior of the azimuth has the uniform one's sigma, 104 deg.",
     ]
-    return Study(TITLE, figures, claims, drawings, captions, remarks)
+    return Study(TITLE, table, claims, drawings, captions, remarks)
 
 
 def _honest_truth(base: Base, runs: int, seed: int) -> Truth:
@@ -155,36 +157,22 @@ def _honest_system(truth: Truth, base: Base, states: int, share: float = 1.0, co
     return system_of(truth, model, states, P0, share * R + QUIET)
 
 
-def _error_figures(case: str, method: str, errors: Errors) -> list[Figure]:
-    figures = []
+def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
     for k, at in enumerate(errors.time):
         phi, sigma = errors.error[k, :, :3] / ARCMIN, errors.sigma[k, :, :3] / ARCMIN
-        quantities = {
-            "phi_e": (phi[:, 0], sigma[:, 0]),
-            "phi_n": (phi[:, 1], sigma[:, 1]),
-            "heading": (phi[:, 2], sigma[:, 2]),
-            "level": (np.sqrt(np.mean(phi[:, :2] ** 2, axis=1)), np.sqrt(np.mean(sigma[:, :2] ** 2, axis=1))),
-        }
-        for quantity, (error, claimed) in quantities.items():
-            figures += of_errors(case, method, quantity, error, claimed, "arcmin", time=at, noise="random_walk")
-        nees = errors.nees[k]
-        figures.append(
-            figure(case, method, "nees", "mean", nees.mean(), "1", time=at, noise="random_walk", runs=len(nees))
-        )
-    return figures
+        table.attitude(case, method, phi, sigma, errors.nees[k], time=at, noise="random_walk")
 
 
-def _literal(seed: int) -> dict[int, tuple[Truth, Array, Array]]:
-    """One run of the paper's scenario: truth, estimates of phi and their sigmas at every step, for ten and eight states."""
+def _literal(runs: int, seed: int) -> dict[int, tuple[Truth, Array, Array]]:
+    """The paper's scenario, with measurement noise drawn anew in each run: truth, phi (runs, K, 3) and sigmas (K, 3)."""
     model = StationaryModel(LAT, complete=False)
-    noise = math.sqrt(LITERAL_R)
     result = {}
     for states in (10, 8):
         truth = simulate(
             model,
             Base("literal"),
             duration=LITERAL_TIME,
-            runs=1,
+            runs=runs,
             seed=seed,
             phi_sigma=PHI_SIGMA,
             gyro_bias=-LITERAL_DRIFT,
@@ -192,33 +180,23 @@ def _literal(seed: int) -> dict[int, tuple[Truth, Array, Array]]:
             every=1,
             given=True,
         )
-        rng = np.random.default_rng([seed, states])
-        (truth.velocity if states == 10 else truth.force)[...] += noise * rng.standard_normal(truth.velocity.shape)
+        measured = truth.velocity if states == 10 else truth.force
+        for run, values in enumerate(measured):
+            values += math.sqrt(LITERAL_R) * np.random.default_rng([seed, states, run]).standard_normal(values.shape)
         system = system_of(truth, model, states, LITERAL_P0 * np.eye(10), LITERAL_R)
         estimates = kalman(system, history="sigma", innovations=False)
-        result[states] = truth, estimates.x[0, :, :3], np.squeeze(estimates.sigma)[:, :3]
+        sigma = estimates.sigma.reshape(-1, *estimates.sigma.shape[-2:])[0]
+        result[states] = truth, estimates.x[..., :3], sigma[:, :3]
     return result
 
 
-def _literal_figures(literal: dict[int, tuple[Truth, Array, Array]]) -> list[Figure]:
-    figures = []
+def _add_literal(table: Table, literal: dict[int, tuple[Truth, Array, Array]]) -> None:
     for states, (truth, x, sigma) in literal.items():
-        true = (truth.phi if states == 10 else truth.phi_platform)[0, -1]
-        for axis, quantity in enumerate(("phi_e", "phi_n", "phi_u")):
-            for statistic, value in (("value", x[-1, axis] - true[axis]), ("sigma", sigma[-1, axis])):
-                figures.append(
-                    figure(
-                        "literal",
-                        f"states{states}",
-                        quantity,
-                        statistic,
-                        value / ARCMIN,
-                        "arcmin",
-                        time=LITERAL_TIME,
-                        noise="per_sample",
-                    )
-                )
-    return figures
+        true = truth.phi if states == 10 else truth.phi_platform
+        for at in LITERAL_TIMES:
+            k = round(at / PERIOD) - 1
+            error, claimed = (x[:, k] - true[:, k]) / ARCMIN, np.broadcast_to(sigma[k] / ARCMIN, x[:, k].shape)
+            table.attitude("literal", f"states{states}", error, claimed, time=at, noise="per_sample")
 
 
 def _wrong_noise(truth: Truth, base: Base) -> dict[str, Errors]:
@@ -248,19 +226,7 @@ def _observability(base: Base, states: int) -> PiecewiseObservability:
     return piecewise_observability(segments, scale[:states], NAMES[:states], STATE_UNITS[:states])
 
 
-def _rank_claim(seen: dict[tuple[str, int], PiecewiseObservability]) -> Claim:
-    ten, eight, two = seen["still", 10], seen["still", 8], seen["two_position", 10]
-    words = "; ".join(map(str, ten.entangled))
-    return Claim(
-        "Seven of ten states are observable on a stationary base, and five of eight.",
-        "holds" if (ten.rank[-1], eight.rank[-1]) == (7, 5) else "does not hold",
-        f"Rank {ten.rank[-1]} of 10 and {eight.rank[-1]} of 8. With ten states (SI): {words}. Turned by 180 deg at half time: rank "
-        f"{two.rank[-1]} of 10.",
-        1,
-    )
-
-
-def _cost(runs: int, seed: int) -> list[Figure]:
+def _add_cost(table: Table, seed: int) -> None:
     """Time of a filter step with ten and eight states, side by side, best of five; and their ratio."""
     truth = simulate(
         StationaryModel(LAT, 0.0, GYRO_WALK, ACCEL_WALK),
@@ -280,85 +246,12 @@ def _cost(runs: int, seed: int) -> list[Figure]:
             kalman(system, innovations=False)
             best[states] = min(best[states], time.perf_counter() - start)
     steps = truth.velocity.shape[0] * truth.velocity.shape[1]
-    figures = [figure("still", f"states{n}", "runtime", "value", best[n] / steps, "s") for n in (10, 8)]
-    return [*figures, figure("still", "states10", "runtime", "ratio", best[10] / best[8], "1", paper=5340 / 2944)]
-
-
-def _claims(
-    literal: dict[int, tuple[Truth, Array, Array]],
-    found: dict[tuple[str, int], Errors],
-    wrong: dict[str, Errors],
-    cost: Sequence[Figure],
-    runs: int,
-) -> list[Claim]:
-    def versus(case: str, at: float) -> tuple[int, float, float, float, float]:
-        k = TIMES.index(at)
-        return paired(found[case, 8].error[k, :, 2], found[case, 10].error[k, :, 2])
-
-    _, win_still, _, ratio_still, p_still = versus("still", 600.0)
-    _, win_sway, _, ratio_sway, p_sway = versus("sway", 120.0)
-    truth8, x8, sigma8 = literal[8]
-    off = np.abs(x8[-1] - truth8.phi_platform[0, -1])
-    speed = next(f.value for f in cost if f.statistic == "ratio")
-    one, two = found["still", 10], found["two_position", 10]
-    return [
-        Claim(
-            "Eight states estimate the misalignment more precisely than ten.",
-            "does not hold" if abs(ratio_still - 1) < 0.03 or ratio_still > 1 else "holds",
-            f"On a still base, with noise that both know, eight states over ten is {ratio_still:.3f} in heading RMS at 600 s; "
-            f"eight are nearer to the truth in {win_still:.0%} of runs.",
-            runs,
-            p_still,
-        ),
-        Claim(
-            "Eight states converge faster than ten.",
-            "does not hold" if ratio_sway > 1 else "holds",
-            f"Still: {_rms(found['still', 8], 60.0):.2f} against {_rms(one, 60.0):.2f} arcmin at 60 s. With a sway of 5 mm/s: "
-            f"{_rms(found['sway', 8], 120.0):.1f} against {_rms(found['sway', 10], 120.0):.1f} arcmin at 120 s, eight states win "
-            f"in {win_sway:.0%} of runs: the accelerometers see the sway differentiated.",
-            runs,
-            p_sway,
-        ),
-        Claim(
-            "With the paper's P0, Q and R the misalignment angles are estimated within 20 s.",
-            "holds in part",
-            f"With eight states the tilts end {off[0] / ARCMIN:.1f} and {off[1] / ARCMIN:.1f} arcmin off, although the filter's "
-            f"own sigma is {math.degrees(sigma8[-1, 0]):.0f} deg: P0 is alike for a tilt and for the bias that looks like it, "
-            f"and the tilt takes nearly all. Heading ends {math.degrees(off[2]):.0f} deg off, its sigma is still that of P0: "
-            "the curve of the paper's figure is the filter's noise.",
-            1,
-        ),
-        Claim(
-            "Eight states cost less.",
-            "holds" if speed > 1.05 else "does not hold",
-            f"A step with ten states takes {speed:.2f} times as long as with eight (side by side, compiled; by the paper's "
-            f"count of operations {5340 / 2944:.2f}).",
-            1,
-        ),
-        Claim(
-            "In one position the biases limit heading (the closed form); in two positions they do not.",
-            "holds",
-            f"One position ends at {_rms(one, 600.0):.2f} arcmin (closed form {_limit():.2f}), two at {_rms(two, 600.0):.2f}.",
-            runs,
-            paired(two.error[-1, :, 2], one.error[-1, :, 2])[4],
-        ),
-        Claim(
-            "H-infinity helps where the noise is not known (related work).",
-            "holds in part" if _rms(wrong["h_infinity"], 120.0) < _rms(wrong["kf_wrong"], 120.0) else "does not hold",
-            f"Sway taken for 1 % of its size: Kalman {_rms(wrong['kf_wrong'], 120.0):.2f}, H-infinity "
-            f"{_rms(wrong['h_infinity'], 120.0):.2f}, Kalman with the right noise {_rms(wrong['kf_retuned'], 120.0):.2f} arcmin at "
-            "120 s: the right noise is what helps.",
-            runs,
-            paired(wrong["h_infinity"].error[2, :, 2], wrong["kf_wrong"].error[2, :, 2])[4],
-        ),
-    ]
+    for n in (10, 8):
+        table.value("still", f"states{n}", "runtime", "value", best[n] / steps, "s")
+    table.value("still", "states10", "runtime", "ratio", best[10] / best[8], "1")
 
 
 def _rms(errors: Errors, at: float) -> float:
     """Of heading over the runs at a time, arcmin."""
     k = list(errors.time).index(at)
     return float(np.sqrt(np.mean(errors.error[k, :, 2] ** 2)) / ARCMIN)
-
-
-def _limit() -> float:
-    return StationaryModel(LAT).limits(GYRO_BIAS, ACCEL_BIAS)[1] / ARCMIN

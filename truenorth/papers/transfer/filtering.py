@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, TransferTrack, transfer_filter
-from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.analysis.consistency import nees
+from truenorth.core.attitude import misalignment
 from truenorth.models.transfer import ARM, BA, BG, PHI, TAU, TransferModel
 from truenorth.papers.transfer.truth import (
     ARM_SIGMA,
@@ -185,7 +186,7 @@ def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
     k -= np.abs(track.time[k - 1] - EPOCHS) < np.abs(track.time[k] - EPOCHS)
     silent = np.abs(track.time[k] - EPOCHS) > NEAR
     C = run.truth.C_nb[track.sample[k]]
-    phi = -rotation_vector_from_dcm(track.C_nb[k] @ np.swapaxes(C, 1, 2))
+    phi = misalignment(track.C_nb[k], C)
     aux, sigma, P = track.aux[k], track.sigma[k], track.P[k][:, PHI, PHI]
     nothing = np.full(len(k), np.nan)
     model = model_of(method, ImuSpec())
@@ -194,7 +195,7 @@ def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
         tau, tau_sigma = aux[:, at.start] + track.delay - run.tau, sigma[:, at.start]
     if (at := model.slice_of(ARM)) is not None:
         arm, arm_sigma = aux[:, at] - run.arm, sigma[:, at]
-    nees = np.einsum("ki,ki->k", phi, np.linalg.solve(P, phi[..., None])[..., 0]) / 3
+    square = nees(phi, P) / 3
     arrays = [
         phi,
         sigma[:, PHI],
@@ -206,6 +207,6 @@ def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
         tau_sigma,
         arm,
         arm_sigma,
-        nees,
+        square,
     ]
     return [np.where(silent.reshape(-1, *[1] * (a.ndim - 1)), np.nan, a) for a in arrays]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -10,12 +9,13 @@ from numpy.typing import NDArray
 
 from truenorth.campaign.comparison import paired
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.papers.claims import Claim
+from truenorth.papers.claims import settle
 from truenorth.papers.study import Study
-from truenorth.papers.table import Figure, figure, of_errors
+from truenorth.papers.table import Table
 from truenorth.papers.transfer.drawings import draw_biases, draw_level, draw_misalignment
 from truenorth.papers.transfer.filtering import EPOCHS, Errors, errors_of
-from truenorth.papers.transfer.observability import Seen, told_by
+from truenorth.papers.transfer.observability import told_by
+from truenorth.papers.transfer.rules import RULES
 from truenorth.papers.transfer.truth import ARCMIN, BEGIN, END, STOP, Case, Flights
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ DROP = (128.0, 138.0)  # s: its silence, in the turn
 SPEED = 200.0  # m/s
 TURN = (EPOCHS > BEGIN) & (EPOCHS <= STOP)
 VELOCITY = ("states12", "states13", "states16", "oracle")
+PAIR = ("states12", "states16", "states12_att", "states16_att")
 BOTH = (*VELOCITY, "states12_att", "states13_att", "states16_att", "oracle_att")
 
 CASES = {
@@ -39,32 +40,35 @@ CASES = {
     "flat_turn_random": (Case("flat_turn_random", 6, space_time="drawn"), VELOCITY),
     "late_master": (Case("late_master", 7, drop=DROP, extra_delay=KNOWN_DELAY), VELOCITY),
     "banked_turn_flexed": (Case("banked_turn_flexed", 8, "banked_turn", flexure=True), ("flexure", "states16_att")),
+    "accelerate_10.5": (Case("accelerate_10.5", 9, "accelerate_10.5"), PAIR),
+    "wing_rock_10.5": (Case("wing_rock_10.5", 10, "wing_rock_10.5"), PAIR),
 }
+DRAWN = ("flat_turn", "banked_turn", "s_turn", "accelerate", "wing_rock")
 Found = dict[tuple[str, str], Errors]
 
 
 def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
     """Run the study; see :func:`truenorth.papers.reproduce`."""
     count = runs or RUNS
-    figures: list[Figure] = []
+    table = Table()
     found: Found = {}
     for name, (case, methods) in CASES.items():
         progress(f"{name}: {count} runs of {len(methods)} methods")
         known = KNOWN_DELAY if name == "late_master" else 0.0
         for method, errors in errors_of(Flights(case, seed), methods, count, workers, known).items():
             found[name, method] = errors
-            figures += _figures(name, method, errors)
-    figures += _comparisons(found)
+            _add_errors(table, name, method, errors)
+    _add_gains(table, found)
     progress("observability")
-    seen = {name: told_by(case) for name, (case, _) in CASES.items() if name == case.manoeuvre}
+    seen = {name: told_by(CASES[name][0]) for name in DRAWN}
     for name, words in seen.items():
-        figures.append(figure(name, "states16", "rank", "value", words.rank, "1"))
+        table.value(name, "states16", "rank", "value", words.rank, "1")
     drawings = {
         "figure_1": draw_misalignment(found["flat_turn", "states12"], "Figure 1: misalignment, 12 states"),
         "figure_2": draw_biases(found["flat_turn", "states12"], "Figure 2: error of the gyro biases, 12 states"),
         "figure_3": draw_misalignment(found["flat_turn", "states16"], "Figure 3: misalignment, 16 states"),
         "figure_4": draw_biases(found["flat_turn", "states16"], "Figure 4: error of the gyro biases, 16 states"),
-        "level": draw_level(found, [name for name in CASES if name == CASES[name][0].manoeuvre]),
+        "level": draw_level(found, DRAWN),
     }
     captions = {
         "figure_1": "Error of the estimated misalignment; thin: single runs, thick: RMS over the runs, dashed: the filter's "
@@ -81,42 +85,32 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "Attitude matching: the master's attitude has 1 arcmin of white noise; the slave's first attitude is the master's, so "
         "that its error is the unknown mounting, and P0 says so.",
         "The acceleration that multiplies the delay is the master's: the slave's less that of the lever arm as estimated.",
-        "late_master: 200 ms that are known beside the paper's 30 ms, and no rows from "
+        "late_master: 200 ms that are known, in addition to the paper's 30 ms, and no rows from "
         f"{DROP[0]:g} to {DROP[1]:g} s; figures in the turn are those of the seconds with rows.",
+        "accelerate and wing_rock have 4 m/s^2 and a rock of 20 deg; accelerate_10.5 and wing_rock_10.5 have as much as the turn: "
+        "10.5 m/s^2 for 25 s, and a rock of 47 deg (g tan 47 deg = 10.5 m/s^2).",
         "banked_turn_flexed: the slave's seat bends by 3, 3 and 6 arcmin (pitch, roll, heading) with a correlation time of 5 s; "
         "`flexure` has second-order Gauss-Markov states for it, 25 in all.",
         *(f"{name.replace('_', ' ')}: {words}" for name, words in seen.items()),
     ]
-    return Study(TITLE, figures, _claims(found, seen, count), drawings, captions, remarks)
+    return Study(TITLE, table, settle(RULES, table, {"flat_turn": str(seen["flat_turn"])}), drawings, captions, remarks)
 
 
-def _figures(case: str, method: str, errors: Errors) -> list[Figure]:
-    figures: list[Figure] = []
+def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
+    def add(name: str, e: Array, s: Array | None, unit: str, scale: float, **when: float) -> None:
+        claimed = None if s is None else s / scale
+        table.errors(case, method, name, e / scale, unit, claimed, noise="random_walk", **when)  # type: ignore[arg-type]
 
-    def window(name: str, values: Array, sigmas: Array, unit: str, scale: float) -> None:
-        e, s = (np.sqrt(np.nanmean(x[:, TURN] ** 2, axis=tuple(range(1, x.ndim)))) / scale for x in (values, sigmas))
-        rows = of_errors(case, method, name, e, s, unit, time=STOP, noise="random_walk")
-        figures.extend(row._replace(window_start_s=BEGIN) for row in rows)
+    def over(values: Array) -> Array:
+        return np.asarray(np.sqrt(np.nanmean(values[:, TURN] ** 2, axis=tuple(range(1, values.ndim)))))
 
     level, level_sigma = errors.phi[..., :2], errors.phi_sigma[..., :2]
-    window("level", level, level_sigma, "arcmin", ARCMIN)
-    window("gyro_bias_y", errors.gyro[..., 1], errors.gyro_sigma[..., 1], "deg/h", DEG_PER_HOUR)
-    nees = errors.nees[:, TURN]
-    figures.append(
-        figure(
-            case,
-            method,
-            "nees",
-            "mean",
-            float(np.nanmean(nees)),
-            "1",
-            time=STOP,
-            window_start=BEGIN,
-            noise="random_walk",
-            runs=len(nees),
-        )
-    )
-    for at in (STOP, END):
+    window = {"time": STOP, "start": BEGIN}
+    add("level", over(level), over(level_sigma), "arcmin", ARCMIN, **window)
+    add("gyro_bias_y", over(errors.gyro[..., 1]), over(errors.gyro_sigma[..., 1]), "deg/h", DEG_PER_HOUR, **window)
+    square = np.nanmean(errors.nees[:, TURN], axis=1)
+    table.errors(case, method, "nees", square, "1", statistics=("mean",), noise="random_walk", **window)  # type: ignore[arg-type]
+    for at in (BEGIN, STOP, END):
         k = int(np.searchsorted(EPOCHS, at))
         quantities = {
             "level": (*_rms_over_axes(level[:, k], level_sigma[:, k]), "arcmin", ARCMIN),
@@ -129,26 +123,14 @@ def _figures(case: str, method: str, errors: Errors) -> list[Figure]:
             quantities[f"lever_arm_{axis}"] = (errors.arm[:, k, i], errors.arm_sigma[:, k, i], "m", 1.0)
         for name, (e, s, unit, scale) in quantities.items():
             if np.isfinite(e).all():
-                figures += of_errors(case, method, name, e / scale, s / scale, unit, time=at, noise="random_walk")
-        figures.append(
-            figure(
-                case,
-                method,
-                "nees",
-                "mean",
-                float(np.nanmean(errors.nees[:, k])),
-                "1",
-                time=at,
-                noise="random_walk",
-                runs=len(nees),
+                add(name, e, s, unit, scale, time=at)
+        if np.isfinite(errors.nees[:, k]).all():
+            table.errors(
+                case, method, "nees", errors.nees[:, k], "1", statistics=("mean",), noise="random_walk", time=at
             )
-        )
         both = _forward(errors, k)
         if np.isfinite(both).all():
-            figures += of_errors(
-                case, method, "lever_arm_y_and_speed_times_tau", both, None, "m", time=at, noise="random_walk"
-            )
-    return figures
+            add("lever_arm_y_and_speed_times_tau", both, None, "m", 1.0, time=at)
 
 
 def _rms_over_axes(errors: Array, sigmas: Array) -> tuple[Array, Array]:
@@ -165,134 +147,20 @@ def level_in_turn(errors: Errors) -> Array:
     return np.asarray(np.sqrt(np.nanmean(errors.phi[:, TURN, :2] ** 2, axis=(1, 2))) / ARCMIN)
 
 
-def _comparisons(found: Found) -> list[Figure]:
-    """16 states against 12 and against the oracle, run by run, in every case."""
-    figures = []
+def _add_gains(table: Table, found: Found) -> None:
+    """Level of 12 states over level of 16, and of 16 over that of the oracle, run by run."""
+    common = {"time": STOP, "start": BEGIN, "noise": "random_walk"}
     for case in CASES:
         for suffix in ("", "_att"):
             if (case, f"states12{suffix}") not in found:
                 continue
             ours = level_in_turn(found[case, f"states16{suffix}"])
+            gain = level_in_turn(found[case, f"states12{suffix}"]) / ours
+            table.errors(case, f"gain{suffix}", "level", gain, "1", statistics=("median", "mean"), **common)  # type: ignore[arg-type]
             for other in (f"states12{suffix}", f"oracle{suffix}"):
+                if (case, other) not in found:
+                    continue
                 runs, wins, _, ratio, _ = paired(ours, level_in_turn(found[case, other]))
                 for statistic, value in (("win_rate", wins), ("ratio", ratio)):
-                    figures.append(
-                        figure(
-                            case,
-                            f"states16{suffix} against {other}",
-                            "level",
-                            statistic,
-                            value,
-                            "1",
-                            time=STOP,
-                            window_start=BEGIN,
-                            noise="random_walk",
-                            runs=runs,
-                        )
-                    )
-    return figures
-
-
-def _claims(found: Found, seen: dict[str, Seen], runs: int) -> list[Claim]:
-    def level(case: str, method: str) -> float:
-        return _rms(level_in_turn(found[case, method]))
-
-    def gain(case: str, suffix: str = "") -> float:
-        return level(case, f"states12{suffix}") / level(case, f"states16{suffix}")
-
-    def heading(case: str, method: str, at: float) -> float:
-        return _rms(found[case, method].phi[:, int(np.searchsorted(EPOCHS, at)), 2] / ARCMIN)
-
-    def gyro(method: str) -> Array:
-        errors = found["flat_turn", method].gyro[:, TURN, 1]
-        return np.asarray(np.sqrt(np.mean(errors**2, axis=1)) / DEG_PER_HOUR)
-
-    _, wins, _, _, p = paired(
-        level_in_turn(found["flat_turn", "states16"]), level_in_turn(found["flat_turn", "states12"])
-    )
-    _, gyro_wins, _, gyro_ratio, gyro_p = paired(gyro("states16"), gyro("states12"))
-    turn, accelerate, rock = (gain(case) for case in ("flat_turn", "accelerate", "wing_rock"))
-    forward = _rms(_forward(found["flat_turn_random", "states16"], -1))
-    before, after = (heading("flat_turn", "states16", at) for at in (BEGIN, STOP))
-    with_attitude = ", ".join(
-        f"{case.replace('_', ' ')} {gain(case, '_att'):.1f}" for case in ("flat_turn", "accelerate", "wing_rock")
-    )
-    cost = level("flat_turn_no_error", "states16") / level("flat_turn_no_error", "states12") - 1.0
-    e12, e16 = found["flat_turn", "states12"], found["flat_turn", "states16"]
-    return [
-        Claim(
-            "With the space-time error modelled, the level misalignment fluctuates much less in the turn.",
-            "holds" if turn > 1.5 and wins > 0.9 else "does not hold",
-            f"Level RMS in the turn {level('flat_turn', 'states16'):.2f} arcmin against "
-            f"{level('flat_turn', 'states12'):.2f} without; a filter that knows delay and lever arm reaches "
-            f"{level('flat_turn', 'oracle'):.2f}. 16 states win in {wins:.0%} of runs. NEES/3 in the turn "
-            f"{np.mean(e16.nees[:, TURN]):.2f} against {np.mean(e12.nees[:, TURN]):.1f}. What it costs where there is no "
-            f"such error: {cost:+.1%} of level.",
-            runs,
-            p,
-        ),
-        Claim(
-            "The estimate of the y gyro's bias becomes notably better.",
-            "holds" if gyro_ratio < 0.8 else "does not hold",
-            f"RMS in the turn {_rms(gyro('states16')):.2f} against {_rms(gyro('states12')):.2f} deg/h; better in "
-            f"{gyro_wins:.0%} of runs.",
-            runs,
-            gyro_p,
-        ),
-        Claim(
-            "Either filter completes the alignment in the end.",
-            "holds in part",
-            f"Heading at {END:.0f} s is {heading('flat_turn', 'states12', END):.2f} arcmin with 12 states and "
-            f"{heading('flat_turn', 'states16', END):.2f} with 16; the 12 states' own sigma says "
-            f"{_rms(e12.phi_sigma[:, -1, 2] / ARCMIN):.2f}.",
-            runs,
-            paired(e16.phi[:, -1, 2], e12.phi[:, -1, 2])[4],
-        ),
-        Claim(
-            "In the turn the heading converges fast.",
-            "holds",
-            f"With 16 states {before:.1f} arcmin at {BEGIN:.0f} s, {after:.2f} at {STOP:.0f} s.",
-            runs,
-        ),
-        Claim(
-            "In a turn, delay and lever arm can hardly be told apart.",
-            "holds",
-            f"{seen['flat_turn']}. With delay and arm drawn (.05 s, 1 m), r_forward + V tau is known to {forward:.2f} m at "
-            f"{END:.0f} s.",
-            runs,
-        ),
-        Claim(
-            "In pure acceleration or wing rock the benefit is greater than in the turn.",
-            "does not hold" if max(accelerate, rock) < turn else "holds",
-            f"Level RMS of 12 over 16 states, velocity matching: flat turn {turn:.1f}, acceleration {accelerate:.1f}, wing "
-            f"rock {rock:.1f}. With velocity and attitude matching: {with_attitude}; there the delay is an attitude error "
-            "wherever the vehicle rotates.",
-            runs,
-        ),
-        Claim(
-            "For fast and accurate alignment the space-time error must be considered.",
-            "holds",
-            f"Heading at {STOP:.0f} s, at the end of the turn: {heading('flat_turn', 'states12', STOP):.1f} against "
-            f"{heading('flat_turn', 'states16', STOP):.2f} arcmin. A master known to be 200 ms late, silent for 10 s of the "
-            f"turn: level {level('late_master', 'states16'):.2f}, heading at the end "
-            f"{heading('late_master', 'states16', END):.2f} arcmin.",
-            runs,
-        ),
-        Claim(
-            "A seat that bends needs states of its own (related work: rapid transfer alignment).",
-            "holds"
-            if level("banked_turn_flexed", "flexure") < level("banked_turn_flexed", "states16_att")
-            else "does not hold",
-            f"Velocity and attitude in a banked turn, level RMS {level('banked_turn_flexed', 'flexure'):.2f} arcmin with "
-            f"second-order Gauss-Markov states, {level('banked_turn_flexed', 'states16_att'):.2f} without.",
-            runs,
-            paired(
-                level_in_turn(found["banked_turn_flexed", "flexure"]),
-                level_in_turn(found["banked_turn_flexed", "states16_att"]),
-            )[4],
-        ),
-    ]
-
-
-def _rms(values: Array) -> float:
-    return math.sqrt(float(np.nanmean(values**2)))
+                    name = f"states16{suffix} against {other}"
+                    table.value(case, name, "level", statistic, value, "1", runs=runs, **common)  # type: ignore[arg-type]

@@ -40,6 +40,12 @@ MANOEUVRES: dict[str, list[dict[str, Any]]] = {
         {"kind": "accelerate", "to": "200 m/s", "acceleration": "4 m/s^2"},
     ],
     "wing_rock": [{"kind": "wing_rock", "duration": "30 s", "amplitude": "20 deg", "period": "4 s"}],
+    # As much as the turn's 10.5 m/s^2: for the same time, and rolled to where a lift of 1 g would pull sideways with it.
+    "accelerate_10.5": [
+        {"kind": "accelerate", "to": "331 m/s", "acceleration": "10.5 m/s^2"},
+        {"kind": "accelerate", "to": "200 m/s", "acceleration": "10.5 m/s^2"},
+    ],
+    "wing_rock_10.5": [{"kind": "wing_rock", "duration": "30 s", "amplitude": "47 deg", "period": "4 s"}],
 }
 
 
