@@ -6,7 +6,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from truenorth.figures.style import POINTS, band, new_figure, style, thin
+from truenorth.figures.style import band, new_figure, style
+from truenorth.figures.thinning import POINTS, thin
 from truenorth.quality import inspect
 from truenorth.records import ImuRecord
 

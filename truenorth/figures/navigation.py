@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.figures.style import COLOURS, REFERENCE, band, evenly, new_figure, style, trace
+from truenorth.figures.style import COLOURS, REFERENCE, band, new_figure, style, trace
+from truenorth.figures.thinning import evenly
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,13 +17,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.figures.thinning import evenly, thin
+
 Array = NDArray[np.float64]
 
 # Okabe and Ito (2008), "Color universal design", in the order in which neighbours differ most.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 REFERENCE = "#444444"  # truth and limits
 AXES_NAMES = ("x", "y", "z")
-POINTS = 4000  # that a long trace is thinned to; more than any screen shows
 
 _RC: dict[Any, Any] = {
     "figure.dpi": 110,
@@ -110,22 +111,3 @@ def trace(ax: Axes, time: ArrayLike, values: ArrayLike, **options: Any) -> None:
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     keep = thin(t, v)
     ax.plot(t[keep], v[keep], **options)
-
-
-def thin(time: ArrayLike, values: ArrayLike, points: int = POINTS) -> NDArray[np.intp]:
-    """Rows (M,) of a trace (N,) to draw, M <= about `points`: peaks and shape survive (MinMaxLTTB)."""
-    t = np.ascontiguousarray(time, dtype=np.float64)
-    v = np.ascontiguousarray(values, dtype=np.float64)
-    if v.size <= points:
-        return np.arange(v.size)
-    if not np.all(np.isfinite(v)):
-        return evenly(v.size, points)
-    from tsdownsample import MinMaxLTTBDownsampler
-
-    rows = MinMaxLTTBDownsampler().downsample(t, v, n_out=points)
-    return np.asarray(rows, dtype=np.intp)
-
-
-def evenly(count: int, points: int = POINTS) -> NDArray[np.intp]:
-    """Rows evenly spread over `count`, both ends included."""
-    return np.unique(np.linspace(0, count - 1, min(count, points)).astype(np.intp))

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import html
-import io
-from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -85,29 +82,12 @@ class Study:
         return paths
 
     def _page(self) -> str:
-        from jinja2 import Environment, PackageLoader
+        from truenorth.report.study import study_page
 
-        from truenorth.core.version import __version__
+        def shown(own: bool) -> list[str]:
+            return [name for name in self.drawings if name.startswith(("figure", "table")) == own]
 
-        environment = Environment(
-            loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True
-        )
-
-        def shown(own: bool) -> list[tuple[str, str, str]]:
-            return [
-                (name.replace("_", " "), self.captions.get(name, ""), _inline(drawing))
-                for name, drawing in self.drawings.items()
-                if name.startswith(("figure", "table")) == own
-            ]
-
-        return environment.get_template("study.html").render(
-            study=self,
-            beside=_html(self._beside()),
-            of_paper=shown(True),
-            more=shown(False),
-            table=_html(self.table.to_frame()),
-            version=html.escape(__version__),
-        )
+        return study_page(self, self._beside(), shown(True), shown(False), self.table.to_frame())
 
     def _beside(self) -> pd.DataFrame:
         """Every figure that the paper gives, ours next to it."""
@@ -158,13 +138,3 @@ def reproduce(
         raise UsageError(f"workers {workers}; expected 1 or more")
     study: Study = import_module(STUDIES[name]).reproduce(runs, seed, full, workers, progress or (lambda stage: None))
     return study
-
-
-def _html(frame: pd.DataFrame) -> str:
-    return str(frame.to_html(index=False, na_rep="", float_format="{:.4g}".format, border=0))
-
-
-def _inline(drawing: Drawing) -> str:
-    buffer = io.BytesIO()
-    drawing.savefig(buffer, format="png")
-    return b64encode(buffer.getvalue()).decode()

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import math
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from truenorth.core.language import translated as _
 from truenorth.core.shown import Write
+from truenorth.report.campaign_charts import campaign_panels, findings
+from truenorth.report.document import Table, render
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from truenorth.campaign import Campaign
 
-CAPTIONS = {
-    "convergence": "How the heading error shrinks with the length of the log. Where the dashed line lies far from the "
-    "fan's middle, the claimed sigma is not honest.",
-    "distribution": "Errors of all runs at the end of the log. The strokes are the root mean square of the claimed sigmas: "
-    "about two thirds of each violin should lie between them.",
-    "overview": "Each method in each case. Blue ratios: sigma claimed too large; red: too small.",
-}
 COLUMNS = {
     "name": "case",
     "method": "method",
@@ -55,49 +48,107 @@ def campaign_files(campaign: Campaign) -> dict[str, Write]:
     figures = plot_campaign(campaign)
     files: dict[str, Write] = {name: partial(table.to_csv, index=False) for name, table in tables.items()}
     files |= {f"{name}.png": figure.savefig for name, figure in figures.items()}
-    files["report.html"] = lambda path: path.write_text(campaign_page(campaign, tables, figures), encoding="utf-8")
+    files["report.html"] = lambda path: path.write_text(campaign_page(campaign, tables), encoding="utf-8")
     return files
 
 
-def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame], figures: dict[str, Figure]) -> str:
-    """HTML text of the page; figures are inside, so that it works offline."""
+def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame]) -> str:
+    """HTML text of the page; everything is inside, so that it works offline."""
     import yaml
-    from jinja2 import Environment, PackageLoader
 
-    from truenorth.core.version import __version__
-
-    environment = Environment(
-        loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True
-    )
     plan = campaign.plan
-    comparison, outcomes = tables["comparison.csv"], tables["outcomes.csv"]
-    comparison = comparison[comparison["quantity"] == "phi_u"]
-    comparison = comparison[comparison["time_s"] == comparison.groupby("case")["time_s"].transform("max")]
-    outcomes = outcomes[outcomes["time_s"] == outcomes.groupby("case")["time_s"].transform("max")]
-    return environment.get_template("campaign.html").render(
+    shown, panels = _tables(campaign, tables), campaign_panels(campaign)
+    mood, finding, lines = findings(campaign)
+    return render(
+        "campaign.html",
+        interactive=bool(panels),
         plan=plan,
-        cases=len(plan.cases),
-        runs=int(campaign.table["run"].nunique()),
-        headings=list(COLUMNS.values()),
-        heading=_accuracy(tables["summary.csv"], "phi_u"),
-        level=_accuracy(tables["summary.csv"], "level"),
-        consistency=_consistency(tables["summary.csv"]),
-        comparison=[_compared(row) for row in comparison.to_dict("records")],
-        outcomes=outcomes.to_dict("records"),
-        convergence=tables["convergence.csv"].to_dict("records") if plan.times else [],
-        limit=f"{math.degrees(plan.converged):g} deg",
-        figures=[
-            (name.replace("_", " ").capitalize(), CAPTIONS.get(name, ""), _inline(f)) for name, f in figures.items()
-        ],
+        mood=mood,
+        finding=finding,
+        lines=lines,
+        panels=panels,
+        tables=shown,
         resolved=yaml.safe_dump(plan.to_mapping(), sort_keys=False, allow_unicode=True, width=110),
-        version=__version__,
+        contents=[_("Finding"), *(p.title for p in panels), *(t.title for t in shown), _("Plan")],
     )
+
+
+def _tables(campaign: Campaign, tables: dict[str, pd.DataFrame]) -> list[Table]:
+    summary, comparison, outcomes = (tables[f"{name}.csv"] for name in ("summary", "comparison", "outcomes"))
+    comparison = _at_the_end(comparison[comparison["quantity"] == "phi_u"])
+    headings = [_(words) for words in COLUMNS.values()]
+    text = frozenset({0, 1})
+    found = [
+        Table(_("Heading error at the end of the log, arcmin"), headings, _accuracy(summary, "phi_u"), words=text),
+        Table(
+            _("Level error (both tilts together) at the end of the log, arcmin"),
+            headings,
+            _accuracy(summary, "level"),
+            words=text,
+        ),
+        Table(
+            _("Is sigma honest? NEES and NIS at the end of the log"),
+            [_("case"), _("method"), _("runs"), "NEES", _("95 % band"), "NIS", _("95 % band")],
+            _consistency(summary),
+            _(
+                "Means over components: 1 where sigma is honest, above it where sigma is too small. The band of NIS is that of "
+                "independent innovations; a method that allows for a base that sways stays below it on one that does not."
+            ),
+            text,
+        ),
+        Table(
+            _("Methods in pairs, heading, run by run"),
+            [
+                _("case"),
+                _("log, s"),
+                _("pair"),
+                _("runs"),
+                _("wins of the first"),
+                _("median difference, arcmin"),
+                _("ratio of RMS"),
+                _("sign test p"),
+            ],
+            [_compared(row) for row in comparison.to_dict("records")],
+            words=frozenset({0, 2}),
+        ),
+        Table(
+            _("Length of log until heading stays within {limit:g} deg").format(
+                limit=math.degrees(campaign.plan.converged)
+            ),
+            [_("case"), _("method"), _("runs"), _("converged"), _("median, s"), _("95 % of runs, s")],
+            [_converged(row) for row in tables["convergence.csv"].to_dict("records")] if campaign.plan.times else [],
+            _("Among the times of the plan."),
+            text,
+        ),
+        Table(
+            _("How the runs ended"),
+            [_("case"), _("method"), _("log, s"), _("status"), _("runs"), _("commonest reason")],
+            [
+                [
+                    str(r["name"]),
+                    str(r["method"]),
+                    f"{r['time_s']:g}",
+                    str(r["status"]),
+                    str(r["runs"]),
+                    str(r["reason"]),
+                ]
+                for r in _at_the_end(outcomes).to_dict("records")
+            ],
+            words=frozenset({0, 1, 3, 5}),
+        ),
+    ]
+    return [table for table in found if table.rows]
+
+
+def _at_the_end(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the longest log of each case."""
+    return rows[rows["time_s"] == rows.groupby("case")["time_s"].transform("max")]
 
 
 def _accuracy(summary: pd.DataFrame, quantity: str) -> list[list[str]]:
     """Rows of the table at the end of the log; the earlier times stand in summary.csv."""
     chosen = summary[summary["quantity"] == quantity]
-    last = chosen[chosen["time_s"] == chosen.groupby("case")["time_s"].transform("max")]
+    last = _at_the_end(chosen)
     rows = []
     for row in last.to_dict("records"):
         row["interval"] = f"{row['rms_low']:.3g} - {row['rms_high']:.3g}" if row["runs"] > 1 else ""
@@ -110,7 +161,7 @@ def _accuracy(summary: pd.DataFrame, quantity: str) -> list[list[str]]:
 def _consistency(summary: pd.DataFrame) -> list[list[str]]:
     """Mean NEES and NIS with their bands at the end of the log; a dash where a method has no innovations."""
     chosen = summary[summary["quantity"].isin(["nees", "nis"])]
-    last = chosen[chosen["time_s"] == chosen.groupby("case")["time_s"].transform("max")]
+    last = _at_the_end(chosen)
     rows = []
     for (name, method), pair in last.groupby(["name", "method"], observed=True, sort=False):
         found = {row["quantity"]: row for row in pair.to_dict("records")}
@@ -126,27 +177,26 @@ def _consistency(summary: pd.DataFrame) -> list[list[str]]:
     return rows
 
 
-def _compared(row: dict[Any, Any]) -> dict[str, str]:
+def _compared(row: dict[Any, Any]) -> list[str]:
     p = row["p_value"]
-    return {
-        "name": str(row["name"]),
-        "time": f"{row['time_s']:g}",
-        "pair": f"{row['method']} against {row['against']}",
-        "runs": str(row["runs"]),
-        "win_rate": f"{row['win_rate']:.0%}",
-        "difference": f"{row['median_difference']:+.3g}",
-        "ratio": f"{row['ratio']:.3g}",
-        "p": "< 0.0001" if p < 1e-4 else f"{p:.4f}",
-    }
+    return [
+        str(row["name"]),
+        f"{row['time_s']:g}",
+        _("{first} against {second}").format(first=row["method"], second=row["against"]),
+        str(row["runs"]),
+        f"{row['win_rate']:.0%}",
+        f"{row['median_difference']:+.3g}",
+        f"{row['ratio']:.3g}",
+        "< 0.0001" if p < 1e-4 else f"{p:.4f}",
+    ]
+
+
+def _converged(row: dict[Any, Any]) -> list[str]:
+    share = f"{100 * row['converged']:.0f} %"
+    return [str(row["name"]), str(row["method"]), str(row["runs"]), share, f"{row['median_s']:g}", f"{row['p95_s']:g}"]
 
 
 def _text(value: Any) -> str:
     if isinstance(value, float):
         return "" if value != value else f"{value:.3g}"
     return str(value)
-
-
-def _inline(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png")
-    return base64.b64encode(buffer.getvalue()).decode()

@@ -1,198 +1,192 @@
-"""Interactive charts of an alignment: convergence with bands, sigma against time, biases, innovations, NIS."""
+"""Charts of an alignment: convergence with bands, sigma against time, biases, innovations, NIS, the log's Allan deviation."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.result import Alignment, History
+from truenorth.core.language import translated as _
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
-from truenorth.figures.style import COLOURS, REFERENCE, evenly, thin
+from truenorth.report.chart import Chart, Clock, speed_unit
+from truenorth.report.document import Panel
+
+if TYPE_CHECKING:
+    from truenorth.alignment.result import Alignment, History
+    from truenorth.analysis.allan import NoiseCoefficients
+    from truenorth.quality import Inspection
 
 Array = NDArray[np.float64]
 
-POINTS = 1500  # of a line; more than a screen shows
-BOUND_POINTS = 300  # of a limit, which is smooth
-MILLI = 1e3  # mm in a metre
+MEASURED = 3  # velocities an epoch: what NIS is expected to be
 
 
-def charts(result: Alignment) -> list[tuple[str, str, Any]]:
-    """Title, caption and plotly figure of each chart; none without a history."""
+def panels(result: Alignment) -> list[Panel]:
+    """Charts of the history, none without one; then the Allan deviation, where the log was inspected."""
+    return [*_of_history(result), *allan_panels(result.inspection)]
+
+
+def _of_history(result: Alignment) -> list[Panel]:
     h = result.history
     if h is None:
         return []
     angles = courses(result)
+    clock = Clock.of(h.time)
+    refused = "" if result.heading_known else " " + _("The heading is refused, and not drawn.")
+    not_estimated = _("With one-sigma bands. A band as wide as at the start means: not estimated.")
     return [
-        (
-            "Convergence",
-            "The attitude at the answer's epoch, as each earlier time would have told it, the base's own motion taken out. "
-            "Light band: one sigma. Dark band: its floor, which waiting does not improve. Axes are scaled to the last three "
-            "quarters of the log." + ("" if result.heading_known else " The heading is refused, and not drawn."),
-            _convergence(h.time, angles, result.heading_known),
+        Panel(
+            _("Convergence"),
+            _(
+                "The attitude at the answer's epoch as each earlier time gives it, with the base's own motion taken out. Light "
+                "band: one sigma. Dark band: its floor, which waiting does not improve. The axes fit the last three quarters of "
+                "the log."
+            )
+            + refused,
+            _convergence(h.time, angles, result.heading_known, clock),
         ),
-        (
-            "How the uncertainty falls",
-            "One sigma of each angle; dotted, its floor. Where a line has met its floor, more time does not pay.",
-            _sigmas(h.time, angles),
+        Panel(
+            _("How the uncertainty falls"),
+            _(
+                "One sigma of each angle; dotted: its floor. Where a line has met its floor, more time does not pay. Here time "
+                "counts from the first epoch."
+            ),
+            _sigmas(h.time, angles, clock),
         ),
-        (
-            "Gyro bias",
-            "With one-sigma bands; a band as wide as at the start means not estimated.",
-            _biases(h.time, h.gyro_bias / DEG_PER_HOUR, h.gyro_bias_sigma / DEG_PER_HOUR, "deg/h"),
+        Panel(
+            _("Gyro bias"), not_estimated, _biases(h.time, h.gyro_bias, h.gyro_bias_sigma, DEG_PER_HOUR, "deg/h", clock)
         ),
-        (
-            "Accelerometer bias",
-            "With one-sigma bands; a band as wide as at the start means not estimated.",
-            _biases(h.time, h.accel_bias / MICRO_G, h.accel_bias_sigma / MICRO_G, "µg"),
+        Panel(
+            _("Accelerometer bias"),
+            not_estimated,
+            _biases(h.time, h.accel_bias, h.accel_bias_sigma, MICRO_G, "µg", clock),
         ),
-        (
-            "Innovations",
-            "Velocity of the base as seen, less as predicted; dotted two sigma, dashed three sigma. They should look like "
-            "noise and stay inside.",
-            _innovations(h),
+        Panel(
+            _("Innovations"),
+            _(
+                "Measured velocity less its prediction. Dotted: two sigma; dashed: three sigma. The innovations should look like "
+                "noise and stay inside."
+            ),
+            _innovations(h, clock),
         ),
-        (
-            "Normalised innovation squared",
-            f"Mean of {NIS_BLOCK} epochs, with the 95 % band of such a mean; 3 is expected, the mean over the log is "
-            f"{np.mean(h.nis):.2f}. The band is that of independent innovations: where the base's own motion makes neighbours "
-            "alike, more means fall outside.",
-            _nis(h),
+        Panel(
+            _("Normalised innovation squared"),
+            _(
+                "Mean of {block} epochs, with the 95 % band of such a mean. {expected} is expected; the mean over the log is "
+                "{mean:.2f}. The band is that of independent innovations: where the base's own motion makes neighbours alike, "
+                "more means fall outside."
+            ).format(block=NIS_BLOCK, expected=MEASURED, mean=np.mean(h.nis)),
+            _nis(h, clock),
         ),
     ]
 
 
-def new_chart(height: int, titles: list[str], over: str = "time, s") -> Any:
-    """Rows of axes over one axis, as a rule time, in the pages' look."""
-    from plotly.subplots import make_subplots
-
-    figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.05, x_title=over)
-    figure.update_layout(
-        height=height,
-        template="plotly_white",
-        margin={"l": 70, "r": 16, "t": 20, "b": 60},
-        showlegend=False,
-        font={"family": "system-ui, sans-serif", "size": 13},
-        hovermode="x unified",
-    )
-    for row, title in enumerate(titles, start=1):
-        figure.update_yaxes(title_text=title, exponentformat="power", automargin=True, row=row, col=1)
-    return figure
+def over_time(clock: Clock) -> str:
+    """Title of an axis of time."""
+    return _("time, {unit}").format(unit=clock.unit)
 
 
-def band_trace(figure: Any, row: int, t: Array, middle: Array, half: Array, colour: str) -> None:
-    """A filled band of this half width."""
-    import plotly.graph_objects as go
-
-    rows = evenly(len(t), POINTS)
-    t, low, high = t[rows], single(middle - half)[rows], single(middle + half)[rows]
-    rgba = f"rgba({int(colour[1:3], 16)},{int(colour[3:5], 16)},{int(colour[5:7], 16)},0.18)"
-    figure.add_trace(
-        go.Scatter(
-            x=np.concatenate([t, t[::-1]]),
-            y=np.concatenate([high, low[::-1]]),
-            fill="toself",
-            fillcolor=rgba,
-            mode="none",
-            hoverinfo="skip",
-        ),
-        row=row,
-        col=1,
-    )
-
-
-def single(y: Array) -> NDArray[np.float32]:
-    """Seven digits, which no eye exhausts, at half the bytes; time keeps all of its own."""
-    return y.astype(np.float32)
-
-
-def line(figure: Any, row: int, t: Array, y: Array, colour: str, name: str, dash: str = "solid") -> None:
-    """A line thinned to what the eye can tell."""
-    import plotly.graph_objects as go
-
-    rows = thin(t, y, POINTS)
-    figure.add_trace(
-        go.Scatter(
-            x=t[rows],
-            y=single(y)[rows],
-            mode="lines",
-            line={"color": colour, "width": 1.4, "dash": dash},
-            name=name,
-            hovertemplate="%{y:.5g}",
-        ),
-        row=row,
-        col=1,
-    )
-
-
-def bound(figure: Any, row: int, t: Array, y: Array, dash: str) -> None:
-    """A limit: seen, but not in the way of the pointer."""
-    rows = evenly(len(t), BOUND_POINTS)
-    line(figure, row, t[rows], y[rows], REFERENCE, "", dash)
-    figure.data[-1].update(hoverinfo="skip", hovertemplate=None, line={"width": 1.0})
-
-
-def _convergence(t: Array, angles: list[Course], heading_known: bool) -> Any:
-    shown = list(zip(COLOURS, angles, strict=False))[0 if heading_known else 1 :]
-    figure = new_chart(220 * len(shown), [f"{course.name}, deg" for _, course in shown])
-    for row, (colour, course) in enumerate(shown, start=1):
+def _convergence(t: Array, angles: list[Course], heading_known: bool, clock: Clock) -> Chart:
+    shown = list(enumerate(angles))[0 if heading_known else 1 :]
+    chart = Chart([f"{_(course.name)}, deg" for _number, course in shown], over_time(clock))
+    for row, (number, course) in enumerate(shown):
         value, sigma, floor = (np.degrees(x) for x in (course.value, course.sigma, course.floor))
-        band_trace(figure, row, t, value, sigma, colour)
-        band_trace(figure, row, t, value, floor, colour)
-        line(figure, row, t, value, colour, course.name)
-        figure.update_yaxes(range=settled_limits(value, sigma), row=row, col=1)
-    return figure
+        for half in (sigma, floor):
+            chart.band(row, clock(t), value - half, value + half, f"c{number}")
+        chart.line(row, clock(t), value, f"c{number}", _(course.name))
+        chart.axis(row, range=list(settled_limits(value, sigma)))
+    return chart
 
 
-def _sigmas(t: Array, angles: list[Course]) -> Any:
-    figure = new_chart(380, ["one sigma, arcmin"], over="time since the first epoch, s")
-    t, angles = t[1:] - t[0], [_later(course) for course in angles]  # zero has no logarithm
-    for colour, course in zip(COLOURS, angles):
-        line(figure, 1, t, 60 * np.degrees(course.sigma), colour, course.name)
-        line(figure, 1, t, 60 * np.degrees(course.floor), colour, f"{course.name}, floor", "dot")
+def _sigmas(t: Array, angles: list[Course], clock: Clock) -> Chart:
+    chart = Chart([_("one sigma, arcmin")], over_time(clock), height=380)
+    since = clock(t[1:] - t[0])  # zero has no logarithm
+    for number, course in enumerate(angles):
+        for values, dash, name in (
+            (course.sigma, "solid", _(course.name)),
+            (course.floor, "dot", _("{angle}, floor").format(angle=_(course.name))),
+        ):
+            chart.line(0, since, 60 * np.degrees(values[1:]), f"c{number}", name, dash=dash, key=True)
     lowest = 0.5 * 60 * np.degrees(min(course.floor[-1] for course in angles))
-    highest = 2.0 * 60 * np.degrees(max(course.sigma.max() for course in angles))
-    figure.update_yaxes(type="log", dtick=1, range=[np.log10(lowest), np.log10(highest)])
-    figure.update_xaxes(type="log")
-    figure.update_layout(showlegend=True, legend={"orientation": "h", "y": 1.14})
-    return figure
+    highest = 2.0 * 60 * np.degrees(max(course.sigma[1:].max() for course in angles))
+    chart.axis(0, type="log", dtick=1, range=[float(np.log10(max(lowest, 1e-6))), float(np.log10(highest))])
+    chart.across(type="log")
+    return chart
 
 
-def _later(course: Course) -> Course:
-    return Course(course.name, course.value[1:], course.sigma[1:], course.floor[1:])
-
-
-def _biases(t: Array, bias: Array, sigma: Array, unit: str) -> Any:
-    figure = new_chart(560, [f"{axis}, {unit}" for axis in "xyz"])
+def _biases(t: Array, bias: Array, sigma: Array, scale: float, unit: str, clock: Clock) -> Chart:
+    chart = Chart([f"{axis}, {unit}" for axis in "xyz"], over_time(clock))
     for i, axis in enumerate("xyz"):
-        band_trace(figure, i + 1, t, bias[:, i], sigma[:, i], COLOURS[i])
-        line(figure, i + 1, t, bias[:, i], COLOURS[i], axis)
-        figure.update_yaxes(range=settled_limits(bias[:, i], sigma[:, i]), row=i + 1, col=1)
-    return figure
+        middle, half = bias[:, i] / scale, sigma[:, i] / scale
+        chart.band(i, clock(t), middle - half, middle + half, f"c{i}")
+        chart.line(i, clock(t), middle, f"c{i}", axis)
+        chart.axis(i, range=list(settled_limits(middle, half)))
+    return chart
 
 
-def _innovations(h: History) -> Any:
-    figure = new_chart(560, [f"{axis}, mm/s" for axis in ("east", "north", "up")])
-    for i, axis in enumerate(("east", "north", "up")):
-        sigma = MILLI * h.innovation_sigma[:, i]
-        line(figure, i + 1, h.time, MILLI * h.innovation[:, i], COLOURS[i], axis)
-        for factor, dash in ((2.0, "dot"), (3.0, "dash")):
-            for sign in (1.0, -1.0):
-                bound(figure, i + 1, h.time, sign * factor * sigma, dash)
-        figure.update_yaxes(range=settled_limits(np.zeros_like(sigma), 4.0 * sigma), row=i + 1, col=1)
-    return figure
+def _innovations(h: History, clock: Clock) -> Chart:
+    scale, unit = speed_unit(h.innovation_sigma[len(h.time) // 4 :])
+    names = (_("east"), _("north"), _("up"))
+    chart = Chart([f"{name}, {unit}" for name in names], over_time(clock))
+    for i, name in enumerate(names):
+        sigma = h.innovation_sigma[:, i] / scale
+        chart.line(i, clock(h.time), h.innovation[:, i] / scale, f"c{i}", name)
+        limits(chart, i, clock(h.time), sigma)
+        chart.axis(i, range=list(settled_limits(np.zeros_like(sigma), 4.0 * sigma)))
+    return chart
 
 
-def _nis(h: History) -> Any:
+def limits(chart: Chart, row: int, x: Array, sigma: Array) -> None:
+    """Two and three sigma on both sides."""
+    for factor, dash in ((2.0, "dot"), (3.0, "dash")):
+        for sign in (1.0, -1.0):
+            chart.limit(row, x, sign * factor * sigma, dash)
+
+
+def _nis(h: History, clock: Clock) -> Chart:
     t, mean, low, high = averaged_nis(h)
-    figure = new_chart(320, ["NIS"])
-    line(figure, 1, t, mean, COLOURS[0], "NIS")
-    ends = h.time[[0, -1]]
-    band_trace(figure, 1, ends, np.full(2, 0.5 * (low + high)), np.full(2, 0.5 * (high - low)), REFERENCE)
-    bound(figure, 1, ends, np.full(2, 3.0), "dash")
-    top = max(1.3 * high, float(np.quantile(mean, 0.98)) if mean.size else 0.0)
-    figure.update_yaxes(range=[0.0, top])
-    figure.update_xaxes(range=list(ends))
-    return figure
+    chart = Chart(["NIS"], over_time(clock), height=320)
+    ends = clock(h.time[[0, -1]])
+    chart.band(0, ends, np.full(2, low), np.full(2, high), "ref")
+    chart.limit(0, ends, np.full(2, float(MEASURED)), "dash")
+    chart.line(0, clock(t), mean, "c0", "NIS")
+    chart.axis(0, range=[0.0, max(1.3 * high, float(np.quantile(mean, 0.98)) if mean.size else 0.0)])
+    chart.across(range=list(ends))
+    return chart
+
+
+def allan_panels(inspection: Inspection | None) -> list[Panel]:
+    """The Allan deviation of the longest part at rest, with the model that was fitted to it."""
+    if inspection is None or inspection.gyro_noise is None or inspection.accel_noise is None:
+        return []
+    rest = inspection.noise_from
+    assert rest is not None  # the noise comes from there
+    chart = Chart([_("gyro, deg/h"), _("accelerometer, µg")], _("averaging time, s"), height=460)
+    for row, (noise, scale) in enumerate(
+        ((inspection.gyro_noise, DEG_PER_HOUR), (inspection.accel_noise, MICRO_G)),
+    ):
+        _allan(chart, row, noise, scale)
+    chart.across(type="log")
+    return [
+        Panel(
+            _("Allan deviation"),
+            _(
+                "From the longest part at rest, {start:.0f} to {stop:.0f} s, with one-sigma bars; dashed: the fitted model. A "
+                "slope of -1/2 is random walk, the flat part bias instability. Where the base moves, it is an upper bound."
+            ).format(start=rest.start, stop=rest.stop),
+            chart,
+        )
+    ]
+
+
+def _allan(chart: Chart, row: int, noise: NoiseCoefficients, scale: float) -> None:
+    tau = noise.allan.tau
+    model = np.sqrt(noise.variance(tau)) / scale
+    deviation, sigma = noise.allan.deviation / scale, noise.allan.sigma / scale
+    for i, axis in enumerate("xyz"):
+        bars = (np.minimum(sigma[:, i], 0.9 * deviation[:, i]), sigma[:, i])
+        chart.points(row, tau, deviation[:, i], f"c{i}", axis, error=bars, key=row == 0)
+        chart.line(row, tau, np.where(model[:, i] > 0.0, model[:, i], np.nan), f"c{i}", "", dash="dash")
+    chart.axis(row, type="log")

@@ -1,0 +1,236 @@
+"""What a campaign found, in sentences, and its interactive charts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.language import translated as _
+from truenorth.report.chart import Chart
+from truenorth.report.document import Panel
+from truenorth.report.numbers import short
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from truenorth.campaign import Campaign
+
+Array = NDArray[np.float64]
+
+FAN = (5, 95)  # percentiles
+MOST_CASES = 12  # with charts of their own
+SMALL = 1e-4  # arcmin: below it a logarithmic axis says nothing
+MUCH_TOO_SMALL = 2.0  # RMS over sigma, above which a claimed sigma misleads
+
+
+def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
+    """Mood, the finding in a sentence, and what else there is to say of the heading at the end of the log."""
+    plan = campaign.plan
+    last = _last(campaign.summary)
+    lines = [
+        _(
+            "{cases} case(s), {methods} method(s), {runs} runs of each, seed {seed}. Every method meets the same data."
+        ).format(
+            cases=len(plan.cases), methods=len(plan.methods), runs=int(campaign.table["run"].nunique()), seed=plan.seed
+        )
+    ]
+    if last.empty:
+        return "bad", _("No run has an answer for the heading."), lines
+    best = last.loc[last.groupby("case")["rms"].idxmin()]
+    wins = best["method"].astype(str).value_counts()
+    winner, first = str(wins.index[0]), best.iloc[0]
+    low, high = float(best["rms"].min()), float(best["rms"].max())
+    if len(best) == 1 and len(plan.methods) == 1:
+        finding = _("{method} finds the heading to {rms} arcmin (RMS of {runs} runs).").format(
+            method=winner, rms=short(low), runs=int(first["runs"])
+        )
+    elif len(best) == 1:
+        finding = _("{method} has the smallest heading error: {rms} arcmin (RMS of {runs} runs).").format(
+            method=winner, rms=short(low), runs=int(first["runs"])
+        )
+    elif len(plan.methods) == 1:
+        finding = _("{method} finds the heading to {low} to {high} arcmin (RMS), depending on the case.").format(
+            method=winner, low=short(low), high=short(high)
+        )
+    else:
+        finding = _(
+            "{method} has the smallest heading error in {wins} of {cases} cases. The best of each case is {low} to {high} "
+            "arcmin (RMS)."
+        ).format(method=winner, wins=int(wins.iloc[0]), cases=len(best), low=short(low), high=short(high))
+    wanted = 60.0 * float(np.degrees(plan.converged))
+    met = best[best["rms"] <= wanted]
+    lines.append(
+        _("The wanted {wanted} arcmin (RMS) is met in {count} of {all} cases.").format(
+            wanted=short(wanted), count=len(met), all=len(best)
+        )
+    )
+    mood, honesty = _honesty(last)
+    lines.append(honesty)
+    failed = int(last["failed"].sum())
+    if failed:
+        lines.append(_("{count} run(s) gave no answer; the last table says why.").format(count=failed))
+        mood = "fair" if mood == "good" else mood
+    return mood, finding, lines
+
+
+def _honesty(last: pd.DataFrame) -> tuple[str, str]:
+    """Mood, and a sentence on whether the errors are as large as claimed."""
+    ratio = last["rms_over_sigma"].to_numpy(float)
+    small, large = ratio > last["ratio_high"].to_numpy(float), ratio < last["ratio_low"].to_numpy(float)
+    if not small.any() and not large.any():
+        return "good", _("Sigma is honest: the errors are as large as claimed in every case, within the 95 % band.")
+    worst = last.iloc[int(np.nanargmax(np.where(small, ratio, -1.0)))] if small.any() else None
+    if worst is not None:
+        words = _(
+            "Sigma is too small in {count} of {all}: {method} in {case} has errors {ratio} times what it claims."
+        ).format(
+            count=int(small.sum()),
+            all=len(last),
+            method=worst["method"],
+            case=worst["name"],
+            ratio=short(float(ratio.max())),
+        )
+        return ("bad" if float(ratio.max()) > MUCH_TOO_SMALL else "fair"), words
+    return "good", _("Sigma is larger than the errors in {count} of {all}: safe, but wider than it need be.").format(
+        count=int(large.sum()), all=len(last)
+    )
+
+
+def campaign_panels(campaign: Campaign) -> list[Panel]:
+    """Convergence over the length of the log, errors at its end, and what a requirement costs: where the plan has them."""
+    shown = []
+    if campaign.table["time_s"].nunique() > 1:
+        shown += _convergence(campaign)
+    shown.append(_distribution(campaign))
+    for path, values in campaign.plan.grid.items():
+        if len(values) > 1 and all(_number(v) is not None for v in values):
+            shown.append(_requirement(campaign, path))
+    return shown
+
+
+def _convergence(campaign: Campaign) -> list[Panel]:
+    caption = _(
+        "Magnitude of the heading error over the length of the log: median, with 5 to 95 % of the runs. Dashed: the claimed sigma; "
+        "dotted: the Cramer-Rao bound. Where the dashed line lies far from the band's middle, the claimed sigma is not honest."
+    )
+    panels = []
+    for case, name in list(campaign.case_names.items())[:MOST_CASES]:
+        chart = Chart([_("heading error, arcmin")], _("length of the log, s"), height=360)
+        for number, method in enumerate(_methods(campaign)):
+            rows = _rows(campaign.table, case, method)
+            if len(rows):
+                _fan(chart, rows, method, f"c{number % 6}")
+        bound = campaign.summary
+        bound = bound[(bound["case"] == case) & (bound["quantity"] == "phi_u") & bound["bound"].notna()]
+        bound = bound.drop_duplicates("time_s").sort_values("time_s")
+        if len(bound):
+            chart.line(0, bound["time_s"], bound["bound"], "ref", _("Cramer-Rao bound"), dash="dot", key=True)
+        chart.axis(0, type="log")
+        panels.append(Panel(_("Convergence: {case}").format(case=name), caption, chart))
+    return panels
+
+
+def _fan(chart: Chart, rows: pd.DataFrame, method: str, colour: str) -> None:
+    groups = [(float(str(time)), group) for time, group in rows.groupby("time_s")]
+    times = np.array([time for time, _group in groups])
+    errors = [np.maximum(np.abs(group["value"].to_numpy(float)), SMALL) for _time, group in groups]
+    sigma = np.array([np.sqrt(np.mean(group["sigma"].to_numpy(float) ** 2)) for _time, group in groups])
+    low, high = (np.array([np.percentile(e, q) for e in errors]) for q in FAN)
+    chart.band(0, times, low, high, colour)
+    chart.points(0, times, [np.median(e) for e in errors], colour, method, size=5, key=True, joined=True)
+    chart.line(0, times, sigma, colour, _("{method}, claimed sigma").format(method=method), dash="dash")
+
+
+def _distribution(campaign: Campaign) -> Panel:
+    """One row a case, one violin a method."""
+    cases = list(campaign.case_names.items())[:MOST_CASES]
+    chart = Chart([_folded(name) for _case, name in cases], _("method"), height=110 + 150 * len(cases))
+    for row, (case, _name) in enumerate(cases):
+        for number, method in enumerate(_methods(campaign)):
+            rows = _rows(campaign.table, case, method)
+            rows = rows[rows["time_s"] == rows["time_s"].max()]
+            if len(rows):
+                sigma = float(np.sqrt(np.mean(rows["sigma"].to_numpy(float) ** 2)))
+                chart.violin(row, method, rows["value"].to_numpy(float), sigma, f"c{number % 6}")
+    return Panel(
+        _("Errors at the end of the log"),
+        _(
+            "Heading error of all runs, estimated minus true, arcmin. The bars are plus and minus one claimed sigma: about two "
+            "thirds of each shape should lie between them."
+        ),
+        chart,
+    )
+
+
+def _requirement(campaign: Campaign, path: str) -> Panel:
+    plan = campaign.plan
+    values = np.array([_number(value) for value in plan.grid[path]], dtype=np.float64)
+    unit = {str(value).partition(" ")[2] for value in plan.grid[path]}
+    over = f"{path}, {unit.pop()}" if len(unit) == 1 else path
+    chart = Chart([_("heading RMS, arcmin")], over, height=400)
+    last = _last(campaign.summary).set_index(["case", "method"])
+    others: dict[str, list[int]] = {}
+    for case in plan.cases:
+        fixed = [f"{k.rpartition('.')[2]} {v}" for k, v in case.parameters.items() if k != path]
+        others.setdefault(", ".join([str(case.scenario["name"]), *fixed]), []).append(case.number)
+    number = 0
+    for name, numbers in others.items():
+        for method in _methods(campaign):
+            rms, low, high, sigma = (
+                np.array([_cell(last, case, method, column) for case in numbers])
+                for column in ("rms", "rms_low", "rms_high", "sigma")
+            )
+            if np.isfinite(rms).any():
+                bars = (np.maximum(rms - low, 0.0), np.maximum(high - rms, 0.0))
+                colour, words = f"c{number % 6}", f"{name}, {method}"
+                chart.points(0, values, rms, colour, words, size=6, key=True, error=bars, joined=True)
+                chart.line(0, values, sigma, colour, _("{method}, claimed sigma").format(method=words), dash="dash")
+                number += 1
+    wanted = 60.0 * float(np.degrees(plan.converged))
+    chart.line(
+        0,
+        values[[0, -1]],
+        np.full(2, wanted),
+        "ref",
+        _("wanted: {limit} arcmin").format(limit=short(wanted)),
+        dash="dot",
+        key=True,
+    )
+    chart.axis(0, type="log")
+    chart.across(type="log", tickvals=values.tolist(), ticktext=[f"{value:g}" for value in values])
+    return Panel(
+        _("What {path} costs").format(path=path.rpartition(".")[2].replace("_", " ")),
+        _("RMS of the heading error with its 95 % interval. Dashed: the claimed sigma."),
+        chart,
+    )
+
+
+def _methods(campaign: Campaign) -> list[str]:
+    return [method.name for method in campaign.plan.methods]
+
+
+def _rows(table: pd.DataFrame, case: int, method: str) -> pd.DataFrame:
+    return table[(table["case"] == case) & (table["method"] == method) & (table["quantity"] == "phi_u")]
+
+
+def _last(summary: pd.DataFrame) -> pd.DataFrame:
+    """Heading of each method in each case at the end of the log, with a method's answers only."""
+    heading = summary[(summary["quantity"] == "phi_u") & summary["rms"].notna()]
+    return heading.sort_values("time_s").groupby(["case", "method"], observed=True).tail(1)
+
+
+def _cell(last: pd.DataFrame, case: int, method: str, column: str) -> float:
+    return float(np.asarray(last.loc[(case, method), column])) if (case, method) in last.index else np.nan
+
+
+def _number(text: object) -> float | None:
+    try:
+        return float(str(text).split()[0])
+    except (ValueError, IndexError):
+        return None
+
+
+def _folded(name: str) -> str:
+    return name.replace(", ", "<br>")

@@ -1,0 +1,49 @@
+"""Coast lines for the map of a track, from the package itself: nothing is asked of a map server.
+
+Source: Natural Earth, 1:50 million, public domain. A coast is true to a kilometre or two, so it is drawn on wide maps only.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.report.document import ASSETS
+
+Array = NDArray[np.float64]
+
+WIDE = 20e3  # m: a narrower map would show a coast where there is none
+UNIT = 100.0  # points a degree
+
+
+def coast_within(south: float, north: float, west: float, east: float) -> tuple[Array, Array]:
+    """Longitude and latitude (deg) of the coasts in a window, one array each, lines parted by NaN.
+
+    Parameters
+    ----------
+    south, north : float, deg
+    west, east : float, deg
+        ``west < east``; both may lie beyond 180, where the window crosses the date line.
+    """
+    points = _points()
+    middle = 0.5 * (west + east)
+    lon = middle + (points[:, 0] - middle + 180.0) % 360.0 - 180.0
+    lat = points[:, 1]
+    inside = (lat >= south) & (lat <= north) & (lon >= west) & (lon <= east)
+    near = inside | np.roll(inside, 1) | np.roll(inside, -1)  # a line leaves the window by its next point
+    broken = np.abs(np.diff(lon, prepend=lon[:1])) > 10.0  # over the date line, seen from this window
+    keep = near | np.isnan(lat)
+    lon, lat = np.where(broken, np.nan, lon)[keep], np.where(broken, np.nan, lat)[keep]
+    gap = np.isnan(lat)
+    first = ~(gap & np.roll(gap, 1))  # of several gaps in a row one is enough
+    return lon[first], lat[first]
+
+
+@cache
+def _points() -> Array:
+    """(N, 2) longitude and latitude of all coasts, deg, a row of NaN after each line."""
+    with np.load(ASSETS / "coast.npz") as file:
+        points = np.cumsum(file["points"].astype(np.int64), axis=0) / UNIT
+        return np.insert(points, file["ends"], np.nan, axis=0)

@@ -1,0 +1,18 @@
+"""Figures spelt for reading."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truenorth.core.units import parse_unit
+
+
+def short(x: float) -> str:
+    """Three significant digits, never with an exponent."""
+    return str(np.format_float_positional(x, precision=3, fractional=False, trim="-"))
+
+
+def quantity(value: float, unit: str) -> str:
+    """An SI value in a datasheet unit."""
+    spelt = unit.replace("ug", "µg").replace("sqrt(h)", "√h").replace("sqrt(Hz)", "√Hz")
+    return f"{short(value / parse_unit(unit)[0])} {spelt}"

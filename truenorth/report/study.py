@@ -1,0 +1,68 @@
+"""The page of a reproduced study: the paper's figures beside ours, drawings, claims with their verdicts, every figure."""
+
+from __future__ import annotations
+
+import io
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from truenorth.core.language import translated as _
+from truenorth.report.document import render
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def study_page(
+    study: Any, beside: pd.DataFrame, of_paper: Sequence[str], more: Sequence[str], table: pd.DataFrame
+) -> str:
+    """HTML text of the page; drawings are inside, so that it works offline.
+
+    Parameters
+    ----------
+    study : Study
+        Title, claims, drawings, captions, remarks.
+    beside : DataFrame
+        The paper's figures, ours next to them.
+    of_paper, more : sequences of str
+        Names of the drawings that are the paper's own, and of the others.
+    table : DataFrame
+        Every figure.
+    """
+    settled = Counter(claim.verdict for claim in study.claims)
+    summary = _("Of {count} claims: {verdicts}.").format(
+        count=len(study.claims), verdicts=", ".join(f"{number} {_(verdict)}" for verdict, number in settled.items())
+    )
+
+    def drawn(names: Sequence[str]) -> list[tuple[str, str, str]]:
+        return [(n.replace("_", " "), study.captions.get(n, ""), _inline(study.drawings[n])) for n in names]
+
+    contents = [_("Verdict"), _("The paper's figures, ours next to them"), *(_spelt(name) for name in of_paper)]
+    contents += [_("Claims"), *(_spelt(name) for name in more)] + ([_("Remarks")] if study.remarks else [])
+    return render(
+        "study.html",
+        interactive=False,
+        study=study,
+        summary=summary,
+        beside=_html(beside),
+        of_paper=drawn(of_paper),
+        more=drawn(more),
+        table=_html(table),
+        contents=[*contents, _("Every figure")],
+    )
+
+
+def _spelt(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _html(frame: pd.DataFrame) -> str:
+    return str(frame.to_html(index=False, na_rep="", float_format="{:.4g}".format, border=0))
+
+
+def _inline(drawing: Any) -> str:
+    buffer = io.BytesIO()
+    drawing.savefig(buffer, format="png")
+    return b64encode(buffer.getvalue()).decode()
