@@ -141,12 +141,21 @@ class Chart:
         """Draw the distribution of values over a name, with bars at plus and minus one claimed sigma."""
         axis = f"y{row + 1}" if row else "y"
         v = np.asarray(values, dtype=np.float64)
-        shape = {"fillcolor": f"{colour}/0.3", "line": {"color": colour}, "points": "all" if v.size < 40 else False}
+        shape: dict[str, Any] = {
+            "fillcolor": f"{colour}/0.3",
+            "line": {"color": colour},
+            "points": "all" if v.size < 40 else False,
+        }
         shape |= {"marker": {"color": colour, "size": 3}, "spanmode": "hard", "showlegend": False, "hoveron": "violins"}
         x = {"x": [name] * v.size}
         self.data.append({"type": "violin", "yaxis": axis, "y": _bytes(v, "f4"), "name": name, **x, **shape})
-        ticks = {"color": "ink", "size": 26, "symbol": "line-ew-open", "line": {"width": 2}}
-        bars = {"x": [name, name], "y": _bytes([-sigma, sigma], "f4"), "mode": "markers", "marker": ticks}
+        ticks: dict[str, Any] = {"color": "ink", "size": 26, "symbol": "line-ew-open", "line": {"width": 2}}
+        bars: dict[str, Any] = {
+            "x": [name, name],
+            "y": _bytes([-sigma, sigma], "f4"),
+            "mode": "markers",
+            "marker": ticks,
+        }
         self.data.append({"type": "scatter", "yaxis": axis, "showlegend": False, "hovertemplate": "%{y:.4g}", **bars})
 
     def axis(self, row: int, **options: Any) -> None:

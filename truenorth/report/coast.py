@@ -45,5 +45,5 @@ def coast_within(south: float, north: float, west: float, east: float) -> tuple[
 def _points() -> Array:
     """(N, 2) longitude and latitude of all coasts, deg, a row of NaN after each line."""
     with np.load(ASSETS / "coast.npz") as file:
-        points = np.cumsum(file["points"].astype(np.int64), axis=0) / UNIT
+        points = np.cumsum(file["points"], axis=0, dtype=np.int16) / UNIT  # wraps as it was written
         return np.insert(points, file["ends"], np.nan, axis=0)

@@ -19,8 +19,8 @@ from truenorth.report.numbers import short
 from truenorth.report.track import track_panel
 
 if TYPE_CHECKING:
-    from truenorth.navigation.driver import Residuals
     from truenorth.navigation.result import Navigation
+    from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 

@@ -55,7 +55,7 @@ def track_panel(result: Navigation) -> Panel:
     line[_after_gaps(result, rows)] = np.nan
     chart.line(0, line[:, 0], line[:, 1], "c0", _("track"), key=True)
     for start, stop in _gap_ends(result):
-        chart.limit_line(*(place[[start, stop]] / scale).T, "c0", "dot")
+        chart.limit_line(place[[start, stop], 0] / scale, place[[start, stop], 1] / scale, "c0", "dot")
     if result.gaps:
         words.append(_("Dotted: bridged gaps of the IMU's log."))
     for name, k, colour, symbol in ((_("start"), 0, "c2", "circle"), (_("end"), -1, "c1", "square")):
