@@ -19,6 +19,7 @@ from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import hand_over
 from truenorth.alignment.inference import allan_noise, infer_spec, noise_of, usual_noise
+from truenorth.alignment.published import FADING, STATIONARY, Published, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
@@ -37,7 +38,7 @@ from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
-Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying"]
+Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying", Published]
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
@@ -66,11 +67,12 @@ def align(
     position : Position
     imu : ImuSpec, str, path or mapping, optional
         Specification, a preset's name, or a YAML file. Without one the scale of the errors is inferred from the log.
-    method : {"auto", "analytic", "inertial", "oba", "kalman", "swaying"}
+    method : {"auto", "analytic", "inertial", "oba", "kalman", "swaying", ...}
         ``analytic``: TRIAD on mean rate and specific force (still base only). ``inertial``: dual vector in the
         inertial frame. ``oba``: optimisation-based alignment. ``kalman``: coarse (oba), then a Kalman filter on
         velocity, re-linearised. ``swaying``: the same with the base's motion and the IMU's lever arm as states.
-        ``auto`` looks at the motion, picks, and says why.
+        ``auto`` looks at the motion, picks, and says why. Published filters, to be compared (:mod:`truenorth.alignment.published`):
+        ``kf``, ``sakf``, ``makf``, ``imakf``; ``states10``, ``states8``.
     at : float, s, optional
         Epoch of the answer on the record's clock; the last sample when left out.
     calibration : Calibration, optional
@@ -208,7 +210,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     used, where = _specification(spec, check, noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
-    if method not in ("kalman", "swaying"):
+    if method in STATIONARY:
+        return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
+    if method not in ("kalman", "swaying", *FADING):
         disturbance = np.sqrt(np.mean(base_velocity(integrals, coarse.C_n0_i, lat, alt) ** 2, axis=0))
         covariance, floor = coarse_covariance(coarse, integrals, noise_of(used), P, disturbance)
         C_n0_b = coarse.C_n0_i @ task.epoch.attitude(integrals.C_ib_at[0])
@@ -216,11 +220,28 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         return _Found(replace(answer, disturbance=disturbance), check)
 
     start = (task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows)
+    if method in FADING:
+        fine = faded_align(*start, method)
+        return _Found(answer_of(task, fine, used, where, P), check, fine.settled)
     sways = method == "swaying"
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
     return _Found(
         answer_of(task, fine, used, where, P, sways), check, fine.settled, detect_drift(fine), "" if sways else form
+    )
+
+
+def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
+    """The answer of a published filter of ten or eight states."""
+    found = stationary_align(task, C_n0_i, noise_of(used), P, method)
+    answer = at_epoch(task, used, where, found.C_n0_b, found.covariance, found.floor)
+    known = ~np.isnan(found.bias[3:])
+    return replace(
+        answer,
+        gyro_bias=found.bias[:3],
+        gyro_bias_sigma=found.bias_sigma[:3],
+        accel_bias=np.where(known, found.bias[3:], answer.accel_bias),
+        accel_bias_sigma=np.where(known, found.bias_sigma[3:], answer.accel_bias_sigma),
     )
 
 
