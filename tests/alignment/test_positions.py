@@ -119,7 +119,7 @@ def test_a_touched_table_is_noticed_and_an_untouched_one_is_not():
     answer = align_positions(ImuRecord(record.time, record.gyro, accel, record.kind), PLACE, spec)
     assert answer.status == "inconsistent"
     assert "touched" in answer.reasons[0]
-    assert "--from" in answer.reasons[0]
+    assert "align the part after it" in answer.reasons[0]
     assert answer.table.touch.time == pytest.approx(150.0, abs=15.0)
     assert answer.table.touch.size == pytest.approx(9.8e-3, rel=0.1)
 

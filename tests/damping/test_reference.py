@@ -8,6 +8,7 @@ from truenorth.core.errors import DataError
 from truenorth.damping.reference import cleaned, reference_of
 from truenorth.models.marine import BA, BG, MarineModel
 from truenorth.records import VelocityRecord
+from truenorth.state.wording import sentences
 
 NOISE = 0.05
 
@@ -38,7 +39,7 @@ def test_a_healthy_log_is_left_as_it_is(course):
     found = cleaned(free, velocity)
     np.testing.assert_array_equal(found.velocity, velocity)
     assert found.noise == pytest.approx(NOISE, rel=0.05)
-    assert (found.outliers, found.jumps, found.gaps, found.reasons()) == (0, (), (), [])
+    assert (found.outliers, found.jumps, found.gaps, found.evidence()) == (0, (), (), [])
 
 
 def test_outliers_jumps_and_gaps(course):
@@ -63,7 +64,7 @@ def test_outliers_jumps_and_gaps(course):
     assert length == pytest.approx(3602.0, abs=12.0)
     late = found.velocity[14000:] - healthy[14000:]
     assert np.abs(np.nanmean(late, axis=0)).max() < 0.12
-    text = " ".join(found.reasons())
+    text = " ".join(sentences(found.evidence()))
     assert "left out as outliers" in text
     assert "jumps by +0." in text
     assert "silent for 36" in text

@@ -100,7 +100,7 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
     words = [reason for reason in found.reasons if reason.startswith("warning: the clock")]
     assert len(words) == 1
     assert "late" in words[0]
-    assert "--offset -0.3" in words[0] or "--offset -0.29" in words[0]
+    assert "by -0.3" in words[0] or "by -0.29" in words[0]
     for options in ({"offset": -0.3}, {"antenna": Mounting(latency=0.3)}, {"antenna": Mounting(latency_sigma=0.5)}):
         result = navigate(record, start, imu=SPEC, gnss=late, **options)
         assert not any(reason.startswith("warning: the clock") for reason in result.reasons)
@@ -111,7 +111,7 @@ def test_a_wrong_lever_arm_is_told(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.1, arm=(1.5, 2.5, 1.0))
     wrong = navigate(record, start, imu=SPEC, gnss=gnss)
-    assert any("lever arm of --gnss seems to be right +1.5" in reason for reason in wrong.reasons)
+    assert any("lever arm of the GNSS seems to be right +1.5" in reason for reason in wrong.reasons)
     right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([1.5, 2.5, 1.0])))
     assert not any("lever arm" in reason for reason in right.reasons)
 

@@ -12,6 +12,7 @@ from truenorth.core.errors import DataError
 from truenorth.navigation import Mounting, navigate
 from truenorth.navigation.second_look import second_look
 from truenorth.records import OdometerRecord, VelocityRecord
+from truenorth.state.wording import sentences
 
 __all__ = ["drive"]  # the fixture of a car that turns twice
 
@@ -39,8 +40,8 @@ def test_an_antenna_of_a_metre_given_in_centimetres(drive):
     result = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([20.0, 30.0, 50.0])))
     assert result.status == "inconsistent"
     (words,) = warnings(result)
-    assert words.startswith("the lever arm of --gnss seems to be right +0.")
-    assert "not 20,30,50: were centimetres handed in? --lever-arm is in metres" in words
+    assert words.startswith("the lever arm of the GNSS seems to be right +0.")
+    assert "not 20,30,50: was it given in centimetres?; check the arm; metres are expected" in words
     right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([0.2, 0.3, 0.5])))
     assert warnings(right) == []
 
@@ -57,11 +58,11 @@ def test_a_wheel_given_in_centimetres_and_a_clock_are_told_apart(drive):
 
     assert told(odometer, (-0.5, 0.0, 0.0)) == []
     (words,) = told(odometer, (-50.0, 0.0, 0.0))
-    assert "lever arm of --odometer" in words
-    assert "were centimetres handed in? --wheel-arm is in metres" in words
+    assert "lever arm of the odometer" in words
+    assert "was it given in centimetres?" in words
     (words,) = told(odometer.shifted(0.25), (-0.5, 0.0, 0.0))
-    assert words.startswith("the clock of --odometer seems 0.25")
-    assert "late: try --offset -0.25" in words
+    assert words.startswith("the clock of the odometer seems 0.25")
+    assert "late: shift the times of that log by -0.25" in words
 
 
 def test_scale_and_mounting_that_are_not_estimated(drive):
@@ -69,8 +70,8 @@ def test_scale_and_mounting_that_are_not_estimated(drive):
     log = wheel_log(motion)
     fast = OdometerRecord(log.time, 1.03 * log.values, "speed", source="odo.csv")
     (words,) = warnings(navigate(record, start, imu=SPEC, odometer=fast, altitude="fixed"))
-    assert words.startswith("--odometer seems to count +")
-    assert words.endswith("%: try --estimate scale")
+    assert words.startswith("the odometer seems to count +")
+    assert words.endswith("%: let it be estimated")
     value, sigma = (float(x) for x in words.split("count +")[1].split(" %")[0].split(" ± "))
     assert abs(value - 3.0) < 4 * sigma < 1.0
     assert (
@@ -79,8 +80,8 @@ def test_scale_and_mounting_that_are_not_estimated(drive):
     )
     turned = Mounting(C_mb=dcm_from_rotation_vector(np.array([0.0, 0.0, 0.04])))
     (words,) = warnings(navigate(record, start, imu=SPEC, odometer=log, wheel=turned, altitude="fixed"))
-    assert "turned against the vehicle of --odometer" in words
-    assert "--estimate mounting" in words
+    assert "turned against the vehicle of the odometer" in words
+    assert "give the mounting; let it be estimated" in words
 
 
 @pytest.mark.parametrize(
@@ -108,11 +109,11 @@ def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
         "velocity": Mounting(),
         "baro": Mounting(),
     }
-    told = second_look(lambda loose: found, mounting)
+    told = sentences(second_look(lambda loose: found, found, mounting))
     assert len(told) == bool(words)
     assert all(word in told[0] for word in words)
     known = mounting | {"gnss": replace(mounting["gnss"], lever_arm_sigma=1.0)}
-    assert second_look(lambda loose: found, known) == []
+    assert second_look(lambda loose: found, found, known) == []
 
 
 def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
@@ -143,7 +144,7 @@ def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
     assert not any("hang together" in words for words in warnings(navigate(record, start, imu=SPEC, gnss=white)))
     told = [words for words in warnings(navigate(record, start, imu=SPEC, gnss=wandering)) if "hang together" in words]
     assert len(told) == 1
-    assert "--gnss-drift" in told[0]
+    assert "give the size and the time of that wander" in told[0]
     antenna = Mounting(bias_sigma=1.5, bias_time=60.0)
     assert not any(
         "hang together" in w for w in warnings(navigate(record, start, imu=SPEC, gnss=wandering, antenna=antenna))
@@ -188,7 +189,7 @@ def test_what_is_open_is_open_and_a_filter_that_breaks_down_says_nothing():
         raise DataError("broken down")
 
     mounting = {name: Mounting(scale_sigma=0.2) for name in ("gnss", "odometer", "velocity", "baro")}
-    assert second_look(run, mounting) == []
+    assert second_look(run, SimpleNamespace(), mounting) == []
     assert asked["baro"] == mounting["baro"]
     assert asked["odometer"].scale_sigma == 0.2
     assert asked["odometer"].gate == 0.0

@@ -42,7 +42,7 @@ def assemble(task: Task, spec: ImuSpec, where: str, C_nb: Array, covariance: Arr
     prior = np.sqrt(spec.bias_variance)
     return Alignment(
         status="not_converged",
-        reasons=(),
+        evidence=(),
         method="",
         method_reason="",
         time=task.epoch.time,

@@ -7,6 +7,9 @@ be seen by anyone: north velocity v equals a heading error of v/(R w_ie cos L).
 
 Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in
 linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
+
+What a signature of the size found does to attitude follows from the same recursion: the state that the filter estimates from
+the signature alone.
 """
 
 from __future__ import annotations
@@ -17,11 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
+from truenorth.models.static import PHI
+from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
 ONSETS = (0.25, 0.5, 0.75)
-THRESHOLD = 25.0  # chi-square with one degree of freedom, 12 signatures: false alarm below 1e-5 a log
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,8 @@ class Drift:
         Since the beginning of the log.
     velocity : float, m/s
         At the end of the log.
+    heading, level : float, rad
+        Errors that the drift leaves in the answer: the largest of all signatures that match beyond chance.
     """
 
     ratio: float
@@ -45,18 +52,27 @@ class Drift:
     axis: str
     onset: float
     velocity: float
+    heading: float
+    level: float
 
     @property
     def found(self) -> bool:
         """Whether chance is ruled out."""
-        return self.ratio > THRESHOLD
+        return self.ratio > limit("drift")
 
-    def __str__(self) -> str:
-        how = "a step to" if self.kind == "step" else "growing to"
-        return (
-            f"the base drifts {self.axis}: from about {self.onset:.0f} s on its velocity shows {how} "
-            f"{abs(self.velocity):.2g} m/s (likelihood ratio {self.ratio:.0f}, chance gives {THRESHOLD:.0f} at most): align a "
-            "part in which it stays"
+    def evidence(self) -> Evidence:
+        """The drift, with its effect: another course of the same size does about as much."""
+        figures: dict[str, Figure] = {
+            "axis": self.axis,
+            "onset": self.onset,
+            "velocity": abs(self.velocity),
+            "ratio": self.ratio,
+            "chance": limit("drift"),
+            "heading": self.heading,
+            "level": self.level,
+        }
+        return Evidence(
+            f"drift.{self.kind}", figures, "bounded", Effect(self.heading, self.level), remedies=("still_part",)
         )
 
 
@@ -91,4 +107,7 @@ def detect_drift(fine: FineAlignment) -> Drift:
     ratio = match**2 / energy
     best = int(np.argmax(ratio))
     kind, axis_name, start = names[best]
-    return Drift(float(ratio[best]), kind, axis_name, float(start), float(match[best] / energy[best]))
+    turned = np.where(ratio > limit("drift"), np.abs(x[PHI] * (match / energy)), 0.0)  # (3, 12): E, N, U
+    heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
+    velocity = match[best] / energy[best]
+    return Drift(float(ratio[best]), kind, axis_name, float(start), float(velocity), float(heading), float(level))

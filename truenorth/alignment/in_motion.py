@@ -39,6 +39,7 @@ from truenorth.navigation.whereabouts import check_fixes
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
@@ -205,10 +206,10 @@ def align_in_motion(
         tell(f"pass {number + 1}")
         guess = replace(guess, C_nb=backtracked(task.record, track))
         track = task.run(guess, gated=True)
-    answer = _answer(task, track, method, why, spread, heading_limit)
-    more = [_of_latitude(answer, able)] if unknown else []
-    more += [note for log in (odometer, gnss) if log is not None for note in log.notes]
-    return answer.with_verdict(answer.status, (*answer.reasons, *more))
+    answer = _answer(task, track, method, why, spread)
+    more = [item for log in (odometer, gnss) if log is not None for item in notes(log.notes)]
+    more += [_of_latitude(answer, able)] if unknown else []
+    return judge_moving(answer, track, heading_limit, more)
 
 
 def _cost_at(task: _Task, lat: float) -> float:
@@ -220,15 +221,13 @@ def _cost_at(task: _Task, lat: float) -> float:
         return math.inf
 
 
-def _of_latitude(answer: Alignment, able: bool) -> str:
+def _of_latitude(answer: Alignment, able: bool) -> Evidence:
     """What stands for a latitude that nobody gave."""
-    lat = math.degrees(answer.position.lat)
+    lat = answer.position.lat
     if able and answer.moving is not None:
-        sigma = math.degrees(float(answer.moving.track.sigma[-1, DP][1])) / METRES_PER_RADIAN
-        return (
-            f"the latitude was not given: found from the log, {lat:.2f} deg, to {significant(sigma, 2)} deg (one sigma)"
-        )
-    return f"the latitude was not given: {lat:.0f} deg assumed, which gyros as poor as these do not feel"
+        sigma = float(answer.moving.track.sigma[-1, DP][1]) / METRES_PER_RADIAN
+        return note("latitude.found", lat=lat, sigma=sigma)
+    return note("latitude.assumed", lat=lat)
 
 
 def _task(
@@ -345,7 +344,7 @@ def _turn_between(C: Array, D: Array) -> float:
     return float(math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
 
 
-def _answer(task: _Task, track: Track, method: str, why: str, spread: float, limit: float) -> Alignment:
+def _answer(task: _Task, track: Track, method: str, why: str, spread: float) -> Alignment:
     place = track.position[-1]
     sigma = track.sigma[-1]
     position = Position(float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8]))
@@ -357,9 +356,9 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float, lim
     distance = float(np.trapezoid(speed, track.time))
     prior = np.sqrt(task.spec.bias_variance)
     moving = moving_of(track, distance, "the earth's rate" if method == "gyrocompass" else "motion", mounting)
-    answer = Alignment(
+    return Alignment(
         status="not_converged",
-        reasons=(),
+        evidence=(),
         method=method,
         method_reason=why,
         time=float(track.time[-1]),
@@ -381,8 +380,6 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float, lim
         source=task.record.source,
         moving=moving,
     )
-    status, reasons = judge_moving(answer, track, limit)
-    return answer.with_verdict(status, reasons)
 
 
 def _history(track: Track, task: _Task) -> History:

@@ -23,7 +23,7 @@ from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.table import TablePosition, TurntableErrors
 from truenorth.alignment.task import Task, bridged, level_of, make_task
 from truenorth.alignment.touched import Touch, find_touch
-from truenorth.alignment.verdict import Circumstances, judge
+from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import Means, means, oba
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE, normal_gravity
@@ -153,13 +153,9 @@ def align_positions(
         history=_history(task, fine),
         table=_errors(found, touch, prior, x, fine.P),
     )
-    status, reasons = judge(
-        answer, Circumstances(heading_limit, check, _leaves(task.motion, stretches), fine.settled, None)
-    )
-    if touch is not None:
-        advice = f"; align the part after it (--from {touch.time + 5:.0f}), or the part before it"
-        status, reasons = "inconsistent", (touch.words(task.gravity) + advice, *reasons)
-    return answer.with_verdict(status, reasons)
+    evidence = [] if touch is None else [touch.evidence(task.gravity)]
+    evidence += leaves(_leaves(task.motion, stretches)) + base_evidence(answer, check, None, settled=fine.settled)
+    return judged(answer, evidence, heading_limit)
 
 
 def find_positions(motion: MotionSummary) -> list[tuple[float, float]]:

@@ -23,7 +23,7 @@ from truenorth.alignment.published import FADING, STATIONARY, Published, faded_a
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
-from truenorth.alignment.verdict import Circumstances, judge
+from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.uncertainty import base_velocity
 from truenorth.core.earth import EARTH_RATE
@@ -131,8 +131,8 @@ def align(
     moves = _moves_from(task.motion)
     if chosen == "swaying" and _all_along(task.motion) and float(np.max(answer.disturbance[:2])) < STAYS:
         moves = None  # lever arm and bounded motion explain all of it
-    status, reasons = judge(answer, Circumstances(heading_limit, found.check, moves, found.settled, found.drift))
-    return answer.with_verdict(status, reasons)
+    evidence = leaves(moves) + base_evidence(answer, found.check, found.drift, settled=found.settled)
+    return judged(answer, evidence, heading_limit)
 
 
 @dataclass(frozen=True)

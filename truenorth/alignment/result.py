@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,6 +14,8 @@ from truenorth.core.position import Position
 from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
+from truenorth.state.wording import sentences
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,8 +89,8 @@ class Alignment(Shown):
     ----------
     status : str
         ``aligned``, ``level_only``, ``not_converged``, ``not_observable`` or ``inconsistent``.
-    reasons : tuple of str
-        The verdict in words, with figures.
+    evidence : tuple of Evidence
+        What decided the status first, with figures and with what it does to the answer.
     method, method_reason : str
         The method that gave the answer, and why it was taken.
     time : float, s
@@ -125,7 +127,7 @@ class Alignment(Shown):
     """
 
     status: Status
-    reasons: tuple[str, ...]
+    evidence: tuple[Evidence, ...]
     method: str
     method_reason: str
     time: float
@@ -151,6 +153,11 @@ class Alignment(Shown):
     transfer: Transfer | None = field(default=None, repr=False)
     table: TurntableErrors | None = field(default=None, repr=False)
     handover: Handover | None = field(default=None, repr=False)
+
+    @cached_property
+    def reasons(self) -> tuple[str, ...]:
+        """The verdict in words, with figures: the evidence in plain English."""
+        return sentences(self.evidence)
 
     @property
     def attitude(self) -> Rotation:
@@ -246,6 +253,7 @@ class Alignment(Shown):
         result: dict[str, Any] = {
             "status": self.status,
             "reasons": list(self.reasons),
+            "evidence": [item.to_dict() for item in self.evidence],
             "method": self.method,
             "method_reason": self.method_reason,
             "time_s": self.time,
@@ -316,7 +324,3 @@ class Alignment(Shown):
             columns[f"innovation_{axis}_sigma_m_s"] = h.innovation_sigma[:, i]
         columns["nis"] = h.nis
         return pd.DataFrame(columns, index=pd.Index(h.time, name="time"))
-
-    def with_verdict(self, status: Status, reasons: tuple[str, ...]) -> Alignment:
-        """The same answer under another verdict."""
-        return replace(self, status=status, reasons=reasons)

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.inference import noise_of
@@ -27,13 +26,14 @@ from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
 from truenorth.alignment.task import Task, bridged, make_task
-from truenorth.alignment.verdict import Circumstances, judge
+from truenorth.alignment.verdict import judged, model_evidence
 from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import notes
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
@@ -125,9 +125,8 @@ def align_rotary(
         method="swaying",
         method_reason=f"the IMU turns on an indexer ({how}), the base may sway: its own motion is fitted to the log",
     )
-    around = Circumstances(heading_limit, _nothing_to_check(), None, fine.settled, detect_drift(fine))
-    status, reasons = judge(answer, around)
-    return answer.with_verdict(status, reasons if encoder is None else (*reasons, *encoder.notes))
+    evidence = model_evidence(detect_drift(fine), settled=fine.settled)
+    return judged(answer, evidence + notes(() if encoder is None else encoder.notes), heading_limit)
 
 
 def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:
@@ -233,8 +232,3 @@ def _place_covariance(task: Task, spec: ImuSpec) -> Array:
     P = np.zeros((6, 6))
     P[3:, 3:] = (spec.accel_scale_factor**2 + spec.accel_misalignment**2) * task.gravity**2 * np.eye(3)
     return P
-
-
-def _nothing_to_check() -> LogCheck:
-    """An indexer makes the biases known; what the log shows of them along north and up is no contradiction."""
-    return LogCheck(np.zeros(2), np.full(2, np.inf), 0.0, math.inf)

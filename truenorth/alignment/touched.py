@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.quality.signals import STILL_ANGLE
+from truenorth.state.evidence import Evidence, contradiction
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,7 @@ BLOCKS = 40  # into which a position is cut
 SHORTEST = 12  # blocks that say what is usual
 BESIDE = 3  # blocks on either side whose means are compared, ...
 GAP = 2  # ... and between them, for what takes its time
+SETTLED = 5.0  # s after a touch from which the table is at rest again
 FACTOR = 10.0  # of the usual scatter of such differences: a false alarm in less than 1e-5 of logs with Gaussian noise
 
 
@@ -47,14 +49,16 @@ class Touch:
         """m/s^2."""
         return float(np.linalg.norm(self.step))
 
-    def words(self, gravity: float) -> str:
-        """What it means."""
-        tilt = np.degrees(self.size / gravity)
-        angle = f"{tilt:.2f} deg" if tilt > 0.1 else f"{60 * tilt:.2f} arcmin"
-        step, usual = self.size / gravity * 1e3, self.usual / gravity * 1e3
-        return (
-            f"the table was touched, or an accelerometer's offset jumped, at about {self.time:.0f} s: the level specific force "
-            f"steps by {step:.2g} mg (as a tilt of {angle} would make it; usual {usual:.2g} mg), and the gyros show no turn"
+    def evidence(self, gravity: float) -> Evidence:
+        """The step, as the tilt that would make it; what it does to an answer over both parts is not known."""
+        return contradiction(
+            "table.touched",
+            "begin_after",
+            time=self.time,
+            after=self.time + SETTLED,
+            step=self.size,
+            usual=self.usual,
+            tilt=self.size / gravity,
         )
 
 

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment import transfer_loop as loop
-from truenorth.alignment.result import Alignment, History, Status
+from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import system_along
+from truenorth.alignment.transfer_verdict import judge_transfer
 from truenorth.analysis.observability import observability
 from truenorth.core.attitude import (
     dcm_from_quaternion,
     dcm_from_rotation_vector,
     euler_from_dcm,
-    euler_sigma,
     rotation_vector_from_dcm,
 )
 from truenorth.core.earth import earth_rate_n, transport_rate_n
@@ -27,6 +27,7 @@ from truenorth.models.transfer import ARM, BA, BG, MOUNT, TAU, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -34,13 +35,9 @@ Array = NDArray[np.float64]
 
 MOST_EPOCHS = 400  # of the linear system that says what is told apart
 MOST_ROWS = 5000  # of the history
-MOST_JUMPS = 3  # of the master, that the reasons tell one by one
-DISTRUST = 0.2  # share of rejected rows above which master and slave contradict each other
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
 TIED = 0.95  # correlation of two states beyond which one is not told without the other
-LOPSIDED, STEADY, FEWEST = 6.0, 0.9, 20  # sigmas of a mean of innovations, their correlation from row to row, rows
-OUTLIER = 5.0  # sigmas by which a delay, a lever arm or a mounting may miss what was assumed
 
 WORDS = {
     "dv_E": "velocity error east",
@@ -74,7 +71,7 @@ def assemble_transfer(
     what: str,
     notes: tuple[str, ...],
     heading_limit: float,
-    parted: str,
+    parted: Evidence | None,
 ) -> Alignment:
     """The answer at the last row of the master, judged; `parted` says what is wrong with the clocks, if anything."""
     P = track.last_P
@@ -83,11 +80,9 @@ def assemble_transfer(
     lat, lon, alt = (float(x) for x in track.position[-1])
     transfer = _transfer(slave, master, model, assumed, start, track, noise, what, notes)
     sigma = track.sigma[-1]
-    reached = euler_sigma(track.C_nb[-1], phi_covariance)
-    status, reasons = _judge(track, transfer, start, where, reached, heading_limit, parted)
-    return Alignment(
-        status=status,
-        reasons=reasons,
+    answer = Alignment(
+        status="not_converged",
+        evidence=(),
         method=f"transfer, {'velocity and attitude' if what == 'both' else what} matching",
         method_reason=f"{model.states} states, closed loop over {transfer.used} rows of {master.source}",
         time=float(track.time[-1]),
@@ -109,6 +104,7 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
+    return judge_transfer(answer, transfer, track, start, heading_limit, parted)
 
 
 def _transfer(
@@ -292,87 +288,3 @@ def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
     # Of n against its last orientation; the turn is small enough to be one about one axis.
     C_last_n = dcm_from_rotation_vector(turned[-1] - turned)
     return C_last_n @ track.C_nb[-1] @ np.swapaxes(C_0b[-1:], 1, 2) @ C_0b
-
-
-def _judge(
-    track: TransferTrack, transfer: Transfer, start: SlaveStart, where: str, sigma: Array, limit: float, parted: str
-) -> tuple[Status, tuple[str, ...]]:
-    """Status and reasons."""
-    told = [*transfer.notes, *transfer.jumps[:MOST_JUMPS]]
-    if len(transfer.jumps) > MOST_JUMPS:
-        told.append(f"{len(transfer.jumps) - MOST_JUMPS} more jumps of the master were taken up")
-    told += [f"not well told apart by this motion: {words}" for words in transfer.open]
-    if parted:
-        return "inconsistent", (parted, *told)
-    share = transfer.rejected / max(1, transfer.rejected + transfer.used)
-    if share > DISTRUST:
-        return "inconsistent", (
-            f"{share:.0%} of the master's rows contradict the slave: check the axes, --lever-arm, --mounting and --delay, "
-            "and whether both sit on one rigid body (--flexure)",
-            *told,
-        )
-    for name, found, prior, scale, unit in (
-        ("delay", transfer.delay - start.delay, transfer.delay_prior, 1e3, "ms"),
-        ("lever arm", transfer.lever_arm - start.arm, transfer.lever_arm_prior[0], 1.0, "m"),
-        ("mounting", _between(start.C_mb, track.C_mb[-1]), transfer.mounting_prior[0], math.degrees(1.0), "deg"),
-    ):
-        miss = float(np.max(np.abs(found)))
-        if prior > 0.0 and miss > OUTLIER * prior:
-            return "inconsistent", (
-                f"the {name} comes out {scale * miss:.3g} {unit} from the assumed one, which was said to be known to "
-                f"{scale * prior:.3g} {unit}: check the slave's axes and --{name.replace(' ', '-')}",
-                *told,
-            )
-    lopsided = _lopsided(track)
-    if lopsided:
-        part = ", or align a part without the jump (--from, --to), which may be an error of the master's own"
-        part = part if transfer.jumps else ""
-        return "inconsistent", (
-            f"{lopsided} differ from the prediction to one side all the time: the slave's errors are larger than its specification "
-            f"({where}) allows, or the master's drift; give the right --imu{part}",
-            *told,
-        )
-    if sigma[0] <= limit:
-        return "aligned", (
-            f"heading is known to {_angle(float(sigma[0]))}, level to {_angle(float(max(sigma[1:])))} (one sigma)",
-            *told,
-        )
-    if transfer.matching == "attitude":
-        why = (
-            "attitude matching tells the slave only as well as its mounting on the master is known: match velocity too"
-        )
-    else:
-        why = "it takes horizontal acceleration to tell heading by velocity: a turn, an S-turn, a change of speed"
-    if max(sigma[1:]) <= math.radians(3.0):
-        return "level_only", (
-            f"heading is known to {_angle(float(sigma[0]))} only, {_angle(limit)} is wanted; {why}",
-            *told,
-        )
-    return "not_converged", (f"level is known to {_angle(float(max(sigma[1:])))} only; {why}", *told)
-
-
-def _lopsided(track: TransferTrack) -> str:
-    """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row.
-
-    Rows that were used, that is: those of a jump lie on one side too, until it is taken up.
-    """
-    later = slice(len(track.time) // 4, None)
-    nu, verdict = (track.innovation / track.innovation_sigma)[later], track.verdict[later]
-    for kind, name in enumerate(("velocities", "attitudes")):
-        rows = nu[verdict[:, kind] == loop.USED, 3 * kind : 3 * kind + 3]
-        if len(rows) < FEWEST:
-            continue
-        follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)
-        mean = np.abs(rows.mean(axis=0)) * math.sqrt(len(rows))
-        if np.any((mean > LOPSIDED) & (follows > STEADY)):
-            return f"the master's {name}"
-    return ""
-
-
-def _between(before: Array, after: Array) -> Array:
-    """(3,) rotation vector from one mounting to another, rad."""
-    return np.asarray(rotation_vector_from_dcm(before.T @ after))
-
-
-def _angle(x: float) -> str:
-    return f"{math.degrees(x):.2f} deg" if x >= math.radians(0.5) else f"{60 * math.degrees(x):.2f} arcmin"

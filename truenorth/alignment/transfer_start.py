@@ -19,6 +19,7 @@ from truenorth.models.transfer import PHI, TransferModel, turn_noise
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence, contradiction
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -82,20 +83,24 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     return assumed, ()
 
 
-def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> str:
-    """In words that the first and the last third of the master are late by different delays; "" where nothing says so."""
+def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Evidence | None:
+    """That the first and the last third of the master are late by different delays; None where nothing says so."""
     first, last = len(master) // 3, 2 * len(master) // 3
     if first < 2:
-        return ""
+        return None
     # Half a window: where the agreement is just sure, a delay is found to a tenth of it.
     least = max(0.5 * WINDOW["rate" if master.C_nb is not None else "force"], master.interval)
     begin, end = (find_delay(slave, part, C_mb) for part in (master[:first], master[last:]))
     if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < least:
-        return ""
-    return (
-        f"the master's stamps are {begin.delay:.2f} s behind the slave's clock until {master.time[first - 1]:.1f} s and "
-        f"{end.delay:.2f} s from {master.time[last]:.1f} s on, by their motion: one of the clocks steps or runs at another rate; "
-        "align a part of the logs (--from, --to), or put the times right"
+        return None
+    return contradiction(
+        "transfer.clocks_part",
+        "part_of_logs",
+        "put_times_right",
+        before=begin.delay,
+        until=float(master.time[first - 1]),
+        after=end.delay,
+        since=float(master.time[last]),
     )
 
 

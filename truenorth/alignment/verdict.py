@@ -1,8 +1,10 @@
-"""May this answer be used? The status, and the reasons in words and figures."""
+"""From an answer and the evidence of its checks to an answer with a verdict: what it reached, and what contradicts it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,139 +12,181 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import Alignment, Status
+from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity
-from truenorth.core.units import DEG_PER_HOUR, MICRO_G, significant
+from truenorth.state.evidence import Effect, Evidence, Figure, contradiction, note
+from truenorth.state.judge import Claim, Verdict, judge
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
-OUTLIER = 5.0  # sigmas by which a checkable component may miss its specification
-NEAR_POLE = 0.1  # cosine of the latitude (84 deg) from which the place, not the gyro, is what hides north
-LEVEL_LIMIT = np.radians(3.0)  # a tilt less certain than this is no level
 
+def judged(
+    answer: Alignment,
+    evidence: Sequence[Evidence],
+    heading_limit: float,
+    *,
+    waiting: bool = True,
+    remedies: tuple[str, ...] = (),
+) -> Alignment:
+    """An answer with its verdict; what the evidence adds to sigma is in its covariance.
 
-@dataclass(frozen=True)
-class Circumstances:
-    """What the verdict needs besides the answer.
-
-    Attributes
+    Parameters
     ----------
+    answer : Alignment
+    evidence : sequence of Evidence
     heading_limit : float, rad
-        Largest one-sigma heading error the user can use.
-    check : LogCheck
-    moves_from : float or None, s
-        When the base begins to go somewhere.
-    settled : bool
-        Whether re-linearisation came to rest.
-    drift : Drift or None
-        What the test for a base that leaves says.
+        Largest one-sigma heading error of use.
+    waiting : bool
+        Whether more of the same data improves heading.
+    remedies : tuple of str
+        What a heading that is not good enough needs.
     """
-
-    heading_limit: float
-    check: LogCheck
-    moves_from: float | None = None
-    settled: bool = True
-    drift: Drift | None = None
-
-
-def judge(answer: Alignment, around: Circumstances) -> tuple[Status, tuple[str, ...]]:
-    """Status and reasons of an answer."""
-    contradictions = _contradictions(answer, around)
-    if contradictions:
-        return "inconsistent", tuple(contradictions)
-    level = float(np.sqrt(np.max(np.linalg.eigvalsh(answer.phi_covariance[:2, :2]))))
-    if level > LEVEL_LIMIT:
-        return "not_converged", (
-            f"level is known to {np.degrees(level):.2f} deg only; {np.degrees(LEVEL_LIMIT):.0f} deg is the most that "
-            "passes for level: record longer, or with less motion",
-        )
-    sigma, floor = _azimuth_sigmas(answer)
-    limit = around.heading_limit
-    good_level = f"level is known to {np.degrees(level) * 60:.2f} arcmin (one sigma)"
-    if sigma <= limit:
-        reasons = [
-            f"heading is known to {_angle(sigma)} (one sigma); {_angle(floor)} of it is sensor bias, which waiting does not improve"
-        ]
-        if answer.pays_until is not None and np.isfinite(answer.pays_until):
-            reasons.append(_waiting(answer))
-        if answer.near_vertical:
-            reasons.append("pitch is near +-90 deg: heading and roll are told only together (see the combination)")
-        return "aligned", tuple(reasons)
-
-    horizontal = EARTH_RATE * np.cos(answer.position.lat)
+    _, floor = azimuth_sigmas(answer)
+    lat = answer.position.lat
     bias = float(np.max(answer.gyro_bias_prior))
-    if floor > limit:
-        if bias / EARTH_RATE < limit and np.cos(answer.position.lat) < NEAR_POLE:
-            return "not_observable", (
-                f"at latitude {np.degrees(answer.position.lat):.3f} deg the earth turns by {horizontal / DEG_PER_HOUR:.3f} deg/h "
-                f"about the horizontal; gyro biases of {significant(bias / DEG_PER_HOUR)} deg/h hide true north there",
-                good_level,
-            )
-        return "level_only", (
-            f"gyro bias can be {significant(bias / DEG_PER_HOUR)} deg/h ({answer.imu_source}); a heading within "
-            f"{np.degrees(limit):g} deg at latitude {np.degrees(answer.position.lat):.1f} deg needs "
-            f"{horizontal * np.tan(min(limit, 1.0)) / DEG_PER_HOUR:.2g} deg/h or better: heading is refused",
-            good_level,
-        )
-    more = (
-        "" if answer.pays_until is None else f"; about {answer.pays_until:.0f} s in all would bring it near its floor"
+    verdict = judge(
+        Claim(
+            sigma=claimed(answer),
+            heading_limit=heading_limit,
+            floor=floor,
+            waiting=waiting,
+            hidden=floor > heading_limit
+            and math.cos(lat) < limit("pole")
+            and bias / EARTH_RATE < heading_limit
+            and answer.moving is None
+            and answer.transfer is None,
+        ),
+        evidence,
     )
-    return "not_converged", (
-        f"heading is known to {_angle(sigma)} only after {answer.duration:.0f} s, {_angle(limit)} is wanted; sensor bias "
-        f"would allow {_angle(floor)}{more}: record longer",
-        good_level,
-    )
+    answer = grown(answer, verdict.added)
+    reached = [] if verdict.finding == "inconsistent" else _reached(answer, verdict, heading_limit, remedies)
+    status: Status = verdict.status("aligned")  # type: ignore[assignment]  # a finding, its good one so called
+    return replace(answer, status=status, evidence=(*reached, *verdict.evidence))
 
 
-def _contradictions(answer: Alignment, around: Circumstances) -> list[str]:
-    found = []
-    if around.moves_from is not None:
-        found.append(
-            f"the base does not stay where it is: it moves from {around.moves_from:.1f} s on; align a part in which it "
-            f"stands (--to {around.moves_from:.0f})"
-        )
-    check = around.check
-    bias = float(np.max(answer.gyro_bias_prior))
-    names = ("north", "up")
-    for name, residual, noise in zip(names, check.rate_residual, check.rate_noise, strict=True):
-        if abs(residual) > OUTLIER * np.hypot(bias, noise):
-            found.append(
-                f"the gyros' mean rate along {name} misses the earth's by {significant(residual / DEG_PER_HOUR)} deg/h, where the "
-                f"specification ({answer.imu_source}) allows {significant(bias / DEG_PER_HOUR)} deg/h: check --lat, the "
-                "units, and the specification"
-            )
-    # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
-    accel = float(
-        np.hypot(
-            np.max(answer.accel_bias_prior),
-            answer.imu.accel_scale_factor * float(normal_gravity(answer.position.lat, answer.position.alt)),
-        )
-    )
-    if abs(check.force_residual) > OUTLIER * np.hypot(accel, check.force_noise):
-        found.append(
-            f"the mean specific force misses gravity by {check.force_residual / MICRO_G:.0f} ug, where the specification "
-            f"({answer.imu_source}) allows {significant(accel / MICRO_G)} ug: check --alt, the units, and the specification"
-        )
-    if around.drift is not None and around.drift.found:
-        found.append(str(around.drift))
-    if not around.settled:
-        found.append("re-linearisation did not come to rest: the log does not look like a base that stays where it is")
-    return found
+def claimed(answer: Alignment) -> Effect:
+    """One sigma of what an alignment gives."""
+    sigma, _ = azimuth_sigmas(answer)
+    velocity = position = math.inf
+    if answer.moving is not None:
+        variance = np.diag(answer.moving.P)
+        velocity, position = float(np.sqrt(variance[3:6].max())), float(np.sqrt(variance[6:9].max()))
+    return Effect(sigma, level_sigma(answer), velocity, position)
 
 
-def _azimuth_sigmas(answer: Alignment) -> tuple[float, float]:
+def level_sigma(answer: Alignment) -> float:
+    """The larger axis of the error ellipse of level, rad."""
+    return float(np.sqrt(np.max(np.linalg.eigvalsh(answer.phi_covariance[:2, :2]))))
+
+
+def azimuth_sigmas(answer: Alignment) -> tuple[float, float]:
     """Sigma and floor of heading, or near the vertical of the combination that stands for it."""
     if answer.near_vertical:
         return answer.azimuth[2], float(np.sqrt(answer.phi_floor[2, 2]))
     return float(answer.euler_sigma[0]), float(answer.euler_sigma_floor[0])
 
 
-def _angle(x: float) -> str:
-    degrees = np.degrees(x)
-    return f"{degrees:.2f} deg" if degrees >= 0.5 else f"{degrees * 60:.2f} arcmin"
+def grown(answer: Alignment, added: Effect) -> Alignment:
+    """The same answer with an independent error in its covariance, its floor and its history."""
+    if added.heading == added.level == 0.0:
+        return answer
+    more = np.diag([added.level, added.level, added.heading]) ** 2
+    history = answer.history
+    if history is not None:
+        history = replace(history, phi_covariance=history.phi_covariance + more, phi_floor=history.phi_floor + more)
+    return replace(
+        answer, phi_covariance=answer.phi_covariance + more, phi_floor=answer.phi_floor + more, history=history
+    )
 
 
-def _waiting(answer: Alignment) -> str:
-    assert answer.pays_until is not None
-    if answer.pays_until <= answer.duration:
-        return f"after {answer.pays_until:.0f} s more time stopped paying: the floor was the larger part"
-    return f"more time pays until about {answer.pays_until:.0f} s; the log has {answer.duration:.0f} s"
+def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, settled: bool = True) -> list[Evidence]:
+    """What contradicts a base that stays where it is, and the specification of the IMU on it.
+
+    A gyro that misses along north by more than its specification may miss along east as much, where nobody sees it:
+    that turns heading by ``residual / (w_ie cos L)``. So do accelerometers, which tilt by ``residual / g``.
+    """
+    found = []
+    place = answer.position
+    bias = float(np.max(answer.gyro_bias_prior))
+    horizontal = EARTH_RATE * math.cos(place.lat)
+    for axis, residual, noise in zip(("north", "up"), check.rate_residual, check.rate_noise, strict=True):
+        if abs(residual) > limit("specification") * math.hypot(bias, noise):
+            turned = min(abs(residual) / max(horizontal, 1e-12), UNIFORM_SIGMA)
+            found.append(
+                Evidence(
+                    "rate.misses",
+                    {"axis": axis, "residual": float(residual), "allowed": bias, "imu": answer.imu_source},
+                    "bounded",
+                    Effect(heading=turned),
+                    ("latitude", "units", "specification"),
+                )
+            )
+    # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
+    g = float(normal_gravity(place.lat, place.alt))
+    accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)
+    if abs(check.force_residual) > limit("specification") * math.hypot(accel, check.force_noise):
+        found.append(
+            Evidence(
+                "force.misses",
+                {"residual": check.force_residual, "allowed": accel, "imu": answer.imu_source},
+                "bounded",
+                Effect(level=abs(check.force_residual) / g),
+                ("height", "units", "specification"),
+            )
+        )
+    return found + model_evidence(drift, settled=settled)
+
+
+def model_evidence(drift: Drift | None, *, settled: bool) -> list[Evidence]:
+    """What contradicts the model of a base that stays: it drifts, or the passes did not come to rest."""
+    found = [] if drift is None or not drift.found else [drift.evidence()]
+    return found if settled else [*found, contradiction("base.unsettled")]
+
+
+def leaves(time: float | None) -> list[Evidence]:
+    """That a base moves from a time (s) on; nothing where it stays."""
+    return [] if time is None else [contradiction("base.moves", "end_before", until=time)]
+
+
+def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple[str, ...]) -> list[Evidence]:
+    """What the answer is good for, with figures."""
+    sigma, floor = azimuth_sigmas(answer)
+    level = level_sigma(answer)
+    if level > limit("level"):
+        calmer = "record_calmer" if answer.moving is None else "record_longer"
+        return [note("level.unknown", *(remedies or (calmer,)), level=level, limit=limit("level"))]
+    coarse = level > math.radians(0.5)
+    good_level = note("level.known" if coarse else "level.known_finely", level=level)
+    if verdict.finding == "good":
+        return _good(answer, sigma, floor, level)
+    if answer.moving is not None or answer.transfer is not None:
+        more = remedies or ("record_longer",)
+        return [note("heading.wanted", *more, sigma=sigma, duration=answer.duration, limit=wanted), good_level]
+    lat = answer.position.lat
+    horizontal, bias = EARTH_RATE * math.cos(lat), float(np.max(answer.gyro_bias_prior))
+    if verdict.finding == "not_observable":
+        return [note("heading.hidden", lat=lat, horizontal=horizontal, bias=bias), good_level]
+    if verdict.finding == "level_only":
+        needed = horizontal * math.tan(min(wanted, 1.0))
+        source = answer.imu_source
+        return [note("heading.bias", bias=bias, imu=source, limit=wanted, lat=lat, needed=needed), good_level]
+    figures: dict[str, Figure] = {"sigma": sigma, "duration": answer.duration, "limit": wanted, "floor": floor}
+    key = "heading.short"
+    if answer.pays_until is not None:
+        key, figures = "heading.short_until", figures | {"pays_until": answer.pays_until}
+    return [Evidence(key, figures, remedies=("record_longer",)), good_level]
+
+
+def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[Evidence]:
+    if answer.transfer is not None:
+        return [note("heading.known_with_level", sigma=sigma, level=level)]
+    if answer.moving is not None:
+        return [note("heading.known_from", sigma=sigma, source=answer.moving.heading_from)]
+    found = [note("heading.known", sigma=sigma, floor=floor)]
+    if answer.pays_until is not None and math.isfinite(answer.pays_until):
+        key = "heading.paid" if answer.pays_until <= answer.duration else "heading.pays"
+        found.append(note(key, pays_until=answer.pays_until, duration=answer.duration))
+    if answer.near_vertical:
+        found.append(note("heading.vertical"))
+    return found

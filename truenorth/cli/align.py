@@ -39,6 +39,7 @@ from truenorth.cli.align_transfer import (
 )
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
+from truenorth.cli.remedies import reasons_of
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -268,7 +269,7 @@ def align(
         advice = advice_after(result, advise)
     if as_json:
         more = {} if advice is None else {"advice": advice.summary()}
-        print(json.dumps(result.summary() | more, allow_nan=False))
+        print(json.dumps(result.summary() | {"reasons": reasons_of(result)} | more, allow_nan=False))
     else:
         _print(result, paths)
         if advice is not None:
@@ -305,7 +306,7 @@ def _print(result: Alignment, paths: list[Path]) -> None:
     colour = {"aligned": "green", "level_only": "yellow"}.get(result.status, "red")
     status = Text(result.status, style=f"bold {colour}")
     console.print(status, f" {result.source}, {result.duration:.1f} s", soft_wrap=True)
-    for reason in result.reasons:
+    for reason in reasons_of(result):
         console.print(f"  {reason}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
     for title in ("", "deg", "one sigma, deg", "floor, deg"):

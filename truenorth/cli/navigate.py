@@ -12,6 +12,7 @@ import typer
 
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.reading import Axes, Columns, Format, Kind, Log, Rate, To, Topic, Units, numbers_of, read_log
+from truenorth.cli.remedies import reasons_of
 
 if TYPE_CHECKING:
     from truenorth.damping.options import Damper
@@ -201,11 +202,11 @@ def navigate(
         if output is not None:
             tell("writing the report")
             paths = result.save(output)
-    for reason in result.reasons:
+    for reason in reasons_of(result):
         if reason.startswith("warning"):
             print(f"truenorth: {reason}", file=sys.stderr)
     if as_json:
-        print(json.dumps(result.summary(), allow_nan=False))
+        print(json.dumps(result.summary() | {"reasons": reasons_of(result)}, allow_nan=False))
     else:
         _print(result, paths)
     if result.status != "navigated":
@@ -309,7 +310,7 @@ def _print(result: Navigation, paths: list[Path]) -> None:
     status = Text(result.status, style=f"bold {'green' if result.status == 'navigated' else 'red'}")
     duration = s["end_s"] - s["start_s"]
     console.print(status, f" {result.source}, {duration:.1f} s, {s['distance_m']:.0f} m", soft_wrap=True)
-    for reason in result.reasons:
+    for reason in reasons_of(result):
         console.print(f"  {reason}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
     for title in (f"at {s['end_s']:.1f} s", "", "one sigma"):

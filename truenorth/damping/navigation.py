@@ -19,12 +19,14 @@ from truenorth.damping.reference import Reference, reference_of
 from truenorth.damping.result import Damping
 from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
 from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI, REF, STATES, MarineModel
+from truenorth.navigation.result import Navigation, judged_navigation
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state import layout as ins
+from truenorth.state.evidence import Evidence, contradiction, note
+from truenorth.state.limits import limit
 
 if TYPE_CHECKING:
-    from truenorth.navigation.result import Navigation
     from truenorth.state.mounting import Mounting
     from truenorth.state.track import Track
 
@@ -34,7 +36,6 @@ GATE = 1.0 - 1e-6  # with which a good row passes: one in six days at 1 Hz is lo
 WINDOW = 5.0  # s, of filter 2
 CHANGE_SIGMA = 0.001  # m/s^2, of filter 2's measurement
 SHORTEST = 16  # epochs of a spectrum
-CONTRADICTED = 5.0  # sigmas between INS and log for half of the time: of sound ones one in a million
 LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of errors.ins: PHI, and the level parts of DV and DP
 
 
@@ -77,12 +78,12 @@ def damp_navigation(
     if result.altitude != "fixed":
         raise UsageError(f"damping with altitude {result.altitude!r}; expected 'fixed': the height is held at sea")
     if velocity is None and damper.needs_reference:
-        raise UsageError(f"damping {damper.method} needs a reference velocity; hand one in with --velocity")
+        raise UsageError(f"damping {damper.method} needs a reference velocity; expected velocity=record")
     track = _even(result.track)
     course = Course(track.time, track.C_nb, track.v_n, track.position)
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
-            f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most: see --every"
+            f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most"
         )
     start = round(damper.start / course.interval)
     if start >= course.epochs - 1:
@@ -112,25 +113,20 @@ def damp_navigation(
     if estimate is not None and damper.method == "augmented":
         last, last_sigma = estimate.x[-1, REF], estimate.sigma[-1, REF]
         report = replace(report, reference_error=last, reference_error_sigma=last_sigma)
-    words = [] if reference is None else reference.reasons()
-    contradicted = None
+    evidence = list(result.evidence)
     if reference is not None and damper.needs_reference:
-        contradicted = _contradiction(course, reference, track.sigma[:, 3:5], damper, start)
+        evidence += _contradiction(course, reference, track.sigma[:, 3:5], damper, start)
+    evidence += [] if reference is None else reference.evidence()
     if report.rejected:
-        words.append(f"velocity log: {report.rejected} measurements rejected by the filter's gate")
+        evidence.append(note("log.rejected", count=report.rejected))
     if damper.method == "internal":
-        words.append("internal damping: what the vehicle's own manoeuvres add is not in the bands")
-    return replace(
-        result,
-        status=result.status if contradicted is None else "inconsistent",
-        track=track if damper.method == "none" else _corrected(track, damped, sigma, start, estimate),
-        reasons=(*result.reasons, *([] if contradicted is None else [contradicted]), *words),
-        damping=report,
-    )
+        evidence.append(note("damping.internal"))
+    track = track if damper.method == "none" else _corrected(track, damped, sigma, start, estimate)
+    return judged_navigation(replace(result, track=track, damping=report), evidence)
 
 
-def _contradiction(course: Course, reference: Reference, sigma: Array, damper: Damper, start: int) -> str | None:
-    """Why a log cannot be this vehicle's, in words; None: it can.
+def _contradiction(course: Course, reference: Reference, sigma: Array, damper: Damper, start: int) -> list[Evidence]:
+    """That a log cannot be this vehicle's.
 
     For more than half of the log it differs from the free INS by more than both can be wrong. A log that is dead or in other
     units does; outliers, jumps and silences do not.
@@ -138,13 +134,11 @@ def _contradiction(course: Course, reference: Reference, sigma: Array, damper: D
     off = np.abs(course.v_n[start:, :2] - reference.velocity[start:])
     expected = np.sqrt(sigma[start:] ** 2 + damper.reference_sigma**2 + reference.noise**2)
     there = np.isfinite(off).all(axis=1)
-    if not there.any() or np.median((off / expected)[there].max(axis=1)) <= CONTRADICTED:
-        return None
-    east, north = np.median(off[there], axis=0)
-    return (
-        f"velocity log: differs from the free INS by {east:.2f} m/s east, {north:.2f} m/s north (median), "
-        f"{np.median(expected[there]):.2f} m/s is expected; check its units, axes, mounting, whether it lives, and --log-error"
-    )
+    if not there.any() or np.median((off / expected)[there].max(axis=1)) <= limit("log"):
+        return []
+    east, north = (float(x) for x in np.median(off[there], axis=0))
+    allowed = float(np.median(expected[there]))
+    return [contradiction("log.contradicts", "log", "log_error", east=east, north=north, allowed=allowed)]
 
 
 def _mounted(velocity: VelocityRecord, mounting: Mounting | None) -> VelocityRecord:
@@ -154,7 +148,7 @@ def _mounted(velocity: VelocityRecord, mounting: Mounting | None) -> VelocityRec
     unknown = (mounting.lever_arm_sigma, mounting.angle_sigma, mounting.scale_sigma, mounting.latency_sigma)
     if np.any(mounting.lever_arm) or any(unknown):
         raise UsageError(
-            "damping takes the log's velocity for the IMU's; expected no lever arm (--wheel-arm) and nothing to --estimate of it"
+            "damping takes the log's velocity for the IMU's; expected no lever arm, and nothing of the log to be estimated"
         )
     if velocity.frame == "body" and not np.array_equal(mounting.C_mb, np.eye(3)):
         turned = np.nan_to_num(velocity.velocity) @ mounting.C_mb

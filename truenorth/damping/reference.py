@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.damping.course import Course
 from truenorth.records import VelocityRecord
+from truenorth.state.evidence import Evidence, note
 
 Array = NDArray[np.float64]
 
@@ -59,19 +60,11 @@ class Reference:
     gaps: tuple[tuple[float, float], ...]
     source: str
 
-    def reasons(self) -> list[str]:
-        """What was wrong with it, in words."""
-        words = []
-        if self.outliers:
-            words.append(f"velocity log: {self.outliers} epochs left out as outliers")
-        for time, east, north in self.jumps:
-            words.append(
-                f"velocity log: at {time:.0f} s its level jumps by {east:+.2f} m/s east, {north:+.2f} m/s north; held to the "
-                "level before"
-            )
-        for time, length in self.gaps:
-            words.append(f"velocity log: silent for {length:.0f} s after {time:.0f} s; undamped in between")
-        return words
+    def evidence(self) -> list[Evidence]:
+        """What was wrong with it."""
+        found = [note("log.outliers", count=self.outliers)] if self.outliers else []
+        found += [note("log.jump", time=time, east=east, north=north) for time, east, north in self.jumps]
+        return found + [note("log.silent", time=time, length=length) for time, length in self.gaps]
 
 
 def reference_of(course: Course, record: VelocityRecord) -> Reference:
@@ -101,7 +94,7 @@ def reference_of(course: Course, record: VelocityRecord) -> Reference:
     if not inside.any():
         raise DataError(
             f"{record.source}: runs from {record.time[0]:.3f} s to {record.time[-1]:.3f} s, navigation from "
-            f"{course.time[0]:.3f} s to {course.time[-1]:.3f} s: no overlap; expected one clock: see --offset"
+            f"{course.time[0]:.3f} s to {course.time[-1]:.3f} s: no overlap; expected one clock"
         )
     nearest, velocity = nearest[inside], np.nan_to_num(record.velocity[inside])
     if record.frame == "body":

@@ -17,18 +17,20 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
-from truenorth.navigation.result import Altitude, Navigation, mean_nis
+from truenorth.navigation.result import Altitude, Navigation, judged_navigation
 from truenorth.navigation.second_look import second_look, slow_errors
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
+from truenorth.quality.innovations import innovation_evidence
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, Trajectory, VelocityRecord
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Track
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -44,8 +46,6 @@ FINE, COARSE = 0.2, 1.0
 AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
 SHORTEST_AXES = 20.0  # s
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
-MOST_REJECTED = 0.2  # of a sensor's measurements
-NIS_LIMIT = 3.0  # mean NIS over its rows, beyond which model and data contradict each other
 
 
 @dataclass(frozen=True)
@@ -176,23 +176,19 @@ def navigate(
     _check_axes(record, begin, plain, sources, mounting)
     tell("navigating")
     track = run(aiding, smooth=smooth)
-    status, reasons = check_residuals(track)
-    if why:
-        reasons.append(why)
+    evidence = innovation_evidence(track.residuals) + why
     if odometer is not None and _is_the_alignments(wheel, begin):
-        reasons.append("odometer: scale, mounting and wheel arm are the alignment's, and estimated on")
+        evidence.append(note("odometer.taken_over"))
     if baro is not None and height != "baro":
-        reasons.append(
-            f"the barometer is not used: height is {height!r}; for its heights altitude 'baro' (--altitude baro)"
-        )
-    reasons += slow_errors(track, mounting["gnss"])
-    reasons += [note for aid in given.values() for note in aid.notes]
+        evidence.append(note("height.barometer_unused", "use_barometer", altitude=height))
+    evidence += slow_errors(track, mounting["gnss"])
+    evidence += [item for aid in given.values() for item in notes(aid.notes)]
     if check_clocks and aiding:
         tell("checking clocks and mountings")
-        reasons += second_look(lambda loose: run(_aiding(sources, loose, height, baro_loop)), mounting)
+        evidence += second_look(lambda loose: run(_aiding(sources, loose, height, baro_loop)), track, mounting)
     result = Navigation(
-        status="navigated" if status else "inconsistent",
-        reasons=tuple(reasons),
+        status="navigated",
+        evidence=(),
         track=track,
         altitude=height,
         smoothed=smooth,
@@ -203,11 +199,11 @@ def navigate(
         late={name: aid.late for name, aid in given.items() if aid.late.rows},
     )
     if damping is None:
-        return result
+        return judged_navigation(result, evidence)
     from truenorth.damping.navigation import damp_navigation
 
     tell(f"damping: {damping.method}")
-    return damp_navigation(result, reference, noise, damping, log)
+    return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, log)
 
 
 def _is_the_alignments(wheel: Mounting | None, start: Start) -> bool:
@@ -284,28 +280,23 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
     return record, gaps, [Aiding("gap", "disturbance", record.time[rows], push**2, turn)]
 
 
-def _altitude(wanted: str | None, sources: Sources) -> tuple[Altitude, str]:
+def _altitude(wanted: str | None, sources: Sources) -> tuple[Altitude, list[Evidence]]:
     heights = sources.gnss is not None and bool(np.isfinite(sources.gnss.alt).any())
     if wanted is not None and wanted not in get_args(Altitude):
         raise UsageError(f"altitude {wanted!r}; expected one of {', '.join(get_args(Altitude))}")
     if wanted == "baro" and sources.baro is None:
-        raise UsageError("altitude 'baro' without a barometer's record; expected --baro FILE (baro=record)")
+        raise UsageError("altitude 'baro' without a barometer's record; expected baro=record")
     if wanted == "gnss" and not heights:
-        raise UsageError(
-            "altitude 'gnss' without heights of GNSS; expected --gnss FILE (gnss=record) with a column of heights"
-        )
+        raise UsageError("altitude 'gnss' without heights of GNSS; expected gnss=record with a column of heights")
     if wanted is not None:
-        return wanted, ""  # type: ignore[return-value]  # one of the four
+        return wanted, []  # type: ignore[return-value]  # one of the four
     if heights:
-        return "gnss", ""
+        return "gnss", []
     if sources.baro is not None:
-        return "baro", ""
+        return "baro", []
     if sources.odometer is not None or sources.velocity is not None:
-        return "free", "height is carried on by velocity alone: no sensor of height is given"
-    return (
-        "fixed",
-        "height is held fixed, as at sea: give a sensor of height, or altitude 'free', where the vehicle climbs",
-    )
+        return "free", [note("height.free")]
+    return "fixed", [note("height.fixed", "height_sensor")]
 
 
 def _aiding(sources: Sources, mounting: Mapping[str, Mounting], altitude: str, loop: float) -> list[Aiding]:
@@ -360,35 +351,3 @@ def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
                 f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
                 "expected one clock: bring the aiding log onto the IMU's with --offset SECONDS"
             )
-
-
-def check_residuals(track: Track) -> tuple[bool, list[str]]:
-    """Whether the measurements agree with the model, and what there is to say."""
-    sound, reasons = True, []
-    for r in track.residuals:
-        if len(r.time) == 0:
-            continue
-        share, nis = r.rejected / len(r.time), mean_nis(r)
-        if share > MOST_REJECTED:
-            sound = False
-            reasons.append(
-                f"{r.name}: {r.rejected} of {len(r.time)} measurements rejected: they contradict the track (half of them "
-                f"by more than {_scatter(r)}); check axes, units, clock, lever arm and sigmas"
-            )
-        elif r.rejected:
-            reasons.append(f"{r.name}: {r.rejected} of {len(r.time)} measurements rejected as outliers")
-        if nis is not None and nis > NIS_LIMIT:
-            sound = False
-            reasons.append(
-                f"{r.name}: innovations are {math.sqrt(nis):.1f} times as large as their sigma says: sigma is not to be trusted"
-            )
-        if r.outside:
-            reasons.append(f"{r.name}: {r.outside} measurements lie before the start or after the end of the IMU's log")
-    return sound, reasons
-
-
-def _scatter(r: Residuals) -> str:
-    """Median size of the innovations, with its unit."""
-    unit = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}.get(r.name, "m/s")
-    size = np.sqrt(np.nansum(r.innovation**2, axis=1))
-    return f"{float(np.median(size)):.3g} {unit}"

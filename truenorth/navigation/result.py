@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -16,9 +16,13 @@ from truenorth.core.attitude import angle_text, euler_from_dcm, euler_sigma, to_
 from truenorth.core.earth import radii
 from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
+from truenorth.quality.innovations import mean_nis
 from truenorth.records import Late
+from truenorth.state.evidence import NO_EFFECT, Effect, Evidence
+from truenorth.state.judge import Claim, judge
 from truenorth.state.layout import BA, BG, DP, DV, PHI
 from truenorth.state.track import Residuals, Track
+from truenorth.state.wording import sentences
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,8 +44,8 @@ class Navigation(Shown):
     ----------
     status : str
         ``navigated``, or ``inconsistent``: the measurements contradict the model.
-    reasons : tuple of str
-        The verdict in words, with figures; warnings too.
+    evidence : tuple of Evidence
+        What decided the status first, with figures and with what it does to the answer.
     track : Track
         State, sensors and covariance at each output epoch, and the aiding sensors' residuals.
     altitude : str
@@ -61,7 +65,7 @@ class Navigation(Shown):
     """
 
     status: Status
-    reasons: tuple[str, ...]
+    evidence: tuple[Evidence, ...]
     track: Track = field(repr=False)
     altitude: Altitude
     smoothed: bool
@@ -71,6 +75,11 @@ class Navigation(Shown):
     source: str
     late: Mapping[str, Late] = field(default_factory=dict)
     damping: Damping | None = None
+
+    @cached_property
+    def reasons(self) -> tuple[str, ...]:
+        """The verdict in words, with figures; warnings too: the evidence in plain English."""
+        return sentences(self.evidence)
 
     @property
     def time(self) -> Array:
@@ -216,6 +225,7 @@ class Navigation(Shown):
         return {
             "status": self.status,
             "reasons": list(self.reasons),
+            "evidence": [item.to_dict() for item in self.evidence],
             "start_s": float(self.time[0]),
             "end_s": float(self.time[-1]),
             "distance_m": self.distance,
@@ -274,8 +284,18 @@ class Navigation(Shown):
         return export(self, Path(path))
 
 
-def mean_nis(r: Residuals) -> float | None:
-    """Mean of NIS over its number of rows, rejected measurements left out: 1 where the model is right."""
-    if not r.used.any():
-        return None
-    return float(np.sum(r.nis[r.used]) / np.sum(r.rows[r.used]))
+def judged_navigation(result: Navigation, evidence: Sequence[Evidence]) -> Navigation:
+    """The verdict on a navigation by its last epoch; what the evidence adds to sigma is in its covariance, as a share of it."""
+    P = result.track.P[-1]
+    sigma = np.sqrt(np.maximum(np.diag(P), 0.0))
+    heading = float(result.euler_sigma[-1, 0])
+    claim = Effect(heading, float(sigma[PHI][:2].max()), float(sigma[DV].max()), float(sigma[DP].max()))
+    verdict = judge(Claim(claim), evidence)
+    if verdict.added != NO_EFFECT:
+        grows = {name: s / own for (name, s), (_, own) in zip(verdict.sigma.items(), claim.items(), strict=True)}
+        factor = np.ones(P.shape[0])
+        factor[PHI] = grows["level"], grows["level"], grows["heading"]
+        factor[DV], factor[DP] = grows["velocity"], grows["position"]
+        result = replace(result, track=replace(result.track, P=factor[:, None] * result.track.P * factor))
+    status: Status = verdict.status("navigated")  # type: ignore[assignment]  # navigated or inconsistent
+    return replace(result, status=status, evidence=verdict.evidence)

@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Role
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.mounting import FALSE_REJECTION, Mounting
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-SMALL = 10.0  # times its prior: a scale or angle beyond is none that a small-angle model finds
-CLEAR = 6.0  # sigmas from which a contradiction is told
-LONG_ARM = 10.0  # m: longer than on most vehicles, to be told where the data do not show it
+SMALL = 10.0  # times its prior: beyond it a small-angle model does not hold
+CLEAR = 6.0  # sigmas from which a contradiction counts
+LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data do not show it
 LEAST_FIXES = 60
 LAGS = 5
 WHITE, LEAST_CORRELATION = (
@@ -48,37 +51,40 @@ OPEN: dict[Role, _Open] = {
     "mounting": _Open("angle_sigma", math.radians(3.0), math.radians(0.5)),
 }
 SMALL_ANGLES: tuple[Role, ...] = ("scale", "mounting")
-SENSORS: dict[str, tuple[str, str, tuple[Role, ...]]] = {
-    "gnss": ("GNSS", "--lever-arm", ("lag", "lever arm")),
-    "odometer": ("odometer", "--wheel-arm", ("lag", "lever arm", "scale", "mounting")),
-    "velocity": ("velocity log", "--wheel-arm", ("lag", "lever arm", "scale", "mounting")),
+SENSORS: dict[str, tuple[str, tuple[Role, ...]]] = {
+    "gnss": ("GNSS", ("lag", "lever arm")),
+    "odometer": ("odometer", ("lag", "lever arm", "scale", "mounting")),
+    "velocity": ("velocity log", ("lag", "lever arm", "scale", "mounting")),
 }
 
 
-def second_look(run: Callable[[Mapping[str, Mounting]], Track], mounting: Mapping[str, Mounting]) -> list[str]:
-    """Warnings about what the data contradict, and about long arms that they do not show.
+def second_look(
+    run: Callable[[Mapping[str, Mounting]], Track], first: Track, mounting: Mapping[str, Mounting]
+) -> list[Evidence]:
+    """What the data contradict of clocks, arms, scales and mountings, and long arms that they do not show.
+
+    The effect is by how much the track with all of them left open differs from the first one.
 
     Parameters
     ----------
     run : callable
         Navigates with the sensors so mounted.
+    first : Track
+        With the sensors mounted as they are said to be.
     mounting : mapping
         How they are said to sit, by the sensor's name.
     """
     try:
         track = run({name: _loosened(name, m) for name, m in mounting.items()})
-    except DataError:  # the measurements fit no track at all, which the first pass has told
+    except DataError:  # the measurements fit no track at all, which the first pass has shown
         return []
-    if _contradicted(track) > MOST_CONTRADICTED:  # figures of a model that does not hold are not worth telling
+    if _contradicted(track) > MOST_CONTRADICTED:  # figures of a model that does not hold are worth nothing
         return []
-    words = []
-    for key, (name, option, roles) in SENSORS.items():
+    against, found = [], []
+    for key, (name, roles) in SENSORS.items():
         given = mounting[key]
         if any(_beyond(track, name, role) for role in SMALL_ANGLES):
-            words.append(
-                f"warning: --{key} fits no small scale error and mounting angle: check its axes and unit, the IMU's axes (--axes), "
-                "and --mounting"
-            )
+            found.append(note("second_look.misfit", "sensor_axes", "imu_axes", "mounting", urgent=True, name=name))
             continue
         for role in roles:
             where = track.layout.slice_of(f"{name} {role}")
@@ -86,15 +92,33 @@ def second_look(run: Callable[[Mapping[str, Mounting]], Track], mounting: Mappin
                 continue
             value, sigma = track.sensors[-1, where], track.sigma[-1, where]
             if np.any((np.abs(value) > CLEAR * sigma) & (np.abs(value) > OPEN[role].least)):
-                words.append(f"warning: {_contradiction(role, key, option, given, value, sigma)}")
+                against.append(_contradiction(role, name, key, given, value, sigma))
             elif role == "lever arm" and np.linalg.norm(given.lever_arm) > LONG_ARM:
                 arm = given.lever_arm
-                if math.sqrt(arm**2 @ sigma**2 / (arm @ arm)) > KNOWN_ARM * np.linalg.norm(arm):
-                    words.append(
-                        f"warning: the lever arm {option} is {np.linalg.norm(arm):.0f} m long, and the data do not show whether it "
-                        "is: metres are expected"
-                    )
-    return words
+                length = float(np.linalg.norm(arm))
+                if math.sqrt(arm**2 @ sigma**2 / (arm @ arm)) > KNOWN_ARM * length:
+                    found.append(note("second_look.long_arm", f"arm.{key}", urgent=True, name=name, length=length))
+    if not against:
+        return found
+    whole = moved(first, track)
+    share = Effect(*(size / math.sqrt(len(against)) for _, size in whole.items()))
+    return [replace(item, kind="known", effect=share) for item in against] + found
+
+
+def moved(first: Track, other: Track) -> Effect:
+    """By how much two tracks differ: the RMS, in sigmas of the first, of the later half, as sizes at the last epoch."""
+    half = slice(len(first.time) // 2, None)
+    turn = np.abs(rotation_vector_from_dcm(first.C_nb[half] @ np.swapaxes(other.C_nb[half], 1, 2)))
+    lat, _, alt = first.position[half].T
+    dlat, dlon, dalt = (first.position[half] - other.position[half]).T
+    R_M, R_N = radii(lat)
+    dp = np.stack([dlon * (R_N + alt) * np.cos(lat), dlat * (R_M + alt), dalt], axis=1)
+    off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[half]), np.abs(dp)], axis=1)
+    sigma = first.sigma[half, :9]
+    known = sigma > 0.0
+    ratio = np.sqrt(np.mean(np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2, axis=0))
+    size = ratio * first.sigma[-1, :9]
+    return Effect(float(size[2]), float(size[:2].max()), float(size[3:6].max()), float(size[6:9].max()))
 
 
 def _contradicted(track: Track) -> float:
@@ -114,7 +138,7 @@ def _beyond(track: Track, name: str, role: Role) -> bool:
     return where is not None and bool(np.any(np.abs(track.sensors[-1, where]) > SMALL * OPEN[role].prior))
 
 
-def slow_errors(track: Track, antenna: Mounting) -> list[str]:
+def slow_errors(track: Track, antenna: Mounting) -> list[Evidence]:
     """A warning where innovations of GNSS positions hang together from row to row, though they are taken for white noise.
 
     Of white ones the mean correlation over the first lags is zero, to one over the root of the number of products; a
@@ -134,9 +158,15 @@ def slow_errors(track: Track, antenna: Mounting) -> list[str]:
         return []
     wander = math.sqrt(max(float(np.mean(alike)) / len(used), 0.0))  # the filter has followed them: it is more
     return [
-        f"warning: errors of the GNSS positions hang together from fix to fix (correlation {correlation:.2f}), they wander by "
-        f"{wander:.2g} m or more: the sigma of position is too small; say by how much and how long, such as --gnss-drift "
-        f"{2 * wander:.2g},60 (m, s)"
+        note(
+            "innovations.wander",
+            "gnss_drift",
+            urgent=True,
+            name=fixes[0].name,
+            correlation=correlation,
+            wander=wander,
+            drift=2 * wander,
+        )
     ]
 
 
@@ -145,41 +175,45 @@ def _loosened(name: str, mounting: Mounting) -> Mounting:
     if name not in SENSORS:
         return mounting
     open_: dict[str, Any] = {
-        OPEN[role].sigma: getattr(mounting, OPEN[role].sigma) or OPEN[role].prior for role in SENSORS[name][2]
+        OPEN[role].sigma: getattr(mounting, OPEN[role].sigma) or OPEN[role].prior for role in SENSORS[name][1]
     }
     return replace(mounting, gate=0.0, **open_)
 
 
-def _contradiction(role: Role, key: str, option: str, given: Mounting, value: Array, sigma: Array) -> str:
+def _contradiction(role: Role, name: str, key: str, given: Mounting, value: Array, sigma: Array) -> Evidence:
+    """What the data say of one property, without its effect."""
     if role == "lag":
         late = "late" if value[0] > 0 else "early"
-        return (
-            f"the clock of --{key} seems {abs(value[0]):.3f} ± {sigma[0]:.3f} s {late}: try --offset {-value[0]:.3f}, or let it be "
-            "estimated"
-        )
+        figures: dict[str, Figure] = {
+            "name": name,
+            "size": abs(float(value[0])),
+            "sigma": float(sigma[0]),
+            "offset": -float(value[0]),
+        }
+        return Evidence(f"second_look.{late}", figures, remedies=("offset", "estimate.lag"), urgent=True)
     if role == "lever arm":
         arm = given.lever_arm + value
-        told = ", ".join(f"{axis} {v:+.2f} ± {s:.2f} m" for axis, v, s in zip(AXES, arm, sigma))
-        return f"the lever arm of --{key} seems to be {told}, not {_plain(given.lever_arm)}: {_advice(arm, sigma, given, option)}"
+        figures = {"name": name, "given": ",".join(f"{x:.4g}" for x in given.lever_arm)}
+        for axis, v, s in zip(AXES, arm, sigma, strict=True):
+            figures |= {axis: float(v), f"{axis}_sigma": float(s)}
+        unit = _smaller_unit(arm, sigma, given)
+        remedies = (f"arm.{key}",) if unit is None else ("arm_unit", f"arm.{key}")
+        return Evidence("second_look.arm", figures | {"unit": unit or ""}, remedies=remedies, urgent=True)
     if role == "scale":
-        return f"--{key} seems to count {100 * value[0]:+.2f} ± {100 * sigma[0]:.2f} %: try --estimate scale"
-    told = ", ".join(
-        f"{name} {math.degrees(v):+.2f} ± {math.degrees(s):.2f} deg" for name, v, s in zip("xz", value, sigma)
-    )
-    return f"the IMU seems turned against the vehicle of --{key}, about {told}: give --mounting, or try --estimate mounting"
+        figures = {"name": name, "scale": float(value[0]), "sigma": float(sigma[0])}
+        return Evidence("second_look.scale", figures, remedies=("estimate.scale",), urgent=True)
+    figures = {"name": name}
+    for axis, v, s in zip("xz", value, sigma, strict=True):
+        figures |= {axis: float(v), f"{axis}_sigma": float(s)}
+    return Evidence("second_look.mounting", figures, remedies=("mounting", "estimate.mounting"), urgent=True)
 
 
-def _advice(arm: Array, sigma: Array, given: Mounting, option: str) -> str:
-    """What to do about an arm that the data contradict."""
+def _smaller_unit(arm: Array, sigma: Array, given: Mounting) -> str | None:
+    """The unit in which an arm that the data contradict was probably given."""
     shown = sigma < 0.5 * OPEN["lever arm"].prior
-    told = given.lever_arm[shown]
-    length = float(np.linalg.norm(told))
+    said = given.lever_arm[shown]
+    length = float(np.linalg.norm(said))
     for unit, factor in SMALLER.items():
-        if length > LONG_ARM and np.linalg.norm(arm[shown] - factor * told) < 0.05 * length:
-            return f"were {unit} handed in? {option} is in metres"
-    axle = ", to the axle that nothing steers" if option == "--wheel-arm" else ""
-    return f"check {option} (metres{axle})"
-
-
-def _plain(arm: Array) -> str:
-    return ",".join(f"{x:.4g}" for x in arm)
+        if length > LONG_ARM and np.linalg.norm(arm[shown] - factor * said) < 0.05 * length:
+            return unit
+    return None

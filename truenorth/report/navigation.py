@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from truenorth.core.language import translated as _
 from truenorth.figures.thinning import evenly
-from truenorth.navigation.result import mean_nis
+from truenorth.quality.innovations import mean_nis
 from truenorth.report.chart import POINTS, Chart, Clock, angle_unit, length_unit, speed_unit
 from truenorth.report.charts import limits, over_time
 from truenorth.report.damping import damping_facts, damping_panels
 from truenorth.report.document import Panel, Table, render, verdict_lines
 from truenorth.report.estimated import estimated_rows
 from truenorth.report.numbers import short
+from truenorth.report.page import MOODS
 from truenorth.report.track import track_panel
+from truenorth.state.wording import headline
 
 if TYPE_CHECKING:
     from truenorth.navigation.result import Navigation
@@ -24,13 +26,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-VERDICTS = {"navigated": ("good", "Navigated"), "inconsistent": ("bad", "The measurements contradict the track")}
 BODY = ("odometer", "velocity log")  # sensors whose innovations are right, forward, up
 
 
 def navigation_page(result: Navigation) -> str:
     """HTML text of the page; everything is inside, so that it works offline."""
-    mood, verdict = VERDICTS[result.status]
+    mood, verdict = MOODS.get(result.status, "bad"), headline(result.status, result.evidence)
     reasons, warnings = verdict_lines(result.reasons)
     if warnings and mood == "good":
         mood, verdict = "fair", "Navigated, with warnings"

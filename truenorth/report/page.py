@@ -13,25 +13,20 @@ from truenorth.report.charts import panels
 from truenorth.report.document import render, verdict_lines
 from truenorth.report.estimated import relation_table
 from truenorth.report.numbers import quantity, short
+from truenorth.state.wording import headline
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
     from truenorth.alignment.table import TurntableErrors
 
-VERDICTS = {
-    "aligned": ("good", "Aligned"),
-    "level_only": ("fair", "Levelled; heading refused"),
-    "not_converged": ("bad", "Not converged"),
-    "not_observable": ("bad", "Heading not observable"),
-    "inconsistent": ("bad", "The data contradict a base that stays"),
-}
+MOODS = {"aligned": "good", "navigated": "good", "level_only": "fair"}
 
 
 def alignment_page(result: Alignment) -> str:
     """HTML text of the page; everything is inside, so that it works offline."""
     shown, health = panels(result), _health(result)
     relation = relation_table(result.transfer, result.moving)
-    mood, verdict = VERDICTS[result.status]
+    mood, verdict = MOODS.get(result.status, "bad"), headline(result.status, result.evidence)
     findings = () if result.inspection is None else result.inspection.findings
     reasons, warned = verdict_lines(result.reasons)
     warnings = [*warned, *(finding for finding in findings if finding.severity != "note")]

@@ -1,0 +1,91 @@
+"""May the answer of a transfer alignment be used? What its master's rows contradict, and what a poor heading needs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment import transfer_loop as loop
+from truenorth.alignment.result import Alignment
+from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
+from truenorth.alignment.transfer_result import Transfer
+from truenorth.alignment.verdict import judged
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.state.evidence import Evidence, contradiction, note, notes
+from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
+
+MOST_JUMPS = 3  # of the master, that the reasons name one by one
+LOPSIDED, STEADY, FEWEST = 6.0, 0.9, 20  # sigmas of a mean of innovations, their correlation from row to row, rows
+
+
+def judge_transfer(
+    answer: Alignment,
+    transfer: Transfer,
+    track: TransferTrack,
+    start: SlaveStart,
+    heading_limit: float,
+    parted: Evidence | None,
+) -> Alignment:
+    """The answer with its verdict; `parted` is what is wrong with the clocks, if anything."""
+    evidence = [] if parted is None else [parted]
+    evidence += _rejected(transfer)
+    evidence += _misses(transfer, track, start)
+    lopsided = _lopsided(track)
+    if lopsided:
+        remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
+        evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
+    evidence += notes(transfer.notes) + notes(transfer.jumps[:MOST_JUMPS])
+    if len(transfer.jumps) > MOST_JUMPS:
+        evidence.append(note("transfer.more_jumps", count=len(transfer.jumps) - MOST_JUMPS))
+    evidence += [note("transfer.open", states=words) for words in transfer.open]
+    needs = "match_velocity" if transfer.matching == "attitude" else "manoeuvre"
+    return judged(answer, evidence, heading_limit, waiting=False, remedies=(needs,))
+
+
+def _rejected(transfer: Transfer) -> list[Evidence]:
+    share = transfer.rejected / max(1, transfer.rejected + transfer.used)
+    if share <= limit("rejected"):
+        return []
+    return [contradiction("transfer.rejected", "transfer_geometry", "flexure", share=share)]
+
+
+def _misses(transfer: Transfer, track: TransferTrack, start: SlaveStart) -> list[Evidence]:
+    """A delay, an arm or a mounting that comes out far from what was said of it."""
+    found = []
+    for name, off, prior in (
+        ("delay", transfer.delay - start.delay, transfer.delay_prior),
+        ("lever_arm", transfer.lever_arm - start.arm, transfer.lever_arm_prior[0]),
+        ("mounting", _between(start.C_mb, track.C_mb[-1]), transfer.mounting_prior[0]),
+    ):
+        miss = float(np.max(np.abs(off)))
+        if prior > 0.0 and miss > limit("mounting") * prior:
+            remedies = ("slave_axes", f"transfer.{name}")
+            found.append(contradiction(f"transfer.{name}", *remedies, miss=miss, prior=float(prior)))
+    return found
+
+
+def _lopsided(track: TransferTrack) -> str:
+    """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row.
+
+    Rows that were used, that is: those of a jump lie on one side too, until it is taken up.
+    """
+    later = slice(len(track.time) // 4, None)
+    nu, verdict = (track.innovation / track.innovation_sigma)[later], track.verdict[later]
+    for kind, name in enumerate(("velocities", "attitudes")):
+        rows = nu[verdict[:, kind] == loop.USED, 3 * kind : 3 * kind + 3]
+        if len(rows) < FEWEST:
+            continue
+        follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)
+        mean = np.abs(rows.mean(axis=0)) * math.sqrt(len(rows))
+        if np.any((mean > LOPSIDED) & (follows > STEADY)):
+            return name
+    return ""
+
+
+def _between(before: Array, after: Array) -> Array:
+    """(3,) rotation vector from one mounting to another, rad."""
+    return np.asarray(rotation_vector_from_dcm(before.T @ after))

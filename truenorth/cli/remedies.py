@@ -1,0 +1,44 @@
+"""Which option of the program offers a remedy that a piece of evidence asks for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+OPTIONS = {
+    "end_before": "--to {until:.0f}",
+    "still_part": "--from, --to",
+    "begin_after": "--from {after:.0f}",
+    "latitude": "--lat",
+    "height": "--alt",
+    "units": "--units",
+    "specification": "--imu",
+    "slave_specification": "--imu",
+    "imu_axes": "--axes",
+    "slave_axes": "--axes",
+    "mounting": "--mounting",
+    "offset": "--offset {offset:.3f}",
+    "estimate.lag": "--estimate latency",
+    "estimate.scale": "--estimate scale",
+    "estimate.mounting": "--estimate mounting",
+    "arm.gnss": "--lever-arm",
+    "arm.odometer": "--wheel-arm",
+    "arm.velocity": "--wheel-arm",
+    "gnss_drift": "--gnss-drift {drift:.2g},60",
+    "height_sensor": "--altitude free",
+    "use_barometer": "--altitude baro",
+    "part_of_logs": "--from, --to",
+    "without_jump": "--from, --to",
+    "transfer.delay": "--delay",
+    "transfer.lever_arm": "--lever-arm",
+    "transfer.mounting": "--mounting",
+    "transfer_geometry": "--axes, --lever-arm, --mounting, --delay",
+    "flexure": "--flexure",
+    "log_error": "--log-error",
+}
+
+
+def reasons_of(result: Any) -> tuple[str, ...]:
+    """The evidence of an alignment or a navigation in words, with the options of this program."""
+    from truenorth.state.wording import sentences
+
+    return sentences(result.evidence, OPTIONS)

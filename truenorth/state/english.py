@@ -1,0 +1,207 @@
+"""English: a sentence for each piece of evidence, a remedy for each key, words for terms."""
+
+from __future__ import annotations
+
+from truenorth.state.wording import Language
+
+TITLES = {
+    "aligned": "Aligned",
+    "navigated": "Navigated",
+    "level_only": "Levelled; heading refused",
+    "not_converged": "Not converged",
+    "not_observable": "Heading not observable",
+    "inconsistent": "The data contradict each other",
+    "base": "The data contradict a base that stays",
+    "drift": "The base drifts",
+    "rate": "The gyros contradict the place or their specification",
+    "force": "The accelerometers contradict the place or their specification",
+    "table": "The table was touched",
+    "innovations": "The measurements contradict the track",
+    "second_look": "The measurements contradict how their sensors sit",
+    "transfer": "Master and slave contradict each other",
+    "log": "The velocity log contradicts the INS",
+}
+
+SENTENCES = {
+    "text": "{text}",
+    # ---- what an alignment reached
+    "heading.known": (
+        "heading is known to {sigma:angle} (one sigma); {floor:angle} of it is sensor bias, which waiting does not improve"
+    ),
+    "heading.known_from": "heading is known to {sigma:angle} (one sigma), from {source:term}",
+    "heading.known_with_level": "heading is known to {sigma:angle}, level to {level:angle} (one sigma)",
+    "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
+    "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
+    "heading.vertical": (
+        "pitch is near +-90 deg: only a combination of heading and roll is known (see the combination)"
+    ),
+    "heading.hidden": (
+        "at latitude {lat:deg|.3f} deg the earth turns by {horizontal:deg/h|.3f} deg/h about the horizontal; gyro biases of "
+        "{bias:deg/h|} deg/h hide true north there"
+    ),
+    "heading.bias": (
+        "gyro bias can be {bias:deg/h|} deg/h ({imu}); a heading within {limit:deg|g} deg at latitude {lat:deg|.1f} deg needs "
+        "{needed:deg/h|.2g} deg/h or better: heading is refused"
+    ),
+    "heading.short": (
+        "heading is known to {sigma:angle} only after {duration:.0f} s, {limit:angle} is wanted; sensor bias would allow "
+        "{floor:angle}"
+    ),
+    "heading.short_until": (
+        "heading is known to {sigma:angle} only after {duration:.0f} s, {limit:angle} is wanted; sensor bias would allow "
+        "{floor:angle}; about {pays_until:.0f} s in all would bring it near its floor"
+    ),
+    "heading.wanted": "heading is known to {sigma:angle} only after {duration:.0f} s, {limit:angle} is wanted",
+    "level.known": "level is known to {level:deg|.2f} deg (one sigma)",
+    "level.known_finely": "level is known to {level:arcmin|.2f} arcmin (one sigma)",
+    "level.unknown": (
+        "level is known to {level:deg|.2f} deg only; {limit:deg|.0f} deg is the most that passes for level"
+    ),
+    "latitude.found": (
+        "the latitude was not given: found from the log, {lat:deg|.2f} deg, to {sigma:deg|.2g} deg (one sigma)"
+    ),
+    "latitude.assumed": (
+        "the latitude was not given: {lat:deg|.0f} deg assumed; gyros as poor as these do not see the difference"
+    ),
+    # ---- a base that stays, against earth and gravity
+    "base.moves": "the base does not stay where it is: it moves from {until:.1f} s on",
+    "base.unsettled": "re-linearisation did not settle: the log does not look like that of a base that stays where it is",
+    "drift.step": (
+        "the base drifts {axis:term}: from about {onset:.0f} s on its velocity shows a step to {velocity:.2g} m/s (likelihood "
+        "ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "drift.ramp": (
+        "the base drifts {axis:term}: from about {onset:.0f} s on its velocity grows to {velocity:.2g} m/s (likelihood "
+        "ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "rate.misses": (
+        "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification ({imu}) "
+        "allows {allowed:deg/h|} deg/h"
+    ),
+    "force.misses": (
+        "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu}) allows "
+        "{allowed:ug|} ug"
+    ),
+    "table.touched": (
+        "the table was touched, or an accelerometer's offset jumped, at about {time:.0f} s: the level specific force steps by "
+        "{step:mg|.2g} mg (as a tilt of {tilt:angle} would make it; usual {usual:mg|.2g} mg), and the gyros show no turn"
+    ),
+    # ---- measurements against the prediction
+    "innovations.rejected": (
+        "{name}: {rejected} of {count} measurements rejected: they contradict the track (half of them by more than "
+        "{scatter:.3g} {unit})"
+    ),
+    "innovations.outliers": "{name}: {rejected} of {count} measurements rejected as outliers",
+    "innovations.size": (
+        "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted"
+    ),
+    "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
+    "innovations.wander": (
+        "errors of the {name}s hang together from fix to fix (correlation {correlation:.2f}), they wander by {wander:.2g} m or "
+        "more: the sigma of position is too small"
+    ),
+    "odometer.taken_over": "odometer: scale, mounting and wheel arm are the alignment's, and estimated on",
+    "odometer.scale": "the odometer counts {scale:%|+.2f} % ({sigma:%|.2g} % one sigma)",
+    # ---- a slave against its master
+    "transfer.clocks_part": (
+        "the master's stamps are {before:.2f} s behind the slave's clock until {until:.1f} s and {after:.2f} s from "
+        "{since:.1f} s on, by their motion: one of the clocks steps or runs at another rate"
+    ),
+    "transfer.rejected": "{share:.0%} of the master's rows contradict the slave",
+    "transfer.delay": (
+        "the delay comes out {miss:ms|.3g} ms from the assumed one, which was said to be known to {prior:ms|.3g} ms"
+    ),
+    "transfer.lever_arm": (
+        "the lever arm comes out {miss:.3g} m from the assumed one, which was said to be known to {prior:.3g} m"
+    ),
+    "transfer.mounting": (
+        "the mounting comes out {miss:deg|.3g} deg from the assumed one, which was said to be known to {prior:deg|.3g} deg"
+    ),
+    "transfer.lopsided": (
+        "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
+        "specification ({imu}) allows, or the master drifts"
+    ),
+    "transfer.more_jumps": "{count} more jumps of the master were followed",
+    "transfer.open": "this motion does not separate them well: {states}",
+    # ---- clocks, arms, scales and mountings left open
+    "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
+    "second_look.early": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s early",
+    "second_look.arm": (
+        "the lever arm of the {name} seems to be right {right:+.2f} ± {right_sigma:.2f} m, forward {forward:+.2f} ± "
+        "{forward_sigma:.2f} m, up {up:+.2f} ± {up_sigma:.2f} m, not {given}"
+    ),
+    "second_look.scale": "the {name} seems to count {scale:%|+.2f} ± {sigma:%|.2f} %",
+    "second_look.mounting": (
+        "the IMU seems turned against the vehicle of the {name}, about x {x:deg|+.2f} ± {x_sigma:deg|.2f} deg, z "
+        "{z:deg|+.2f} ± {z_sigma:deg|.2f} deg"
+    ),
+    "second_look.misfit": "the {name} fits no small scale error and mounting angle",
+    "second_look.long_arm": (
+        "the lever arm of the {name} is {length:.0f} m long, and the data do not show whether it is"
+    ),
+    # ---- a velocity log, for damping
+    "log.contradicts": (
+        "velocity log: differs from the free INS by {east:.2f} m/s east, {north:.2f} m/s north (median), {allowed:.2f} m/s is "
+        "expected"
+    ),
+    "log.outliers": "velocity log: {count} epochs left out as outliers",
+    "log.jump": (
+        "velocity log: at {time:.0f} s its level jumps by {east:+.2f} m/s east, {north:+.2f} m/s north; held to the level before"
+    ),
+    "log.silent": "velocity log: silent for {length:.0f} s after {time:.0f} s; undamped in between",
+    "log.rejected": "velocity log: {count} measurements rejected by the filter's gate",
+    "damping.internal": "internal damping: what the vehicle's own manoeuvres add is not in the bands",
+    # ---- height
+    "height.free": "height is carried on by velocity alone: no sensor of height is given",
+    "height.fixed": "height is held fixed, as at sea",
+    "height.barometer_unused": "the barometer is not used: height is {altitude!r}",
+}
+
+REMEDIES = {
+    "record_longer": "record longer",
+    "record_calmer": "record longer, or with less motion",
+    "end_before": "align a part in which the base stands",
+    "still_part": "align a part in which the base stays",
+    "begin_after": "align the part after it, or the part before it",
+    "latitude": "check the latitude",
+    "height": "check the height",
+    "units": "check the units",
+    "specification": "check the specification",
+    "source": "check axes, units, clock, lever arm and sigmas of that sensor",
+    "sensor_axes": "check its axes and unit",
+    "imu_axes": "check the IMU's axes",
+    "mounting": "give the mounting",
+    "estimate.lag": "let it be estimated",
+    "estimate.scale": "let it be estimated",
+    "estimate.mounting": "let it be estimated",
+    "offset": "shift the times of that log by {offset:.3f} s",
+    "arm_unit": "was it given in {unit}?",
+    "arm.gnss": "check the arm; metres are expected",
+    "arm.odometer": "check the arm, to the axle that nothing steers; metres are expected",
+    "arm.velocity": "check the arm; metres are expected",
+    "gnss_drift": "give the size and the time of that wander, such as {drift:.2g} m and 60 s",
+    "height_sensor": "give a sensor of height, or let the height be free, where the vehicle climbs",
+    "use_barometer": "for its heights keep the height by the barometer",
+    "part_of_logs": "align a part of the logs",
+    "put_times_right": "correct the times",
+    "transfer_geometry": "check the axes, the lever arm, the mounting and the delay",
+    "flexure": "check whether both sit on one rigid body",
+    "slave_axes": "check the slave's axes",
+    "transfer.delay": "check the delay",
+    "transfer.lever_arm": "check the lever arm",
+    "transfer.mounting": "check the mounting",
+    "slave_specification": "give the right specification",
+    "without_jump": "align a part without the jump, which may be an error of the master",
+    "match_velocity": (
+        "attitude matching knows the slave only as well as its mounting on the master is known; match velocity too"
+    ),
+    "manoeuvre": "velocity shows heading by horizontal acceleration alone; make a turn, an S-turn, a change of speed",
+    "log": "check its units, axes, mounting, and whether it lives",
+    "log_error": "check the error that was stated for it",
+    "manoeuvre_gnss": "the vehicle must accelerate and turn while GNSS sees it",
+    "north": "an odometer tells nothing of north; use gyros that see the earth turn, or GNSS",
+}
+
+TERMS = {"earth": "the earth's rate"}
+
+ENGLISH = Language(TITLES, SENTENCES, REMEDIES, TERMS)

@@ -1,0 +1,50 @@
+"""Every limit of a verdict, in one table, with the reason for it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Limit(NamedTuple):
+    """A threshold: its value, its unit, and why it is what it is."""
+
+    value: float
+    unit: str
+    reason: str
+
+
+LIMITS: dict[str, Limit] = {
+    # ---- what the judge does with an effect
+    "negligible": Limit(0.3, "sigma", "adds 4 % to sigma: less than the figures of sigma are worth"),
+    "bound": Limit(1.0, "sigma", "a suspicion of up to one sigma leaves the answer within three of them: it is added"),
+    "growth": Limit(
+        3.0, "sigma", "an error three times as large as all others together is not a correction of the model"
+    ),
+    # ---- what an answer must reach
+    "level": Limit(
+        math.radians(3.0), "rad", "beyond it the small-angle models of all procedures lose their second digit"
+    ),
+    "pole": Limit(0.1, "1", "cosine of 84 deg latitude, from which the place, not the gyro, is what hides north"),
+    # ---- checks of the sensors against earth and gravity
+    "specification": Limit(5.0, "sigma", "a sound IMU misses its specification by that much once in a million"),
+    "drift": Limit(
+        25.0, "1", "likelihood ratio, chi-square with 1 degree of freedom, 12 signatures: 1e-5 false alarms"
+    ),
+    # ---- measurements of aiding sensors and masters
+    "rejected": Limit(
+        0.2, "1", "of a sensor's measurements; a sound one loses 1e-4 to the gate, a poor road some per cent"
+    ),
+    "nis": Limit(
+        3.0, "1", "mean over its rows, beyond which sigma is 1.7 times too small: model and data do not agree"
+    ),
+    "mounting": Limit(5.0, "sigma", "by which a delay, an arm or a mounting may miss what was said of it"),
+    "log": Limit(5.0, "sigma", "between INS and velocity log for half of the time: of sound ones one in a million"),
+    # ---- innovations
+    "chance": Limit(5.0, "sigma", "a statistic of innovations this far out is chance once in two million tests"),
+}
+
+
+def limit(name: str) -> float:
+    """The value of a limit."""
+    return LIMITS[name].value
