@@ -98,7 +98,7 @@ def test_scale_and_mounting_that_are_not_estimated(drive):
 )
 def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
     found = SimpleNamespace(
-        model=SimpleNamespace(slice_of=lambda name: slice(0, 3) if name == "GNSS lever arm" else None),
+        layout=SimpleNamespace(slice_of=lambda name: slice(0, 3) if name == "GNSS lever arm" else None),
         residuals=(),
         sensors=np.zeros((1, 3)),
         sigma=np.array([sigma]),
