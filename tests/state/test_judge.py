@@ -25,6 +25,7 @@ claims = st.builds(
     floor=st.floats(0.0, 0.5),
     waiting=st.booleans(),
     hidden=st.booleans(),
+    able=st.booleans(),
 )
 items = st.builds(
     Evidence,
@@ -100,7 +101,9 @@ def test_a_sigma_that_grows_beyond_its_limit_is_no_good():
 
 def test_an_output_that_is_refused_is_not_made_wrong():
     claim = Claim(Effect(1.0, 1e-4, math.inf, math.inf), heading_limit=0.1, floor=1.0)
-    assert judge(claim, [contradiction("text", effect=Effect(heading=math.inf), text="")]).finding == "level_only"
+    item = contradiction("text", effect=Effect(heading=math.inf), text="")
+    assert judge(claim, [item]).finding == "level_only"
+    assert judge(replace(claim, able=True), [item]).finding == "inconsistent"  # it is missed, and that is why
 
 
 @given(effects)

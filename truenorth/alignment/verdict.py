@@ -45,6 +45,7 @@ def judged(
     _, floor = azimuth_sigmas(answer)
     lat = answer.position.lat
     bias = float(np.max(answer.gyro_bias_prior))
+    stays = answer.moving is None and answer.transfer is None
     verdict = judge(
         Claim(
             sigma=claimed(answer),
@@ -54,8 +55,8 @@ def judged(
             hidden=floor > heading_limit
             and math.cos(lat) < limit("pole")
             and bias / EARTH_RATE < heading_limit
-            and answer.moving is None
-            and answer.transfer is None,
+            and stays,
+            able=stays and bias < heading_limit * EARTH_RATE * math.cos(lat),
         ),
         evidence,
     )

@@ -1,4 +1,4 @@
-"""The command line: `truenorth align`, `advise`, `inspect`, `navigate`, `simulate`, `campaign`, `tune`, `reproduce`.
+"""The command line: one command for each thing to do (`align`, `inspect`, `navigate`, `simulate`, ...).
 
 Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
@@ -15,6 +15,7 @@ import typer
 from truenorth.cli.advise import advise
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
+from truenorth.cli.faults import faults
 from truenorth.cli.inspect import inspect
 from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
@@ -41,6 +42,7 @@ app.command("inspect")(inspect)
 app.command("navigate")(navigate)
 app.command("simulate")(simulate)
 app.command("campaign")(campaign)
+app.command("faults")(faults)
 app.command("tune")(tune)
 app.command("reproduce")(reproduce)
 

@@ -20,7 +20,8 @@ class Claim:
     Attributes
     ----------
     sigma : Effect
-        One sigma of each output; infinite for one that it does not give. A heading beyond its limit is not given either.
+        One sigma of each output; infinite for one that it does not give. A heading beyond its limit counts as not given,
+        unless the sensors are `able` to give it.
     heading_limit : float, rad
         Largest one-sigma heading error of use; infinite: heading is not what the result is for.
     floor : float, rad
@@ -29,6 +30,8 @@ class Claim:
         Whether more of the same data improves heading at all.
     hidden : bool
         Whether the place, not the sensor, is what hides north.
+    able : bool
+        Whether the sensors, as specified, can give heading: one that they then do not give is missed.
     """
 
     sigma: Effect
@@ -36,6 +39,7 @@ class Claim:
     floor: float = 0.0
     waiting: bool = True
     hidden: bool = False
+    able: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
     added = NO_EFFECT
     given = claim.sigma
     if given.heading > claim.heading_limit:  # refused, whatever else is found
-        given = replace(given, heading=math.inf)
+        given = replace(given, heading=claim.heading_limit if claim.able else math.inf)
     for item in evidence:
         size = weight(item.effect, given)
         if item.kind == "note" or size <= limit("negligible"):

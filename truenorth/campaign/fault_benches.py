@@ -1,0 +1,228 @@
+"""Procedures that faults are tried on: a sound simulated log with its truth, drawn anew for each run, and how to align it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment import align, align_in_motion, align_rotary, align_transfer
+from truenorth.alignment.result import Alignment
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
+from truenorth.core.position import METRES_PER_RADIAN, Position
+from truenorth.navigation import navigate
+from truenorth.navigation.result import Navigation
+from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.state.state import Start
+
+Array = NDArray[np.float64]
+Inputs = dict[str, Any]
+Truth = Callable[[float], Any]  # motion states of the body at a time
+
+DRIVE = [
+    {"kind": "straight", "duration": "15 s"},
+    {"kind": "accelerate", "to": "14 m/s", "acceleration": "1.5 m/s^2"},
+    {"kind": "turn", "angle": "90 deg", "rate": "9 deg/s"},
+    {"kind": "straight", "duration": "25 s"},
+    {"kind": "accelerate", "to": "6 m/s", "acceleration": "1.5 m/s^2"},
+    {"kind": "turn", "angle": "-120 deg", "rate": "12 deg/s"},
+    {"kind": "accelerate", "to": "14 m/s", "acceleration": "1.2 m/s^2"},
+    {"kind": "turn", "angle": "60 deg", "rate": "8 deg/s"},
+    {"kind": "straight", "duration": "40 s"},
+]
+SHAKE = [{"kind": "vibration", "sines": [{"frequency": "12 Hz", "acceleration": ["5 mg", "5 mg", "8 mg"]}]}]
+WHEEL = {"rate": "10 Hz", "output": "speed", "noise": "0.02 m/s", "scale_sigma": "1 %", "mounting_sigma": "0.5 deg"}
+RECEIVER = {"rate": "1 Hz", "position_noise": "1 m", "velocity_noise": "0.05 m/s"}
+
+
+@dataclass(frozen=True)
+class Bench:
+    """One procedure.
+
+    Attributes
+    ----------
+    name : str
+    scenario : callable
+        Draws one.
+    align : callable
+        Inputs to an alignment or a navigation.
+    """
+
+    name: str
+    scenario: Callable[[np.random.Generator], Mapping[str, Any]]
+    align: Callable[[Inputs], Alignment | Navigation]
+
+    def draw(self, seed: int, run: int) -> tuple[Inputs, Truth]:
+        """A sound log of its own motion and errors, and its truth."""
+        rng = np.random.default_rng([seed, run])
+        built = read_scenario(dict(self.scenario(rng)))
+        simulated = built.simulate(seed=seed, run=run)
+        record = simulated.record
+        body = built.build_motion(seed, run)
+        begin = body.states(np.array(float(record.time[0] - record.interval)))
+        place = Position(float(begin.lat), float(begin.lon), float(begin.alt))
+        inputs: Inputs = {"record": record, "place": place, "imu": built.imu_spec}
+        inputs |= {key: aid.record for key, aid in _aiding(built, seed, run).items()}
+        if self.name == "navigate":
+            inputs["start"] = _start(rng, begin, simulated, built)
+        return inputs, lambda time: body.states(np.array(time))
+
+
+def _aiding(built: Scenario, seed: int, run: int) -> dict[str, Any]:
+    return built.simulate_aiding(seed=seed, run=run)
+
+
+def _start(rng: np.random.Generator, at: Any, simulated: Any, built: Scenario) -> Start:
+    """Drawn about the truth with the sigmas that it claims."""
+    spec = built.imu_spec
+    sigma = np.repeat([3e-4, 0.02, 1.0, 0.0, 0.0], 3)
+    sigma[2] = 3e-3
+    sigma[9:] = np.sqrt(spec.bias_variance)
+    off = sigma * rng.standard_normal(15)
+    return Start(
+        time=float(simulated.record.time[0] - simulated.record.interval),
+        C_nb=dcm_from_rotation_vector(-off[:3]) @ at.C_nb,
+        v_n=at.v_n + off[3:6],
+        lat=float(at.lat) + off[7] / METRES_PER_RADIAN,
+        lon=float(at.lon) + off[6] / (METRES_PER_RADIAN * math.cos(float(at.lat))),
+        alt=float(at.alt) + off[8],
+        gyro_bias=np.zeros(3),
+        accel_bias=np.zeros(3),
+        P=np.diag(sigma**2),
+    )
+
+
+def _base(rng: np.random.Generator, name: str, duration: float, imu: str) -> dict[str, Any]:
+    lat = rng.choice([-1.0, 1.0]) * rng.uniform(15.0, 60.0)
+    return {
+        "name": name,
+        "duration": f"{duration:g} s",
+        "rate": "50 Hz",
+        "position": {"lat": f"{lat:.4f} deg", "lon": f"{rng.uniform(-180.0, 180.0):.4f} deg"},
+        "imu": imu,
+    }
+
+
+def _still(rng: np.random.Generator) -> dict[str, Any]:
+    return _base(rng, "still", 240.0, "navigation") | {
+        "motion": {"kind": "rest", "heading": f"{rng.uniform(0.0, 360.0):.3f} deg"},
+    }
+
+
+def _tone(rng: np.random.Generator, low: float, high: float, unit: str, shift: float) -> dict[str, Any]:
+    period, phase = rng.uniform(5.0, 9.0) + shift, rng.uniform(0.0, 360.0)
+    return {
+        "amplitude": f"{rng.uniform(low, high):.4f} {unit}",
+        "period": f"{period:.3f} s",
+        "phase": f"{phase:.2f} deg",
+    }
+
+
+def _sway(rng: np.random.Generator) -> dict[str, Any]:
+    heading = f"{rng.uniform(0.0, 360.0):.3f} deg"
+    tones = {"heading": [_tone(rng, 1.0, 4.0, "deg", 3.0)], "pitch": [_tone(rng, 1.5, 5.0, "deg", 0.0)]}
+    tones |= {"roll": [_tone(rng, 3.0, 8.0, "deg", 1.0)], "up": [_tone(rng, 0.05, 0.4, "m", 1.5)]}
+    tones |= {"east": [_tone(rng, 0.01, 0.05, "m", 0.5)], "north": [_tone(rng, 0.01, 0.05, "m", 0.2)]}
+    return {"kind": "sway", "heading": heading, "tones": tones}
+
+
+def _swaying(rng: np.random.Generator) -> dict[str, Any]:
+    arm = [f"{x:.2f} m" for x in rng.uniform(-8.0, 8.0, 3)]
+    return _base(rng, "swaying", 240.0, "navigation") | {"motion": _sway(rng), "lever_arm": arm}
+
+
+def _rotary(rng: np.random.Generator) -> dict[str, Any]:
+    axes = [
+        {"kind": "spin", "direction": "z", "rate": f"{rng.uniform(8.0, 18.0):.2f} deg/s"},
+        {"kind": "spin", "direction": "x", "rate": f"{rng.uniform(2.0, 6.0):.2f} deg/s"},
+    ]
+    indexer = {"axes": axes, "encoder": {"resolution": "1 arcsec"}}
+    return _swaying(rng) | {"name": "rotary", "indexer": indexer}
+
+
+def _drive(rng: np.random.Generator, imu: str) -> dict[str, Any]:
+    heading = f"{rng.uniform(0.0, 360.0):.3f} deg"
+    base = _base(rng, "drive", 160.0, imu)
+    return base | {"motion": {"kind": "legs", "heading": heading, "legs": DRIVE}, "disturbances": SHAKE}
+
+
+def _flight(rng: np.random.Generator) -> dict[str, Any]:
+    legs = [
+        {"kind": "straight", "duration": f"{rng.uniform(30.0, 40.0):.1f} s"},
+        {"kind": "turn", "angle": "90 deg", "rate": "3 deg/s", "onset": "0.5 s"},
+        {"kind": "straight", "duration": "20 s"},
+        {"kind": "turn", "angle": "-60 deg", "rate": "3 deg/s", "onset": "0.5 s"},
+        {"kind": "straight", "duration": "30 s"},
+    ]
+    heading = f"{rng.uniform(0.0, 360.0):.3f} deg"
+    imu = {
+        "name": "slave",
+        "gyro": {"bias": "1 deg/h", "random_walk": "0.05 deg/sqrt(h)"},
+        "accel": {"bias": "50 ug", "random_walk": "10 ug/sqrt(Hz)"},
+    }
+    master = {"rate": "10 Hz", "latency": "30 ms", "lever_arm": ["1 m", "0.1 m", "0.2 m"], "velocity_noise": "0.2 m/s"}
+    base = _base(rng, "flight", 120.0, "tactical")
+    base["position"]["alt"] = "3000 m"
+    return base | {
+        "imu": imu,
+        "motion": {"kind": "legs", "heading": heading, "speed": "120 m/s", "legs": legs},
+        "master": master,
+    }
+
+
+def _transfer(i: Inputs) -> Alignment:
+    return align_transfer(i["record"], i["master"], i["imu"], matching="velocity", mounting_sigma=math.radians(1.0))
+
+
+BENCHES: dict[str, Bench] = {
+    bench.name: bench
+    for bench in (
+        Bench("still", _still, lambda i: align(i["record"], i["place"], i["imu"])),
+        Bench("swaying", _swaying, lambda i: align(i["record"], i["place"], i["imu"])),
+        Bench("rotary", _rotary, lambda i: align_rotary(i["record"], i["encoder"], i["place"], i["imu"])),
+        Bench(
+            "odometer",
+            lambda rng: _drive(rng, "navigation") | {"odometer": WHEEL},
+            lambda i: align_in_motion(i["record"], i["imu"], odometer=i["odometer"], position=i["place"]),
+        ),
+        Bench(
+            "gnss",
+            lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER},
+            lambda i: align_in_motion(i["record"], i["imu"], gnss=i["gnss"], position=i["place"]),
+        ),
+        Bench("transfer", _flight, _transfer),
+        Bench(
+            "navigate",
+            lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER, "odometer": WHEEL},
+            lambda i: navigate(i["record"], i["start"], imu=i["imu"], gnss=i["gnss"]),
+        ),
+    )
+}
+
+
+def misses(answer: Alignment | Navigation, truth: Truth) -> dict[str, float]:
+    """Errors of what the answer gives, in its own sigmas."""
+    if isinstance(answer, Navigation):
+        track = answer.track
+        at = truth(float(track.time[-1]))
+        phi = -rotation_vector_from_dcm(track.C_nb[-1] @ at.C_nb.T)
+        lat, lon, alt = track.position[-1]
+        east = (lon - float(at.lon) + math.pi) % (2.0 * math.pi) - math.pi
+        dp = [east * METRES_PER_RADIAN * math.cos(lat), (lat - float(at.lat)) * METRES_PER_RADIAN, alt - float(at.alt)]
+        off = np.abs(np.concatenate([phi, track.v_n[-1] - at.v_n, dp])) / np.maximum(track.sigma[-1, :9], 1e-12)
+        off[[5, 8]] = 0.0 if answer.altitude == "fixed" else off[[5, 8]]
+        return {
+            "level": float(off[:2].max()),
+            "heading": float(off[2]),
+            "velocity": float(off[3:6].max()),
+            "position": float(off[6:].max()),
+        }
+    at = truth(answer.time)
+    phi = np.abs(rotation_vector_from_dcm(answer.C_nb @ at.C_nb.T))
+    off = phi / np.sqrt(np.diag(answer.phi_covariance))
+    found = {"level": float(off[:2].max())}
+    return found | ({"heading": float(off[2])} if answer.heading_known else {})

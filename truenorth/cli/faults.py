@@ -1,0 +1,65 @@
+"""`truenorth faults`: spoil simulated logs in all ways that are known, and count the wrong answers that pass in silence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truenorth.cli.console import make_console, stages
+
+# The \b keeps the lines as they are, ready to be copied.
+EXAMPLES = """
+\b
+Examples:
+  truenorth faults
+  truenorth faults --procedure rotary --procedure swaying --runs 20
+  truenorth faults --fault "late gyros" --fault none --seed 7 -o faults
+\b
+Exit codes: 0 no wrong answer passed in silence; 1 some did; 2 wrong usage.
+"""
+
+
+def faults(
+    procedure: Annotated[
+        list[str] | None, typer.Option(help="One or more; all without it.", show_default=False)
+    ] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option(help="One or more; all without it. 'none' is a sound log.", show_default=False)
+    ] = None,
+    runs: Annotated[int, typer.Option(min=1, help="Of each procedure with each fault.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="Of motions, errors, and sizes of the faults.")] = 0,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for faults.csv and trials.csv.", show_default=False)
+    ] = None,
+) -> None:
+    """Try faults of logs, clocks, places and specifications on every procedure, with drawn sizes."""
+    import pandas as pd
+    from rich.table import Table
+
+    from truenorth.campaign.faults import OUTCOMES, run_faults, table
+    from truenorth.core.atomic import atomic_path, writable_folder
+
+    with stages(False) as tell:
+        trials = run_faults(procedure or (), fault or (), runs=runs, seed=seed, progress=tell)
+    rows = table(trials)
+    console = make_console()
+    shown = Table(box=None, pad_edge=False)
+    for title in ("procedure", "fault", *OUTCOMES, "worst, sigmas"):
+        shown.add_column(title, justify="left" if title in ("procedure", "fault") else "right")
+    for row in rows:
+        worst = f"{row['worst']:.1f}" if row["silent"] else ""
+        shown.add_row(row["procedure"], row["fault"], *(str(row[name] or "") for name in OUTCOMES), worst)
+    console.print(shown)
+    if output is not None:
+        folder = writable_folder(output)
+        for name, frame in (("faults.csv", pd.DataFrame(rows)), ("trials.csv", pd.DataFrame(trials))):
+            with atomic_path(folder / name) as path:
+                frame.to_csv(path, index=False)
+            console.print(f"wrote {folder / name}", soft_wrap=True)
+    if any(row["silent"] or row["crash"] for row in rows):
+        raise typer.Exit(1)
+
+
+faults.__doc__ = f"{faults.__doc__}\n{EXAMPLES}"
