@@ -38,7 +38,7 @@ def test_what_a_person_reads(logs):
     assert result.exit_code == 0, result.output
     assert "mounting, deg: heading 0.3" in result.stdout
     assert "right 0 (as given)" in result.stdout
-    assert "not well told apart" in result.stdout
+    assert "does not separate them well" in result.stdout
 
 
 def test_another_time_base_and_what_is_not_seen(logs, tmp_path):
