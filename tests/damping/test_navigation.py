@@ -173,7 +173,7 @@ def test_a_log_that_cannot_be_this_ships(ship, method, factor):
     log = ship.log()
     result = ship.navigate(Damper(method), VelocityRecord(log.time, factor * log.velocity, "navigation"))
     assert result.status == "inconsistent"
-    assert "m/s is expected; check its units" in result.reasons[0] + result.reasons[1]
+    assert "m/s is expected: check its units" in result.reasons[0] + result.reasons[1]
     assert ship.navigate(Damper(method), log).status == "navigated"
 
 
