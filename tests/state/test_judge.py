@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truenorth.state.english import ENGLISH
+from truenorth.state.english import REMEDIES, SENTENCES, TITLES
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, OUTPUTS, Effect, Evidence, contradiction, note
 from truenorth.state.judge import Claim, judge, weight
 from truenorth.state.limits import LIMITS, limit
@@ -122,18 +122,18 @@ def test_every_limit_has_its_reason():
 
 def test_english_names_no_option():
     """Options stand in the command line's table alone."""
-    assert not any("--" in text for table in ENGLISH for text in table.values())
+    assert not any("--" in text for table in (TITLES, SENTENCES, REMEDIES) for text in table.values())
 
 
 def test_the_command_line_offers_remedies_that_exist():
     from truenorth.cli.remedies import OPTIONS
 
-    assert OPTIONS.keys() <= ENGLISH.remedies.keys()
+    assert OPTIONS.keys() <= REMEDIES.keys()
 
 
 def test_templates_are_sound():
     """Each field has a name, so that another language may order them otherwise."""
-    for text in (*ENGLISH.sentences.values(), *ENGLISH.remedies.values()):
+    for text in (*SENTENCES.values(), *REMEDIES.values()):
         assert all(name for _, name, _, _ in string.Formatter().parse(text) if name is not None)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from truenorth.state.wording import Language
-
 TITLES = {
     "aligned": "Aligned",
     "navigated": "Navigated",
@@ -203,5 +201,3 @@ REMEDIES = {
 }
 
 TERMS = {"earth": "the earth's rate"}
-
-ENGLISH = Language(TITLES, SENTENCES, REMEDIES, TERMS)
