@@ -53,6 +53,8 @@ def test_parts_of_one_array(save):
     path = save(mimu=np.column_stack([SENSORS, TIME]))
     columns = {"dtheta": "mimu[0:3]", "dvel": "mimu[3:6]", "time": "mimu[6]"}
     assert_is(read_imu(path, columns=columns), "increments")
+    turned = read_imu(path, columns=columns | {"dvel_y": "-mimu[4]"})
+    np.testing.assert_array_equal(turned.accel, SENSORS[:, 3:] * [1, -1, 1])
 
 
 def test_counts_with_a_scale_and_an_interval(save):
@@ -82,15 +84,15 @@ def test_a_matlab_struct_and_the_array_of_psins(tmp_path):
 @pytest.mark.parametrize(
     ("variables", "columns", "error", "words"),
     [
-        ({"a": TIME}, {}, DataError, ["no variables of an IMU", "found a"]),
-        ({"gyro": SENSORS[:, :3]}, {"time": "t"}, DataError, ["'accel' is missing", "found gyro"]),
-        ({"gyro": SENSORS[:, :3], "acc": SENSORS[:, :3]}, {}, DataError, ["'accel' is missing", "is it 'acc'?"]),
-        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:, :3], "ts": 0.01}, {}, UsageError, ["interval", "'ts'", "--rate"]),
-        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:5, :3], "time": TIME}, {}, DataError, ["7 and 5 rows"]),
+        ({"a": TIME}, {}, DataError, ["no columns of an IMU among a"]),
+        ({"gyro": SENSORS[:, :3]}, {"time": "t"}, DataError, ["'accel_x' is missing", "found gyro"]),
+        ({"gyro": SENSORS[:, :3], "forces": SENSORS[:, :3], "time": TIME}, {}, DataError, ["'accel_x' is missing", "forces[0]"]),
+        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:, :3]}, {}, UsageError, ["no time", "rate"]),
+        ({"gyro": SENSORS[:, :3], "accel": SENSORS[:5, :3], "time": TIME}, {}, DataError, ["different length", "accel_x 5"]),
         ({"gyro": SENSORS[:, :3], "accel": SENSORS[:, :3], "time": TIME[:5]}, {}, DataError, ["time 5"]),
-        ({"gyro": SENSORS, "accel": SENSORS[:, :3], "time": TIME}, {}, DataError, ["(7, 6)", "gyro[0:3]"]),
-        ({"gyro": np.full((7, 3), "a"), "accel": SENSORS[:, :3], "time": TIME}, {}, DataError, ["'gyro'", "numbers"]),
-        ({"c": SENSORS, "time": TIME}, {"gyro": "c[0:3]", "accel": "c[4:7]"}, DataError, ["'c[4:7]'", "no such columns"]),
+        ({"gyro": SENSORS, "accel": SENSORS[:, :3], "time": TIME}, {"gyro": "gyro"}, DataError, ["6 columns", "gyro[0:3]"]),
+        ({"gyro": np.full((7, 3), "a"), "accel": SENSORS[:, :3], "time": TIME}, {}, DataError, ["'gyro_x' is missing"]),
+        ({"c": SENSORS, "time": TIME}, {"gyro": "c[0:3]", "accel": "c[4:7]"}, DataError, ["'c[4:7]'", "no such three"]),
         ({"c": SENSORS, "time": TIME}, {"gyro": "c[:3]", "accel": "c[3:6]"}, UsageError, ["'c[:3]'", "counts[0:3]"]),
         ({"c": SENSORS, "s": TIME, "time": TIME}, {"gyro": "c[0:3]", "accel": "c[3:6]", "scale": "s"}, DataError,
          ["scale 's'", "(7,)"]),

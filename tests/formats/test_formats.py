@@ -45,8 +45,7 @@ def test_units_axes_and_names_by_options(record, tmp_path):
 
     (tmp_path / "log.yaml").write_text(f"columns: {columns}\nunits: 'deg/s,g'\naxes: FRD\n")
     _same(read_imu(path), read)
-    with pytest.raises(DataError, match="gyro_x"):
-        read_imu(path, columns={"time": "t"})
+    assert len(read_imu(path, columns={"time": "t"})) == len(record)
     (tmp_path / "log.yaml").write_text("colums: {}\n")
     with pytest.raises(DataError, match="colums"):
         read_imu(path)
@@ -57,7 +56,7 @@ def test_a_rate_makes_the_time(record, tmp_path):
     write_imu(record, path)
     lines = [",".join(line.split(",")[1:]) for line in path.read_text().splitlines()]
     path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(DataError, match="--rate"):
+    with pytest.raises(UsageError, match="give the rate"):
         read_imu(path)
     read = read_imu(path, rate=100.0)
     np.testing.assert_allclose(read.time, record.time, rtol=1e-14)
@@ -73,7 +72,7 @@ def test_psins_text(record, tmp_path):
     np.testing.assert_array_equal(read.gyro, record.gyro)
     np.testing.assert_array_equal(read.time, record.time)
     np.savetxt(path, np.column_stack([record.gyro, record.accel]), fmt="%.17g")
-    with pytest.raises(UsageError, match="--rate"):
+    with pytest.raises(UsageError, match="give the rate"):
         read_imu(path)
     np.testing.assert_allclose(read_imu(path, rate=100).time, record.time, rtol=1e-14)
 
@@ -84,7 +83,7 @@ def test_kf_gins_text_and_binary(record, tmp_path):
     np.savetxt(text, table, fmt="%.17g")
     table.astype("<f8").tofile(binary)
     for path in (text, binary):
-        read = read_imu(path)
+        read = read_imu(path, format="kf-gins" if path is text else None)
         assert read.kind == "increments"
         np.testing.assert_allclose(read.gyro, record.gyro, rtol=0, atol=1e-16)
         np.testing.assert_allclose(read.accel, record.accel, rtol=0, atol=1e-16)
@@ -99,13 +98,14 @@ def test_mat_and_npz_by_variable(record, tmp_path):
     gyro, accel = ("gyro", "accel") if record.kind == "rates" else ("dtheta", "dvel")
     path = tmp_path / "log.mat"
     savemat(path, {"w": record.gyro, "f": record.accel, "t": record.time})
-    read = read_imu(path, columns={gyro: "w", accel: "f", "time": "t"})
+    units = "rad/s,m/s^2" if record.kind == "rates" else "rad,m/s"
+    read = read_imu(path, columns={gyro: "w", accel: "f", "time": "t"}, units=units)
     _same(read, record)
-    with pytest.raises(DataError, match="found w, f, t"):
+    with pytest.raises(DataError, match="gravity"):
         read_imu(path)
     archive = tmp_path / "log.npz"
     np.savez(archive, **{gyro: record.gyro[:, :2], accel: record.accel, "time": record.time})
-    with pytest.raises(DataError, match=r"\(200, 2\)"):
+    with pytest.raises(DataError, match="gyro_x|dtheta_x"):
         read_imu(archive)
 
 
@@ -113,7 +113,7 @@ def test_mat_and_npz_by_variable(record, tmp_path):
 def test_text_under_a_binary_name(tmp_path, suffix):
     path = tmp_path / f"log.{suffix}"
     path.write_text("time,gyro_x\n1,2\n")
-    with pytest.raises(DataError, match="--format"):
+    with pytest.raises(DataError, match="another format"):
         read_imu(path)
 
 
@@ -127,12 +127,12 @@ def test_damaged_parquet(record, tmp_path):
 
 def test_wrong_encoding_and_unknown_suffix(tmp_path):
     path = tmp_path / "log.csv"
-    path.write_bytes("température,gyro_x\n1,2\n".encode("latin-1"))
-    with pytest.raises(DataError, match="UTF-8"):
-        read_imu(path)
+    names = "température,time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n"
+    path.write_bytes((names + "20,0.1,1,2,3,4,5,6\n20,0.2,1,2,3,4,5,6\n").encode("latin-1"))
+    assert len(read_imu(path)) == 2
     other = tmp_path / "log.dat"
-    other.write_text("1 2 3\n")
-    with pytest.raises(UsageError, match="--format"):
+    other.write_bytes(bytes(100))
+    with pytest.raises(UsageError, match="names no format"):
         read_imu(other)
     with pytest.raises(UsageError, match=r"\.csv, \.parquet or \.npz"):
         write_imu(ImuRecord(np.array([0.0, 1.0]), np.zeros((2, 3)), np.zeros((2, 3))), tmp_path / "log.xyz")

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 TURN_STEP = 0.5  # s, over which the turn of gravity is compared with the gyros
 LEAST_TURN = np.radians(0.5)  # rad, RMS of gravity's turn over TURN_STEP, for a judgement on the gyros
+AGREES = 0.8  # share of gravity's turn that the gyros must explain for a claim
 EQUAL = 0.02  # readings whose shares differ by less are equals
 AXES = "xyz"
 
@@ -34,12 +35,15 @@ class Turning:
         Signed axes, such as ``+y +x -z``, of the reading that agrees best: what the gyro columns x, y, z hold.
     best_agreement : float
         Its agreement.
+    best_scale : float
+        Measured rate over the rate that gravity's direction shows, in that reading.
     """
 
     scale: float
     agreement: float
     best_axes: str
     best_agreement: float
+    best_scale: float
 
 
 def fit_turning(interval: float, rates: Array) -> Turning:
@@ -61,7 +65,7 @@ def fit_turning(interval: float, rates: Array) -> Turning:
     Turning
         All NaN where the record is too short or nothing turned.
     """
-    nothing = Turning(np.nan, np.nan, "", np.nan)
+    nothing = Turning(np.nan, np.nan, "", np.nan, np.nan)
     cells = max(1, round(TURN_STEP / interval))
     size = np.linalg.norm(rates[3:], axis=0)
     if rates.shape[1] < 20 * cells or not np.all(size > 0.0):
@@ -99,7 +103,7 @@ def fit_turning(interval: float, rates: Array) -> Turning:
     # A turn about one axis leaves others open: of equals, the reading nearest to the axes as given.
     equals = [r for r in readings if r[0] > most - EQUAL]
     best = max(equals, key=lambda r: sum(sign for i, sign in enumerate(r[3]) if r[2][i] == i))
-    return Turning(identity[1], identity[0], _columns(best[2], best[3]), best[0])
+    return Turning(identity[1], identity[0], _columns(best[2], best[3]), best[0], best[1])
 
 
 def _smooth(signal: Array, cells: int) -> Array:

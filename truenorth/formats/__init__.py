@@ -17,9 +17,11 @@ from truenorth.formats.aiding import (
     read_trajectory,
     read_velocity,
 )
+from truenorth.formats.columns import columns_of
 from truenorth.formats.detect import FORMATS, format_of
 from truenorth.formats.gnss import read_gnss
 from truenorth.formats.layout import layout_for
+from truenorth.formats.table import record_of
 from truenorth.records import ImuRecord, Record
 
 __all__ = [
@@ -37,16 +39,13 @@ __all__ = [
 ]
 
 READERS = {
-    "csv": ("csv", "read"),
-    "parquet": ("parquet", "read"),
-    "npz": ("npz", "read"),
     "mat": ("mat", "read"),
     "psins": ("psins", "read"),
     "kf-gins": ("kf_gins", "read_text"),
     "kf-gins-binary": ("kf_gins", "read_binary"),
     "ros": ("ros", "read"),
 }
-WRITERS = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
+WRITERS = {".csv": "text", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
 
 
 def read_imu(
@@ -100,9 +99,14 @@ def read_imu(
     path = Path(path)
     given = {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind, "topic": topic}
     try:
-        module, function = READERS[format_of(path, format)]
+        chosen = format_of(path, format)
+        layout = layout_for(path, given)
+        if chosen not in READERS:
+            return record_of(columns_of(path, chosen), layout)
+        module, function = READERS[chosen]
         reader = getattr(import_module(f"truenorth.formats.{module}"), function)
-        return reader(path, layout_for(path, given))
+        record: ImuRecord = reader(path, layout)
+        return record
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
 

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.formats.columns import columns_of
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
 from truenorth.formats.order import ordered
 from truenorth.formats.places import check_degrees
-from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, columns_of, find
+from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find
 from truenorth.records import EncoderRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
 Array = NDArray[np.float64]
@@ -314,8 +315,13 @@ def open_log(
         values = options_for(path, given, lambda content: checked_options(content, quantities, known_keys))
         others = {key: value for key, value in values.items() if key in known_keys}
         options = Options(values.get("columns", {}), values.get("units", {}), others)
-        example = ",".join(q.name for q in quantities[:4])
-        return ordered(find(columns_of(path, chosen, example), quantities, options)), others
+        columns = columns_of(path, chosen)
+        if not columns.named:
+            example = ",".join(q.name for q in quantities[:4])
+            raise DataError(
+                f"{path.name}: numbers, and no header of names above them; expected one such as {example}: add it"
+            )
+        return ordered(find(columns, quantities, options)), others
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.formats.content import check_regular, first_bytes, suffix_of
 
 SUFFIXES = {
     ".csv": "csv",
@@ -16,24 +17,30 @@ SUFFIXES = {
     ".npz": "npz",
     ".mat": "mat",
     ".imu": "psins",
-    ".txt": "kf-gins",
+    ".feather": "feather",
+    ".arrow": "feather",
+    ".txt": "csv",
+    ".asc": "csv",
     ".bin": "kf-gins-binary",
     ".bag": "ros",
     ".mcap": "ros",
     ".db3": "ros",
 }
-FORMATS = tuple(dict.fromkeys(SUFFIXES.values()))
+FORMATS = (*dict.fromkeys(SUFFIXES.values()), "kf-gins")
 AIDING_SUFFIXES = {
     ".csv": "csv",
     ".tsv": "csv",
     ".txt": "csv",
     ".parquet": "parquet",
     ".pq": "parquet",
+    ".feather": "feather",
+    ".arrow": "feather",
     ".npz": "npz",
     ".mat": "mat",
 }
 BEGINNINGS = {
     b"PAR1": "parquet",
+    b"ARROW1": "feather",
     b"PK\x03\x04": "npz",
     b"MATLAB": "mat",
     b"#ROSBAG": "ros",
@@ -41,17 +48,13 @@ BEGINNINGS = {
     b"SQLite format 3": "ros",
 }
 FOREIGN = {
-    b"\x1f\x8b": "gzip data; unpack it first",
-    b"BZh": "bzip2 data; unpack it first",
-    b"\x28\xb5\x2f\xfd": "zstandard data; unpack it first",
     b"\x89HDF": "HDF5 data; save it as .npz, .mat (version 7), .csv or .parquet",
     b"\xd0\xcf\x11\xe0": "an Excel workbook; save its sheet as CSV",
-    b"\xff\xfe": "UTF-16 text; save it as UTF-8",
-    b"\xfe\xff": "UTF-16 text; save it as UTF-8",
+    b"7z\xbc\xaf": "a 7z archive; unpack it",
+    b"\xfd7zXZ": "xz data; unpack it",
     b"%PDF": "a PDF document",
 }
 TEXT = ("csv", "psins", "kf-gins")
-HEAD = 4096
 
 
 def format_of(
@@ -77,7 +80,8 @@ def format_of(
     DataError
         An empty file, or one that is not what its suffix says.
     """
-    formats = tuple(dict.fromkeys(suffixes.values()))
+    formats = FORMATS if suffixes is SUFFIXES else tuple(dict.fromkeys(suffixes.values()))
+    check_regular(path)
     if given is not None and given not in formats:
         raise UsageError(f"format {given!r} is not known; choose one of {', '.join(formats)}")
     if path.is_dir() and "ros" not in formats:
@@ -86,21 +90,21 @@ def format_of(
         if given not in (None, "ros") or not (path / "metadata.yaml").is_file():
             raise UsageError(f"{path}: a folder; only a ROS 2 bag is one (with metadata.yaml in it), name a file")
         return "ros"
-    with path.open("rb") as file:
-        head = file.read(HEAD)
+    head = first_bytes(path)
     if not head:
         raise DataError(f"{path.name}: the file is empty; expected {what}")
     found = next((name for beginning, name in BEGINNINGS.items() if head.startswith(beginning)), None)
-    chosen = given or suffixes.get(path.suffix.lower()) or found
+    chosen = given or suffixes.get(suffix_of(path)) or found
     foreign = next((what for beginning, what in FOREIGN.items() if head.startswith(beginning)), None)
     if found == "npz" and not _is_npz(path):
         found, foreign = None, "a zip archive, such as an Excel workbook; save its sheet as CSV, or unpack it"
     if foreign is not None and not (chosen == "kf-gins-binary" and len(head) % 56 == 0):
         raise DataError(f"{path.name}: holds {foreign}")
+    if chosen is None and b"\0" not in head and "csv" in formats:
+        chosen = "csv"  # text under a suffix that names nothing
     if chosen is None:
         raise UsageError(
-            f"{path.name}: the suffix {path.suffix or '(none)'} names no format; give one with --format: "
-            f"{', '.join(formats)}"
+            f"{path.name}: the suffix {path.suffix or '(none)'} names no format; give one of {', '.join(formats)}"
         )
     if chosen not in formats:
         raise DataError(f"{path.name}: holds {chosen} data; expected {what}: {', '.join(formats)}")
@@ -111,17 +115,17 @@ def format_of(
 def _check_content(source: str, head: bytes, chosen: str, found: str | None) -> None:
     if found is not None and found != chosen:
         raise DataError(
-            f"{source}: read as {chosen}, but it holds {found} data; rename the file or give --format {found}"
+            f"{source}: read as {chosen}, but it holds {found} data; rename the file, or read it as {found}"
         )
     if chosen in BEGINNINGS.values() and found is None:
         raise DataError(
-            f"{source}: read as {chosen}, but it does not begin as such a file does; it is damaged, or another format: "
-            "give --format"
+            f"{source}: read as {chosen}, but it does not begin as such a file does; it is damaged, or of another format: "
+            "name that"
         )
-    if chosen in TEXT and b"\0" in head:
-        raise DataError(f"{source}: read as {chosen}, which is text, but it holds binary data; give its --format")
+    if chosen in TEXT and b"\0" in head.rstrip(b"\0") and not head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise DataError(f"{source}: read as {chosen}, which is text, but it holds binary data; name its format")
     if chosen == "kf-gins-binary" and all(byte in b"\t\n\r" or 32 <= byte < 127 for byte in head):
-        raise DataError(f"{source}: read as binary, but it holds text; give --format kf-gins or csv")
+        raise DataError(f"{source}: read as binary, but it holds text; name the format kf-gins or csv")
 
 
 def _is_npz(path: Path) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from truenorth.core.errors import DataError
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
-from truenorth.formats.text import bare_table, delimiter_of, is_comment, split
+from truenorth.formats.text import REMARKS, open_table
 from truenorth.records import ImuRecord
 
 EXPECTED = "rows of t, three angle and three velocity increments in rad and m/s"
@@ -29,19 +29,18 @@ def read_text(path: Path, layout: Layout) -> ImuRecord:
     DataError
         Fewer than seven columns, a header of names, text in a number, NaN, time going back: with the line.
     """
-    table, above = bare_table(path, EXPECTED)
+    table = open_table(path)
     count = len(table.names)
     if count < len(COLUMNS):
         raise DataError(f"{path.name}: {count} columns; expected 7: {EXPECTED}")
-    for line in above:
-        if not is_comment(line) and len(split(line, delimiter_of(line))) == count:
-            raise DataError(
-                f"{path.name}: a header of names, {line.strip()!r}; KF-GINS files have none: give --format csv to read it"
-            )
+    if table.named and not table.header.lstrip().startswith(REMARKS):
+        raise DataError(
+            f"{path.name}: a header of names, {table.header.strip()!r}; KF-GINS files have none: read it as csv"
+        )
     table = replace(table, names=[*COLUMNS, *table.names[len(COLUMNS) :]])
     values = table.read(COLUMNS)
     if not np.all(np.diff(values[:, 0]) > 0) and np.all(np.diff(values[:, 6]) > 0):
-        raise DataError(f"{path.name}: time stands in the seventh column; expected {EXPECTED}: give --format psins")
+        raise DataError(f"{path.name}: time stands in the seventh column; expected {EXPECTED}: read it as psins")
     return finish(
         values[:, 0], values[:, 1:4], values[:, 4:], layout.kind or "increments", layout, path.name,
         axes="FRD", labels=COLUMNS, place=table.place,

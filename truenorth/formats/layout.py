@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.yaml_file import read_mapping, unknown_key
 from truenorth.records import COLUMNS
-
-Kind = Literal["rates", "increments"]
+from truenorth.records.imu import Kind
 
 BLOCKS: dict[str, tuple[str, str]] = {"rates": ("gyro", "accel"), "increments": ("dtheta", "dvel")}
 ARRAY_ONLY = (*BLOCKS["rates"], *BLOCKS["increments"], "scale", "interval")
@@ -26,8 +25,9 @@ class Layout:
     Attributes
     ----------
     columns : mapping
-        Our column names to the log's. For ``.npz`` and ``.mat`` also ``gyro, accel`` (``dtheta, dvel``) to arrays of
-        three columns, ``scale`` to what the sensor values are multiplied with, and ``interval`` to the sampling interval.
+        Our column names to the log's; a minus before the latter turns the sign. For ``.npz`` and ``.mat`` also ``gyro,
+        accel`` (``dtheta, dvel``) to arrays of three columns, ``scale`` to what the sensor values are multiplied with, and
+        ``interval`` to the sampling interval.
     units : mapping
         Of ``gyro``, ``accel`` and ``time``; SI where left out. A number before the unit (``0.05 deg/s``) is the size of
         one count.
@@ -47,10 +47,6 @@ class Layout:
     rate: float | None = None
     kind: Kind | None = None
     topic: str | None = None
-
-    def name(self, ours: str) -> str:
-        """What the log calls one of our columns."""
-        return self.columns.get(ours, ours)
 
 
 def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:
@@ -126,6 +122,8 @@ def _columns(value: Any) -> dict[str, str]:
 
 def _units(value: Any) -> dict[str, str]:
     names = ("gyro", "accel", "time")
+    if isinstance(value, str) and "=" in value:
+        value = {key.strip(): text.strip() for key, _, text in (part.partition("=") for part in value.split(","))}
     if isinstance(value, str):
         parts = [part.strip() for part in value.split(",")]
         if len(parts) not in (2, 3) or not all(parts):

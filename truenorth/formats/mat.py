@@ -1,8 +1,14 @@
-"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; ``imu`` of PSINS without being told."""
+"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; ``imu`` of PSINS without being told.
+
+SciPy's reader follows pointers of the file without a check, and ends the interpreter on some damaged ones: it runs in a
+process of its own.
+"""
 
 from __future__ import annotations
 
-import zlib
+import io
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,18 +16,22 @@ from typing import Any
 import numpy as np
 
 from truenorth.core.errors import DataError
-from truenorth.formats.arrays import record_from_arrays
+from truenorth.formats import mat_child
+from truenorth.formats.columns import columns_of_arrays
+from truenorth.formats.content import LARGEST
 from truenorth.formats.layout import Layout
+from truenorth.formats.table import record_of
 from truenorth.records import ImuRecord
 
 PSINS = {"dtheta": "imu[0:3]", "dvel": "imu[3:6]", "time": "imu[6]"}
+LONGEST = 300.0  # s, of reading
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
     """Read a MATLAB file.
 
     An array ``imu`` of seven columns is what the PSINS toolbox keeps under this name (three angle and three velocity
-    increments, time; right-forward-up), unless the layout names columns.
+    increments, rad and m/s, time; right-forward-up), unless the layout names columns.
 
     Raises
     ------
@@ -30,8 +40,9 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     """
     variables = variables_of(path)
     if not layout.columns and np.shape(variables.get("imu", 0))[1:] == (7,):
-        layout = replace(layout, columns=PSINS)
-    return record_from_arrays(variables, layout, path.name)
+        units = {"gyro": "rad", "accel": "m/s", "time": "s", **layout.units}
+        layout = replace(layout, columns=PSINS, units=units)
+    return record_of(columns_of_arrays(path, variables), layout)
 
 
 def variables_of(path: Path) -> dict[str, Any]:
@@ -42,25 +53,18 @@ def variables_of(path: Path) -> dict[str, Any]:
     DataError
         A damaged file, or one of version 7.3.
     """
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
+    command = [sys.executable, "-I", mat_child.__file__, str(path.absolute()), str(LARGEST)]
     try:
-        content = loadmat(path, simplify_cells=True)
-    except NotImplementedError:
+        child = subprocess.run(command, capture_output=True, timeout=LONGEST, check=False)
+    except subprocess.TimeoutExpired:
+        raise DataError(f"{path.name}: not read in {LONGEST:g} s; the MATLAB file is damaged") from None
+    if child.returncode == mat_child.TOO_NEW:
         raise DataError(
             f"{path.name}: a MATLAB 7.3 (HDF5) file; save it with save('{path.name}', ..., '-v7') and read that"
-        ) from None
-    except (ValueError, TypeError, OSError, EOFError, MatReadError, zlib.error) as error:
-        raise DataError(f"{path.name}: the MATLAB file is damaged or cut short ({error}); write it anew") from None
-    return _flat({name: value for name, value in content.items() if not name.startswith("__")})
-
-
-def _flat(content: dict[str, Any]) -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for name, value in content.items():
-        if isinstance(value, dict):
-            flat |= {f"{name}.{key}": inner for key, inner in _flat(value).items()}
-        else:
-            flat[name] = value
-    return flat
+        )
+    if child.returncode:
+        why = child.stderr.decode(errors="replace").strip().splitlines()
+        reason = why[-1] if why else "its reader crashed"
+        raise DataError(f"{path.name}: the MATLAB file is damaged or cut short ({reason}); write it anew")
+    with np.load(io.BytesIO(child.stdout), allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.formats.checks import check_order
 from truenorth.formats.quantities import Found
-from truenorth.formats.table import check_order
 from truenorth.records import IN_ORDER, Late
 
 Array = NDArray[np.float64]

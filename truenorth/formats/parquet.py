@@ -1,81 +1,54 @@
-"""Parquet: the documented columns, or others by name; the index `time` of a pandas table is a column like any other."""
+"""Parquet and Feather: the documented columns, or others by name; the index `time` of a pandas table is a column like any other."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
-from truenorth.formats.layout import Layout
-from truenorth.formats.table import choose, finish
-from truenorth.records import ImuRecord, Record
+from truenorth.formats.columns import Columns
+from truenorth.records import Record
 
 Array = NDArray[np.float64]
 
 
-def read(path: Path, layout: Layout) -> ImuRecord:
-    """Read a Parquet log; only the columns that are needed.
+def columns(path: Path, format: str) -> Columns:
+    """The columns of a file, read when they are asked for.
 
     Raises
     ------
     DataError
-        A damaged file, a missing column, one that does not hold numbers, or an empty cell.
-    """
-    choice = choose(names_of(path), layout, path.name)
-    values = read_columns(path, choice.names)
-    time = None if choice.time is None else values[:, 0]
-    gyro, accel = values[:, -6:-3], values[:, -3:]
-    return finish(time, gyro, accel, choice.kind, layout, path.name, labels=choice.labels)
-
-
-def names_of(path: Path) -> list[str]:
-    """The columns of a file.
-
-    Raises
-    ------
-    DataError
-        A damaged file.
-    """
-    with _opened(path) as file:
-        return list(file.schema_arrow.names)
-
-
-def read_columns(path: Path, names: Sequence[str]) -> Array:
-    """Columns side by side, (N, len(names)); an empty cell is NaN.
-
-    Raises
-    ------
-    DataError
-        A damaged file, or a column that does not hold numbers.
+        A damaged file; when read, a column that does not hold numbers.
     """
     import pyarrow as pa
-
-    with _opened(path) as file:
-        table = file.read(columns=list(names), use_threads=False)
-    for name in names:
-        kind = table.schema.field(name).type
-        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
-            wanted = "seconds, as numbers" if pa.types.is_temporal(kind) else "numbers"
-            raise DataError(f"{path.name}: column {name} holds {kind}; expected {wanted}")
-    return to_numpy([table.column(name).cast(pa.float64()) for name in names])
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    import pyarrow as pa
+    import pyarrow.feather as pf
     import pyarrow.parquet as pq
 
-    try:
-        with pq.ParquetFile(path) as file:
-            yield file
-    except (pa.ArrowException, OSError) as error:
-        raise DataError(f"{path.name}: the Parquet file is damaged or cut short ({error}); write it anew") from None
+    def table(names: Sequence[str] | None) -> pa.Table:
+        wanted = None if names is None else list(dict.fromkeys(names))
+        try:
+            if format == "feather":
+                return pf.read_table(path, columns=wanted)
+            with pq.ParquetFile(path) as file:
+                return file.schema_arrow.empty_table() if wanted is None else file.read(wanted, use_threads=False)
+        except (pa.ArrowException, OSError) as error:
+            what = format.capitalize()
+            raise DataError(f"{path.name}: the {what} file is damaged or cut short ({error}); write it anew") from None
+
+    def read(names: Sequence[str], gaps: bool = False) -> Array:
+        found = table(names)
+        for name in names:
+            kind = found.schema.field(name).type
+            if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
+                wanted = "seconds, as numbers" if pa.types.is_temporal(kind) else "numbers"
+                raise DataError(f"{path.name}: column {name} holds {kind}; expected {wanted}")
+        return to_numpy([found.column(name).cast(pa.float64(), safe=False) for name in names])
+
+    return Columns(path, list(table(None).column_names), read, lambda name: table([name]).column(name))
 
 
 def write(record: Record, path: Path) -> None:

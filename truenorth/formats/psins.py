@@ -17,7 +17,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import finish
-from truenorth.formats.text import TextTable, bare_table, delimiter_of, is_comment, split
+from truenorth.formats.text import REMARKS, TextTable, open_table
 from truenorth.records import ImuRecord
 
 EXPECTED = "rows of gx gy gz ax ay az [t], increments in rad and m/s"
@@ -33,21 +33,24 @@ def read(path: Path, layout: Layout) -> ImuRecord:
     DataError
         Another number of columns, a header of other names, text in a number, NaN, time going back: with the line.
     """
-    table, above = bare_table(path, EXPECTED)
+    table = open_table(path)
     count = len(table.names)
     if count not in (6, 7):
         raise DataError(f"{path.name}: {count} columns; expected 6 or 7: {EXPECTED}")
+    if (
+        table.named
+        and not table.header.lstrip().startswith(REMARKS)
+        and [n[:1].lower() for n in table.names[:6]] != list("gggaaa")
+    ):
+        raise DataError(f"{path.name}: the header {table.header.strip()!r} is not {EXPECTED}; read it as csv")
+    compact = any("PSINS" in line and "SIMU" in line for line in (*table.above, table.header))
     table = replace(table, names=COLUMNS[:count])
-    if above and "PSINS" in above[0] and "SIMU" in above[0]:
+    if compact:
         return _compact(table, layout)
-    for line in above:
-        names = split(line, delimiter_of(line))
-        if not is_comment(line) and len(names) == count and [n[:1].lower() for n in names[:6]] != list("gggaaa"):
-            raise DataError(f"{path.name}: the header {line.strip()!r} is not {EXPECTED}; give --format csv to read it")
     values = table.read(table.names)
     time = values[:, 6] if count == 7 else None
     if time is not None and not np.all(np.diff(time) > 0) and np.all(np.diff(values[:, 0]) > 0):
-        raise DataError(f"{path.name}: time stands in the first column; expected {EXPECTED}: give --format kf-gins")
+        raise DataError(f"{path.name}: time stands in the first column; expected {EXPECTED}: read it as kf-gins")
     return finish(
         time, values[:, :3], values[:, 3:6], layout.kind or "increments", layout, path.name,
         labels=("t", *COLUMNS[:6]), place=table.place,
@@ -60,7 +63,7 @@ def _compact(table: TextTable, layout: Layout) -> ImuRecord:
     if len(numbers) < 3:
         raise DataError(f"{source}: the three header rows of a PSINS log are not complete; the file is cut short")
     rows = [
-        [float(cell) for cell in split(line.decode(), table.delimiter)] for _, (_, line) in zip(range(3), table.lines())
+        [float(cell) for cell in table.dialect.cells(line.decode())] for _, (_, line) in zip(range(3), table.lines())
     ]
     t0, interval, g = rows[1][3], rows[1][4] * 1e-3, rows[1][5]
     if not (interval > 0.0 and 9.0 < g < 10.0):

@@ -10,7 +10,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,13 +18,13 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import unknown_key
-from truenorth.formats.table import check_finite
+from truenorth.formats.behaviour import EPOCH
+from truenorth.formats.checks import check_finite
+from truenorth.formats.columns import Columns
+from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
 
 Array = NDArray[np.float64]
-
-BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
-WRITTEN = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "m_s": "m/s", "mps2": "m/s^2", "knots": "kn", "sec": "s"}
 
 
 @dataclass(frozen=True)
@@ -57,25 +56,6 @@ class Quantity:
 
 
 TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc"))
-
-
-@dataclass(frozen=True)
-class Columns:
-    """A log as named columns, whatever its format.
-
-    Attributes
-    ----------
-    names : sequence of str
-    read : callable
-        Columns of some names side by side, (N, n); empty cells are NaN.
-    place : callable
-        Where a row stands in the file, in words.
-    """
-
-    path: Path
-    names: Sequence[str]
-    read: Callable[[Sequence[str]], Array]
-    place: Callable[[int], str] = lambda row: f"row {row + 1}"
 
 
 @dataclass(frozen=True)
@@ -152,8 +132,8 @@ class Found:
         """The error for a log without the columns that are `wanted`, in words."""
         found = ", ".join(self.labels.values())
         return DataError(
-            f"{self.source}: expected {wanted}; understood only {found}: name the columns with --columns or a YAML file beside "
-            "the log"
+            f"{self.source}: expected {wanted}; understood only {found}: name the columns, in the call or a YAML "
+            "file beside the log"
         )
 
 
@@ -220,35 +200,51 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
                 near = get_close_matches(name, columns.names, n=1)
                 hint = f"; is it {near[0]!r}?" if near else ""
                 raise DataError(f"{source}: column {name!r} is missing; found {', '.join(columns.names)}{hint}")
-            unit = _split(name)[1]
+            unit = split(name)[1]
             sign = 1.0 if name == options.columns[quantity.name] else -1.0
             claims[quantity.name] = [(name, sign * _factor(quantity, unit, name, options, source))]
     for ours, claim in claims.items():
         if len(claim) > 1:
             both = " and ".join(repr(name) for name, _ in claim)
-            raise DataError(f"{source}: columns {both} are both {ours}; say which with --columns {ours}=...")
+            raise DataError(f"{source}: columns {both} are both {ours}; say which, columns: {{{ours}: ...}}")
     labels = {ours: claim[0][0] for ours, claim in claims.items()}
     if "time" not in labels:
         raise DataError(
-            f"{source}: no column of time among {', '.join(columns.names) or '(none)'}; expected time in seconds: name it with "
-            "--columns time=... or a YAML file beside the log"
+            f"{source}: no column of time among {', '.join(columns.names) or '(none)'}; expected time in seconds: name it, in the "
+            "call or a YAML file beside the log"
         )
-    table = columns.read(list(dict.fromkeys(labels.values())))
-    index = {name: i for i, name in enumerate(dict.fromkeys(labels.values()))}
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
-    values = {ours: table[:, index[labels[ours]]] * factors[ours] for ours in labels}
+    time, said = columns.clock(labels["time"])
+    factors["time"] = 1.0 if said is not None else _of_epoch(time, factors["time"])
+    numbers = list(dict.fromkeys(label for ours, label in labels.items() if ours != "time"))
+    table = columns.read(numbers, True) if numbers else np.zeros((len(time), 0))
+    if len(table) != len(time):
+        raise DataError(
+            f"{source}: columns of different length (time {len(time)}, {numbers[0]} {len(table)}); expected as many of each: name "
+            "those of one sensor"
+        )
+    values = {ours: table[:, numbers.index(label)] * factors[ours] for ours, label in labels.items() if ours != "time"}
+    values = {"time": time * factors["time"], **values}
     found = Found(source, labels, values, factors, columns.place, frozenset(options.columns))
     found.require("time")
     return found
 
 
+def _of_epoch(time: Array, factor: float) -> float:
+    """Factor of a clock, which counts ms, us or ns where only these give a date since 1970 in this century."""
+    first = float(time[0]) if len(time) else 0.0
+    if factor == 1.0 and first > EPOCH[1]:
+        return next((f for f in (1e-3, 1e-6, 1e-9) if EPOCH[0] < first * f < EPOCH[1]), factor)
+    return factor
+
+
 def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[tuple[Quantity, float, str | None]]:
     """What a header cell may mean: a quantity, its sign, and the unit it names."""
-    plain, unit = _split(name)
+    plain, unit = split(name)
     words = _key(plain)
     ends = [(words, unit)]
     if unit is None:
-        ends += [(words[: m.start()], _written(words[m.end() :])) for m in re.finditer("_", words)]
+        ends += [(words[: m.start()], unit_in(words[m.end() :])) for m in re.finditer("_", words)]
     for base, stated in ends:
         if base != words and stated is None:
             continue
@@ -259,25 +255,8 @@ def _meanings(name: str, quantities: Sequence[Quantity]) -> Iterable[tuple[Quant
                     return
 
 
-def _split(name: str) -> tuple[str, str | None]:
-    match = BRACKETS.fullmatch(name.strip())
-    if match is None or match[2].isdigit():  # gnss[3] is a part of an array
-        return name, None
-    return match[1], match[2]
-
-
 def _key(name: str) -> str:
     return re.sub(r"[\s\-]+", "_", name.strip()).casefold()
-
-
-def _written(suffix: str) -> str | None:
-    """The unit that the end of a name stands for; None where it stands for none."""
-    text = WRITTEN.get(suffix, suffix)
-    try:
-        parse_unit(text)
-    except UsageError:
-        return None
-    return text
 
 
 def _factor(quantity: Quantity, stated: str | None, label: str, options: Options, source: str) -> float:
@@ -294,44 +273,3 @@ def _factor(quantity: Quantity, stated: str | None, label: str, options: Options
             f"{quantity.dimension.replace('_', ' ')}, such as {example.partition(' ')[2]}"
         )
     return factor
-
-
-def columns_of(path: Path, format: str, example: str) -> Columns:
-    """A log of any format as columns; of two-dimensional arrays each column is ``name[i]``, counted from 0.
-
-    Raises
-    ------
-    DataError
-        A damaged file, or one without a header.
-    """
-    if format == "csv":
-        from truenorth.formats.csv import open_table
-
-        table = open_table(path, example)
-        return Columns(path, table.names, lambda names: table.read(names, gaps=True), table.place)
-    if format == "parquet":
-        from truenorth.formats.parquet import names_of, read_columns
-
-        return Columns(path, names_of(path), lambda names: read_columns(path, names))
-    from truenorth.formats import mat, npz
-
-    parts: dict[str, Array] = {}
-    for name, value in (npz if format == "npz" else mat).variables_of(path).items():
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu" or array.ndim not in (1, 2):
-            continue
-        if array.ndim == 1:
-            parts[name] = array.astype(np.float64)
-        else:
-            parts |= {f"{name}[{i}]": array[:, i].astype(np.float64) for i in range(array.shape[1])}
-
-    def read(names: Sequence[str]) -> Array:
-        if len({len(parts[name]) for name in names}) > 1:
-            sizes = ", ".join(f"{name} {len(parts[name])}" for name in names)
-            raise DataError(
-                f"{path.name}: columns of different length ({sizes}); expected as many of each: name those of one sensor with "
-                "--columns"
-            )
-        return np.column_stack([parts[name] for name in names])
-
-    return Columns(path, list(parts), read)

@@ -1,86 +1,320 @@
-"""What every reader shares: named columns of a log become a checked `ImuRecord` in SI units and our axes."""
+"""From the columns of a log to a checked `ImuRecord` in SI units and our axes; what the log does not say is found, or asked."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from difflib import get_close_matches
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
-from truenorth.formats.layout import ARRAY_ONLY, Kind, Layout
-from truenorth.records import COLUMNS, ImuRecord
+from truenorth.formats.behaviour import (
+    accel_readings,
+    clock_readings,
+    gravity_level,
+    gyro_facts,
+    gyro_readings,
+    size,
+)
+from truenorth.formats.checks import check_finite, check_order
+from truenorth.formats.choice import Choice, choose, interval_of, rate_above
+from truenorth.formats.columns import Columns
+from truenorth.formats.guesses import UnsureError, in_words, take
+from truenorth.formats.layout import Layout
+from truenorth.records import COLUMNS, Guess, ImuRecord
+from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
-DIMENSION_OF: dict[Kind, Mapping[str, str]] = {
+FEWEST = 50  # rows, from which a log shows by itself what its numbers are
+BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
+BUNCH_SHARE = 0.05  # of the steps that are longer than 1.5 median ones, or zero; gaps are fewer
+SPAN = 0.02  # by which the stamps' span and that of a given rate may differ
+DIMENSION_OF: dict[Kind, dict[str, str]] = {
     "rates": {"gyro": "angular_rate", "accel": "acceleration", "time": "time"},
     "increments": {"gyro": "angle", "accel": "speed", "time": "time"},
 }
+CLAIM = 100.0  # prior weight of SI where the columns have the documented names
+FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
-@dataclass(frozen=True)
-class Choice:
-    """The columns of a log that are needed, by the log's names."""
-
-    kind: Kind
-    time: str | None
-    sensors: tuple[str, ...]
-
-    @property
-    def names(self) -> list[str]:
-        """Time, where there is one, and the six sensor columns."""
-        return [*([] if self.time is None else [self.time]), *self.sensors]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Seven names for messages."""
-        return (self.time or "time", *self.sensors)
-
-
-def choose(names: Sequence[str], layout: Layout, source: str) -> Choice:
-    """Find the columns that are needed among those there are.
-
-    Parameters
-    ----------
-    names : sequence of str
-        The columns there are.
-    layout : Layout
-    source : str
-        File name; messages begin with it.
+def record_of(columns: Columns, layout: Layout) -> ImuRecord:
+    """The record of a log of named columns.
 
     Raises
     ------
     DataError
-        A column that is missing or there twice; the message lists those found and the nearest name.
+        Bad data, with place and column; gravity in no unit; stamps in bunches.
+    UnsureError
+        Two readings explain the log.
+    UsageError
+        A unit of another dimension, or neither time nor rate.
     """
-    for key in ARRAY_ONLY:
-        if key in layout.columns:
-            raise UsageError(
-                f"{source}: columns: {key!r} is for arrays; name single columns, such as gyro_x and accel_x"
-            )
-    kind = named_kind(lambda ours: layout.name(ours) in names or ours in layout.columns)
-    if kind is None:
-        raise DataError(
-            f"{source}: no column of an IMU among {', '.join(names) or '(none)'}; expected time, gyro_x .. accel_z (rates "
-            "in SI units) or dtheta_x .. dvel_z (increments), or name them with --columns or a YAML file beside the log"
+    source = columns.path.name
+    choice = choose(columns, layout)
+    guesses = choice.guesses
+    if columns.notes:
+        guesses.insert(
+            0, Guess("text", "; ".join(columns.notes), "the dialect in which most lines are rows of numbers")
         )
-    time = None
-    if layout.rate is None or layout.name("time") in names:
-        time = _found("time", names, layout, source)
-    sensors = tuple(_found(ours, names, layout, source) for ours in COLUMNS[kind])
-    return Choice(layout.kind or kind, time, sensors)
+    names = [name for name, _ in choice.sensors]
+    values = columns.read(names, False) * np.array([sign for _, sign in choice.sensors])
+    values = _scaled(columns, layout, names, values)
+    check_finite(values, choice.labels[1:], source, columns.place)
+    time, layout = _clock(columns, layout, choice, len(values), guesses)
+    gyro, accel = values[:, :3], values[:, 3:]
+    kind, units = _units(time, gyro, accel, layout, choice, source, guesses)
+    layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
+    if layout.axes is None:
+        layout = _axes(columns, layout, choice, accel, guesses)
+    else:
+        guesses.append(Guess("axes", layout.axes, "as the caller says", 1.0, {"axes": layout.axes}))
+    return finish(
+        time, gyro, accel, kind, layout, source, labels=choice.labels, place=columns.place, taken_for=tuple(guesses)
+    )
 
 
-def named_kind(there: Callable[[str], bool], columns: Mapping[str, Sequence[str]] = COLUMNS) -> Kind | None:
-    """Rates or increments, whichever has more of its columns there; None without any."""
-    rates, increments = (sum(map(there, columns[kind])) for kind in ("rates", "increments"))
-    if not rates and not increments:
-        return None
-    return "rates" if rates >= increments else "increments"
+def _scaled(columns: Columns, layout: Layout, names: Sequence[str], values: Array) -> Array:
+    """Counts times what the caller names as their scale: one value, or one for each column of the array."""
+    reference = layout.columns.get("scale")
+    if reference is None:
+        return values
+    if reference not in columns.names:
+        raise DataError(f"{columns.path.name}: scale {reference!r} is missing; found {', '.join(columns.names)}")
+    scale = columns.read([reference], False)[:, 0]
+    if scale.size == 1:
+        return values * scale[0]
+    places = [_place_in_array(name) for name in names]
+    whole = {sum(_array_of(other) == _array_of(name) for other in columns.names) for name in names}
+    if whole != {scale.size}:
+        raise DataError(
+            f"{columns.path.name}: scale {reference!r} has shape {scale.shape}; expected one value, or one for each of the "
+            f"{max(whole)} columns of {_array_of(names[0])!r}"
+        )
+    return values * scale[places]
+
+
+def _array_of(name: str) -> str:
+    return name.partition("[")[0] if "[" in name else name[:-2]
+
+
+def _place_in_array(name: str) -> int:
+    return int(name.partition("[")[2].rstrip("]")) if "[" in name else "xyz".index(name[-1])
+
+
+# ------------------------------------------------------------------------------------------------- clock
+
+
+def _clock(columns: Columns, layout: Layout, choice: Choice, rows: int, guesses: list[Guess]) -> tuple[Array, Layout]:
+    """Time in seconds: from the stamps, or made from the rate."""
+    source = columns.path.name
+    if not choice.time:
+        return _made(columns, layout, rows, guesses), layout
+    raw, said = columns.clock(choice.time[0])
+    if len(choice.time) == 2:
+        raw = raw + 1e-9 * columns.read([choice.time[1]], False)[:, 0]
+    if len(raw) != rows:
+        raise DataError(f"{source}: gyro and accelerometer have {rows} rows, time {len(raw)}; expected as many of each")
+    check_finite(raw[:, None], choice.labels[:1], source, columns.place)
+    stated = layout.units.get("time", choice.units.get("time"))
+    if layout.rate is None:
+        _check_bunches(raw, said, stated, source, guesses)
+    elif np.all(np.diff(raw) >= 0.0) and raw[-1] > raw[0]:
+        return _evenly(raw, said, stated, layout.rate, source, guesses), layout
+    check_order(raw, choice.labels[0], source, columns.place)
+    if said is not None:
+        guesses.append(Guess("unit of time", said, "the cells are no bare numbers"))
+        return raw, layout
+    if "time" in layout.units:
+        return raw * unit_factor("time", "rates", layout), layout
+    if stated is not None:
+        guesses.append(Guess("unit of time", stated, "the heading", 1.0, {"units": {"time": stated}}))
+        return raw * size(stated), layout
+    return raw * size(_unit_of_time(raw, source, guesses)), layout
+
+
+def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:
+    steps = np.diff(raw)
+    step = float(np.median(steps))
+    readings = clock_readings(step, float(raw[0]))
+    if step == 1.0 and np.all(steps == 1.0):
+        options: list[dict[str, Any]] = [{"units": {"time": "ms"}}, {"rate": "(rows a second)"}]
+        raise UnsureError(
+            f"{source}: time goes up by 1 in each row: it may be in ms (1000 rows a second) or count the rows",
+            options,
+            guesses,
+        )
+    if len(raw) < 3 or not readings:
+        return "s"
+    options = [{"units": {"time": reading.unit}} for reading in readings]
+    return take("unit of time", readings, options, source, guesses).unit
+
+
+def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> Array:
+    """Time of a log without any: the first row's interval ends at ``1 / rate``."""
+    rate = layout.rate
+    if rate is None:
+        interval = interval_of(columns, layout)
+        if interval is not None:
+            value, name = interval
+            rate = 1.0 / (value * unit_factor("time", "rates", layout))
+            guesses.append(Guess("rate", f"{rate:g} Hz", f"the interval {name!r}", 1.0, {"rate": rate}))
+    if rate is None:
+        above = rate_above(columns)
+        if above is None:
+            raise UsageError(
+                f"{columns.path.name}: no time in the log; name its column (columns: {{time: ...}}) or give the rate"
+            )
+        rate, line = above
+        guesses.append(Guess("rate", f"{rate:g} Hz", f"the line {line!r} above the table", 1.0, {"rate": rate}))
+    return np.arange(1, rows + 1) / rate
+
+
+def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str, guesses: list[Guess]) -> None:
+    """Refuse stamps of a computer that read several rows at once: their steps say nothing of the sampling."""
+    steps = np.diff(raw)
+    if len(steps) < FEWEST or steps.min() < 0.0 or raw[-1] <= raw[0]:
+        return
+    median, mean = float(np.median(steps)), float(np.mean(steps))
+    uneven = float(np.mean((steps > 1.5 * median) | (steps == 0.0)))
+    if mean < BUNCHED * median or uneven < BUNCH_SHARE:
+        return
+    unit = 1.0 if said is not None else size(stated) if stated is not None else None
+    if unit is None:
+        readings = clock_readings(mean, float(raw[0]))
+        unit = size(readings[0].unit) if readings else 1.0
+    rate = 1.0 / (mean * unit)
+    by_median = "many are equal" if median == 0.0 else f"the median step is one of {1.0 / (median * unit):.0f} Hz"
+    raise UnsureError(
+        f"{source}: the rows are stamped in bunches: {by_median}, but {rate:.4g} rows a second come in all; if the sensor "
+        "samples evenly, give its rate", [{"rate": f"{rate:.4g}"}], guesses,
+    )  # fmt: skip
+
+
+def _evenly(raw: Array, said: str | None, stated: str | None, rate: float, source: str, guesses: list[Guess]) -> Array:
+    """Rows at a given rate, from where the stamps begin: no row is stamped before it was taken."""
+    steps = float(raw[-1] - raw[0]) / (len(raw) - 1)
+    if said is None and stated is None:
+        stated = min(("s", "ms", "us", "ns"), key=lambda unit: abs(np.log(steps * size(unit) * rate)))
+    stamps = raw * (1.0 if said is not None or stated is None else size(stated))
+    even = np.arange(len(raw)) / rate
+    span = float(stamps[-1] - stamps[0])
+    if abs(span / even[-1] - 1.0) > SPAN:
+        raise DataError(
+            f"{source}: {len(raw)} rows at {rate:g} Hz last {even[-1]:.6g} s, their stamps span {span:.6g} s; expected the same: "
+            f"rows are missing, or the rate is {(len(raw) - 1) / span:.6g} Hz"
+        )
+    guesses.append(
+        Guess("time", f"even, {rate:g} Hz", "the rate is given: stamps give only the start", 1.0, {"rate": rate})
+    )
+    return even + float(np.min(stamps - even))
+
+
+# ------------------------------------------------------------------------------------------------- units
+
+
+def _units(
+    time: Array, gyro: Array, accel: Array, layout: Layout, choice: Choice, source: str, guesses: list[Guess]
+) -> tuple[Kind, dict[str, str]]:
+    """Kind of the rows, and the units of the sensors."""
+    said = {
+        key: unit for key in ("gyro", "accel") if (unit := layout.units.get(key, choice.units.get(key))) is not None
+    }
+    kind: Kind | None = layout.kind or choice.kind
+    for key, unit in said.items():
+        who = "as the caller says" if key in layout.units else "the heading"
+        guesses.append(Guess(f"unit of the {_sensor(key)}", unit, who, 1.0, {"units": {key: unit}}))
+    if kind is None and "accel" in said:
+        kind = "increments" if _dimension(said["accel"]) == DIMENSIONS["speed"][0] else "rates"
+    if kind is not None and (choice.documented or len(said) == 2):
+        if choice.documented and not said:
+            _check_claim(time, gyro, accel, kind, source, guesses)
+        return kind, said
+    if len(time) < FEWEST:
+        kind = kind or "rates"
+        guesses.append(Guess("units", "SI where nothing is said", f"{len(time)} rows show nothing", 0.5))
+        return kind, said
+    interval = float(np.median(np.diff(time)))
+    if "accel" not in said:
+        kinds: tuple[Kind, ...] = ("rates", "increments") if kind is None else (kind,)
+        level = gravity_level(accel)
+        readings = accel_readings(level, interval, kinds)
+        if not readings:
+            raise DataError(f"{source}: {_no_gravity(level, accel, kinds[0], interval)}")
+        options = [{"kind": r.kind, "units": {"accel": r.unit}} for r in readings]
+        best = take("unit of the accelerometers", readings, options, source, guesses)
+        kind, said["accel"] = best.kind, best.unit
+    assert kind is not None
+    if "gyro" not in said:
+        facts = gyro_facts(time, gyro, accel, kind)
+        readings = gyro_readings(facts, kind, said["accel"])
+        said["gyro"] = take(
+            "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses
+        ).unit
+    return kind, said
+
+
+def _sensor(key: str) -> str:
+    return "gyros" if key == "gyro" else "accelerometers"
+
+
+def _dimension(unit: str) -> Any:
+    return (parse_quantity(unit) if unit[:1].isdigit() else parse_unit(unit))[1]
+
+
+def _no_gravity(level: float, accel: Array, kind: Kind, interval: float) -> str:
+    found = f"the accelerometers show {level:.4g} (median of the norm), which is gravity in no usual unit"
+    if level == 0.0 or float(np.median(np.std(accel, axis=0))) > 0.5 * level:
+        return f"{found}: a log whose gravity was taken out, or other columns; expected specific force"
+    count = 9.80665 / level / (interval if kind == "increments" else 1.0)
+    unit = f"{count / 9.80665:.4g} g" if kind == "rates" else f"{count * interval:.4g} m/s"
+    return f"{found}; if they are counts, say how large one is, such as {in_words({'units': {'accel': unit}})}"
+
+
+def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str, guesses: list[Guess]) -> None:
+    """Ask where documented names, which mean SI, stand over numbers that are hardly in it."""
+    interval = float(np.median(np.diff(time)))
+    unit = "rad/s" if kind == "rates" else "rad"
+    force = "m/s^2" if kind == "rates" else "m/s"
+    guesses.append(Guess("units", f"{unit}, {force}", "the documented names mean SI"))
+    if len(time) < FEWEST or not accel_readings(gravity_level(accel), interval, (kind,), (force,)):
+        return  # what is no gravity in SI, the checks of plausibility name
+    readings = gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force)
+    weights = [r.probability * (CLAIM if r.unit == unit else 1.0) for r in readings]
+    if readings and readings[int(np.argmax(weights))].unit != unit:
+        best = readings[int(np.argmax(weights))]
+        claim = next((r.why for r in readings if r.unit == unit), f"in {unit} they cannot be a gyro's")
+        options = [{"units": {"gyro": best.unit, "accel": force}}, {"units": {"gyro": unit, "accel": force}}]
+        raise UnsureError(
+            f"{source}: the gyros' columns have the documented names, which mean {unit}, but look like {best.unit}: {best.why}; "
+            f"{claim}", options, guesses,
+        )  # fmt: skip
+
+
+# -------------------------------------------------------------------------------------------------- axes
+
+
+def _axes(columns: Columns, layout: Layout, choice: Choice, accel: Array, guesses: list[Guess]) -> Layout:
+    mean = np.median(accel, axis=0)
+    size_ = float(np.linalg.norm(mean))
+    up = mean / size_ if size_ > 0.0 else np.zeros(3)
+    axis = int(np.argmax(np.abs(up)))
+    shown = f"the specific force points along ({up[0]:+.2f}, {up[1]:+.2f}, {up[2]:+.2f}), which is up at rest"
+    headerless = not columns.named and choice.time and columns.names.index(choice.time[0]) == 0
+    if headerless and layout.kind == "increments" and up[2] < -FULL_UP:
+        guesses.append(
+            Guess("axes", "FRD", f"{shown}; rows of time and increments, z down, are KF-GINS's", 1.0, {"axes": "FRD"})
+        )
+        return replace(layout, axes="FRD")
+    if axis == 2 and up[2] > 0.0:
+        why = f"{shown}; which of x and y is forward, no log shows"
+        guesses.append(Guess("axes", "RFU", why, 1.0, {"axes": "RFU"}))
+    else:
+        guesses.append(Guess("axes", "RFU", f"{shown}: this is doubtful", 0.5, {"axes": "RFU"}))
+    return layout
 
 
 def finish(
@@ -94,6 +328,7 @@ def finish(
     axes: str = "RFU",
     labels: Sequence[str] | None = None,
     place: Callable[[int], str] = lambda row: f"row {row + 1}",
+    taken_for: tuple[Guess, ...] = (),
 ) -> ImuRecord:
     """Check values as they were read, then give them our units, axes and time.
 
@@ -111,6 +346,7 @@ def finish(
         What the file calls time and the six columns.
     place : callable
         Where a row stands in the file, in words.
+    taken_for : tuple of Guess
 
     Raises
     ------
@@ -126,14 +362,13 @@ def finish(
             check_finite(values.reshape(len(values), -1), labels[first:], source, place)
     if time is None:
         if layout.rate is None:
-            raise UsageError(f"{source}: no time in the log; give the samples a second with --rate")
+            raise UsageError(f"{source}: no time in the log; give the rate")
         time = np.arange(1, len(gyro) + 1) / layout.rate
     else:
         check_order(time, labels[0], source, place)
         time = time * unit_factor("time", kind, layout)
-    record = ImuRecord(
-        time, gyro * unit_factor("gyro", kind, layout), accel * unit_factor("accel", kind, layout), kind, source
-    )
+    rates = gyro * unit_factor("gyro", kind, layout)
+    record = ImuRecord(time, rates, accel * unit_factor("accel", kind, layout), kind, source, taken_for)
     axes = (layout.axes or axes).strip().upper()
     if axes == "RFU":
         return record
@@ -157,41 +392,3 @@ def unit_factor(sensor: str, kind: Kind, layout: Layout) -> float:
             f"{dimension.replace('_', ' ')}, such as {unit}"
         )
     return factor
-
-
-def _found(ours: str, names: Sequence[str], layout: Layout, source: str) -> str:
-    wanted = layout.name(ours)
-    if names.count(wanted) == 1:
-        return wanted
-    if wanted in names:
-        raise DataError(f"{source}: column {wanted!r} is there {names.count(wanted)} times; rename one")
-    taken = {layout.name(name) for columns in COLUMNS.values() for name in ("time", *columns)}
-    spare = {name.lower(): name for name in names if name not in taken}
-    near = [spare[name] for name in get_close_matches(wanted.lower(), spare, n=1)]
-    hint = f"; is it {near[0]!r}? Then --columns {ours}={near[0]}" if near else ""
-    if ours == "time":
-        hint += "; for a log without time give --rate"
-    raise DataError(f"{source}: column {wanted!r} is missing; found {', '.join(names)}{hint}")
-
-
-def check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
-    """Refuse NaN and inf among the columns (N, len(labels)) of a file, by place and column."""
-    finite = np.isfinite(values)
-    if not finite.all():
-        row, column = (int(i) for i in np.argwhere(~finite)[0])
-        raise DataError(
-            f"{source}: {place(row)}, column {labels[column]}: {values[row, column]}; expected a finite number: remove "
-            "the row or repair the log"
-        )
-
-
-def check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:
-    """Refuse time that does not increase, by its place in the file."""
-    bad = np.flatnonzero(np.diff(time) <= 0)
-    if bad.size:
-        k = int(bad[0]) + 1
-        what = "repeats" if time[k] == time[k - 1] else "goes back"
-        raise DataError(
-            f"{source}: {place(k)}, column {label}: time {what} ({time[k - 1]:.15g}, then {time[k]:.15g}); expected "
-            "strictly increasing time: sort the log or drop the repeated rows"
-        )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.turning import Turning, fit_turning
+from truenorth.analysis.turning import AGREES, Turning, fit_turning
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.units import STANDARD_GRAVITY as G
 from truenorth.quality.regimes import MotionSummary
@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 DEG = np.pi / 180.0
 LEVEL_TOLERANCE = 0.12  # of g: local gravity, biases of cheap sensors, motion
 UP_LIMIT = np.radians(60.0)  # tilt of z from up beyond which the axes are doubtful
-AGREES = 0.8  # share of gravity's turn that the gyros must explain for a claim
 CONTRADICTS = 4.0  # times as much left unexplained as by another reading: the axes as given are wrong
 # A lever arm r accelerates in step with the sway and tilts apparent gravity by w^2 r/g: .3 for 3 m at 1 rad/s.
 SCALE_TOLERANCE = 0.35

@@ -1,6 +1,6 @@
 """Records: measurements in SI units and our axes, checked when they are made."""
 
-from truenorth.records.base import GAP_FACTOR, IN_ORDER, Late, Record
+from truenorth.records.base import GAP_FACTOR, IN_ORDER, Guess, Late, Record
 from truenorth.records.encoder import EncoderRecord
 from truenorth.records.gnss import GnssRecord, HeightRecord
 from truenorth.records.imu import COLUMNS, ImuRecord
@@ -14,6 +14,7 @@ __all__ = [
     "IN_ORDER",
     "EncoderRecord",
     "GnssRecord",
+    "Guess",
     "HeightRecord",
     "ImuRecord",
     "Late",

@@ -36,6 +36,30 @@ class Late(NamedTuple):
 IN_ORDER = Late()
 
 
+class Guess(NamedTuple):
+    """One thing that a log did not say, and what a reader took it for.
+
+    Attributes
+    ----------
+    what : str
+        Such as ``unit of the gyros``.
+    value : str
+        What it was taken for.
+    why : str
+        The evidence, in words.
+    probability : float
+        Of this reading among all that were thought of; 1 where the log or the caller says so.
+    option : mapping
+        The reader's option that says the same.
+    """
+
+    what: str
+    value: str
+    why: str
+    probability: float = 1.0
+    option: Mapping[str, Any] = {}  # never written to
+
+
 class Record:
     """Measurements over time: a frozen dataclass with ``time`` (N,), ``source``, and arrays of N rows.
 

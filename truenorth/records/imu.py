@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import Record
+from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
+Kind = Literal["rates", "increments"]
 
 COLUMNS = {
     "rates": ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"),
@@ -37,6 +38,8 @@ class ImuRecord(Record):
         What a row is.
     source : str
         Where the record came from (a file name); messages begin with it.
+    taken_for : tuple of Guess
+        What the reader took the log for.
 
     Raises
     ------
@@ -48,8 +51,9 @@ class ImuRecord(Record):
     time: Array
     gyro: Array
     accel: Array
-    kind: Literal["rates", "increments"] = "rates"
+    kind: Kind = "rates"
     source: str = field(default="IMU record", compare=False)
+    taken_for: tuple[Guess, ...] = field(default=(), compare=False, repr=False)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """``gyro`` and ``accel`` with the columns of the kind."""
@@ -63,4 +67,4 @@ class ImuRecord(Record):
     def rotated(self, C_new_old: ArrayLike) -> ImuRecord:
         """The same measurements in other body axes: ``v_new = C_new_old @ v_old``."""
         C = np.asarray(C_new_old, dtype=np.float64)
-        return ImuRecord(self.time, self.gyro @ C.T, self.accel @ C.T, self.kind, self.source)
+        return replace(self, gyro=self.gyro @ C.T, accel=self.accel @ C.T)

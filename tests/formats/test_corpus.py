@@ -1,0 +1,67 @@
+"""Logs in the dialects of the field: read right as they are, or after one question, or refused for the right reason."""
+
+import numpy as np
+import pytest
+
+from tests.formats.corpus.dialects import Log, logs
+from truenorth.core.errors import DataError, TruenorthError
+from truenorth.formats import read_imu
+from truenorth.records import ImuRecord
+
+CORPUS = logs()
+
+
+def is_right(log: Log, record: ImuRecord) -> bool:
+    """Whether a record is the log's truth: to its printed digits in the sensors, to a step of the clock in time."""
+    truth = log.truth
+    if len(record) != len(truth.time):
+        return False
+    # Rates and increments are the same thing, where the interval is right.
+    increments = truth.gyro.mean(axis=0).size and abs(np.median(np.linalg.norm(truth.accel, axis=1))) < 2.0
+    scale = (
+        1.0 if (record.kind == "increments") == bool(increments) else record.interval ** (-1.0 if increments else 1.0)
+    )
+    close = np.allclose(record.gyro / scale, truth.gyro, rtol=1e-4, atol=1e-4 * np.abs(truth.gyro).max())
+    close &= np.allclose(record.accel / scale, truth.accel, rtol=1e-4, atol=1e-4 * np.abs(truth.accel).max())
+    return bool(close and np.abs(record.time - truth.time - log.shift).max() < 0.02 * record.interval + 1e-6)
+
+
+def outcome(log: Log, folder) -> str:
+    """``as it is``, ``asked``, ``refused``, or what is wrong."""
+    path = folder / log.name
+    log.write(path)
+    try:
+        record = read_imu(path)
+    except TruenorthError as error:
+        text = str(error)
+        assert path.name in text, text
+        if log.refused:
+            return "refused" if log.refused in text else f"refused for another reason: {text}"
+        if not log.answer:
+            return f"refused: {text}"
+        if not is_right(log, read_imu(path, **log.answer)):
+            return "wrong after the answer"
+        return "asked" if isinstance(error, DataError | TruenorthError) else text
+    if is_right(log, record):
+        return "as it is"
+    if log.answer and is_right(log, read_imu(path, **log.answer)) and ("axes" in log.answer or "columns" in log.answer):
+        from truenorth.quality import inspect
+
+        codes = {finding.code for finding in inspect(record).findings if finding.severity == "error"}
+        return "asked" if codes & {"axes_down", "gyro_axes"} else f"read wrong in silence: {codes}"
+    return "read wrong in silence"
+
+
+@pytest.mark.parametrize("log", CORPUS, ids=lambda log: log.name)
+def test_a_log_is_read_right_or_not_at_all(log, tmp_path):
+    result = outcome(log, tmp_path)
+    assert result in ("as it is", "asked", "refused"), result
+    if log.refused:
+        assert result == "refused"
+    elif not log.answer:
+        assert result == "as it is"
+
+
+def test_the_corpus_is_as_large_as_it_should_be():
+    assert len(CORPUS) >= 60
+    assert len({log.name for log in CORPUS}) == len(CORPUS)

@@ -1,0 +1,202 @@
+"""What the numbers of an IMU's log must be in, by physics: each reading of them with its probability.
+
+- **Accelerometers.** At rest and over most motions the norm of the specific force is gravity's; increments show it times the
+  interval. A unit is as likely as the median norm is near to what gravity is in it (1 % for a good sensor, 5 % for a bad one).
+- **Gyros, where gravity turns.** ``du/dt = -w x u``: the rate that gravity's direction shows in the accelerometers over the
+  rate of the gyros is the unit.
+- **Gyros at rest.** White noise gives the angle random walk of a reading, and with it what bias such a gyro has: from one to
+  ten thousand deg/h for each deg/sqrt(h). The mean rate, the earth's plus that bias, is likely or not: a gyrocompass shows the
+  earth's rate in one unit only, a cheap gyro's bias explains several, and then nobody can tell.
+- **Clocks.** IMUs write 5 to 4000 rows a second; dates since 1970 have their size.
+
+What is usual (rad/s with m/s^2, deg/s with g) weighs a little; it never decides alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.analysis.turning import AGREES, Turning, fit_turning
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.units import STANDARD_GRAVITY as G
+from truenorth.core.units import parse_quantity, parse_unit
+from truenorth.records.imu import Kind
+
+Array = NDArray[np.float64]
+
+DEG = np.pi / 180.0
+SURE = 0.98  # probability from which a reading is taken without a question
+TOLERANCE = 0.12  # of gravity: beyond it no reading of the accelerometers is one
+CELL = 0.1  # s
+WALKS = (DEG / 60.0 * 5e-5, DEG / 60.0 * 3.0)  # rad/sqrt(s): random walks of the best and the worst gyros
+LARGEST_BIAS = 5.0 * DEG  # rad/s
+LARGEST_RATE = 2000.0 * DEG  # rad/s
+BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sqrt(h), of gyros of all classes
+DECADE = 0.25  # decades by which those limits are soft
+
+# Prior weight of a unit: how often logs are written so.
+ACCEL_UNITS: dict[Kind, dict[str, float]] = {
+    "rates": {"m/s^2": 1.0, "g": 1.0, "mg": 0.2, "cm/s^2": 0.05, "ug": 0.02, "ft/s^2": 0.02},
+    "increments": {"m/s": 1.0, "g*s": 0.05, "cm/s": 0.01, "mm/s": 0.01, "ft/s": 0.01},
+}
+GYRO_UNITS: dict[Kind, dict[str, float]] = {
+    "rates": {"rad/s": 1.0, "deg/s": 1.0, "deg/h": 0.1, "mrad/s": 0.02, "mdps": 0.05},
+    "increments": {"rad": 1.0, "deg": 0.3, "arcsec": 0.2, "mrad": 0.02},
+}
+USUAL = {"m/s^2": ("rad/s", 4.0), "g": ("deg/s", 6.0), "mg": ("deg/s", 4.0), "m/s": ("rad", 4.0), "g*s": ("deg", 4.0)}
+CLOCKS = {"s": 1.0, "ms": 1.0, "us": 0.7, "ns": 0.7, "0.1 ms": 0.02}
+RATES = ((20.0, 1000.0, 1.0), (5.0, 4000.0, 0.3), (1.0, 4000.0, 0.05), (0.2, 20000.0, 0.003))  # Hz, weight
+EPOCH = (9.4e8, 2.3e9)  # s since 1970: the years 2000 to 2042
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read some columns: its unit (and kind), its probability, and why."""
+
+    unit: str
+    probability: float
+    why: str
+    kind: Kind = "rates"
+
+
+def size(unit: str) -> float:
+    """What a unit, or a count of so much, is in SI."""
+    return (parse_quantity(unit) if unit[:1].isdigit() and unit != "1" else parse_unit(unit))[0]
+
+
+def _ranked(readings: Sequence[tuple[str, float, str, Kind]]) -> list[Reading]:
+    total = sum(weight for _, weight, _, _ in readings)
+    if total <= 0.0 or not np.isfinite(total):
+        return []
+    found = [Reading(unit, weight / total, why, kind) for unit, weight, why, kind in readings if weight > 1e-9 * total]
+    return sorted(found, key=lambda reading: -reading.probability)
+
+
+def gravity_level(accel: Array) -> float:
+    """Median norm of three columns."""
+    return float(np.median(np.linalg.norm(accel, axis=1)))
+
+
+def accel_readings(
+    level: float, interval: float, kinds: Sequence[Kind], units: Sequence[str] | None = None
+) -> list[Reading]:
+    """Units of accelerometers whose median norm is `level`, most likely first; none where gravity is in no unit.
+
+    Parameters
+    ----------
+    level : float
+    interval : float, s
+        NaN where it is not known: then increments cannot be told.
+    kinds : sequence of {"rates", "increments"}
+    units : sequence of str, optional
+        Those that are possible; the usual ones of `kinds` when left out.
+    """
+    readings = []
+    for kind in kinds:
+        for unit, prior in ACCEL_UNITS[kind].items() if units is None else dict.fromkeys(units, 1.0).items():
+            wanted = G / size(unit) * (interval if kind == "increments" else 1.0)
+            away = np.log(level / wanted) if level > 0.0 and wanted > 0.0 else np.inf
+            if not abs(away) < TOLERANCE:
+                continue
+            near = 0.9 / 0.01 * np.exp(-0.5 * (away / 0.01) ** 2) + 0.1 / 0.05 * np.exp(-0.5 * (away / 0.05) ** 2)
+            why = f"the median norm of the accelerometers is {level:.4g}, gravity is {wanted:.4g} {unit}"
+            why += f" a row of {interval:.4g} s" if kind == "increments" else ""
+            readings.append((unit, prior * float(near), why, kind))
+    return _ranked(readings)
+
+
+@dataclass(frozen=True)
+class GyroFacts:
+    """What the gyros show, in their own unit a second, beside the accelerometers' turning of gravity."""
+
+    turning: Turning
+    mean: float
+    mean_sigma: float
+    walk: float
+    largest: float
+
+
+def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
+    """What the gyros of a log show; `gyro` and `accel` (N, 3) in any unit, rates or increments."""
+    interval = float(np.median(np.diff(time)))
+    rows = max(1, round(CELL / interval))
+    cells = len(time) // rows
+    data = np.hstack([gyro, accel])[: cells * rows]
+    if kind == "increments":
+        data = data / interval
+    rates = data.reshape(cells, rows, 6).mean(axis=1).T if cells else np.zeros((6, 0))
+    turning = fit_turning(rows * interval, np.ascontiguousarray(rates))
+    walks = []
+    for tau in (interval, 0.1, 0.5, 1.0, 2.0):
+        m = max(1, round(tau / interval))
+        count = len(data) // m
+        if count >= 8:
+            means = data[: count * m, :3].reshape(count, m, 3).mean(axis=1)
+            walks.append(np.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2, axis=0) * m * interval))
+    walk = float(np.median(np.min(walks, axis=0))) if walks else 0.0
+    parts = [part.mean(axis=0) for part in np.array_split(data[:, :3], 10)] if len(data) >= 100 else []
+    wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
+    mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
+    largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
+    return GyroFacts(turning, mean, wander, walk, largest)
+
+
+def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
+    """Units of gyros, most likely first."""
+    turned = np.isfinite(facts.turning.best_agreement) and facts.turning.best_agreement >= AGREES
+    usual, weight = USUAL.get(accel_unit, ("", 1.0))
+    readings = []
+    for unit, prior in GYRO_UNITS[kind].items() if units is None else dict.fromkeys(units, 1.0).items():
+        factor = size(unit)
+        likely = prior * (weight if unit == usual else 1.0) * _below(facts.largest * factor, LARGEST_RATE)
+        if turned:
+            scale = facts.turning.best_scale * factor
+            away = np.log(scale)
+            likely *= 0.95 * np.exp(-0.5 * (away / 0.15) ** 2) + 0.05 * np.exp(-0.5 * (away / 0.6) ** 2) + 1e-12
+            why = f"in {unit} the gyros turn {scale:.3g} times as far as gravity in the accelerometers"
+        elif facts.walk > 0.0 and facts.mean_sigma < np.inf:
+            rest = _at_rest(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
+            likely *= rest
+            walk = facts.walk * factor / DEG * 60.0
+            why = (
+                f"in {unit} the mean rate is {facts.mean * factor / EARTH_RATE:.3g} times the earth's, the random walk "
+                f"{walk:.2g} deg/sqrt(h)"
+            )
+        else:
+            why = "usual"
+        readings.append((unit, float(likely), why, kind))
+    return _ranked(readings)
+
+
+def _below(value: float, limit: float) -> float:
+    """Likelihood of a value that has a soft upper limit."""
+    return float(np.exp(-0.5 * (max(0.0, np.log10(value / limit)) / DECADE) ** 2)) if value > 0.0 else 1.0
+
+
+def _at_rest(mean: float, sigma: float, walk: float) -> float:
+    """Likelihood of a mean rate (rad/s) and a random walk (rad/sqrt(s)) of a gyro triad on a base that does not turn.
+
+    The norm x of the earth's rate W plus a bias of variance s^2 on each axis has the density
+    ``x / (W s sqrt(2 pi)) (exp(-(x - W)^2 / 2 s^2) - exp(-(x + W)^2 / 2 s^2))``; times x, of its logarithm.
+    """
+    bias = np.hypot(BIAS_RATIOS * walk / 60.0, sigma)  # deg/h for deg/sqrt(h) is 1/60 of rad/s for rad/sqrt(s)
+    x, w = mean, EARTH_RATE
+    near = np.exp(-0.5 * ((x - w) / bias) ** 2) - np.exp(-0.5 * ((x + w) / bias) ** 2)
+    density = x * x / (w * bias * np.sqrt(2.0 * np.pi)) * near
+    return float(np.mean(density) + 1e-6) * _below(walk, WALKS[1]) * _below(WALKS[0], walk) * _below(mean, LARGEST_BIAS)
+
+
+def clock_readings(step: float, first: float, units: Sequence[str] | None = None) -> list[Reading]:
+    """Units of a clock whose median step is `step` and whose first value is `first`, most likely first."""
+    readings = []
+    for unit, prior in CLOCKS.items() if units is None else dict.fromkeys(units, 1.0).items():
+        rate = 1.0 / (step * size(unit))
+        weight = next((weight for low, high, weight in RATES if low <= rate <= high), 1e-6)
+        epoch = EPOCH[0] < first * size(unit) < EPOCH[1]
+        why = f"{rate:.4g} rows a second" + (", counted from 1970" if epoch else "")
+        readings.append((unit, prior * weight * (1000.0 if epoch else 1.0), why, "rates"))
+    return _ranked(readings)  # type: ignore[arg-type]

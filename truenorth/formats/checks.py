@@ -1,0 +1,35 @@
+"""What no log may hold where a number is needed, by its place in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError
+
+Array = NDArray[np.float64]
+
+
+def check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
+    """Refuse NaN and inf among the columns (N, len(labels)) of a file, by place and column."""
+    finite = np.isfinite(values)
+    if not finite.all():
+        row, column = (int(i) for i in np.argwhere(~finite)[0])
+        raise DataError(
+            f"{source}: {place(row)}, column {labels[column]}: {values[row, column]}; expected a finite number: remove "
+            "the row or repair the log"
+        )
+
+
+def check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:
+    """Refuse time that does not increase, by its place in the file."""
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if bad.size:
+        k = int(bad[0]) + 1
+        what = "repeats" if time[k] == time[k - 1] else "goes back"
+        raise DataError(
+            f"{source}: {place(k)}, column {label}: time {what} ({time[k - 1]:.15g}, then {time[k]:.15g}); expected "
+            "strictly increasing time: sort the log or drop the repeated rows"
+        )

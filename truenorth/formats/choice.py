@@ -1,0 +1,430 @@
+"""Which columns of a log are time, rates and specific forces: as the caller says, as they are called, or as they behave."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import DIMENSIONS, parse_unit
+from truenorth.formats.behaviour import accel_readings, gravity_level
+from truenorth.formats.columns import Columns
+from truenorth.formats.guesses import UnsureError
+from truenorth.formats.layout import BLOCKS, Layout
+from truenorth.formats.names import Heading, clock_of, families, heading_of
+from truenorth.records import COLUMNS, Guess
+from truenorth.records.imu import Kind
+
+Array = NDArray[np.float64]
+
+REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
+INTERVALS = ("ts", "Ts", "dt", "interval")
+RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|$)", re.IGNORECASE)
+STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
+MOST_COLUMNS = 200  # that are looked at where no name tells
+
+
+@dataclass
+class Choice:
+    """The columns of an IMU in a log.
+
+    Attributes
+    ----------
+    kind : {"rates", "increments"} or None
+        None: the names do not tell.
+    time : tuple of str
+        One column, or two of seconds and their fraction; none where the log has no clock.
+    sensors : list of (str, float)
+        Six columns, each with its sign.
+    units : dict
+        That the headings name, of ``gyro``, ``accel`` and ``time``.
+    documented : bool
+        The columns have our own names, which mean SI.
+    guesses : list of Guess
+    """
+
+    kind: Kind | None
+    time: tuple[str, ...]
+    sensors: list[tuple[str, float]]
+    units: dict[str, str] = field(default_factory=dict)
+    documented: bool = False
+    guesses: list[Guess] = field(default_factory=list)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Seven names for messages."""
+        return (self.time[0] if self.time else "time", *(name for name, _ in self.sensors))
+
+
+def choose(columns: Columns, layout: Layout) -> Choice:
+    """Find the columns of an IMU.
+
+    Raises
+    ------
+    DataError
+        A column that is missing or there twice; the message lists those found and the nearest name.
+    UnsureError
+        Several sets of columns may be meant.
+    """
+    named = _named(columns, layout)
+    if named is not None:
+        kind: Kind = layout.kind or ("rates" if set(COLUMNS["rates"]) & set(named) else "increments")
+        return _by_caller(columns, layout, named, kind)
+    for kind in _by_size(columns.names):
+        if all(ours in columns.names for ours in COLUMNS[kind]):
+            _once(columns, COLUMNS[kind])
+            choice = Choice(kind, (), [(ours, 1.0) for ours in COLUMNS[kind]], documented=True)
+            return _with_time(columns, layout, choice)
+    found = _by_name(columns, layout)
+    if found is not None:
+        return _with_time(columns, layout, found)
+    near = [name for name in columns.names if name in {c for names in COLUMNS.values() for c in names}]
+    if near:
+        wanted = next(c for k in COLUMNS for c in COLUMNS[k] if near[0] in COLUMNS[k] and c not in columns.names)
+        raise _missing(columns, wanted, wanted)
+    return _by_behaviour(columns, layout)
+
+
+def _by_size(names: Sequence[str]) -> tuple[Kind, Kind]:
+    rates, increments = (sum(c in names for c in COLUMNS[kind]) for kind in ("rates", "increments"))
+    return ("rates", "increments") if rates >= increments else ("increments", "rates")
+
+
+def _once(columns: Columns, names: Sequence[str]) -> None:
+    for name in names:
+        if columns.names.count(name) > 1:
+            raise DataError(
+                f"{columns.path.name}: column {name!r} is there {columns.names.count(name)} times; rename one"
+            )
+
+
+def _missing(columns: Columns, ours: str, wanted: str) -> DataError:
+    near = {name.lower(): name for name in columns.names}
+    match = get_close_matches(wanted.lower(), near, n=1)
+    hint = f"; is it {near[match[0]]!r}? Then columns: {{{ours}: {near[match[0]]}}}" if match else ""
+    return DataError(f"{columns.path.name}: column {wanted!r} is missing; found {', '.join(columns.names)}{hint}")
+
+
+# ---------------------------------------------------------------------------------------------- by caller
+
+
+def _named(columns: Columns, layout: Layout) -> dict[str, tuple[str, float]] | None:
+    """The caller's columns by our names, with their signs; None where none of a sensor is named."""
+    result: dict[str, tuple[str, float]] = {}
+    for ours, text in layout.columns.items():
+        if ours in ("time", "scale", "interval"):
+            continue
+        sign = 1.0 if text in columns.names or not text.startswith("-") else -1.0
+        theirs = text if sign > 0.0 else text[1:]
+        block = next((k for k, pair in BLOCKS.items() if ours in pair), None)
+        if block is None:
+            result[ours] = (theirs, sign)
+            continue
+        three = COLUMNS[block][:3] if ours == BLOCKS[block][0] else COLUMNS[block][3:]
+        result |= {name: (part, sign) for name, part in zip(three, _parts(columns, theirs))}
+    return result or None
+
+
+def _parts(columns: Columns, reference: str) -> list[str]:
+    """The three columns of a block such as ``counts[0:3]``, or of an array of three."""
+    match = REFERENCE.fullmatch(reference.strip())
+    if match is not None:
+        name, first, stop = match[1], int(match[2]), int(match[3])
+        parts = [f"{name}[{i}]" for i in range(first, stop)]
+        have = sum(other.startswith(f"{name}[") for other in columns.names)
+        if have and (len(parts) != 3 or stop > have):
+            raise DataError(
+                f"{columns.path.name}: {reference!r}: variable {name!r} has {have} columns and no such three; expected "
+                f"{name}[0:3] or the like"
+            )
+    elif "[" in reference:
+        raise UsageError(
+            f"{columns.path.name}: cannot read the reference {reference!r}; write it like counts, counts[0:3] or imu[6]"
+        )
+    else:
+        name, parts = reference, [f"{reference}[{i}]" for i in range(3)]
+        if f"{reference}_x" in columns.names:  # an array that has one of our names
+            parts = [f"{reference}_{axis}" for axis in "xyz"]
+        if reference in columns.names and columns.path.suffix.lower() not in (".npz", ".mat"):
+            raise UsageError(
+                f"{columns.path.name}: columns: 'gyro' and its like are for arrays; name single columns, such as gyro_x and accel_x"
+            )
+        have = sum(other.startswith(f"{name}[") for other in columns.names)
+        if have > 3 or reference in columns.names:
+            raise DataError(
+                f"{columns.path.name}: {reference!r} has {have or 1} columns; expected three, x, y and z: of a larger array "
+                f"name a part, such as {reference}[0:3]"
+            )
+    if parts[0] not in columns.names:
+        whole = sorted({other.partition("[")[0] for other in columns.names})
+        near = get_close_matches(name, whole, n=1)
+        hint = f"; is it {near[0]!r}?" if near else ""
+        raise DataError(f"{columns.path.name}: {name!r} is missing; found {', '.join(whole) or 'none'}{hint}")
+    return parts
+
+
+def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, float]], kind: Kind) -> Choice:
+    other = "increments" if kind == "rates" else "rates"
+    for ours, theirs in zip(COLUMNS[other], COLUMNS[kind]):  # where the caller's kind wins over the name
+        named = {theirs if key == ours else key: value for key, value in named.items()}
+    missing = [ours for ours in COLUMNS[kind] if ours not in named]
+    found = families(columns.names) if missing and columns.named else {}
+    for ours in missing:
+        sets = found.get(ours.rpartition("_")[0], [])
+        if ours in columns.names:
+            named[ours] = (ours, 1.0)
+        elif len(sets) == 1:
+            named[ours] = (sets[0][ours[-1]].name, 1.0)
+    for ours in COLUMNS[kind]:
+        if ours not in named or named[ours][0] not in columns.names:
+            raise _missing(columns, ours, named.get(ours, (ours, 1.0))[0])
+    _once(columns, [name for name, _ in named.values()])
+    choice = Choice(kind, (), [named[ours] for ours in COLUMNS[kind]])
+    choice.documented = all(name == ours for ours, (name, _) in named.items())
+    choice.units = _units([heading_of(name) for name, _ in choice.sensors], kind)
+    return _with_time(columns, layout, choice)
+
+
+def _units(headings: Sequence[Heading | None], kind: Kind) -> dict[str, str]:
+    """Units of a sensor that all of its headings agree on, and that fit the kind."""
+    result = {}
+    wanted = {"rates": ("angular_rate", "acceleration"), "increments": ("angle", "speed")}[kind]
+    for sensor, part, dimension in zip(("gyro", "accel"), (headings[:3], headings[3:]), wanted):
+        said = {heading.unit if heading is not None else None for heading in part}
+        unit = said.pop()
+        if not said and unit is not None and parse_unit(unit)[1] == DIMENSIONS[dimension][0]:
+            result[sensor] = unit
+    return result
+
+
+# ------------------------------------------------------------------------------------------------ by name
+
+
+def _by_name(columns: Columns, layout: Layout) -> Choice | None:
+    """The columns by their headings; None where they do not tell."""
+    if not columns.named:
+        return None
+    found = families(columns.names)
+    sets: dict[Kind, tuple[list[dict[str, Heading]], list[dict[str, Heading]]]] = {
+        "rates": (found["gyro"], found["accel"]),
+        "increments": (found["dtheta"], found["dvel"]),
+    }
+    for kind, (gyros, accels) in sets.items():
+        if not gyros or not accels or layout.kind not in (None, kind):
+            continue
+        accels = _with_gravity(columns, accels) if len(accels) > 1 else accels
+        if len(gyros) > 1 or len(accels) > 1:
+            several = gyros if len(gyros) > 1 else accels
+            sensor = BLOCKS[kind][0 if several is gyros else 1]
+            choices = [{"columns": {f"{sensor}_{axis}": axes[axis].name for axis in "xyz"}} for axes in several]
+            raise UnsureError(
+                f"{columns.path.name}: {len(several)} sets of columns look like {sensor}: "
+                + ", ".join(axes["x"].name for axes in several), choices,
+            )  # fmt: skip
+        headings = [*(gyros[0][axis] for axis in "xyz"), *(accels[0][axis] for axis in "xyz")]
+        names = [heading.name for heading in headings]
+        _once(columns, names)
+        said = accels[0]["x"].unit
+        if said is not None and kind == "rates" and parse_unit(said)[1] == DIMENSIONS["speed"][0]:
+            kind = "increments"
+        ours = COLUMNS[kind]
+        guess = Guess("columns", ", ".join(names), "their names", 1.0, {"columns": dict(zip(ours, names))})
+        told = kind if kind == "increments" or said is not None else None
+        return Choice(told, (), [(name, 1.0) for name in names], _units(headings, kind), guesses=[guess])
+    return None
+
+
+def _with_gravity(columns: Columns, sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
+    """Of several sets of accelerations those that hold gravity, which an IMU's do."""
+    good = []
+    for axes in sets:
+        values = columns.read([axes[axis].name for axis in "xyz"], True)
+        if accel_readings(gravity_level(values[np.isfinite(values).all(axis=1)]), np.nan, ("rates",)):
+            good.append(axes)
+    return good or sets
+
+
+def _with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
+    """The same with its clock: the caller's, the one of that name, the steadiest of several, or the only column that increases."""
+    wanted = layout.columns.get("time")
+    if wanted is not None:
+        if wanted in columns.names or f"{wanted}[0]" in columns.names:
+            choice.time = (wanted if wanted in columns.names else f"{wanted}[0]",)
+        elif layout.rate is None:
+            raise _missing(columns, "time", wanted)
+        _note_unit(choice, *(clock_of(choice.time[0]) if choice.time else (False, None)))
+        return choice
+    if "interval" in layout.columns:
+        return choice
+    taken = {name for name, _ in choice.sensors}
+    names = [name for name in columns.names if name not in taken]
+    if "time" in names:
+        choice.time = ("time",)
+        return choice
+    clocks = (
+        {name: unit for name in names if (found := clock_of(name))[0] for unit in (found[1],)} if columns.named else {}
+    )
+    whole = [name for name, unit in clocks.items() if re.search(r"(?i)(?:^|[^a-z])secs?$", name)]
+    parts = [name for name in names if re.search(r"(?i)(?:nano_?secs?|nsecs?|nanosec)$", name)]
+    if whole and parts:
+        choice.time = (whole[0], parts[0])
+        choice.units["time"] = "s"
+        choice.guesses.append(Guess("time", f"{whole[0]} + {parts[0]}", "seconds and nanoseconds by their names"))
+        return choice
+    steady = {name: scatter for name in clocks if (scatter := _scatter(columns, name)) is not None}
+    if steady:
+        best = min(
+            steady,
+            key=lambda name: (
+                steady[name] > STEADY,
+                list(clocks).index(name) if steady[name] < 0.05 else 99,
+                steady[name],
+            ),
+        )
+        why = "its name" if len(steady) == 1 else f"of {', '.join(steady)} the steadiest, or the first of equals"
+        choice.time = (best,)
+        choice.guesses.append(Guess("time", best, why, 1.0, {"columns": {"time": best}}))
+        _note_unit(choice, True, clocks[best])
+        return choice
+    wrong = [name for name in clocks if len(columns.column(name)) > 1]
+    if wrong and layout.rate is None:
+        choice.time = (wrong[0],)  # which is refused with the row that is wrong
+        _note_unit(choice, True, clocks[wrong[0]])
+        return choice
+    if layout.rate is None:
+        _clock_by_behaviour(columns, layout, choice, names)
+    return choice
+
+
+def _note_unit(choice: Choice, is_clock: bool, unit: str | None) -> None:
+    if is_clock and unit is not None:
+        choice.units["time"] = unit
+
+
+def _scatter(columns: Columns, name: str) -> float | None:
+    """RMS scatter of a clock's steps over the median one; None where it does not always increase."""
+    try:
+        steps = np.diff(columns.clock(name)[0])
+    except DataError:
+        return None
+    if not steps.size or not np.all(np.isfinite(steps)) or steps.min() < 0.0 or np.median(steps) <= 0.0:
+        return None
+    median = float(np.median(steps))
+    near = steps[steps < 3.0 * median]
+    return float(np.sqrt(np.mean((near / median - 1.0) ** 2)))
+
+
+def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
+    """Take the only column that increases steadily for the clock; a row counter is none."""
+    found = []
+    for name in names[:MOST_COLUMNS]:
+        scatter = _scatter(columns, name)
+        if scatter is not None and scatter < STEADY:
+            steps = np.diff(columns.clock(name)[0])
+            counts = np.all(steps == 1.0) and not re.search(r"(?i)time|stamp|[^a-z]ms", name)
+            found.append((name, bool(counts)))
+    clocks = [name for name, counts in found if not counts]
+    if len(clocks) == 1:
+        choice.time = (clocks[0],)
+        choice.guesses.append(
+            Guess(
+                "time",
+                f"column {clocks[0]}",
+                "the only one that increases steadily",
+                1.0,
+                {"columns": {"time": clocks[0]}},
+            )
+        )
+    elif len(clocks) > 1:
+        options = [{"columns": {"time": name}} for name in clocks]
+        raise UnsureError(
+            f"{columns.path.name}: columns {', '.join(clocks)} all increase like a clock", options, choice.guesses
+        )
+
+
+# ------------------------------------------------------------------------------------------- by behaviour
+
+
+def _by_behaviour(columns: Columns, layout: Layout) -> Choice:
+    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three beside them."""
+    source = columns.path.name
+    numbers = {}
+    for name in columns.names[:MOST_COLUMNS]:
+        try:
+            numbers[name] = columns.read([name], True)[:, 0]
+        except DataError:
+            continue  # text
+    longest = max((len(v) for v in numbers.values()), default=0)
+    numbers = {name: v for name, v in numbers.items() if len(v) == longest}
+    choice = Choice(None, (), [])
+    if longest >= 3:
+        choice = _with_time(columns, layout, choice)
+    skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
+    free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
+    blocks = [free[i : i + 3] for i in range(0, len(free) - 2, 3)]
+    interval = float(np.median(np.diff(columns.clock(choice.time[0])[0]))) if choice.time else np.nan
+    forces = [
+        block for block in blocks
+        if _constant(values := np.column_stack([numbers[name] for name in block]))
+        and any(
+            accel_readings(gravity_level(values), interval * scale, ("rates", "increments"))
+            for scale in (1.0, 1e-3, 1e-6, 1e-9, 1e-4)
+        )
+    ]  # fmt: skip
+    if longest < 3 or not forces or len(blocks) < 2:
+        raise DataError(
+            f"{source}: no columns of an IMU among {', '.join(columns.names) or '(none)'}; expected time, gyro_x .. accel_z (rates "
+            "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
+        )
+    others = [block for block in blocks if block not in forces] if len(forces) == 1 else []
+    if len(forces) > 1 or len(others) > 1:
+        sensor, several = ("accel", forces) if len(forces) > 1 else ("gyro", others)
+        options = [{"columns": {f"{sensor}_{axis}": name for axis, name in zip("xyz", block)}} for block in several]
+        raise UnsureError(
+            f"{source}: {len(several)} sets of three columns may be the {'accelerometers' if sensor == 'accel' else 'gyros'}: "
+            + ", ".join(" ".join(block) for block in several), options, choice.guesses,
+        )  # fmt: skip
+    names = [*others[0], *forces[0]]
+    why = f"the norm of columns {' '.join(forces[0])} is gravity's; {' '.join(others[0])} are the three others"
+    choice.sensors = [(name, 1.0) for name in names]
+    choice.guesses.append(Guess("columns", ", ".join(names), why, 1.0, {"columns": dict(zip(COLUMNS["rates"], names))}))
+    return choice
+
+
+def _constant(values: Array) -> bool:
+    """Whether the norm of three columns stays about the same, as gravity does."""
+    norm = np.linalg.norm(values, axis=1)
+    low, middle, high = np.quantile(norm, [0.25, 0.5, 0.75])
+    return bool(middle > 0.0 and (high - low) < 0.3 * middle)
+
+
+def rate_above(columns: Columns) -> tuple[float, str] | None:
+    """The sampling rate that a line above the table names, and the line."""
+    for line in columns.above:
+        match = RATE_LINE.search(line.strip())
+        if match is not None and float(match[1]) > 0.0:
+            return float(match[1]), line.strip()
+    return None
+
+
+def interval_of(columns: Columns, layout: Layout) -> tuple[float, str] | None:
+    """The sampling interval that a variable of one value holds, and its name."""
+    names: Mapping[str, str] = layout.columns
+    candidates = (names["interval"],) if "interval" in names else INTERVALS
+    for name in candidates:
+        if name in columns.names:
+            values = columns.read([name], False)
+            if values.size == 1 and 0.0 < values.item() < np.inf:
+                return float(values.item()), name
+            if "interval" in names:
+                raise DataError(
+                    f"{columns.path.name}: interval {name!r} is {values[:3, 0]}; expected one positive time"
+                )
+    if "interval" in names:
+        raise _missing(columns, "interval", names["interval"])
+    return None

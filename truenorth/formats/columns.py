@@ -1,0 +1,169 @@
+"""A log as named columns, whatever its format; clocks in seconds, where dates and times of day stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError
+from truenorth.formats.layout import BLOCKS
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Array = NDArray[np.float64]
+DAY = 86400.0
+OURS = tuple(name for pair in BLOCKS.values() for name in pair)  # arrays of three columns with our names
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A log as named columns.
+
+    Attributes
+    ----------
+    path : Path
+    names : sequence of str
+    read : callable
+        Columns of some names side by side, (N, n), for (names, whether gaps are allowed); empty cells are NaN.
+    column : callable
+        One column as Arrow keeps it, in the type that it has.
+    place : callable
+        Where a row stands in the file, in words.
+    named : bool
+        Whether the names are the log's own; else ``1, 2, ...``.
+    notes : tuple of str
+        What was left out or mended, and how the log is written.
+    """
+
+    path: Path
+    names: Sequence[str]
+    read: Callable[[Sequence[str], bool], Array]
+    column: Callable[[str], pa.ChunkedArray]
+    place: Callable[[int], str] = lambda row: f"row {row + 1}"
+    named: bool = True
+    notes: tuple[str, ...] = ()
+    above: tuple[str, ...] = ()
+
+    def clock(self, name: str) -> tuple[Array, str | None]:
+        """A column of time, and what it holds: ``"dates"`` and ``"times of day"`` are in seconds, None is bare numbers.
+
+        Raises
+        ------
+        DataError
+            A cell that is none of them.
+        """
+        import pyarrow as pa
+
+        column = self.column(name)
+        kind = column.type
+        if column.null_count:
+            row = next(i for i, valid in enumerate(column.is_valid().to_pylist()) if not valid)
+            raise DataError(f"{self.path.name}: {self.place(row)}, column {name}: empty; expected a time")
+        if pa.types.is_timestamp(kind):
+            return _seconds(column, pa.timestamp("ns", kind.tz), 1e9), "dates"
+        if pa.types.is_date(kind):
+            return _seconds(column.cast(pa.timestamp("ns")), pa.timestamp("ns"), 1e9), "dates"
+        if pa.types.is_time(kind):
+            return _unwrapped(_seconds(column, pa.time64("ns"), 1e9)), "times of day"
+        if pa.types.is_duration(kind):
+            return _seconds(column, pa.duration("ns"), 1e9), "durations"
+        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+            return self._text_clock(name, column.to_pylist())
+        return self.read([name], False)[:, 0], None
+
+    def _text_clock(self, name: str, cells: list[str]) -> tuple[Array, str | None]:
+        import pandas as pd
+
+        plain = pd.Series([cell.strip() for cell in cells])
+        try:
+            if "-" in cells[0] or "/" in cells[0]:
+                stamps = pd.to_datetime(plain, format="mixed", utc=True)
+                return np.asarray(stamps.to_numpy("datetime64[ns]").astype(np.int64) * 1e-9, dtype=np.float64), "dates"
+            if ":" in cells[0]:
+                time = pd.to_timedelta(plain.where(plain.str.count(":") == 2, "00:" + plain))
+                return _unwrapped(
+                    np.asarray(time.to_numpy("timedelta64[ns]").astype(np.int64) * 1e-9, dtype=np.float64)
+                ), "times of day"
+        except (ValueError, OverflowError) as error:
+            raise DataError(
+                f"{self.path.name}: column {name}: not dates or times of one form ({error}); write ISO dates or seconds"
+            ) from None
+        return self.read([name], False)[:, 0], None  # which names the cell that is no number
+
+
+def _seconds(column: pa.ChunkedArray, kind: Any, scale: float) -> Array:
+    import pyarrow as pa
+
+    whole = column.cast(kind).cast(pa.int64())
+    counts = np.concatenate([np.asarray(chunk) for chunk in whole.chunks])
+    return np.asarray(counts / scale, dtype=np.float64)
+
+
+def _unwrapped(time: Array) -> Array:
+    """Times of day that go on after midnight."""
+    midnights = np.concatenate([[0.0], np.cumsum(np.diff(time) < -DAY / 2)])
+    return np.asarray(time + DAY * midnights, dtype=np.float64)
+
+
+def columns_of(path: Path, format: str) -> Columns:
+    """A log of any format as columns; of two-dimensional arrays each column is ``name[i]``, counted from 0.
+
+    Raises
+    ------
+    DataError
+        A damaged file, or one without a table.
+    """
+    if format in ("csv", "kf-gins", "psins"):
+        from truenorth.formats.text import open_table
+
+        table = open_table(path)
+        notes = (*table.notes, table.dialect.words())
+        return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, table.above)
+    if format in ("parquet", "feather"):
+        from truenorth.formats import parquet
+
+        return parquet.columns(path, format)
+    from truenorth.formats import mat, npz
+
+    return columns_of_arrays(path, (npz if format == "npz" else mat).variables_of(path))
+
+
+def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
+    """Columns of named arrays."""
+    parts: dict[str, Any] = {}
+    for name, value in variables.items():
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiumM" or array.ndim > 2:
+            continue
+        if array.ndim == 0 or (array.ndim == 2 and 1 in array.shape):
+            array = array.reshape(-1)
+        if array.ndim == 2 and array.shape[0] < array.shape[1] and array.shape[0] <= 10:
+            array = array.T  # MATLAB users keep time in either direction
+        if array.ndim == 1:
+            parts[name] = array
+        elif array.shape[1] == 3 and name in OURS:
+            parts |= {f"{name}_{axis}": array[:, i] for i, axis in enumerate("xyz")}
+        else:
+            parts |= {f"{name}[{i}]": array[:, i] for i in range(array.shape[1])}
+
+    def read(names: Sequence[str], gaps: bool = False) -> Array:
+        if len({len(parts[name]) for name in names}) > 1:
+            sizes = ", ".join(f"{name} {len(parts[name])}" for name in names)
+            raise DataError(
+                f"{path.name}: columns of different length ({sizes}); expected as many of each: name those of one sensor"
+            )
+        return np.column_stack([parts[name].astype(np.float64) for name in names])
+
+    def column(name: str) -> pa.ChunkedArray:
+        import pyarrow as pa
+
+        part = parts[name]
+        return pa.chunked_array([pa.array(part if part.dtype.kind in "mM" else part.astype(np.float64))])
+
+    return Columns(path, list(parts), read, column)

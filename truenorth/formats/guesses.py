@@ -1,0 +1,56 @@
+"""What a reader takes a log for: guesses with their evidence, and the question where two readings explain it equally."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from truenorth.core.errors import DataError
+from truenorth.formats.behaviour import SURE, Reading
+from truenorth.records import Guess
+
+
+class UnsureError(DataError):
+    """Several readings explain a log; the caller has to say which.
+
+    Attributes
+    ----------
+    question : str
+        What is not known and why.
+    options : sequence of mapping
+        The reader's options that answer it, one for each reading.
+    guesses : sequence of Guess
+        What was found before.
+    """
+
+    def __init__(self, question: str, options: Sequence[Mapping[str, Any]], guesses: Sequence[Guess] = ()) -> None:
+        self.question, self.options, self.guesses = question, tuple(options), tuple(guesses)
+        super().__init__(f"{question}; say which: {' or '.join(map(in_words, options))}")
+
+
+def in_words(option: Mapping[str, Any]) -> str:
+    """An option as it stands in a layout file, on one line."""
+    parts = []
+    for key, value in option.items():
+        if isinstance(value, Mapping):
+            value = "{" + ", ".join(f"{name}: {text}" for name, text in value.items()) + "}"
+        parts.append(f"{key}: {value}")
+    return ", ".join(parts)
+
+
+def take(
+    what: str, readings: Sequence[Reading], options: Sequence[Mapping[str, Any]], source: str, guesses: list[Guess]
+) -> Reading:
+    """The most likely reading, noted among the guesses.
+
+    Raises
+    ------
+    UnsureError
+        It is not sure.
+    """
+    best = readings[0]
+    if best.probability < SURE:
+        why = "; ".join(f"{r.unit} ({100 * r.probability:.0f} %): {r.why}" for r in readings[:2])
+        raise UnsureError(f"{source}: the {what} is not sure: {why}", options[:2], guesses)
+    guesses.append(Guess(what, best.unit, best.why, best.probability, options[0]))
+    return best

@@ -1,0 +1,137 @@
+"""What the headings of an IMU's log mean: ``wx``, ``gyroX``, ``Acc_X [g]``, ``w_RS_S_x [rad s^-1]``, ``linear_acceleration.z``.
+
+A heading is a stem and an axis, with a unit in brackets or at its end. What stands before the stem (``imu0_``, ``field.``,
+``raw_``) tells several sensors of a log apart, and nothing else.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from truenorth.core.units import DIMENSIONS, parse_unit
+from truenorth.formats.layout import BLOCKS
+from truenorth.formats.units import split, unit_in
+
+STEMS = {
+    "dtheta": r"d(?:elta)?_?(?:theta|tht|ang(?:le)?|th)|(?:theta|angle|ang|gyro|ori)_?inc(?:rement)?s?",
+    "dvel": r"d(?:elta)?_?v(?:el(?:ocity)?)?|(?:v|vel|velocity|acc|accel)_?inc(?:rement)?s?",
+    "gyro": r"gyro(?:scope|s|_?rotation|_?rate)?|gyrs?|(?:body_?|turn_?)?rates?|ang(?:ular)?_?(?:vel(?:ocity)?|rate)|omega|ω|"
+    r"w(?:_?rs_?s|_?ib_?b|_?ib|_?b|m)?|g|(?:motion_?)?rot(?:ation)?(?:_?rate)?",
+    "accel": r"(?:accelerometer_?)?acc(?:el(?:eration|erometer|erometers|s)?)?s?|lin(?:ear)?_?acc(?:el(?:eration)?)?|"
+    r"spec(?:ific)?_?force|sf|f(?:_?ib_?b|_?ib|_?b|m)?|a(?:_?rs_?s|_?ib_?b|_?ib|_?b|m)?|gf",
+}
+BEFORE = re.compile(
+    r"(?:(?:imu|ins|field|sensors?|raw|calib(?:rated)?|cal|uncal(?:ibrated)?|body|data|device|meas(?:ured)?|output|inertial|combined|b|mems|fog|rlg|left|right|main|primary)_?\d*_?)+"
+)
+AFTER = r"raw|cal|calibrated|body|b|meas|out|sensor|imu\d*"
+NOT_FORCE = ("free", "user", "gravity", "mag")  # accelerations without gravity, gravity alone, magnetometers
+AXES = {"x": "x", "y": "y", "z": "z"}
+ROLL_RATES = {"p": "x", "q": "y", "r": "z"}  # of aircraft
+CLOCK = re.compile(
+    r"(?:(?:imu|gps|gnss|utc|unix|epoch|posix|ros|logging|location|system|sys|sample|device|sensor|host|pc|log|rec|header|field|elapsed|mono|"
+    r"monotonic|recv|receive|start|loggingtime|locationtime|of|since|relative|boot|itow|sow|seconds|motion|accelerometer|gyro)_?)*"
+    r"(?:time(?:_?stamp|_?of_?week|_?of_?day|_?boot|_?fine)?|t|stamp|timestamp|ts|tow|itow|sow|clock|epoch|seconds?|secs?|"
+    r"sampletimefine|datetime|date_?time|utc|elapsed|seconds_elapsed)"
+    r"(?:_(?P<unit>s|ms|us|ns|secs?|msecs?|usecs?|nsecs?|seconds?|millis(?:econds)?|micros(?:econds)?|nanos(?:econds)?|since_?1970|since_?reboot))?"
+)
+TENTH_MS = ("sampletimefine", "sample_time_fine")  # of Xsens: counts of .1 ms
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What a heading means: the sensor, the axis, the sensor's family, and the unit it names."""
+
+    name: str
+    sensor: str
+    axis: str
+    family: str
+    unit: str | None
+
+
+def plain(text: str) -> str:
+    """A heading as words in lower case with underscores between them: ``gyroX`` and ``Gyro X`` are ``gyro_x``."""
+    text = re.sub(r"(?<=[a-z\d])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", text.strip())
+    return re.sub(r"[^0-9a-zω]+", "_", text.casefold()).strip("_")
+
+
+def heading_of(name: str) -> Heading | None:
+    """What a heading means; None where it is no sensor's of an IMU."""
+    bare, unit = split(name)
+    match = re.fullmatch(r"(.*?)\s*\[([0-5])\]", name.strip())  # a column of an array
+    if match is not None:
+        bare, unit = f"{match[1]}_{'xyz'[int(match[2]) % 3]}", None
+        if int(match[2]) > 2:
+            return None
+    words = plain(bare)
+    said = None if unit is None else unit_in(unit)
+    for base, ending in _without_unit(words):
+        found = _stem(base)
+        if found is not None:
+            sensor, axis, family, inner = found
+            return Heading(name, sensor, axis, family, said or ending or inner)
+    return None
+
+
+def _without_unit(words: str) -> list[tuple[str, str | None]]:
+    """The words, and the words before each ending that is a unit."""
+    parts = words.split("_")
+    results: list[tuple[str, str | None]] = [(words, None)]
+    for count in (1, 2, 3, 4):
+        if len(parts) > count:
+            ending = unit_in("_".join(parts[-count:])) or unit_in("/".join(parts[-count:]))
+            if ending is not None and parts[-count] not in AXES:
+                results.append(("_".join(parts[:-count]), ending))
+    return results
+
+
+def _stem(words: str) -> tuple[str, str, str, str | None] | None:
+    """Sensor, axis, family, and unit before the axis, of a heading without the unit at its end."""
+    if words in ROLL_RATES:
+        return "gyro", ROLL_RATES[words], "pqr", None
+    words = re.sub(r"_?axis(?=_|$)|^axis_", "", words)
+    if any(word in words for word in NOT_FORCE):
+        return None
+    cut = [(words[:-1].rstrip("_"), words[-1:])]
+    if re.match(r"[xyz]_", words):
+        cut.append((words[2:], words[0]))
+    for body, axis in cut:
+        for stem, unit in _without_unit(body) if axis in AXES else ():
+            for bare in dict.fromkeys((stem, BEFORE.sub("", stem, count=1) if BEFORE.match(stem) else stem)):
+                for sensor, pattern in STEMS.items():
+                    if re.fullmatch(rf"(?:{pattern})(?:_?\d+)?(?:_?(?:{AFTER}))?", bare):
+                        return sensor, AXES[axis], body, unit
+    return None
+
+
+def clock_of(name: str) -> tuple[bool, str | None]:
+    """Whether a heading is a clock's, and the unit it names."""
+    bare, unit = split(name)
+    words = plain(bare)
+    if words in TENTH_MS:
+        return True, "0.1 ms"
+    match = CLOCK.fullmatch(words)
+    if match is None:
+        return False, None
+    said = unit_in(unit) if unit else None
+    ending = match["unit"]
+    if said is None and ending is not None and words not in ("seconds", "secs", "second", "sec"):
+        said = unit_in(ending) if not ending.startswith("since") else None
+    if said is not None and parse_unit(said)[1] != DIMENSIONS["time"][0]:
+        said = None
+    return True, said
+
+
+def families(names: Sequence[str]) -> dict[str, list[dict[str, Heading]]]:
+    """By sensor, the sets of three headings, x, y and z, that the log has."""
+    sets: dict[tuple[str, str], dict[str, Heading]] = {}
+    for name in names:
+        heading = heading_of(name)
+        if heading is not None:
+            sets.setdefault((heading.sensor, heading.family), {}).setdefault(heading.axis, heading)
+    result: dict[str, list[dict[str, Heading]]] = {sensor: [] for pair in BLOCKS.values() for sensor in pair}
+    for (sensor, _), axes in sets.items():
+        if len(axes) == 3:
+            result[sensor].append(axes)
+    return result
