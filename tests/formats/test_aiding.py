@@ -189,13 +189,13 @@ def test_arrays_by_name(tmp_path):
     gnss = np.column_stack([T, LAT, LON, ALT, THREE])
     columns = {"time": "gps[0]", "lat": "gps[1]", "lon": "gps[2]", "alt": "gps[3]"}
     columns |= {"VN": "gps[4]", "VE": "gps[5]", "VU": "-gps[6]"}
-    np.savez(tmp_path / "a.npz", gps=gnss, imu=np.ones((5, 7)), words=np.array("text"))
-    savemat(tmp_path / "a.mat", {"gps": gnss, "imu": np.ones((5, 7))})
+    np.savez(tmp_path / "a.npz", gps=gnss, imu=np.ones((5, 3)), words=np.array("text"))
+    savemat(tmp_path / "a.mat", {"gps": gnss, "imu": np.ones((5, 3))})
     for name in ("a.npz", "a.mat"):
         record = truenorth.read_gnss(tmp_path / name, columns=columns, units="position=rad")
         np.testing.assert_array_equal(record.lat, LAT)
         np.testing.assert_array_equal(record.v_n, THREE[:, [1, 0, 2]] * [1, 1, -1])
-        with pytest.raises(DataError, match=r"different length \(gps\[0\] 40, imu\[1\] 5"):
+        with pytest.raises(DataError, match=r"different length \(time 40, imu\[1\] 5"):
             truenorth.read_gnss(tmp_path / name, columns={"time": "gps[0]", "lat": "imu[1]", "lon": "imu[2]"})
 
 
@@ -208,10 +208,15 @@ ODO = "time,speed\n1,2\n2,3\n"
         ("odometer", "time,speed\n1,2\n2,x\n", {}, ["line 3, column speed: 'x'", "expected a number"]),
         ("odometer", "time,speed\n1,2\n2,\n", {}, ["line 3, column speed: nan", "finite"]),
         ("odometer", "time,speed\n1,2\n\n1,3\n", {}, ["line 4, column time", "repeats"]),
-        ("odometer", "time,speed\n1,2\n2\n", {}, ["line 3: 1 columns", "expected 2"]),
-        ("odometer", "speed,x\n1,2\n2,3\n", {}, ["no column of time among speed, x", "--columns time="]),
+        ("odometer", "time,speed\n1,2\n2\n3,4\n5,6\n", {}, ["line 3: 1 columns", "expected 2"]),
+        ("odometer", "speed,x\n1,2\n2,3\n", {}, ["no column of time among speed, x", "name it, in the call"]),
         ("odometer", "time,x\n1,2\n2,3\n", {}, ["expected time and one of pulses", "understood only time"]),
-        ("odometer", "time,speed,v\n1,2,3\n2,3,4\n", {}, ["'speed' and 'v' are both speed", "--columns speed="]),
+        (
+            "odometer",
+            "time,speed,v\n1,2,3\n2,3,4\n",
+            {},
+            ["'speed' and 'v' are both speed", "say which, columns: {speed: ...}"],
+        ),
         ("odometer", "time,pulses\n1,2\n2,3\n", {}, ["pulses without their size", "'2 cm'"]),
         ("odometer", "time,pulses,pulse_size\n1,2,1\n2,3,2\n", {}, ["pulse_size", "one size"]),
         ("odometer", ODO, {"units": "speed=deg"}, ["column speed", "cannot be in 'deg'", "speed"]),
@@ -220,9 +225,9 @@ ODO = "time,speed\n1,2\n2,3\n"
         ("odometer", ODO, {"units": "km/h"}, ["units are", "pairs such as"]),
         ("odometer", ODO, {"columns": {"speed": "Sped"}}, ["column 'Sped' is missing", "is it 'speed'?"]),
         ("odometer", ODO, {"columns": {"velo": "speed"}}, ["columns: key 'velo' is not known"]),
-        ("odometer", "1,2\n2,3\n", {}, ["line 1 holds numbers, not names", "time,pulses"]),
+        ("odometer", "1,2\n2,3\n", {}, ["numbers, and no header of names", "time,pulses"]),
         ("odometer", "", {}, ["empty", "log of named columns"]),
-        ("odometer", ODO, {"format": "psins"}, ["format 'psins'", "choose one of csv, parquet, npz, mat"]),
+        ("odometer", ODO, {"format": "psins"}, ["format 'psins'", "choose one of csv, parquet, feather, npz, mat"]),
         ("odometer", ODO, {"format": "npz"}, ["read as npz"]),
         ("velocity", ODO.replace("speed", "x"), {}, ["v_forward", "VE, VN, VU"]),
         ("velocity", "time,v_forward\n1,\n2,\n", {}, ["not one velocity"]),
@@ -299,8 +304,8 @@ def test_paths(tmp_path):
         truenorth.read_gnss(tmp_path / "none.csv")
     with pytest.raises(UsageError, match="a folder"):
         truenorth.read_height(tmp_path)
-    with pytest.raises(UsageError, match="names no format"):
-        truenorth.read_height(log(tmp_path, ODO, "log.dat"))
+    with pytest.raises(DataError, match="expected time and alt"):
+        truenorth.read_height(log(tmp_path, "time,word\n1,2\n2,3\n", "log.dat"))
     path = tmp_path / "log.csv"
     write_record(RECORDS["height"][0], tmp_path / "a.parquet")
     (tmp_path / "a.parquet").rename(path)

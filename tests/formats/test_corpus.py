@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.formats.corpus.dialects import Log, logs
-from truenorth.core.errors import DataError, TruenorthError
-from truenorth.formats import read_imu
+from truenorth.core.errors import DataError, TruenorthError, UsageError
+from truenorth.formats import read_imu, write_layout
 from truenorth.records import ImuRecord
 
 CORPUS = logs()
@@ -39,9 +39,9 @@ def outcome(log: Log, folder) -> str:
             return "refused" if log.refused in text else f"refused for another reason: {text}"
         if not log.answer:
             return f"refused: {text}"
-        if not is_right(log, read_imu(path, **log.answer)):
-            return "wrong after the answer"
-        return "asked" if isinstance(error, DataError | TruenorthError) else text
+        if not isinstance(error, DataError | UsageError):
+            return f"no question: {text}"
+        return "asked" if is_right(log, read_imu(path, **log.answer)) else "wrong after the answer"
     if is_right(log, record):
         return "as it is"
     if log.answer and is_right(log, read_imu(path, **log.answer)) and ("axes" in log.answer or "columns" in log.answer):
@@ -50,6 +50,26 @@ def outcome(log: Log, folder) -> str:
         codes = {finding.code for finding in inspect(record).findings if finding.severity == "error"}
         return "asked" if codes & {"axes_down", "gyro_axes"} else f"read wrong in silence: {codes}"
     return "read wrong in silence"
+
+
+@pytest.mark.parametrize("name", ["xsens.txt", "bare_counter.csv", "kf_gins.txt", "g_dps_moving.csv", "increments.npz"])
+def test_a_layout_that_was_written_says_all_that_was_found(name, tmp_path):
+    log = next(log for log in CORPUS if log.name == name)
+    path = tmp_path / name
+    log.write(path)
+    first = read_imu(path)
+    write_layout(first, path)
+    again = read_imu(path)
+    for name in ("time", "gyro", "accel"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
+    assert again.kind == first.kind
+    assert all(
+        guess.why == "as the caller says"
+        for guess in again.taken_for
+        if guess.what not in ("text", "axes", "time", "units")
+    )
+    with pytest.raises(UsageError, match="is there already"):
+        write_layout(first, path)
 
 
 @pytest.mark.parametrize("log", CORPUS, ids=lambda log: log.name)

@@ -105,7 +105,7 @@ def test_mat_and_npz_by_variable(record, tmp_path):
         read_imu(path)
     archive = tmp_path / "log.npz"
     np.savez(archive, **{gyro: record.gyro[:, :2], accel: record.accel, "time": record.time})
-    with pytest.raises(DataError, match="gyro_x|dtheta_x"):
+    with pytest.raises(DataError, match=r"gyro_x|dtheta_x"):
         read_imu(archive)
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from truenorth.cli.console import make_console
-from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, read_log
+from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, in_line, read_log
 
 FIGURES = (".png", ".svg", ".pdf")
 
@@ -20,6 +20,7 @@ Examples:
   truenorth inspect log.csv
   truenorth inspect log.csv --lat 34.2 --plot log.png
   truenorth inspect bag/ --axes FLU --json
+  truenorth inspect any.csv --write-layout
 """
 
 
@@ -38,11 +39,14 @@ def inspect(
     start: From = None,
     stop: To = None,
     plot: Annotated[Path | None, typer.Option(help="Write a figure (.png, .svg, .pdf).", show_default=False)] = None,
+    layout: Annotated[
+        bool, typer.Option("--write-layout", help="Write what the log was taken for as LOG.yaml beside it.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
-    """Look at a log: rate, gaps, frozen or saturated samples, likely unit and axes mistakes, motion, noise."""
+    """Look at a log: what it is taken for, rate, gaps, frozen or saturated samples, mistakes of units and axes, motion, noise."""
     from truenorth.core.atomic import atomic_path, writable_folder
-    from truenorth.core.errors import UsageError
+    from truenorth.core.errors import DataError, UsageError
     from truenorth.core.position import Position
 
     place = None if lat is None else Position.from_degrees(lat, 0.0, 0.0)
@@ -50,28 +54,38 @@ def inspect(
         if plot.suffix.lower() not in FIGURES:
             raise UsageError(f"--plot {plot}: cannot draw into this kind of file; use {', '.join(FIGURES)}")
         writable_folder(plot.parent)
+    from truenorth.formats import write_layout
     from truenorth.quality import inspect as inspect_record
 
-    record = read_log(
-        log,
-        axes=axes,
-        units=units,
-        rate=rate,
-        columns=columns,
-        format=format,
-        kind=kind,
-        topic=topic,
-        start=start,
-        stop=stop,
-    )
+    try:
+        record = read_log(
+            log,
+            axes=axes,
+            units=units,
+            rate=rate,
+            columns=columns,
+            format=format,
+            kind=kind,
+            topic=topic,
+            start=start,
+            stop=stop,
+        )
+    except DataError as error:
+        for line in getattr(error, "__notes__", []):  # what was found before the question
+            make_console(stderr=as_json).print(line, soft_wrap=True)
+        raise
     found = inspect_record(record, None if place is None else place.lat)
     if plot is not None:
         with atomic_path(plot) as path:
             found.plot().savefig(path)
+    written = write_layout(record, log) if layout else None
     if as_json:
-        print(json.dumps(found.to_dict(), allow_nan=False))
+        taken = [guess._asdict() for guess in record.taken_for]
+        print(json.dumps(found.to_dict() | {"taken_for": taken}, allow_nan=False))
         return
     console = make_console()
+    for guess in record.taken_for:
+        console.print(f"taken for {in_line(guess)}", soft_wrap=True)
     console.print(found.table())
     colours = {"error": "red", "warning": "yellow", "note": "cyan"}
     for finding in found.findings:
@@ -81,6 +95,8 @@ def inspect(
         console.print("nothing wrong was found")
     if plot is not None:
         console.print(f"wrote {plot}", soft_wrap=True)
+    if written is not None:
+        console.print(f"wrote {written}", soft_wrap=True)
 
 
 inspect.__doc__ = f"{inspect.__doc__}\n{EXAMPLES}"

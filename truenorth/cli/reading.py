@@ -3,34 +3,45 @@
 from __future__ import annotations
 
 import math
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from truenorth.records import ImuRecord
+    from truenorth.records import Guess, ImuRecord
 
 Log = Annotated[
     Path,
     typer.Argument(
-        help="IMU log: .csv, .parquet, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.", show_default=False
+        help="IMU log: text, .parquet, .feather, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.",
+        show_default=False,
     ),
 ]
 Axes = Annotated[
     str | None,
-    typer.Option(help="Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, ...", show_default=False),
+    typer.Option(
+        help="Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, even FLD.",
+        show_default=False,
+    ),
 ]
 Units = Annotated[
-    str | None, typer.Option(help="Units of gyro and accelerometer columns, such as 'deg/s,g'.", show_default=False)
+    str | None,
+    typer.Option(
+        help="Units of the columns, as 'deg/s,g' or 'gyro=deg/s'; else found or asked.",
+        show_default=False,
+    ),
 ]
 Rate = Annotated[
-    float | None, typer.Option(help="Samples a second, for a log without a time column.", show_default=False)
+    float | None,
+    typer.Option(help="Samples a second, of a log without time, or with bad stamps.", show_default=False),
 ]
 Columns = Annotated[
     str | None,
     typer.Option(
-        help="Names of the columns in the log, as 'time=t,gyro_x=wx,...'; for .npz and .mat the variables.",
+        help="Names of the columns in the log, as 'time=t,gyro_x=wx,gyro_y=-wy'; for .npz and .mat the variables.",
         show_default=False,
     ),
 ]
@@ -60,10 +71,8 @@ def read_log(
     stop: float | None,
 ) -> ImuRecord:
     """Read a log as the options say, and cut the window out of it."""
-    import math
-
-    from truenorth.core.errors import UsageError
-    from truenorth.formats import read_imu
+    from truenorth.core.errors import DataError, UsageError
+    from truenorth.formats import UnsureError, read_imu
 
     for option, value in (("--from", start), ("--to", stop)):
         if value is not None and not math.isfinite(value):
@@ -76,19 +85,40 @@ def read_log(
         if any(not equals or not ours.strip() or not theirs.strip() for ours, equals, theirs in pairs):
             raise UsageError(f"--columns {columns!r}: expected pairs such as time=t,gyro_x=wx")
         names = {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
-    record = read_imu(
-        log,
-        format=format,
-        units=units,
-        axes=axes,
-        rate=rate,
-        columns=names,
-        kind=kind,  # type: ignore[arg-type]  # checked there, with the choices in the message
-        topic=topic,
-    )
+    try:
+        record = read_imu(
+            log,
+            format=format,
+            units=units,
+            axes=axes,
+            rate=rate,
+            columns=names,
+            kind=kind,  # type: ignore[arg-type]  # checked there, with the choices in the message
+            topic=topic,
+        )
+    except UnsureError as unsure:
+        choices = " or ".join(as_options(option) for option in unsure.options)
+        error = DataError(f"{unsure.question}; say which: {choices}")
+        error.add_note("\n".join(map(in_line, unsure.guesses)))
+        raise error from unsure
     if start is not None or stop is not None:
         record = record.between(start, stop)
     return record
+
+
+def as_options(option: Mapping[str, Any]) -> str:
+    """A reader's option as it is typed: ``{"units": {"gyro": "deg/s"}}`` is ``--units gyro=deg/s``."""
+    words = []
+    for key, value in option.items():
+        text = ",".join(f"{name}={one}" for name, one in value.items()) if isinstance(value, Mapping) else str(value)
+        words.append(f"--{key} {shlex.quote(text)}")
+    return " ".join(words)
+
+
+def in_line(guess: Guess) -> str:
+    """What a log was taken for, in one line: what, value, how sure, why."""
+    sure = "" if guess.probability > 0.995 else f" ({100 * guess.probability:.0f} % sure)"
+    return f"{guess.what}: {guess.value}{sure}: {guess.why}"
 
 
 def numbers_of(text: str, option: str, count: int, meaning: str) -> list[float]:

@@ -20,12 +20,14 @@ from truenorth.formats.aiding import (
 from truenorth.formats.columns import columns_of
 from truenorth.formats.detect import FORMATS, format_of
 from truenorth.formats.gnss import read_gnss
+from truenorth.formats.guesses import UnsureError, write_layout
 from truenorth.formats.layout import layout_for
 from truenorth.formats.table import record_of
 from truenorth.records import ImuRecord, Record
 
 __all__ = [
     "FORMATS",
+    "UnsureError",
     "read_encoder",
     "read_gnss",
     "read_height",
@@ -35,6 +37,7 @@ __all__ = [
     "read_trajectory",
     "read_velocity",
     "write_imu",
+    "write_layout",
     "write_record",
 ]
 
@@ -61,33 +64,39 @@ def read_imu(
 ) -> ImuRecord:
     """Read an IMU log into SI units and right-forward-up body axes.
 
-    A small YAML file beside the log (``LOG.yaml`` for ``LOG.csv``) may hold the same options; those of the call win.
+    What the log and the call do not say is found by the names of its columns, and by its numbers: what a clock does, what
+    gravity is, how far the gyros turn it. Where that leaves two readings, the reader asks: it raises `UnsureError`, which names
+    both. The record's ``taken_for`` holds what was found, and why. A small YAML file beside the log (``LOG.yaml`` for
+    ``LOG.csv``) may hold the same options; those of the call win.
 
     Parameters
     ----------
     path : path
-        A file, or the folder of a ROS 2 bag.
+        A file, which may be packed (gzip, zstd, bzip2, lz4), or the folder of a ROS 2 bag.
     format : str, optional
         One of `FORMATS`; told by suffix and content when left out.
     units : str or mapping, optional
         Of the gyro and accelerometer columns and of time, such as ``"deg/s,g"``, ``"deg/s,g,ms"`` or
-        ``{"gyro": "0.05 deg/s", "time": "us"}`` (a number is the size of one count); SI where left out.
+        ``{"gyro": "0.05 deg/s", "time": "us"}`` (a number is the size of one count). Documented names mean SI.
     axes : str, optional
-        Where the log's x, y and z point, such as ``"FRD"``; RFU when left out (KF-GINS: FRD, ROS: FLU).
+        Where the log's x, y and z point, such as ``"FRD"``; RFU when left out (KF-GINS: FRD, ROS: FLU). A left-handed set, such
+        as ``"FLD"``, is one too.
     rate : float, optional
-        Hz, for a log without time: the first sample is then at ``1 / rate``.
+        Hz, for a log without time, or whose stamps are worse than its sampling: these give only the start then.
     columns : mapping, optional
-        Our names (``time, gyro_x``, ...) to the log's. In ``.npz`` and ``.mat`` files, variables: ``gyro`` and
-        ``accel`` (``dtheta`` and ``dvel``) to arrays of three columns, which may be a part of a larger one
-        (``"counts[0:3]"``, counted from 0), ``scale`` to what multiplies them, ``interval`` to the sampling interval.
+        Our names (``time, gyro_x``, ...) to the log's; a minus turns the sign: ``{"gyro_y": "-wy"}``. In ``.npz`` and
+        ``.mat`` files, variables: ``gyro`` and ``accel`` (``dtheta`` and ``dvel``) to arrays of three columns, which may be a
+        part of a larger one (``"counts[0:3]"``, counted from 0), ``scale`` to what multiplies them, ``interval`` to the
+        sampling interval.
     kind : {"rates", "increments"}, optional
-        What a row is, where the names of the columns do not tell or are wrong.
+        What a row is, where the names of the columns are wrong.
     topic : str, optional
         Of a ROS bag with several IMUs.
 
     Returns
     -------
     ImuRecord
+        Time counts from 1970 where the log's clock holds dates.
 
     Raises
     ------
@@ -95,6 +104,8 @@ def read_imu(
         No such file, an unknown format, column, unit or axes.
     DataError
         Bad data: with file, line (or row) and column.
+    UnsureError
+        Two readings explain the log: it names both, and the option that says which.
     """
     path = Path(path)
     given = {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind, "topic": topic}

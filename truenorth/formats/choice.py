@@ -187,6 +187,9 @@ def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, flo
     choice = Choice(kind, (), [named[ours] for ours in COLUMNS[kind]])
     choice.documented = all(name == ours for ours, (name, _) in named.items())
     choice.units = _units([heading_of(name) for name, _ in choice.sensors], kind)
+    given = {ours: f"{'-' if sign < 0.0 else ''}{name}" for ours, (name, sign) in named.items()}
+    given |= {key: layout.columns[key] for key in ("time", "scale", "interval") if key in layout.columns}
+    choice.guesses.append(Guess("columns", ", ".join(given.values()), "as the caller says", 1.0, {"columns": given}))
     return _with_time(columns, layout, choice)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.formats.arrow import to_numpy
 from truenorth.formats.layout import BLOCKS
 
 if TYPE_CHECKING:
@@ -75,7 +76,9 @@ class Columns:
             return _seconds(column, pa.duration("ns"), 1e9), "durations"
         if pa.types.is_string(kind) or pa.types.is_large_string(kind):
             return self._text_clock(name, column.to_pylist())
-        return self.read([name], False)[:, 0], None
+        if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+            return to_numpy([column.cast(pa.float64(), safe=False)])[:, 0], None
+        return self.read([name], False)[:, 0], None  # which names the cell that is no number
 
     def _text_clock(self, name: str, cells: list[str]) -> tuple[Array, str | None]:
         import pandas as pd

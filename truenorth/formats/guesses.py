@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
-from truenorth.core.errors import DataError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats.behaviour import SURE, Reading
-from truenorth.records import Guess
+from truenorth.records import Guess, ImuRecord
 
 
 class UnsureError(DataError):
@@ -36,6 +38,35 @@ def in_words(option: Mapping[str, Any]) -> str:
             value = "{" + ", ".join(f"{name}: {text}" for name, text in value.items()) + "}"
         parts.append(f"{key}: {value}")
     return ", ".join(parts)
+
+
+def layout_of(guesses: Sequence[Guess]) -> dict[str, Any]:
+    """What a layout file says, that makes a reader take a log for the same without a guess."""
+    layout: dict[str, Any] = {}
+    for guess in guesses:
+        for key, value in guess.option.items():
+            layout[key] = {**layout.get(key, {}), **value} if isinstance(value, Mapping) else value
+    return layout
+
+
+def write_layout(record: ImuRecord, path: str | PathLike[str]) -> Path:
+    """Write what a reader took a log for as ``LOG.yaml`` beside it, which the reader then obeys.
+
+    Raises
+    ------
+    UsageError
+        There is such a file, which is not replaced.
+    """
+    import yaml
+
+    from truenorth.core.atomic import atomic_path
+
+    target = Path(path).with_suffix(".yaml")
+    if target.exists():
+        raise UsageError(f"{target}: is there already; remove it, or edit it by hand")
+    with atomic_path(target) as temporary:
+        temporary.write_text(yaml.safe_dump(layout_of(record.taken_for), sort_keys=False, allow_unicode=True), "utf-8")
+    return target
 
 
 def take(

@@ -126,9 +126,10 @@ def _clock(columns: Columns, layout: Layout, choice: Choice, rows: int, guesses:
         return _evenly(raw, said, stated, layout.rate, source, guesses), layout
     check_order(raw, choice.labels[0], source, columns.place)
     if said is not None:
-        guesses.append(Guess("unit of time", said, "the cells are no bare numbers"))
+        guesses.append(Guess("time", said, "the cells are no bare numbers"))
         return raw, layout
     if "time" in layout.units:
+        guesses.append(Guess("unit of time", layout.units["time"], "as the caller says", 1.0, {"units": layout.units}))
         return raw * unit_factor("time", "rates", layout), layout
     if stated is not None:
         guesses.append(Guess("unit of time", stated, "the heading", 1.0, {"units": {"time": stated}}))
@@ -170,6 +171,8 @@ def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> 
             )
         rate, line = above
         guesses.append(Guess("rate", f"{rate:g} Hz", f"the line {line!r} above the table", 1.0, {"rate": rate}))
+    elif layout.rate is not None:
+        guesses.append(Guess("rate", f"{rate:g} Hz", "as the caller says", 1.0, {"rate": rate}))
     return np.arange(1, rows + 1) / rate
 
 
@@ -187,6 +190,8 @@ def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str
         readings = clock_readings(mean, float(raw[0]))
         unit = size(readings[0].unit) if readings else 1.0
     rate = 1.0 / (mean * unit)
+    whole = round(rate)
+    rate = float(whole) if whole and abs(rate / whole - 1.0) < 0.003 else rate
     by_median = "many are equal" if median == 0.0 else f"the median step is one of {1.0 / (median * unit):.0f} Hz"
     raise UnsureError(
         f"{source}: the rows are stamped in bunches: {by_median}, but {rate:.4g} rows a second come in all; if the sensor "

@@ -35,6 +35,7 @@ STAMP = re.compile(
 DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
 REMARKS = ("#", "%", "//")
 LONGEST_LINE = 65536
+LONGEST_HEAD = 1 << 22
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 SAMPLE = 40  # lines by which the dialect is judged
 
@@ -162,15 +163,16 @@ class TextTable:
     @cached_property
     def _remarks(self) -> bool:
         """Whether remarks stand among the rows."""
-        return re.search(rb"(?m)^[ \t]*(?:#|%|//)", self._rows) is not None
+        return (
+            any(mark in self._rows for mark in REMARKS_BYTES)
+            and re.search(rb"(?m)^[ \t]*(?:#|%|//)", self._rows) is not None
+        )
 
     @cached_property
     def _rows(self) -> bytes:
         """The text from the first row on."""
-        start = 0
-        for _ in range(self.skip):
-            start = _line_end(self.text, start)
-        return self.text[start:]
+        head = self.text[:LONGEST_HEAD].splitlines(keepends=True)
+        return self.text[sum(map(len, head[: self.skip])) :]
 
     @cached_property
     def _body(self) -> bytes:
@@ -193,7 +195,7 @@ class TextTable:
         for k, name in enumerate(names):
             labels[self.names.index(name)] = str(k)
         wanted = [str(k) for k in range(len(names))]
-        if not self._body.strip():
+        if not self._body or self._body.isspace():
             raise DataError(f"{self.path.name}: a header and no rows; expected numbers below it")
         table = pc.read_csv(
             pa.BufferReader(self._body),
@@ -246,14 +248,6 @@ def write(record: Record, path: Path) -> None:
 REMARKS_BYTES = tuple(mark.encode() for mark in REMARKS)
 
 
-def _line_end(text: bytes, start: int) -> int:
-    ends = [place for mark in (b"\n", b"\r") if (place := text.find(mark, start)) >= 0]
-    if not ends:
-        return len(text)
-    end = min(ends)
-    return end + (2 if text[end : end + 2] == b"\r\n" else 1)
-
-
 def open_table(path: Path) -> TextTable:
     """Find the table in a text.
 
@@ -283,13 +277,10 @@ def open_table(path: Path) -> TextTable:
 
 def _head(path: Path, text: bytes) -> list[tuple[int, str]]:
     """The first lines that are not empty, numbered from 1."""
-    lines, start = [], 0
-    for number in range(1, HEADER_LINES + SAMPLE + 1):
-        if start >= len(text):
+    lines: list[tuple[int, str]] = []
+    for number, raw in enumerate(text[:LONGEST_HEAD].splitlines(), start=1):
+        if len(lines) == HEADER_LINES + SAMPLE:
             break
-        end = _line_end(text, start)
-        raw = text[start : min(end, start + LONGEST_LINE)].strip(b"\r\n")
-        start = end
         if b"\0" in raw:
             raise DataError(f"{path.name}: line {number}: holds binary data; expected text: give the file's format")
         try:
@@ -314,7 +305,8 @@ def _dialect(head: list[tuple[int, str]]) -> tuple[Dialect, int]:
             rows = [dialect.cells(line) for line in lines]
             size, rows_of_size = Counter(len(row) for row in rows if row).most_common(1)[0] if any(rows) else (0, 0)
             numbers = [dialect.share(row) for row in rows if len(row) == size]
-            score = rows_of_size / max(1, len(lines)) * (sum(numbers) / max(1, len(numbers)))
+            alone = 0.5 if size < 2 else 1.0  # a table has several columns
+            score = alone * rows_of_size / max(1, len(lines)) * (sum(numbers) / max(1, len(numbers)))
             # Of equals the dialect of more columns: a line of one cell is a number in none or in all of them.
             if (score, size) > (highest + 1e-9, 0) or (abs(score - highest) <= 1e-9 and size > count):
                 best, count, highest = dialect, size, score

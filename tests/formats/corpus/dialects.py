@@ -124,6 +124,11 @@ def bunched(t: Truth, size: int) -> Truth:
     return Truth(last + 2e-4 * (k % size), t.gyro, t.accel)
 
 
+def xyz(time: str, *patterns: str) -> str:
+    """A header: the clock, and each pattern for x, y and z."""
+    return ",".join([time, *(pattern.format(axis) for pattern in patterns for axis in "xyz")])
+
+
 def logs() -> list[Log]:
     """The corpus."""
     nav, still, cheap = truth(grade="navigation", seconds=60.0), truth(), truth(grade="consumer")
@@ -192,13 +197,13 @@ def logs() -> list[Log]:
     add("header_is_a_remark.csv", text(still, "# " + SI), still)
     add("lab_notes.csv", text(still, SI, above="Experiment 7, second floor\nOperator: N. N.\n"), still)
     # --- names and units in headings
-    euroc = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"
+    euroc = xyz("#timestamp [ns]", "w_RS_S_{} [rad s^-1]", "a_RS_S_{} [m s^-2]")
     add("euroc.csv", text(cheap, euroc, time=1e-9, start=EPOCH), cheap, shift=EPOCH)
     add(
         "phone.csv",
         text(
             cheap,
-            '"Time (s)","Gyroscope x (rad/s)","Gyroscope y (rad/s)","Gyroscope z (rad/s)","Acceleration x (m/s^2)","Acceleration y (m/s^2)","Acceleration z (m/s^2)"',
+            xyz('"Time (s)"', '"Gyroscope {} (rad/s)"', '"Acceleration {} (m/s^2)"'),
         ),
         cheap,
     )
@@ -277,7 +282,8 @@ def logs() -> list[Log]:
         ),
         sway,
     )
-    add("two_imus.csv", text(sway, "t,imu0_gyro_x,imu0_gyro_y,imu0_gyro_z,imu0_acc_x,imu0_acc_y,imu0_acc_z,imu1_acc_x,imu1_acc_y,imu1_acc_z", order="tgae", extra=sway.accel + 0.02), sway,
+    add("two_imus.csv", text(sway, xyz("t", "imu0_gyro_{}", "imu0_acc_{}", "imu1_acc_{}"),
+        order="tgae", extra=sway.accel + 0.02), sway,
         answer={"columns": {"accel_x": "imu0_acc_x", "accel_y": "imu0_acc_y", "accel_z": "imu0_acc_z"}})  # fmt: skip
     # --- units by behaviour
     add("g_dps_moving.csv", text(cheap_sway, "t,wx,wy,wz,ax,ay,az", **dps), cheap_sway)

@@ -58,7 +58,7 @@ def truth(base: str = "still", grade: str = "tactical", rate: float = 100.0, sec
     relative = np.einsum("kji,kjl->kil", C_nb, np.gradient(C_nb, time, axis=0))
     turning = np.stack([relative[:, 2, 1], relative[:, 0, 2], relative[:, 1, 0]], axis=1)
     velocity = speed[:, None] * np.stack([np.sin(heading), np.cos(heading), np.zeros_like(time)], axis=1)
-    force_n = np.gradient(velocity, time, axis=0) + [0.0, 0.0, GRAVITY]
+    force_n = np.gradient(velocity, time, axis=0) + np.array([0.0, 0.0, GRAVITY])
     gyro = turning + np.einsum("kji,j->ki", C_nb, EARTH)
     accel = np.einsum("kji,kj->ki", C_nb, force_n)
     rng = np.random.default_rng([len(base), len(grade), round(rate)])
