@@ -96,3 +96,10 @@ def test_the_coast_crosses_the_date_line():
 
 def test_numbers_for_people_have_no_exponent():
     assert [significant(x) for x in (1000.0, 0.0123456, 123456.0)] == ["1000", "0.0123", "123000"]
+
+
+def test_no_coast_jumps():
+    """A line that leaves the window and comes back elsewhere is two lines."""
+    lon, lat = coast_within(44.0, 60.0, 117.0, 164.0)
+    steps = np.hypot(np.diff(lon), np.diff(lat))
+    assert np.nanmax(steps) < 1.5

@@ -33,12 +33,11 @@ def coast_within(south: float, north: float, west: float, east: float) -> tuple[
     lat = points[:, 1]
     inside = (lat >= south) & (lat <= north) & (lon >= west) & (lon <= east)
     near = inside | np.roll(inside, 1) | np.roll(inside, -1)  # a line leaves the window by its next point
-    broken = np.abs(np.diff(lon, prepend=lon[:1])) > 10.0  # over the date line, seen from this window
-    keep = near | np.isnan(lat)
-    lon, lat = np.where(broken, np.nan, lon)[keep], np.where(broken, np.nan, lat)[keep]
-    gap = np.isnan(lat)
-    first = ~(gap & np.roll(gap, 1))  # of several gaps in a row one is enough
-    return lon[first], lat[first]
+    rows = np.flatnonzero(near)
+    parted = np.diff(rows, prepend=-1) > 1  # the line goes on outside, or another one begins
+    over_date_line = np.abs(np.diff(lon, prepend=lon[:1]))[rows] > 10.0
+    breaks = np.flatnonzero(parted | over_date_line)
+    return np.insert(lon[rows], breaks, np.nan), np.insert(lat[rows], breaks, np.nan)
 
 
 @cache

@@ -56,13 +56,7 @@ def relation_table(transfer: Transfer | None, moving: Moving | None) -> Table | 
         for i, angle in enumerate((_("heading"), _("pitch"), _("roll"))):
             name = _("Mounting, {angle}").format(angle=angle)
             rows.append((name, *_shown(angles[i], sigmas[i], "deg", bool(transfer.mounting_estimated[i]))))
-        caption = " ".join(
-            (
-                _("The lever arm goes from the master to the slave, in axes of the slave."),
-                *transfer.open,
-                *transfer.notes,
-            )
-        )
+        caption = _("The lever arm goes from the master to the slave, in axes of the slave.")
         return Table(_("Slave and master"), [_("Quantity"), _("Value"), _("One sigma")], rows, caption)
     if moving is None:
         return None

@@ -72,14 +72,15 @@ def _numbers(result: Navigation) -> list[tuple[str, str, str]]:
 
 
 def _facts(result: Navigation) -> list[tuple[str, str]]:
+    clock = Clock.of(result.time)
     scale, unit = length_unit([result.distance])
     bridged = _("{count} bridged, the longest {longest:.3g} s")
     gaps = bridged.format(count=len(result.gaps), longest=max((g for _t, g in result.gaps), default=0.0))
     return [
         (
             _("Log"),
-            _("{source}, {start:.1f} to {stop:.1f} s").format(
-                source=result.source, start=result.time[0], stop=result.time[-1]
+            _("{source}, {start:.5g} to {stop:.5g} {unit}").format(
+                source=result.source, start=clock(result.time[0]), stop=clock(result.time[-1]), unit=clock.unit
             ),
         ),
         (_("Distance"), f"{short(result.distance / scale)} {unit}"),

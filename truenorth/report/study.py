@@ -39,14 +39,15 @@ def study_page(
     def drawn(names: Sequence[str]) -> list[tuple[str, str, str]]:
         return [(n.replace("_", " "), study.captions.get(n, ""), _inline(study.drawings[n])) for n in names]
 
-    contents = [_("Verdict"), _("The paper's figures, ours next to them"), *(_spelt(name) for name in of_paper)]
+    contents = [_("Verdict")] if beside.empty else [_("Verdict"), _("The paper's figures, ours next to them")]
+    contents += [_spelt(name) for name in of_paper]
     contents += [_("Claims"), *(_spelt(name) for name in more)] + ([_("Remarks")] if study.remarks else [])
     return render(
         "study.html",
         interactive=False,
         study=study,
         summary=summary,
-        beside=_html(beside),
+        beside="" if beside.empty else _html(beside),
         of_paper=drawn(of_paper),
         more=drawn(more),
         table=_html(table),
