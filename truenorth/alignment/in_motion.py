@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.sensors import from_gnss, from_odometer
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_latitude import find_latitude
 from truenorth.alignment.in_motion_start import (
     Guess,
@@ -115,7 +116,7 @@ def align_in_motion(
     wheel: Mounting | None = None,
     antenna: Mounting | None = None,
     zupt: bool = True,
-    method: Method = "auto",
+    method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
     calibration: Calibration | None = None,
     offset: float = 0.0,
@@ -143,8 +144,9 @@ def align_in_motion(
         How they sit. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m) of the wheel are estimated.
     zupt : bool
         Use stops: seconds in which the wheel, or GNSS, says that nothing moves.
-    method : {"auto", "gyrocompass", "motion"}
-        Where the heading begins: coarse alignment by the earth's rate, or a bank of headings that motion decides between.
+    method : {"auto", "gyrocompass", "motion", ...}
+        Where the heading begins: coarse alignment by the earth's rate, or a bank of headings that motion decides between. Published
+        filters, to be compared (:mod:`truenorth.alignment.azimuth`): ekf, ukf, ckf, gh3, gh5, gh7, sgkf3, sgkf7, sgkf.
     heading_limit : float, rad
         Largest one-sigma heading error that still counts as `aligned`.
     calibration : Calibration, optional
@@ -172,11 +174,18 @@ def align_in_motion(
     """
     tell = progress or (lambda stage: None)
     task = _task(record, imu, odometer, gnss, position, wheel, antenna, zupt, calibration, offset)
-    if method not in get_args(Method):
-        raise UsageError(f"method {method!r} is not known; choose one of {', '.join(get_args(Method))}")
+    if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
+        raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")
     if not heading_limit > 0.0 or passes < 1:
         raise UsageError(
             f"heading limit {math.degrees(heading_limit):g} deg, {passes} passes; expected a positive angle, one or more"
+        )
+    if method in AZIMUTH_METHODS:
+        tell(f"aligning: {method}")
+        track = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
+        answer = _answer(task, track, method, "asked for; a published filter, to be compared", 0.0)
+        return judge_moving(
+            answer, track, heading_limit, [n for log in (odometer, gnss) if log for n in notes(log.notes)]
         )
     bias = float(np.sqrt(task.spec.bias_variance[0]))
     level_rate = EARTH_RATE * math.cos(task.position.lat)
@@ -355,7 +364,7 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float) -> 
     speed = np.linalg.norm(track.v_n, axis=1)
     distance = float(np.trapezoid(speed, track.time))
     prior = np.sqrt(task.spec.bias_variance)
-    moving = moving_of(track, distance, "the earth's rate" if method == "gyrocompass" else "motion", mounting)
+    moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting)
     return Alignment(
         status="not_converged",
         evidence=(),

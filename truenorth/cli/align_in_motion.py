@@ -142,7 +142,7 @@ def align_moving(
         position=position,
         wheel=wheel,
         antenna=antenna,
-        method="auto" if method == "auto" else method,  # type: ignore[arg-type]  # checked there, with the choices
+        method=method,
         heading_limit=limit,
         calibration=calibration,
         offset=offset,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.azimuth_filters import Logs
 from truenorth.core.position import Position
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
@@ -104,6 +105,11 @@ class Drives:
     def spec(self) -> ImuSpec:
         """Of the IMU."""
         return self.scenario.imu_spec
+
+    @property
+    def logs(self) -> Logs:
+        """As the loop of the paper's model takes them."""
+        return Logs(self.steps, self.dtheta, self.dvel, self.wheel, self.rows)
 
     @property
     def scale_sigma(self) -> float:

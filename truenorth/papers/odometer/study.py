@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.azimuth_filters import METHODS, Belief
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.papers.claims import settle
 from truenorth.papers.odometer.drawings import draw_paper_figures, draw_starts
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
-from truenorth.papers.odometer.loop import LEVEL_SIGMA, METHODS, Belief, Errors, run_method
+from truenorth.papers.odometer.loop import LEVEL_SIGMA, Errors, run_method
 from truenorth.papers.odometer.paper_table import add_paper_table
 from truenorth.papers.odometer.rules import RULES
 from truenorth.papers.odometer.scenario import Drives, drive, ring, slipping, starts, stepping, straight, with_walk

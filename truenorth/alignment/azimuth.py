@@ -1,0 +1,138 @@
+"""Published filters of a vehicle on the move with an odometer, on one's own log.
+
+====================  ==========================================================================================
+method                what it does with the paper's 16 states
+====================  ==========================================================================================
+ekf, ukf, ckf         extended, unscented and cubature Kalman filter in all states
+gh3, gh5, gh7         Gauss-Hermite filter of order 3, 5, 7 with nodes in the azimuth alone
+sgkf3, sgkf7          the same with the strong tracking factor; sgkf is sgkf3
+====================  ==========================================================================================
+
+They assume that the wheel sits at the IMU, that the vehicle goes where its forward axis points (the mounting is what is given,
+known), and that displacements over a second have white noise of 2 cm. Coarse alignment takes the first part of the log and the
+filter the rest, so that nothing is used twice. A gate leaves out what contradicts the filter by far, judged before fading.
+
+They are here to be compared: the closed loop with invariant errors of this library needs no nonlinear filter and estimates the
+wheel's mounting and lever arm too.
+
+Source: M. Wu, X. Tang, X. Huang, odometer-aided alignment on the move by a strong tracking Gauss-Hermite filter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.azimuth_filters import METHODS, Begin, Logs, Solution, noise_density, run_loop
+from truenorth.coarse.odometer import odometer_alignment
+from truenorth.core.attitude import skew
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
+from truenorth.models.in_motion_azimuth import BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.records import ImuRecord, OdometerRecord
+from truenorth.records.specs import ImuSpec
+from truenorth.state.layout import Layout
+from truenorth.state.mounting import Mounting
+from truenorth.state.track import Residuals, Track
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.inertial import earth_rotation
+
+Array = NDArray[np.float64]
+
+ALIASES = {"sgkf": "sgkf3"}
+AZIMUTH_METHODS = (*(name for name in METHODS if not name.endswith("capped")), *ALIASES)
+COARSE_TIME, COARSE_PART = 120.0, 0.4  # s, and at most this part of the log, of coarse alignment
+LEVEL_SIGMA, HEADING_SIGMA = np.radians(0.2), np.radians(5.0)  # that it leaves
+VELOCITY_SIGMA = 0.1  # m/s
+
+
+def azimuth_track(
+    record: ImuRecord,
+    odometer: OdometerRecord | None,
+    position: Position,
+    spec: ImuSpec,
+    wheel: Mounting,
+    method: str,
+) -> Track:
+    """Track of a vehicle by one of the published filters, from the end of coarse alignment on.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        Without gaps.
+    odometer : OdometerRecord
+    position : Position
+        At the start.
+    spec : ImuSpec
+    wheel : Mounting
+        Its mounting, scale's sigma and latency are used.
+    method : str
+        One of `AZIMUTH_METHODS`.
+
+    Raises
+    ------
+    UsageError
+        No odometer.
+    """
+    if odometer is None:
+        raise UsageError(f"method {method!r} measures by an odometer; expected an odometer's log")
+    C_mb = wheel.C_mb
+    dtheta, dvel = (values @ C_mb.T for values in increments(record))
+    begin = record.time[0] - record.steps[0]
+    edges = np.append(begin, record.time)
+    distance = np.interp(edges, odometer.time - wheel.latency, np.cumsum(odometer.distance))
+    per_epoch = max(1, round(1.0 / record.interval))
+    rows = np.arange(0, len(record) + 1, per_epoch)
+    logs = Logs(record.steps, dtheta[None], dvel[None], np.diff(distance)[None], rows.astype(np.int64))
+
+    epoch = round(min(COARSE_TIME, COARSE_PART * record.duration) / (per_epoch * record.interval))
+    elapsed = float(edges[rows[epoch]] - begin)
+    part = record.between(None, record.time[rows[epoch] - 1] + 0.1 * record.interval)
+    coarse = odometer_alignment(part, odometer, position, wheel)
+    C_n0_b = coarse.C_n0_i @ _turned(dtheta[: rows[epoch]] @ C_mb)
+    C_nm = earth_rotation(elapsed, position.lat).T @ C_n0_b @ C_mb.T
+    speed = float(np.interp(edges[rows[epoch]], odometer.time - wheel.latency, odometer.speed))
+    v_n = C_nm[:, 1] * speed
+    sigma = np.zeros(STATES)
+    sigma[PHI] = LEVEL_SIGMA, LEVEL_SIGMA, HEADING_SIGMA
+    sigma[DV], sigma[DP] = VELOCITY_SIGMA, (position.horizontal_sigma,) * 2 + (position.vertical_sigma,)
+    variance = spec.bias_variance
+    sigma[BG], sigma[BA], sigma[DK] = np.sqrt(variance[:3]), np.sqrt(variance[3:]), wheel.scale_sigma
+    J = np.eye(STATES)
+    J[DV, PHI] = skew(v_n)
+    P0 = J @ np.diag(sigma**2) @ J.T
+    start = Begin(epoch, C_nm[None], v_n[None], coarse.position[-1], P0[None], noise_density(spec))
+    name = ALIASES.get(method, method)
+    found = run_loop(logs, np.zeros(1, dtype=np.int64), start, name, gated=True, keep_P=True)
+    return _track(found, edges[rows[epoch + 1 :]], C_mb, wheel)
+
+
+def _turned(dtheta: Array) -> Array:
+    """``C_ib`` at the end of increments, (3, 3)."""
+    from truenorth.strapdown.level import inertial_integrals
+
+    count = len(dtheta)
+    return np.asarray(inertial_integrals(dtheta, np.zeros((count, 3)), np.ones(count), [count])[0][-1])
+
+
+def _track(found: Solution, time: Array, C_mb: Array, wheel: Mounting) -> Track:
+    """Of the IMU: attitude, biases and their covariance from vehicle axes back to its own."""
+    T = np.eye(STATES)
+    T[BG, BG] = T[BA, BA] = C_mb.T
+    errors = found.errors[0]
+    sensors = np.zeros((len(time), STATES))
+    sensors[:, BG], sensors[:, BA], sensors[:, DK] = errors[:, :3] @ C_mb, errors[:, 3:6] @ C_mb, errors[:, 6]
+    residuals = Residuals(
+        "odometer displacement", time, found.innovation[0], found.innovation_sigma[0], found.nis[0], found.used[0], 0
+    )
+    layout = Layout(("odometer scale",), ((wheel.scale_sigma,),))
+    return Track(
+        time,
+        found.C_nb[0] @ C_mb,
+        found.v_n[0],
+        found.position[0],
+        sensors,
+        T @ found.P[0] @ T.T,
+        layout,
+        (residuals,),
+    )

@@ -1,0 +1,293 @@
+"""The paper's large-azimuth model in a closed loop with any nonlinear filter, many logs of one motion at once.
+
+Mechanised at the rate of the IMU, filtered and corrected once a second.
+
+Source: M. Wu, X. Tang, X. Huang, odometer-aided alignment on the move by a strong tracking Gauss-Hermite filter; the model is that
+of :mod:`truenorth.models.in_motion_azimuth`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.azimuth_mechanisation import mechanise_interval
+from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
+from truenorth.filters import (
+    Estimates,
+    Gate,
+    NonlinearSystem,
+    StrongTracking,
+    cubature,
+    extended,
+    gauss_hermite,
+    unscented,
+)
+from truenorth.filters.system import FilterState
+from truenorth.models import in_motion_azimuth as model
+from truenorth.models.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown import wander
+
+Array = NDArray[np.float64]
+
+R_SIGMA = 0.02  # m, of a displacement over a second: the paper's pulse
+LOST = 0.5  # rad of tilt, by which the model has lost its meaning and the run is given up
+CAP = 1.2  # of the factor of sgkf3_capped
+GATE = Gate(0.9999, by="epoch", patience=20)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A filter with its options.
+
+    Attributes
+    ----------
+    run : callable
+        ``run(system, state, gate) -> Estimates``.
+    tracking : bool
+        Its adaptation begins with the factor of strong tracking.
+    """
+
+    run: Callable[[NonlinearSystem, FilterState | None, Gate | None], Estimates]
+    tracking: bool = False
+
+
+def _reduced(order: int, tracking: StrongTracking | None = None) -> Method:
+    return Method(
+        lambda system, state, gate: gauss_hermite(
+            system, state, order=order, nonlinear=[AZIMUTH], tracking=tracking, gate=gate, innovations=True
+        ),
+        tracking=tracking is not None,
+    )
+
+
+METHODS = {
+    "ekf": Method(lambda system, state, gate: extended(system, state, gate=gate, innovations=True)),
+    "ukf": Method(
+        lambda system, state, gate: unscented(
+            system, state, alpha=1.0, beta=0.0, kappa=3.0 - STATES, gate=gate, innovations=True
+        )
+    ),
+    "ckf": Method(lambda system, state, gate: cubature(system, state, gate=gate, innovations=True)),
+    "gh3": _reduced(3),
+    "gh5": _reduced(5),
+    "gh7": _reduced(7),
+    "sgkf3": _reduced(3, StrongTracking()),
+    "sgkf7": _reduced(7, StrongTracking()),
+    "sgkf3_capped": _reduced(3, StrongTracking(cap=CAP)),
+}
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What a filter of the study believes, as factors on its covariances.
+
+    Attributes
+    ----------
+    P0, Q, R : float
+    """
+
+    P0: float = 1.0
+    Q: float = 1.0
+    R: float = 1.0
+
+
+NOMINAL = Belief()
+
+
+class Logs(NamedTuple):
+    """Logs of R runs on one time axis.
+
+    Attributes
+    ----------
+    steps : (N,) array, s
+    dtheta, dvel : (R, N, 3) arrays, rad and m/s
+    wheel : (R, N) array, m
+        Distance in each sample.
+    rows : (K+1,) array of int
+        Samples before each epoch.
+    """
+
+    steps: Array
+    dtheta: Array
+    dvel: Array
+    wheel: Array
+    rows: NDArray[np.int64]
+
+
+class Begin(NamedTuple):
+    """Where B runs begin.
+
+    Attributes
+    ----------
+    epoch : int
+    C_nb : (B, 3, 3) array
+    v_n : (B, 3) array, m/s
+    place : (3,) array
+        Latitude, longitude (rad), height (m).
+    P0 : (B, 16, 16) array
+    noise : (16,) array
+        Density of the process noise.
+    """
+
+    epoch: int
+    C_nb: Array
+    v_n: Array
+    place: Array
+    P0: Array
+    noise: Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a filter found for B runs at K epochs after the beginning.
+
+    Attributes
+    ----------
+    C_nb : (B, K, 3, 3) array
+    v_n : (B, K, 3) array, m/s
+    position : (B, K, 3) array
+    errors : (B, K, 7) array
+        Gyro and accelerometer bias, relative scale of the odometer.
+    sigma : (B, K, 16) array
+    P : (B, K, 16, 16) array
+        K = 0 where it was not asked for.
+    innovation, innovation_sigma : (B, K, 3) arrays, m
+    nis : (B, K) array
+    used : (B, K) array of bool
+        Not rejected by the gate.
+    lost : (B,) array of bool
+        Given up: a tilt beyond half a radian, where the model has no meaning.
+    acted : (B,) array
+        Share of the epochs in which a factor of strong tracking was above 1.
+    """
+
+    C_nb: Array
+    v_n: Array
+    position: Array
+    errors: Array
+    sigma: Array
+    P: Array
+    innovation: Array
+    innovation_sigma: Array
+    nis: Array
+    used: NDArray[np.bool_]
+    lost: NDArray[np.bool_]
+    acted: Array
+
+
+def run_loop(
+    logs: Logs,
+    which: NDArray[np.int64],
+    begin: Begin,
+    method: str,
+    *,
+    gated: bool = False,
+    turned: bool = True,
+    belief: Belief = NOMINAL,
+    keep_P: bool = False,
+) -> Solution:
+    """Align B runs.
+
+    Parameters
+    ----------
+    logs : Logs
+    which : (B,) array of int
+        The log of each.
+    begin : Begin
+    method : str
+        A key of `METHODS`.
+    gated : bool
+        Judge each epoch by its normalised innovation squared.
+    turned : bool
+        Turn the covariance of velocity with a correction of the azimuth; see
+        :func:`truenorth.models.in_motion_azimuth.after_correction`.
+    belief : Belief
+    keep_P : bool
+        Keep the covariance of each epoch.
+    """
+    B, count, first = len(which), len(logs.rows) - 1 - begin.epoch, logs.rows[begin.epoch]
+    s = np.stack([wander.state_at(C, v, *begin.place) for C, v in zip(begin.C_nb, begin.v_n, strict=True)])
+    s[:, wander.LAST_ANGLE] = 2.0 * logs.dtheta[which, first] - logs.dtheta[which, first + 1]
+    s[:, wander.LAST_VELOCITY] = 2.0 * logs.dvel[which, first] - logs.dvel[which, first + 1]
+    P = belief.P0 * begin.P0
+    start = P.copy()
+    p, z, errors = np.zeros((B, model.PARAMETERS)), np.zeros((B, 3)), np.zeros((B, 7))
+    out = _room(B, count, keep_P)
+    gate, state, tracking = GATE if gated else None, None, METHODS[method].tracking
+    system: NonlinearSystem | None = None
+    for k in range(count):
+        ends = logs.rows[begin.epoch + k : begin.epoch + k + 2]
+        mechanise_interval(logs.steps, logs.dtheta, logs.dvel, logs.wheel, which, ends[0], ends[1], errors, s, p, z)
+        if system is None:
+            system = NonlinearSystem(
+                model.transition,
+                model.measurement,
+                Q=belief.Q * np.diag(begin.noise * p[0, model.T])[None],
+                R=belief.R * R_SIGMA**2 * np.eye(3)[None],
+                z=z[:, None, :],
+                x0=np.zeros(STATES),
+                P0=P,
+                p=p[:, None, :],
+                transition_jacobian=model.transition_jacobian,
+                measurement_jacobian=model.measurement_jacobian,
+            )
+        else:
+            system = replace(system, z=z[:, None, :], p=p[:, None, :])
+        found = METHODS[method].run(system, state, gate)
+        if tracking:
+            out.acted[:] += found.adaptation[:, -1, 0] > 1.0
+        if gated:
+            out.used[:, k] = found.adaptation[:, -1, int(tracking)] > 0.0
+        out.innovation[:, k], out.nis[:, k] = found.innovation[:, -1], found.nis[:, -1]
+        out.innovation_sigma[:, k] = np.sqrt(np.einsum("bii->bi", found.innovation_covariance[:, -1]))
+        x = found.x[:, -1]
+        P = model.after_correction(x, found.P[:, -1], velocity=turned)
+        gone = ~(np.all(np.isfinite(x), axis=1) & (np.abs(x[:, :2]).max(axis=1) < LOST))
+        gone |= ~(np.einsum("bii->bi", P)[:, :2].max(axis=1) < LOST**2)
+        out.lost[:] |= gone
+        x[gone], P[gone] = 0.0, start[gone]
+        C = model.correction(x) @ dcm_from_quaternion(s[:, wander.ATTITUDE])
+        s[:, wander.ATTITUDE] = quaternion_from_dcm(C)
+        s[:, wander.VELOCITY] -= x[:, DV]
+        for b in range(B):
+            wander.displace(s[b], -x[b, DP.start], -x[b, DP.start + 1], -x[b, DP.start + 2])
+        errors[:, :3] += x[:, BG]
+        errors[:, 3:6] += x[:, BA]
+        errors[:, 6] += x[:, DK]
+        state = FilterState(np.zeros((B, STATES)), P, found.state.log_likelihood, found.state.memory)
+        out.C_nb[:, k], out.v_n[:, k], out.position[:, k], _ = wander.north(s)
+        out.errors[:, k], out.sigma[:, k] = errors, np.sqrt(np.einsum("bii->bi", P))
+        if keep_P:
+            out.P[:, k] = P
+    return replace(out, acted=out.acted / max(count, 1))
+
+
+def noise_density(spec: ImuSpec) -> Array:
+    """(16,) of the process noise, by a specification."""
+    noise = np.zeros(STATES)
+    noise[PHI], noise[DV] = spec.gyro_random_walk**2, spec.accel_random_walk**2
+    return noise
+
+
+def _room(B: int, count: int, keep_P: bool) -> Solution:
+    three = (B, count, 3)
+    return Solution(
+        C_nb=np.empty((*three, 3)),
+        v_n=np.empty(three),
+        position=np.empty(three),
+        errors=np.empty((B, count, 7)),
+        sigma=np.empty((B, count, STATES)),
+        P=np.empty((B, count if keep_P else 0, STATES, STATES)),
+        innovation=np.empty(three),
+        innovation_sigma=np.empty(three),
+        nis=np.empty((B, count)),
+        used=np.ones((B, count), dtype=np.bool_),
+        lost=np.zeros(B, dtype=np.bool_),
+        acted=np.zeros(B),
+    )
