@@ -14,11 +14,12 @@ from truenorth.cli import app
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import ecef_axes
 from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
 from truenorth.formats import read_encoder, write_record
 from truenorth.papers.rotary.truth import simulate_run
 from truenorth.records import EncoderRecord, ImuRecord
-from truenorth.simulation import Axis, C_bs_from_angles, Indexed, Indexer, Spin, rest, simulate
+from truenorth.simulation import Axis, Indexed, Indexer, Spin, rest, simulate
 from truenorth.strapdown.inertial import integrate
 
 ARCMIN = math.radians(1 / 60)

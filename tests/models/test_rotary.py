@@ -136,7 +136,9 @@ def test_states_of_arm_and_motion(ship):
     np.testing.assert_array_equal(full.H[:, :, :15], system.H)
     np.testing.assert_array_equal(np.diag(full.P0)[12:15], 4.0)
     assert math.sqrt(full.H[0, 0, 15:] @ full.P0[15:, 15:] @ full.H[0, 0, 15:]) == pytest.approx(0.1)
-    np.testing.assert_allclose((full.R - system.R)[:, [0, 1, 2], [0, 1, 2]], np.square([[1e-3, 2e-3, 3e-3]] * 60))
+    np.testing.assert_allclose(
+        (full.R - system.R)[:, [0, 1, 2], [0, 1, 2]], np.square([[1e-3, 2e-3, 3e-3]] * 60) - 1e-12
+    )
     assert not full.P0[19:, 19:].any()
 
 

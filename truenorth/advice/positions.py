@@ -26,7 +26,7 @@ from truenorth.core.position import Position
 from truenorth.core.shown import Shown
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.models.static import BA, BG, DV, PHI, StaticModel
+from truenorth.models.static import BA, BG, DV, PHI, QUIETEST_BASE, StaticModel
 from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps
@@ -242,13 +242,14 @@ class _Scheme:
         self.interval = max(1.0, T / EPOCHS)
         self.integrals = integrate(self.record, self.interval)
         self.base = (disturbance**2 / self.integrals.intervals)[:, None, None] * np.eye(3)
+        self.base += QUIETEST_BASE**2 * np.eye(3)
 
     def system(self, model: StaticModel) -> LinearSystem:
         """With some noise of the sensors."""
         C = rest(self.position).states(np.array(0.0)).C_nb
         log = StayingLog(self.record, C, self.position, model, self.prior, self.interval, integrals=self.integrals)
         system = log.linearise()
-        return replace(system, R=system.R + self.base)
+        return replace(system, R=system.R + self.base - QUIETEST_BASE**2 * np.eye(3))
 
     def heading_variance(self) -> float:
         """At the end, deflection of the vertical included, rad^2."""

@@ -20,7 +20,7 @@ from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, sett
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import Estimates, LinearSystem
 from truenorth.filters.gains import Gains, filter_gains, initial_part
-from truenorth.models.static import BA, BG, PHI, STATES, StaticModel, mean_velocity
+from truenorth.models.static import BA, BG, PHI, QUIETEST_BASE, STATES, StaticModel, mean_velocity
 from truenorth.models.static_force import Form, gained_velocity
 from truenorth.records import ImuRecord
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
@@ -202,7 +202,7 @@ def fine_align(
     else:
         expected = model.accel_random_walk**2 * interval
         gained = gained_velocity(log.integrals, C_n0_i, position.lat, position.alt)
-        R = np.maximum(white_variance(gained) - expected, SLIGHT * expected)
+        R = np.maximum(white_variance(gained) - expected, max(SLIGHT * expected, QUIETEST_BASE**2))
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
     noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
     last = settle(log, noise, in_sigmas(PHI), most=MAX_PASSES)

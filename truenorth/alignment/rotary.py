@@ -100,14 +100,14 @@ def align_rotary(
     coarse = integrate(record, task.interval, rows_at=rows)
     C_n0_i = oba(coarse, position.lat, position.alt).C_n0_i
     tell("aligning: swaying")
-    P_bias = np.diag(spec.bias_variance) + _place_covariance(task, spec)
+    P_bias = np.diag(spec.bias_variance)
     if encoder is None:
         mount = Mount(np.zeros(3))
     else:
         angles = angles_at(encoder, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb)
-    fine = sway_align(record, C_n0_i, position, noise_of(spec), P_bias, task.interval, rows, mount)
+    fine = sway_align(record, C_n0_i, position, noise_of(spec), P_bias, task.interval, rows, mount, _turned(spec))
     source = f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 
@@ -227,8 +227,7 @@ def _arm(given: ArrayLike | None) -> tuple[Array, float]:
     return arm, KNOWN_ARM
 
 
-def _place_covariance(task: Task, spec: ImuSpec) -> Array:
-    """(6, 6) what an accelerometer's scale factor and misalignment act as on an IMU that may lie any way."""
-    P = np.zeros((6, 6))
-    P[3:, 3:] = (spec.accel_scale_factor**2 + spec.accel_misalignment**2) * task.gravity**2 * np.eye(3)
-    return P
+def _turned(spec: ImuSpec) -> ImuSpec | None:
+    """The specification, where it knows of scale factors or misalignments, which turns bring to light."""
+    sigmas = (spec.gyro_scale_factor, spec.gyro_misalignment, spec.accel_scale_factor, spec.accel_misalignment)
+    return spec if any(sigmas) else None

@@ -18,14 +18,14 @@ from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import windowed_fit
 from truenorth.core.earth import normal_gravity
 from truenorth.core.position import Position
-from truenorth.estimate.base_motion import QUIETEST_BASE
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.models.disturbance import AxisMotion
-from truenorth.models.static import PHI, StaticModel
+from truenorth.models.static import PHI, QUIETEST_BASE, StaticModel
 from truenorth.models.swaying import MOST_OSCILLATORS, with_motion
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
@@ -106,6 +106,7 @@ def sway_align(
     interval: float,
     rows_at: Array | None = None,
     mount: Mount = UNKNOWN_ARM,
+    turned: ImuSpec | None = None,
 ) -> SwayAlignment:
     """Estimate attitude, biases, lever arm and the base's motion from a whole log.
 
@@ -114,12 +115,14 @@ def sway_align(
     record, C_n0_i, position, model, P_bias, interval, rows_at
         As in :func:`truenorth.alignment.fine.fine_align`.
     mount : Mount
+    turned : ImuSpec, optional
+        Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
 
     Returns
     -------
     SwayAlignment
     """
-    log, residual = _settled(record, C_n0_i, position, model, P_bias, interval, rows_at, mount)
+    log, residual = _settled(record, C_n0_i, position, model, P_bias, interval, rows_at, mount, turned)
     step = float(np.mean(log.integrals.intervals))
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
     estimator = _MotionFilter(residual, step, walks)
@@ -167,9 +170,10 @@ def _settled(
     interval: float,
     rows_at: Array | None,
     mount: Mount,
+    turned: ImuSpec | None = None,
 ) -> tuple[StayingLog, Array]:
     """A log about windowed fits until the attitude stands still, and what the last fit leaves of its measurements."""
-    prior = prior_of(P_bias, arm=mount.arm, arm_sigma=mount.arm_sigma)
+    prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma)
     log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, sways=True, C_sb=mount.C_sb)
 
     def fit(system: LinearSystem) -> _Fitted:

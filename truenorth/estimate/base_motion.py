@@ -11,11 +11,11 @@ from scipy.special import chdtri
 
 from truenorth.estimate.batch import Filtered
 from truenorth.filters import Estimates, LinearSystem, kalman
+from truenorth.models.static import QUIETEST_BASE
 
 Array = NDArray[np.float64]
 
 SAME_NOISE = 0.1  # of the expected innovation variance
-QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without noise
 COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
 COLOUR_ALARM = 1e-3  # rate at which white innovations pass for coloured
 COLOUR_RUNS = 5  # fewer blocks than this show nothing of it
@@ -72,8 +72,8 @@ class VelocityNoise:
         self.R, self.parts, self.most = R, parts, most
 
     def __call__(self, system: LinearSystem) -> Filtered:
-        """Filter a system that holds no variance of the base's velocity yet."""
-        system = replace(system, R=system.R + self.R[:, None] * np.eye(3))
+        """Filter a system that holds the variance of the quietest base so far."""
+        system = replace(system, R=system.R + (self.R - QUIETEST_BASE**2)[:, None] * np.eye(3))
         estimates = kalman(system, history="full")
         for colour in (False, True):
             for _ in range(self.most):

@@ -16,7 +16,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.filters import LinearSystem
 from truenorth.models.matrices import MATRICES, matrices_of, with_matrices, without_errors
-from truenorth.models.static import BG, DV, PHI, STATES, StaticModel
+from truenorth.models.static import BG, DV, PHI, QUIETEST_BASE, STATES, StaticModel
 from truenorth.models.static_force import Form, force_system
 from truenorth.models.swaying import arm_rows, with_arm, without_sway
 from truenorth.records import ImuRecord
@@ -162,11 +162,13 @@ class StayingLog:
         return self.taken[BIASES]
 
     def linearise(self) -> LinearSystem:
-        """The system of the errors that are left; without any variance of the base's own motion in R."""
+        """The system of the errors that are left; of the base's own motion R holds the least that it can be."""
         lat, alt, groups = self.position.lat, self.position.alt, self.prior.groups
         integrals = without_sway(self.integrals, self.C_sb) if self.sways else self.integrals
         P0 = self.prior.P
-        system = self.noise.linearise(integrals, self.C_n0_i, lat, alt, P0[:STATES, :STATES], np.zeros(3))
+        system = self.noise.linearise(
+            integrals, self.C_n0_i, lat, alt, P0[:STATES, :STATES], np.full(3, QUIETEST_BASE**2)
+        )
         if self.form == "force":
             system = force_system(system, self.integrals, self.C_n0_i, lat, alt)
         if "matrices" in groups:

@@ -37,6 +37,7 @@ DV = slice(3, 6)
 BG = slice(6, 9)
 BA = slice(9, 12)
 STATES = 12
+QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without noise
 
 
 @dataclass(frozen=True)

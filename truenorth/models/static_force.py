@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.filters import LinearSystem
-from truenorth.models.static import DV, STATES
+from truenorth.models.static import DV, QUIETEST_BASE, STATES
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_velocity
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def force_system(
     Returns
     -------
     LinearSystem
-        Without the variance of what the base itself gains in an interval.
+        Whose R holds the variance of the quietest base only.
     """
     # z = J x_{k-1} + w_dv, and x_{k-1} = Phi^-1 (x_k - w): told by the state after the interval, as the filter has it.
     J = core.Phi[:, DV].copy()
@@ -61,7 +61,7 @@ def force_system(
     return replace(
         core,
         H=C @ back,
-        R=0.5 * (noise + np.swapaxes(noise, 1, 2)),
+        R=0.5 * (noise + np.swapaxes(noise, 1, 2)) + QUIETEST_BASE**2 * np.eye(3),
         S=core.Q @ np.swapaxes(own, 1, 2) @ C_t,
         z=z,
     )

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.filters import LinearSystem
 from truenorth.models.disturbance import AxisMotion
-from truenorth.models.static import grown
+from truenorth.models.static import QUIETEST_BASE, grown
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
@@ -106,10 +106,10 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     Parameters
     ----------
     system : LinearSystem
-        Without any variance of the base's motion in R.
+        Whose R holds the variance of the quietest base.
     interval : float, s
     motion : three AxisMotion
-        Along E, N, U.
+        Along E, N, U; none quieter than that.
 
     Returns
     -------
@@ -126,4 +126,4 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
         bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q
         bigger["P0"][part, part], bigger["H"][:, axis, part] = P, h
         white[axis] = item.white
-    return replace(system, **bigger, R=system.R + np.diag(white**2))
+    return replace(system, **bigger, R=system.R + np.diag(white**2 - QUIETEST_BASE**2))

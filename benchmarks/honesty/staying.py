@@ -1,0 +1,159 @@
+"""Alignment of a base that stays (still, swaying, on an indexer) with errors that real sensors have.
+
+Run: ``python -m benchmarks.honesty.staying --runs 20``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from benchmarks.honesty.harness import Case, Log, main
+from truenorth.alignment import align, align_rotary
+from truenorth.alignment.result import Alignment
+
+UNSCALED = {
+    "gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "bias_instability": "0.001 deg/h"},
+    "accel": {"bias": "50 ug", "random_walk": "10 ug/sqrt(Hz)", "bias_instability": "5 ug"},
+}
+
+
+def _place(rng: np.random.Generator) -> dict[str, str]:
+    return {"lat": f"{rng.uniform(20.0, 55.0):.4f} deg", "lon": "10 deg"}
+
+
+def _rest(rng: np.random.Generator) -> dict[str, str]:
+    return {
+        "kind": "rest",
+        "heading": f"{rng.uniform(0.0, 360.0):.3f} deg",
+        "pitch": f"{rng.uniform(-3.0, 3.0):.3f} deg",
+        "roll": f"{rng.uniform(-3.0, 3.0):.3f} deg",
+    }
+
+
+def _sway(rng: np.random.Generator, angles: tuple[float, ...], periods: tuple[float, ...]) -> dict[str, Any]:
+    names = ("roll", "pitch", "heading")
+    tones = {
+        name: [{"amplitude": f"{a} deg", "period": f"{T * rng.uniform(0.95, 1.05):.4f} s"}]
+        for name, a, T in zip(names, angles, periods, strict=True)
+    }
+    return {"kind": "sway", "heading": f"{rng.uniform(0.0, 360.0):.3f} deg", "tones": tones}
+
+
+def rotary_scheme(rng: np.random.Generator) -> Mapping[str, Any]:
+    """Eight positions, slews of 10 deg/s, all errors of a navigation grade IMU."""
+    return {
+        "duration": "600 s",
+        "position": _place(rng),
+        "motion": _rest(rng),
+        "imu": "navigation",
+        "indexer": {"scheme": "8", "dwell": "60 s", "encoder": {"resolution": "1 arcsec"}},
+    }
+
+
+def rotary_spin(imu: Any) -> Any:
+    """Spin about x with 15 deg/s and about z with 6 deg/s."""
+    return lambda rng: {
+        "duration": "600 s",
+        "position": _place(rng),
+        "motion": _rest(rng),
+        "imu": imu,
+        "indexer": {
+            "axes": [
+                {"kind": "spin", "direction": "x", "rate": "15 deg/s"},
+                {"kind": "spin", "direction": "z", "rate": "6 deg/s"},
+            ],
+            "encoder": {"resolution": "1 arcsec"},
+        },
+    }
+
+
+def ship(rng: np.random.Generator) -> Mapping[str, Any]:
+    """A ship at 20 deg S, the IMU 14 m from its centre, without an indexer."""
+    return {
+        "duration": "600 s",
+        "position": {"lat": "-20 deg", "lon": "10 deg"},
+        "motion": _sway(rng, (8.0, 4.0, 6.0), (11.0, 7.0, 5.0)),
+        "lever_arm": [f"{v:.3f} m" for v in 14.0 * _direction(rng)],
+        "imu": "navigation",
+    }
+
+
+def gentle(rng: np.random.Generator) -> Mapping[str, Any]:
+    """A tactical IMU that sways by a degree."""
+    return {
+        "duration": "300 s",
+        "position": _place(rng),
+        "motion": _sway(rng, (1.0, 0.7, 0.5), (7.0, 6.0, 9.0)),
+        "imu": "tactical",
+    }
+
+
+def _imu(gyro: str) -> dict[str, Any]:
+    return {
+        "gyro": {"bias": gyro, "random_walk": "0.005 deg/sqrt(h)"},
+        "accel": {"bias": "50 ug", "random_walk": "20 ug/sqrt(Hz)"},
+    }
+
+
+def still(gyro: str) -> Any:
+    """A base at rest whose IMU's specification nobody gives."""
+
+    def scenario(rng: np.random.Generator) -> Mapping[str, Any]:
+        return {
+            "duration": "300 s",
+            "rate": "50 Hz",
+            "position": _place(rng),
+            "motion": _rest(rng),
+            "imu": _imu(gyro),
+        }
+
+    return scenario
+
+
+def low_cost(rng: np.random.Generator) -> Mapping[str, Any]:
+    """A consumer IMU at rest for a few minutes."""
+    return {
+        "duration": f"{rng.uniform(120.0, 300.0):.0f} s",
+        "rate": "50 Hz",
+        "position": _place(rng),
+        "motion": _rest(rng),
+        "imu": "consumer" if rng.random() < 0.5 else "industrial",
+    }
+
+
+def _direction(rng: np.random.Generator) -> np.ndarray:
+    v = rng.standard_normal(3)
+    return v / np.linalg.norm(v)
+
+
+def _by_rotary(axes: tuple[str, ...], imu: Any = "navigation") -> Any:
+    def call(log: Log) -> Alignment:
+        return align_rotary(log.record, log.encoder, log.position, imu, axes=axes)
+
+    return call
+
+
+def _with(imu: Any) -> Any:
+    def call(log: Log) -> Alignment:
+        return align(log.record, log.position, imu)
+
+    return call
+
+
+CASES = (
+    Case("rotary, eight positions, navigation grade", rotary_scheme, _by_rotary(("z", "x"))),
+    Case("rotary, spin x 15 z 6 deg/s, navigation grade", rotary_spin("navigation"), _by_rotary(("x", "z"))),
+    Case("rotary, the same, no scale factors", rotary_spin(UNSCALED), _by_rotary(("x", "z"), UNSCALED)),
+    Case("ship at 20 deg S, arm 14 m, auto", ship, _with("navigation")),
+    Case("tactical, gentle sway, auto", gentle, _with("tactical"), ("aligned", "level_only", "not_converged")),
+    Case("still, no specification, gyro bias .3 deg/h", still("0.3 deg/h"), _with(None), ("aligned", "level_only")),
+    Case("still, no specification, gyro bias .05 deg/h", still("0.05 deg/h"), _with(None), ("aligned", "level_only")),
+    Case("still, specification given, gyro bias .01 deg/h", still("0.01 deg/h"), _with(_imu("0.01 deg/h"))),
+    Case("low cost at rest, no specification", low_cost, _with(None), ("aligned", "level_only")),
+)
+
+if __name__ == "__main__":
+    main(CASES)
