@@ -198,3 +198,49 @@ def test_what_a_record_with_a_gap_covers():
     times = np.array([-0.1, 0.0, 1.5, 2.0, 3.0, 5.0, 5.5, 6.0, 6.1])
     assert master.covers(times).tolist() == [False, True, True, True, False, True, True, True, False]
     assert master.covers(times, 3.0).tolist() == [False, *[True] * 7, False]
+
+
+def _three(rows=5):
+    return np.arange(1.0, rows + 1), np.ones((rows, 3)), np.ones((rows, 3))
+
+
+def test_what_the_caller_writes_later_is_not_the_records():
+    time, gyro, accel = _three()
+    record = ImuRecord(time, gyro, accel)
+    gyro[:] = 7.0
+    time[0] = -5.0
+    assert np.all(record.gyro == 1.0)
+    assert record.time[0] == 1.0
+
+
+def test_a_masked_value_is_absent():
+    time, gyro, accel = _three()
+    masked = np.ma.masked_array(gyro, mask=np.zeros(gyro.shape, bool))
+    masked[3, 1] = np.ma.masked
+    with pytest.raises(DataError, match="row 4, column gyro_y: nan"):
+        ImuRecord(time, masked, accel)
+
+
+def test_dates_are_seconds_since_1970():
+    _, gyro, accel = _three()
+    time = np.datetime64("2024-03-05T10:00:00", "ns") + np.arange(5) * np.timedelta64(10, "ms")
+    record = ImuRecord(time, gyro, accel)
+    assert record.interval == pytest.approx(0.01, abs=1e-6)
+    assert record.time[0] == 1709632800.0
+
+
+@pytest.mark.parametrize(
+    "wrong", [None, "text", [["a"] * 3] * 5, {"a": 1}, np.ones((5, 3), complex), object(), [[1, 2], [3]]]
+)
+def test_what_is_no_array_of_numbers_is_named(wrong):
+    time, _, accel = _three()
+    with pytest.raises(DataError, match="gyro"):
+        ImuRecord(time, wrong, accel)
+
+
+@pytest.mark.parametrize(("kind", "value"), [("rates", 1e200), ("rates", -2e4), ("increments", 2e4)])
+def test_what_no_sensor_measures_is_refused(kind, value):
+    time, gyro, accel = _three()
+    gyro[2, 0] = value
+    with pytest.raises(DataError, match=r"row 3, column .*_x.*check the units"):
+        ImuRecord(time, gyro, accel, kind)

@@ -133,6 +133,7 @@ DIMENSIONS: dict[str, tuple[Dimension, str]] = {
 }
 
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.DOTALL)
+_ZERO = re.compile(r"[+-]?0+(?:\.0*)?")
 _SUPERSCRIPTS = str.maketrans("⁻¹²³⁴", "-1234")
 _NAME = re.compile(r"°C|[°º′″'\"%]|[A-Za-zµμ]+|1(?![\d.])")
 _POWER = re.compile(r"\^?([-+]?\d(?:\.\d+)?)(?!\d)|\^\(([-+]?\d)/([1-9])\)")
@@ -257,10 +258,13 @@ def parse(text: str, dimension: str) -> float:
     Raises
     ------
     UsageError
-        Not a quantity, or one of another dimension; the message gives an example of the right one.
+        Not a quantity, or one of another dimension; the message gives an example of the right one. A bare zero is one of
+        every dimension.
     """
     wanted, example = DIMENSIONS[dimension]
     words = dimension.replace("_", " ")
+    if isinstance(text, str) and _ZERO.fullmatch(text.strip()):
+        return 0.0  # the same in every unit
     try:
         value, found = parse_quantity(text)
     except UsageError as error:

@@ -11,6 +11,48 @@ from typing import Any
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import parse
 
+LARGEST = 1 << 20  # bytes
+DEEPEST = 20
+LONGEST = 1000  # characters of a value
+MOST_NODES = 100_000  # with every alias counted as what it stands for
+
+
+def _check_size(text: str) -> None:
+    """Refuse a text that is deep or, with its aliases written out, large: by its events, before anything is built.
+
+    Raises
+    ------
+    ValueError
+        In words.
+    """
+    import yaml
+
+    sizes: dict[str, int] = {}
+    open_nodes: list[tuple[str | None, int]] = []
+    count = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        where = f"line {event.start_mark.line + 1}" if event.start_mark else "a line"
+        if isinstance(event, yaml.CollectionStartEvent):
+            open_nodes.append((event.anchor, count))
+            if len(open_nodes) > DEEPEST:
+                raise ValueError(f"{where}: nested more than {DEEPEST} deep")
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = open_nodes.pop()
+            if anchor is not None:
+                sizes[anchor] = count - before
+        elif isinstance(event, yaml.AliasEvent):
+            if event.anchor not in sizes:
+                raise ValueError(f"{where}: *{event.anchor} stands for nothing, or for itself")
+            count += sizes[event.anchor]
+        elif isinstance(event, yaml.ScalarEvent):
+            if len(event.value) > LONGEST:
+                raise ValueError(f"{where}: a value of {len(event.value)} characters")
+            if event.anchor is not None:
+                sizes[event.anchor] = 1
+        count += 1
+        if count > MOST_NODES:
+            raise ValueError(f"more than {MOST_NODES} entries")
+
 
 def read_mapping(path: str | PathLike[str]) -> dict[Any, Any]:
     """The keys and values of a YAML file; an empty file has none.
@@ -30,19 +72,40 @@ def read_mapping(path: str | PathLike[str]) -> dict[Any, Any]:
         def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
             seen = set()
             for key, _ in node.value:
+                if not isinstance(key.value, str):
+                    raise yaml.constructor.ConstructorError(None, None, "a key that is no word", key.start_mark)
                 if key.value in seen:
                     raise yaml.constructor.ConstructorError(None, None, f"key {key.value!r} twice", key.start_mark)
                 seen.add(key.value)
             return super().construct_mapping(node, deep=deep)
 
     try:
-        content = yaml.load(Path(path).read_text(encoding="utf-8"), Loader)
+        if not Path(path).is_file():
+            raise UsageError(f"{path}: cannot be read (No such file)")
+        with Path(path).open("rb") as file:
+            raw = file.read(LARGEST + 1)
+        if len(raw) > LARGEST:
+            raise DataError(f"{path}: larger than {LARGEST >> 20} MiB; expected a few keys")
+        text = raw.decode("utf-8")
+        _check_size(text)
+        content = yaml.load(text, Loader)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
+    except DataError:
+        raise
     except (yaml.YAMLError, UnicodeDecodeError) as error:
+        why = getattr(error, "problem", None) or str(error).splitlines()[0]
         mark = getattr(error, "problem_mark", None)
         line = f", line {mark.line + 1}" if mark is not None else ""
-        raise DataError(f"{path}{line}: not a YAML file ({getattr(error, 'problem', None) or error})") from None
+        raise DataError(f"{path}{line}: not a YAML file ({why})") from None
+    except (
+        ValueError,
+        OverflowError,
+        TypeError,
+        KeyError,
+        AttributeError,
+    ) as error:  # a date or a number that cannot be
+        raise DataError(f"{path}: {error}") from None
     if content is None:
         return {}
     if not isinstance(content, Mapping):

@@ -153,8 +153,7 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
                 "error",
                 "gyro_axes",
                 f"the gyros explain {100 * turning.agreement:.0f} % of how gravity turns in the accelerometers, with "
-                f"the columns x y z read as {turning.best_axes} {100 * turning.best_agreement:.0f} %: gyro axes "
-                "look swapped or of the wrong sign against the accelerometers'; check --axes and the wiring",
+                f"their columns x y z read as {turning.best_axes} {100 * turning.best_agreement:.0f} %: {_remedy(turning)}",
             )
         )
         return True
@@ -171,6 +170,21 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
     text = f"{found}: unit (increments read as rates?) or scale factor of the gyros are wrong"
     findings.append(Finding(severity, code, text))  # type: ignore[arg-type]
     return True
+
+
+def _remedy(turning: Turning) -> str:
+    """What mends gyros whose axes do not go with the accelerometers'."""
+    holds = turning.best_axes.split()
+    columns = {axis[1]: (name, axis[0]) for name, axis in zip(AXES, holds)}
+    wrong = [axis for axis in AXES if columns[axis] != (axis, "+")]
+    named = ", ".join(f"gyro_{axis}={columns[axis][1].replace('+', '')}<column {columns[axis][0]}>" for axis in wrong)
+    if holds == ["-x", "-y", "-z"]:
+        return (
+            "the axes are a left-handed set: say where they point, such as axes FLD for forward, left, down; or all three gyros "
+            f"have the wrong sign: columns {named}"
+        )
+    what = "exchanged" if any(columns[axis][0] != axis for axis in AXES) else "of the wrong sign"
+    return f"gyro axes are {what} against the accelerometers': columns {named}; or check the wiring"
 
 
 # ------------------------------------------------------------------------------ gyros against the earth

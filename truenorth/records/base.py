@@ -81,11 +81,7 @@ class Record:
     def __post_init__(self) -> None:
         groups = {name: columns for name, columns in self.groups().items() if self._holds(name)}
         for name in ("time", *groups):
-            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
-            if array.flags.writeable:
-                array = array.view()
-                array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, _own(getattr(self, name), name, self.source))
         _check_shapes(self, groups)
         _check_time(self.time, self.source)
         for name, columns in groups.items():
@@ -177,6 +173,36 @@ class Record:
         import pandas as pd
 
         return pd.DataFrame(self.columns(), pd.Index(self.time, name="time"))
+
+
+def _own(given: Any, name: str, source: str) -> Array:
+    """An array as the record keeps it: of doubles, contiguous, never written to; a masked value is NaN, a date in seconds.
+
+    Raises
+    ------
+    DataError
+        No numbers.
+    """
+    values = given.filled(np.nan) if isinstance(given, np.ma.MaskedArray) and given.dtype.kind == "f" else given
+    if isinstance(values, np.ma.MaskedArray):
+        values = values.astype(np.float64).filled(np.nan)
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    if kind in "mM" and kind:
+        if name != "time" or np.isnat(values).any():
+            raise DataError(f"{source}: {name} holds {values.dtype}; expected numbers, or dates in time alone")
+        values = values.astype(f"{values.dtype.str[:2]}8[ns]").astype(np.int64) * 1e-9
+    try:
+        if kind == "c":
+            raise TypeError
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        what = f"an array of {values.dtype}" if kind else type(given).__name__
+        raise DataError(f"{source}: {name} is {what}; expected an array of numbers") from None
+    if array.flags.writeable:
+        if isinstance(given, np.ndarray) and np.may_share_memory(array, given):
+            array = array.copy()  # what the caller writes later is not the record's
+        array.flags.writeable = False
+    return array
 
 
 def check_range(record: Record, name: str, low: float, high: float, advice: str) -> None:

@@ -13,6 +13,7 @@ from truenorth.core.errors import DataError
 from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
+LARGEST = (1e4, 1e6)  # rad/s and m/s^2: far beyond the range of any IMU
 Kind = Literal["rates", "increments"]
 
 COLUMNS = {
@@ -60,9 +61,19 @@ class ImuRecord(Record):
         return {"gyro": COLUMNS[self.kind][:3], "accel": COLUMNS[self.kind][3:]}
 
     def __post_init__(self) -> None:
-        if self.kind not in COLUMNS:
+        if not isinstance(self.kind, str) or self.kind not in COLUMNS:
             raise DataError(f"{self.source}: kind {self.kind!r} is not known; use 'rates' or 'increments'")
         super().__post_init__()
+        scale = self.interval if self.kind == "increments" else 1.0
+        for values, limit, names in zip(
+            (self.gyro, self.accel), LARGEST, (COLUMNS[self.kind][:3], COLUMNS[self.kind][3:])
+        ):
+            if max(float(values.max()), -float(values.min())) > limit * scale:
+                row, i = np.argwhere(np.abs(values) > limit * scale)[0]
+                raise DataError(
+                    f"{self.source}: row {row + 1}, column {names[i]}: {values[row, i]:g}; no such sensor measures more than "
+                    f"{limit * scale:g}: check the units, or repair the row"
+                )
 
     def rotated(self, C_new_old: ArrayLike) -> ImuRecord:
         """The same measurements in other body axes: ``v_new = C_new_old @ v_old``."""

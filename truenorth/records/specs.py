@@ -359,6 +359,10 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
 def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
     if not isinstance(content, Mapping):
         raise DataError(f"{where}: expected the groups gyro and accel, found {type(content).__name__}")
+    if not any(key in KEYS or key == "correlation_time" for key in content):
+        raise DataError(
+            f"{where}: names no error of the IMU; expected the groups gyro and accel (a perfect IMU is ImuSpec())"
+        )
     values: dict[str, Any] = {"name": str(content.get("name", name))}
     for group, entries in content.items():
         if group == "name":
