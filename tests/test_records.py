@@ -238,7 +238,7 @@ def test_what_is_no_array_of_numbers_is_named(wrong):
         ImuRecord(time, wrong, accel)
 
 
-@pytest.mark.parametrize(("kind", "value"), [("rates", 1e200), ("rates", -2e4), ("increments", 2e4)])
+@pytest.mark.parametrize(("kind", "value"), [("rates", 1e200), ("rates", -2e6), ("increments", 2e6)])
 def test_what_no_sensor_measures_is_refused(kind, value):
     time, gyro, accel = _three()
     gyro[2, 0] = value

@@ -183,9 +183,9 @@ def _own(given: Any, name: str, source: str) -> Array:
     DataError
         No numbers.
     """
-    values = given.filled(np.nan) if isinstance(given, np.ma.MaskedArray) and given.dtype.kind == "f" else given
-    if isinstance(values, np.ma.MaskedArray):
-        values = values.astype(np.float64).filled(np.nan)
+    values: Any = given
+    if isinstance(given, np.ma.MaskedArray) and given.dtype.kind in "fiu":
+        values = np.ma.filled(given.astype(np.float64), np.nan)
     kind = getattr(getattr(values, "dtype", None), "kind", "")
     if kind in "mM" and kind:
         if name != "time" or np.isnat(values).any():

@@ -13,7 +13,7 @@ from truenorth.core.errors import DataError
 from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
-LARGEST = (1e4, 1e6)  # rad/s and m/s^2: far beyond the range of any IMU
+LARGEST = (1e6, 1e8)  # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
 Kind = Literal["rates", "increments"]
 
 COLUMNS = {

@@ -359,7 +359,7 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
 def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
     if not isinstance(content, Mapping):
         raise DataError(f"{where}: expected the groups gyro and accel, found {type(content).__name__}")
-    if not any(key in KEYS or key == "correlation_time" for key in content):
+    if not set(content) - {"name"}:
         raise DataError(
             f"{where}: names no error of the IMU; expected the groups gyro and accel (a perfect IMU is ImuSpec())"
         )
