@@ -8,7 +8,7 @@ import pytest
 
 from truenorth.core.errors import UsageError
 from truenorth.papers.claims import Claim, Rule, check, condition, exact, interval, markdown, paired, settled
-from truenorth.papers.study import STUDIES
+from truenorth.papers.study import STUDIES, Study, save_all
 from truenorth.papers.sweeps import Sweep, swept
 from truenorth.papers.table import OF_RUNS, STATISTICS, UNITS, Figure, Reference, Table
 
@@ -160,6 +160,29 @@ def test_claims_in_markdown():
     )
     assert "- A remark." in text
     assert isinstance(settled(Rule("c", (exact("a x heading@1 < 2"),)), table, {}), Claim)
+
+
+def test_all_studies_on_one_page(tmp_path):
+    """`reproduce all`: a folder each, and every claim with its verdict on one page."""
+    studies = {}
+    for number, name in enumerate(("one", "two")):
+        table = Table()
+        table.value("a", "m", "x", "value", float(number), "1")
+        rule = Rule(f"x of {name} is small", (exact("a m x value < 0.5"),))
+        studies[name] = Study(f"Study {name}", table, [settled(rule, table, {})], {})
+    paths = save_all(studies, tmp_path)
+    assert {p.relative_to(tmp_path).as_posix() for p in paths} == {
+        "index.html",
+        *(f"{name}/{file}" for name in studies for file in ("figures.csv", "claims.md", "report.html")),
+    }
+    page = (tmp_path / "index.html").read_text()
+    assert (
+        page.index("Holds")
+        < page.index("x of one is small")
+        < page.index("Does not hold")
+        < page.index("x of two is small")
+    )
+    assert 'href="one/report.html"' in page
 
 
 def test_words_of_the_table():

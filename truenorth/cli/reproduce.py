@@ -21,10 +21,12 @@ Studies:
   damping   Double-filter external damping of a marine INS over 48 h
   static    Kalman filters for static alignment, with ten and with eight states
   odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
+  all       All of them, and index.html: which claims hold, in part, or not
 \b
 Examples:
   truenorth reproduce static -o static
   truenorth reproduce static --runs 50 --seed 3 -o static50
+  truenorth reproduce all --runs 20 -o papers
 \b
 Exit codes: 0 done; 2 wrong usage.
 """
@@ -44,15 +46,21 @@ def reproduce(
 ) -> None:
     """Reproduce a published system: figures.csv, the paper's figures, and claims.md with what holds."""
     from truenorth.core.atomic import writable_folder
+    from truenorth.papers import STUDIES, save_all
     from truenorth.papers import reproduce as reproduced
 
     writable_folder(output)  # before the work, not after it
+    names = list(STUDIES) if name == "all" else [name]
     with _stages() as progress:
-        study = reproduced(name, runs=runs, seed=seed, full=full, workers=workers, progress=progress)
+        studies = {
+            each: reproduced(each, runs=runs, seed=seed, full=full, workers=workers, progress=progress)
+            for each in names
+        }
     console = make_console()
-    for claim in study.claims:
-        console.print(f"{claim.verdict}: {claim.text}", soft_wrap=True)
-    for path in study.save(output):
+    for study in studies.values():
+        for claim in study.claims:
+            console.print(f"{claim.verdict}: {claim.text}", soft_wrap=True)
+    for path in save_all(studies, output) if name == "all" else studies[name].save(output):
         console.print(f"wrote {path}", soft_wrap=True)
 
 

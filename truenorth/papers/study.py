@@ -138,3 +138,20 @@ def reproduce(
         raise UsageError(f"workers {workers}; expected 1 or more")
     study: Study = import_module(STUDIES[name]).reproduce(runs, seed, full, workers, progress or (lambda stage: None))
     return study
+
+
+def save_all(studies: Mapping[str, Study], folder: str | PathLike[str]) -> list[Path]:
+    """Write each study to a folder of its name, and index.html: every claim of every study on one page, with its verdict.
+
+    Raises
+    ------
+    UsageError
+        The folder cannot be written to.
+    """
+    from truenorth.report.study import index_page
+
+    target = writable_folder(folder)
+    paths = [path for name, study in studies.items() for path in study.save(target / name)]
+    with atomic_files() as file:
+        file(target / "index.html").write_text(index_page(studies), encoding="utf-8")
+    return [*paths, target / "index.html"]

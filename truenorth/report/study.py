@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from truenorth.core.language import translated as _
@@ -53,6 +53,12 @@ def study_page(
         table=_html(table),
         contents=[*contents, _("Every figure")],
     )
+
+
+def index_page(studies: Mapping[str, Any]) -> str:
+    """HTML text of one page with every claim of every study, each linked to ``NAME/report.html``."""
+    contents = [_("Verdict"), *(study.title for study in studies.values())]
+    return render("studies.html", interactive=False, studies=studies, contents=contents)
 
 
 def _spelt(name: str) -> str:

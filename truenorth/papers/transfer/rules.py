@@ -30,19 +30,19 @@ RULES = (
     Rule(
         "In the turn the heading converges fast.",
         (
-            paired("flat_turn states16 heading@150 < 0.5 * flat_turn states16 heading@120"),
-            paired("flat_turn states12 heading@150 < 0.5 * flat_turn states12 heading@120"),
+            interval("flat_turn states16 heading@150 < 0.2 * flat_turn states16 heading@120"),
+            interval("flat_turn states12 heading@150 < 0.2 * flat_turn states12 heading@120"),
         ),
     ),
     Rule(
         "In a turn, delay and lever arm can hardly be told apart.",
         (
-            paired(
+            interval(
                 "flat_turn_random states16 lever_arm_y_and_speed_times_tau@200 < 0.5 * flat_turn_random states16 lever_arm_y@200"
             ),
             interval("flat_turn_random states16 lever_arm_y@200 > 0.5"),
         ),
-        "{flat_turn}. Delay and arm are drawn (.05 s, 1 m): r_forward + V tau is known to "
+        "In words: {flat_turn}. Delay and arm are drawn (.05 s, 1 m): r_forward + V tau is known to "
         "{flat_turn_random states16 lever_arm_y_and_speed_times_tau@200:.2f} m, r_forward alone to "
         "{flat_turn_random states16 lever_arm_y@200:.2f} m.",
     ),
