@@ -4,7 +4,7 @@ BIN := .venv/bin
 READY := .venv/.ready
 WORKERS ?= auto
 
-.PHONY: demo test test-all check format bench release lock clean
+.PHONY: demo test test-all check format bench docs messages release lock clean
 
 demo: $(READY)
 	$(BIN)/python examples/demo.py
@@ -26,6 +26,12 @@ format: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks
+
+docs: $(READY)
+	$(BIN)/mkdocs build -q
+
+messages: $(READY)
+	$(BIN)/python -m tests.report.catalogue
 
 release: $(READY)
 	$(BIN)/python .ci/release.py

@@ -17,7 +17,6 @@ from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.faults import faults
 from truenorth.cli.inspect import inspect
-from truenorth.cli.live import live
 from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
@@ -40,7 +39,6 @@ app = typer.Typer(
 app.command("align")(align)
 app.command("advise")(advise)
 app.command("inspect")(inspect)
-app.command("live")(live)
 app.command("navigate")(navigate)
 app.command("simulate")(simulate)
 app.command("campaign")(campaign)
@@ -58,8 +56,20 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def _main(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+    lang: str = typer.Option("en", "--lang", help="Language of verdicts and reports: en or zh; anywhere on the line."),
 ) -> None:
-    pass
+    from truenorth.core.language import speak
+
+    speak(lang)
+
+
+def _language_first(arguments: list[str]) -> list[str]:
+    """``--lang zh`` may stand anywhere: it is moved to where the program reads it, before the command."""
+    for i, word in enumerate(arguments):
+        count = 2 if word == "--lang" else 1 if word.startswith("--lang=") else 0
+        if count:
+            return [*arguments[i : i + count], *arguments[:i], *arguments[i + count :]]
+    return arguments
 
 
 OUTPUTS = ("-o", "--output", "--plot")
@@ -84,7 +94,7 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     try:
         with protected(_inputs(sys.argv[1:])):
-            app()
+            app(args=_language_first(sys.argv[1:]))
     except TruenorthError as error:
         print(f"truenorth: {error}", file=sys.stderr)
         sys.exit(error.exit_code)

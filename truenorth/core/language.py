@@ -44,13 +44,19 @@ def in_language(code: str) -> Iterator[None]:
     UsageError
         A language that is not known.
     """
-    if code not in LANGUAGES:
-        raise UsageError(f"language {code!r} is not known; choose one of {', '.join(LANGUAGES)}")
-    token = _chosen.set(code)
+    before = _chosen.get()
+    speak(code)
     try:
         yield
     finally:
-        _chosen.reset(token)
+        _chosen.set(before)
+
+
+def speak(code: str) -> None:
+    """Set the language from here on; see `in_language`."""
+    if code not in LANGUAGES:
+        raise UsageError(f"language {code!r} is not known; choose one of {', '.join(LANGUAGES)}")
+    _chosen.set(code)
 
 
 @cache
