@@ -17,6 +17,7 @@ from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.faults import faults
 from truenorth.cli.inspect import inspect
+from truenorth.cli.live import live
 from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
@@ -39,6 +40,7 @@ app = typer.Typer(
 app.command("align")(align)
 app.command("advise")(advise)
 app.command("inspect")(inspect)
+app.command("live")(live)
 app.command("navigate")(navigate)
 app.command("simulate")(simulate)
 app.command("campaign")(campaign)

@@ -271,7 +271,7 @@ def align(
         more = {} if advice is None else {"advice": advice.summary()}
         print(json.dumps(result.summary() | {"reasons": reasons_of(result)} | more, allow_nan=False))
     else:
-        _print(result, paths)
+        print_answer(result, paths)
         if advice is not None:
             print_advice(make_console(), advice)
     if result.status not in ("aligned", "level_only"):
@@ -297,7 +297,8 @@ def _refuse_implausible(record: ImuRecord, lat: float | None, any_attitude: bool
             print(f"truenorth: warning: {finding.message}", file=sys.stderr)
 
 
-def _print(result: Alignment, paths: list[Path]) -> None:
+def print_answer(result: Alignment, paths: list[Path]) -> None:
+    """Print an alignment for people, and the files that were written."""
     from rich.table import Table
     from rich.text import Text
 

@@ -79,12 +79,6 @@ def read_log(
             raise UsageError(f"{option} {value}: expected seconds on the log's clock")
     if start is not None and stop is not None and start >= stop:
         raise UsageError(f"--from {start:g} --to {stop:g}: the window ends before it begins")
-    names: dict[str, str] | None = None
-    if columns is not None:
-        pairs = [pair.partition("=") for pair in columns.split(",")]
-        if any(not equals or not ours.strip() or not theirs.strip() for ours, equals, theirs in pairs):
-            raise UsageError(f"--columns {columns!r}: expected pairs such as time=t,gyro_x=wx")
-        names = {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
     try:
         record = read_imu(
             log,
@@ -92,7 +86,7 @@ def read_log(
             units=units,
             axes=axes,
             rate=rate,
-            columns=names,
+            columns=names_of(columns),
             kind=kind,  # type: ignore[arg-type]  # checked there, with the choices in the message
             topic=topic,
         )
@@ -119,6 +113,24 @@ def in_line(guess: Guess) -> str:
     """What a log was taken for, in one line: what, value, how sure, why."""
     sure = "" if guess.probability > 0.995 else f" ({100 * guess.probability:.0f} % sure)"
     return f"{guess.what}: {guess.value}{sure}: {guess.why}"
+
+
+def names_of(columns: str | None) -> dict[str, str] | None:
+    """Our names of columns to the log's, of an option such as ``time=t,gyro_x=wx``.
+
+    Raises
+    ------
+    UsageError
+        No such pairs.
+    """
+    from truenorth.core.errors import UsageError
+
+    if columns is None:
+        return None
+    pairs = [pair.partition("=") for pair in columns.split(",")]
+    if any(not equals or not ours.strip() or not theirs.strip() for ours, equals, theirs in pairs):
+        raise UsageError(f"--columns {columns!r}: expected pairs such as time=t,gyro_x=wx")
+    return {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
 
 
 def numbers_of(text: str, option: str, count: int, meaning: str) -> list[float]:

@@ -1,0 +1,167 @@
+"""Live alignment: the answer of the whole log, whatever the chunks; hostile rows counted; memory bounded."""
+
+import numpy as np
+import pytest
+
+from truenorth.alignment import align
+from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
+from truenorth.live import Aligner
+from truenorth.live.intake import CONFIRMED, Intake
+from truenorth.live.log import Log
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import rest, simulate
+from truenorth.strapdown.increments import increments
+
+PLACE = Position.from_degrees(45.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def record():
+    return simulate(rest(PLACE, 0.7, 0.02, -0.03), rate=50.0, duration=130.0, imu=imu_spec("navigation"), seed=3).record
+
+
+def rows_of(record):
+    return np.column_stack([record.time, record.gyro, record.accel])
+
+
+def pushed(aligner, record, chunk):
+    for first in range(0, len(record), chunk):
+        part = slice(first, first + chunk)
+        aligner.push(record.time[part], record.gyro[part], record.accel[part])
+
+
+@pytest.mark.parametrize("chunk", [1, 13, 1000])
+def test_the_last_answer_is_that_of_the_whole_log_to_the_bit(record, chunk):
+    with Aligner(PLACE, "navigation", kind=record.kind, background=False) as aligner:
+        pushed(aligner, record, chunk)
+        found = aligner.finish()
+    whole = align(record, PLACE, "navigation")
+    assert np.array_equal(found.C_nb, whole.C_nb)
+    assert np.array_equal(found.phi_covariance, whole.phi_covariance)
+    assert found.status == whole.status == "aligned"
+
+
+def test_between_solutions_the_gyros_carry_the_answer_within_its_sigma(record):
+    with Aligner(PLACE, "navigation", kind=record.kind, background=False) as aligner:
+        pushed(aligner, record, 50)
+        answer, whole = aligner.answer, aligner.finish()
+    assert answer.time == record.time[-1]
+    assert answer.solution.time < answer.time
+    assert aligner.solutions > 10
+    off = answer.euler - whole.euler
+    assert np.all(np.abs(off) < 3.0 * answer.sigma)
+    assert np.abs(off[1:]).max() < np.radians(0.01)
+    assert answer.sigma[0] == pytest.approx(whole.euler_sigma[0], rel=0.3)
+
+
+def test_a_thread_solves_while_rows_come(record):
+    with Aligner(PLACE, "navigation", kind=record.kind, share=1.0) as aligner:
+        pushed(aligner, record, 10)
+        found = aligner.finish()
+    assert np.array_equal(found.C_nb, align(record, PLACE, "navigation").C_nb)
+    assert aligner.answer is not None
+
+
+def test_hostile_rows_are_counted_and_the_answer_is_unharmed(record):
+    rows, random = rows_of(record), np.random.default_rng(5)
+    hostile = []
+    for number, row in enumerate(rows):
+        hostile.append(row)
+        if number % 97 == 50:
+            bad = row.copy()
+            bad[random.integers(0, 7)] = np.nan
+            hostile.append(bad)
+        if number % 101 == 50:
+            bad = row.copy()
+            bad[random.integers(1, 7)] = 1e200
+            hostile.append(bad)
+        if number % 89 == 50:
+            hostile.append(row)  # repeated
+        if number % 113 == 50:
+            bad = row.copy()
+            bad[0] += 1.7e9  # another clock
+            hostile.append(bad)
+        if number % 127 == 60:
+            hostile.append(rows[number - 55])  # repeated, and too late or not
+    hostile[300], hostile[303] = hostile[303], hostile[300]
+    with Aligner(PLACE, "navigation", kind=record.kind, background=False) as aligner:
+        for row in hostile:
+            aligner.push(row[0], row[1:4], row[4:])
+        found = aligner.finish()
+    counts = aligner.intake.counts
+    assert np.array_equal(found.C_nb, align(record, PLACE, "navigation").C_nb)
+    assert counts.taken == len(record)
+    assert min(counts.not_finite, counts.too_large, counts.repeated, counts.other_clock, counts.reordered) > 0
+    assert counts.taken + counts.left_out == len(hostile)
+
+
+def test_a_jump_of_the_clock_that_goes_on_is_a_gap_and_loses_no_row():
+    intake = Intake()
+    rows = np.zeros((100, 7))
+    rows[:, 0] = np.arange(100) * 0.01
+    rows[50:, 0] += 100.0
+    taken = sum(len(block) for row in rows for block in intake.sift(row[None]))
+    assert taken == 100
+    assert intake.counts.left_out == 0
+    few = np.zeros((CONFIRMED - 1, 7))
+    few[:, 0] = 1000.0 + np.arange(CONFIRMED - 1) * 0.01
+    assert not intake.sift(few)  # waits
+    rows[:, 0] += 101.0
+    assert len(intake.sift(rows[:10])) == 10
+    assert intake.counts.other_clock == CONFIRMED - 1
+
+
+def test_after_a_long_gap_alignment_begins_anew_and_says_when(record):
+    rows = rows_of(record)
+    kept = np.concatenate([rows[:2000], rows[2100:]])
+    with Aligner(PLACE, "navigation", kind=record.kind, background=False) as aligner:
+        aligner.push(kept[:, 0], kept[:, 1:4], kept[:, 4:])
+        found = aligner.finish()
+    assert found.duration == pytest.approx(record.time[-1] - rows[2100, 0], abs=0.05)
+    assert found.status == "aligned"
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("chunk", [1, 7, 333])
+def test_merged_rows_keep_the_sums_whatever_the_chunks(kind, chunk):
+    random = np.random.default_rng(1)
+    count = 9000
+    rows = np.column_stack([np.arange(1, count + 1) * 0.01, random.normal(size=(count, 6))])
+    log = Log(kind, most=1000)
+    for first in range(0, count, chunk):
+        assert log.add(rows[first : first + chunk])
+    assert log.merged == 16
+    assert len(log) <= 1000
+    record = log.record()
+    assert record.kind == "increments"
+    reference = Log(kind, most=10**6)
+    reference.add(rows)
+    dtheta, dvel = increments(reference.record())
+    upto = int(np.searchsorted(rows[:, 0], record.time[-1], side="right"))
+    np.testing.assert_allclose(record.gyro.sum(axis=0), dtheta[:upto].sum(axis=0), atol=1e-9)
+    np.testing.assert_allclose(record.accel.sum(axis=0), dvel[:upto].sum(axis=0), atol=1e-9)
+    np.testing.assert_allclose(np.diff(record.time), 0.16, atol=1e-9)
+
+
+def test_a_base_that_drives_off_is_noticed_and_the_heading_until_then_kept(record):
+    rows = rows_of(record)
+    drive = rows[:, 0] > 90.0
+    scale = 0.02 if record.kind == "increments" else 1.0
+    rows[drive, 5] += 0.5 * scale  # forward
+    with Aligner(PLACE, "navigation", kind=record.kind, background=False) as aligner:
+        for first in range(0, len(rows), 25):
+            part = rows[first : first + 25]
+            aligner.push(part[:, 0], part[:, 1:4], part[:, 4:])
+        answer, found = aligner.answer, aligner.finish()
+    assert 87.0 < aligner.left <= 90.0
+    assert found.status == "aligned"
+    assert abs(found.heading - 0.7) < 4.0 * found.euler_sigma[0]
+    assert any("left its place" in reason for reason in answer.reasons)
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    with Aligner(PLACE, background=False) as aligner:
+        with pytest.raises(UsageError, match="expected"):
+            aligner.push([0.0, 1.0], np.zeros((3, 3)), np.zeros((2, 3)))
+        assert aligner.answer is None

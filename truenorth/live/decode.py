@@ -1,0 +1,206 @@
+"""Bytes to rows: CSV lines with the documented columns, or a fixed binary row.
+
+Binary row: ``TNR1``, seven little-endian float64 (time s, gyro x y z rad/s, specific force x y z m/s^2) and the CRC-32 of those 56
+bytes as little-endian uint32: 64 bytes.
+"""
+
+from __future__ import annotations
+
+import struct
+import time as clock
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.attitude import body_axes
+from truenorth.core.errors import DataError
+from truenorth.formats.layout import Layout
+from truenorth.formats.names import clock_of, heading_of
+from truenorth.formats.table import unit_factor
+from truenorth.live.log import Kind
+from truenorth.records import COLUMNS
+
+Array = NDArray[np.float64]
+
+MAGIC = b"TNR1"
+PAYLOAD = struct.Struct("<7d")
+LENGTH = len(MAGIC) + PAYLOAD.size + 4
+LONGEST_LINE = 4096  # bytes; what is longer without an end is not text
+BARE = ("time", *COLUMNS["rates"])
+
+
+def binary_row(time: float, gyro: Array, accel: Array) -> bytes:
+    """One row in the binary form."""
+    payload = PAYLOAD.pack(time, *gyro, *accel)
+    return MAGIC + payload + struct.pack("<I", zlib.crc32(payload))
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Where the seven numbers stand in a line, and what they are multiplied by."""
+
+    kind: Kind
+    at: tuple[int, ...]
+    factor: Array
+    timed: bool
+    width: int
+
+
+class Decoder:
+    """Bytes of one source, in chunks of any size, to rows ``time, gyro (3), accel (3)`` in SI units and RFU axes.
+
+    Parameters
+    ----------
+    layout : Layout
+        Names of columns, units and axes, as for a file.
+    source : str
+        Messages begin with it.
+    now : callable
+        Arrival time, s, of rows that carry none.
+
+    Attributes
+    ----------
+    broken : int
+        Lines or binary rows that could not be read.
+    kind : {"rates", "increments"}
+    """
+
+    def __init__(self, layout: Layout, source: str, now: Callable[[], float] = clock.monotonic) -> None:
+        self._layout, self._source, self._now = layout, source, now
+        self._half = b""
+        self._frames = False  # binary rows have come
+        self._columns: _Columns | None = None
+        self._turn = np.eye(3) if layout.axes is None else body_axes(layout.axes)
+        self.broken = 0
+        self.arrival_time = False
+
+    @property
+    def kind(self) -> Kind:
+        """What a row is; rates until a header says otherwise."""
+        return self._layout.kind or ("rates" if self._columns is None else self._columns.kind)
+
+    def feed(self, data: bytes) -> Array:
+        """(K, 7) the rows that are whole now.
+
+        Raises
+        ------
+        DataError
+            A header that lacks a column, or text that is none.
+        """
+        self._half += data
+        self._frames = self._frames or MAGIC in self._half
+        rows = self._binary() if self._frames else self._text()
+        result = np.array(rows, dtype=np.float64).reshape(-1, 7)
+        result[:, 1:4] = result[:, 1:4] @ self._turn.T
+        result[:, 4:] = result[:, 4:] @ self._turn.T
+        return result
+
+    def _binary(self) -> list[tuple[float, ...]]:
+        rows = []
+        while (start := self._half.find(MAGIC)) >= 0 and len(self._half) - start >= LENGTH:
+            frame = self._half[start : start + LENGTH]
+            payload = frame[len(MAGIC) : -4]
+            if zlib.crc32(payload) == int.from_bytes(frame[-4:], "little"):
+                self.broken += start > 0
+                rows.append(PAYLOAD.unpack(payload))
+                self._half = self._half[start + LENGTH :]
+            else:
+                self.broken += 1
+                self._half = self._half[start + 1 :]
+        return rows
+
+    def _text(self) -> list[list[float]]:
+        *lines, self._half = self._half.split(b"\n")
+        if len(self._half) > LONGEST_LINE:
+            raise DataError(
+                f"{self._source}: {len(self._half)} bytes without the end of a line; expected CSV lines or binary rows"
+            )
+        found = (self._line(line.decode("utf-8", "replace").strip()) for line in lines)
+        return [row for row in found if row is not None]
+
+    def _line(self, line: str) -> list[float] | None:
+        if not line or line[0] in "#$/":  # comments, and NMEA sentences in between
+            return None
+        if not (line.isascii() and line.isprintable()):
+            self.broken += 1
+            return None
+        cells = [cell.strip() for cell in line.split("," if "," in line else ";" if ";" in line else None)]
+        try:
+            numbers = [float(cell) if cell else np.nan for cell in cells]
+        except ValueError:
+            if self._columns is None:
+                self._columns = self._from_header(cells)
+            else:
+                self.broken += 1
+            return None
+        if self._columns is None:
+            self._columns = self._without_header(len(numbers))
+        columns = self._columns
+        if len(numbers) != columns.width:
+            self.broken += 1
+            return None
+        values = [numbers[i] * factor for i, factor in zip(columns.at, columns.factor)]
+        return values if columns.timed else [self._now(), *values]
+
+    def _from_header(self, names: list[str]) -> _Columns:
+        """Where the seven numbers stand: by the caller's names, by ours, or by what a heading means."""
+        at: dict[str, int] = {}
+        sign = np.ones(len(names))
+        theirs = {text: ours for ours, text in self._layout.columns.items()}
+        units = dict(self._layout.units)
+        for i, name in enumerate(names):
+            ours = theirs.get(name) or theirs.get(f"-{name}") or name
+            sign[i] = -1.0 if f"-{name}" in theirs else 1.0
+            if ours not in ("time", *COLUMNS["rates"], *COLUMNS["increments"]):
+                heading, (is_clock, clock_unit) = heading_of(name), clock_of(name)
+                if heading is not None:
+                    ours = f"{heading.sensor}_{heading.axis}"
+                    sensor = "gyro" if heading.sensor in ("gyro", "dtheta") else "accel"
+                    self._say_unit(units, sensor, heading.unit, name)
+                elif is_clock:
+                    ours = "time"
+                    self._say_unit(units, "time", clock_unit or "s", name)
+            at.setdefault(ours, i)
+        kind: Kind = "increments" if "dtheta_x" in at else "rates"
+        missing = [ours for ours in COLUMNS[kind] if ours not in at]
+        if missing:
+            raise DataError(
+                f"{self._source}: the header {', '.join(names)} has no column {missing[0]}; expected {', '.join(BARE)}, or the "
+                "names of the columns"
+            )
+        wanted = ["time"] * ("time" in at) + list(COLUMNS[kind])
+        places = [at[ours] for ours in wanted]
+        return self._scaled(self._layout.kind or kind, places, "time" in at, len(names), units, sign[places])
+
+    def _say_unit(self, units: dict[str, str], key: str, unit: str | None, name: str) -> None:
+        """Take over a heading's unit where the caller has named none.
+
+        Raises
+        ------
+        DataError
+            Neither says one, and the name is not ours, which would mean SI.
+        """
+        if key not in units and unit is None:
+            raise DataError(f"{self._source}: column {name!r} names no unit; say it, such as deg/s,g")
+        units.setdefault(key, unit or "")
+
+    def _without_header(self, count: int) -> _Columns:
+        if count not in (6, 7):
+            raise DataError(
+                f"{self._source}: the first line holds {count} numbers and no names; expected a header, or {', '.join(BARE)} "
+                "(or the six without time)"
+            )
+        kind, units = self._layout.kind or "rates", dict(self._layout.units)
+        return self._scaled(kind, list(range(count)), count == 7, count, units, np.ones(count))
+
+    def _scaled(
+        self, kind: Kind, at: list[int], timed: bool, width: int, units: dict[str, str], sign: Array
+    ) -> _Columns:
+        self.arrival_time = not timed
+        layout = replace(self._layout, units=units)
+        factors = [unit_factor("time", kind, layout)] * timed
+        factors += [unit_factor(sensor, kind, layout) for sensor in ("gyro",) * 3 + ("accel",) * 3]
+        return _Columns(kind, tuple(at), np.array(factors) * sign, timed, width)

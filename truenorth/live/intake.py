@@ -1,0 +1,132 @@
+"""Rows as they come, sifted: what is no number, too large, repeated, too late or of another clock is counted and left out.
+
+A sound row goes through at once. A row that is later than expected by more than `JUMP` waits until the rows after it show
+whether time has really gone on (a gap) or whether it was a stray of another clock; no sound row is lost by that.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LARGEST_RATE = 200.0  # rad/s: above 11000 deg/s, beyond every gyro of a vehicle
+LARGEST_FORCE = 5000.0  # m/s^2: 500 g
+LATE = 1.0  # s: a row may stand so long behind a newer one
+JUMP = 10.0  # s: a step ahead that has to be confirmed
+CONFIRMED = 20  # rows that go on from the step
+
+
+@dataclass
+class Counts:
+    """What became of the rows.
+
+    Attributes
+    ----------
+    taken : int
+    reordered : int
+        Taken, though they came after a row of later time.
+    not_finite, too_large, repeated, too_late, other_clock : int
+        Left out.
+    """
+
+    taken: int = 0
+    reordered: int = 0
+    not_finite: int = 0
+    too_large: int = 0
+    repeated: int = 0
+    too_late: int = 0
+    other_clock: int = 0
+
+    @property
+    def left_out(self) -> int:
+        """How many rows were not taken."""
+        return self.not_finite + self.too_large + self.repeated + self.too_late + self.other_clock
+
+    def words(self) -> str:
+        """What was left out or put in order, such as ``3 rows not finite, 1 row repeated``; empty where nothing was."""
+        found = {name.replace("_", " "): count for name, count in asdict(self).items() if name != "taken" and count}
+        return ", ".join(f"{count} row{'s' * (count > 1)} {name}" for name, count in found.items())
+
+
+class Intake:
+    """Sifts rows ``time, gyro (3), accel (3)`` in SI units."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self._newest = -np.inf
+        self._recent: deque[Array] = deque()  # times of the blocks of the last `LATE` seconds
+        self._ahead: list[Array] = []  # rows beyond a jump, not yet confirmed
+
+    def sift(self, rows: Array) -> list[Array]:
+        """Sound rows in blocks of ascending time; a block that begins before the newest row so far is to be sorted in.
+
+        Parameters
+        ----------
+        rows : (K, 7) array
+        """
+        sound = self._sound(rows)
+        if not len(sound):
+            return []
+        time = sound[:, 0]
+        steps = np.diff(time, prepend=time[0] if self._newest == -np.inf else self._newest)
+        if not self._ahead and np.all(steps[1:] > 0.0) and np.all(steps < JUMP) and time[0] > self._newest:
+            self._take(sound)
+            return [sound]
+        blocks: list[Array] = []
+        for row in sound:
+            blocks += self._one(row)
+        return blocks
+
+    def _sound(self, rows: Array) -> Array:
+        if np.abs(rows[:, 1:]).max(initial=0.0) < LARGEST_RATE and np.isfinite(rows[:, 0]).all():  # NaN is not below
+            return rows
+        finite = np.isfinite(rows).all(axis=1)
+        with np.errstate(invalid="ignore"):
+            small = (np.abs(rows[:, 1:4]) < LARGEST_RATE).all(axis=1) & (np.abs(rows[:, 4:]) < LARGEST_FORCE).all(
+                axis=1
+            )
+        self.counts.not_finite += int(np.sum(~finite))
+        self.counts.too_large += int(np.sum(finite & ~small))
+        return rows[finite & small]
+
+    def _take(self, rows: Array) -> None:
+        self.counts.taken += len(rows)
+        self._newest = max(self._newest, float(rows[-1, 0]))
+        self._recent.append(rows[:, 0])
+        while self._recent[0][-1] < self._newest - LATE:
+            self._recent.popleft()
+
+    def _one(self, row: Array) -> list[Array]:
+        time = float(row[0])
+        if time - self._newest >= JUMP and self._newest > -np.inf:
+            return self._beyond(row)
+        if self._ahead and time > self._newest:  # the old clock goes on: what jumped was another one
+            self.counts.other_clock += len(self._ahead)
+            self._ahead = []
+        if any(time in block for block in self._recent):
+            self.counts.repeated += 1
+            return []
+        if time <= self._newest - LATE:
+            self.counts.too_late += 1
+            return []
+        self.counts.reordered += time < self._newest
+        block = row[None, :]
+        self._take(block)
+        return [block]
+
+    def _beyond(self, row: Array) -> list[Array]:
+        if self._ahead and not 0.0 < row[0] - self._ahead[-1][0] < JUMP:
+            self.counts.other_clock += len(self._ahead)
+            self._ahead = []
+        self._ahead.append(row)
+        if len(self._ahead) < CONFIRMED:
+            return []
+        block = np.array(self._ahead)
+        self._ahead = []
+        self._take(block)
+        return [block]

@@ -1,0 +1,98 @@
+"""What comes out while a log runs: JSON lines, NMEA sentences, a view for the terminal."""
+
+from __future__ import annotations
+
+import json
+from functools import reduce
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truenorth.core.units import significant
+from truenorth.live.aligner import Aligner, Answer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+COLOURS = {"aligned": "green", "level_only": "yellow"}
+
+
+def json_line(answer: Answer) -> str:
+    """One JSON object on one line, see :meth:`Answer.summary`."""
+    return json.dumps(answer.summary(), allow_nan=False)
+
+
+def nmea_lines(answer: Answer) -> list[str]:
+    """``$HEHDT`` (true heading) and ``$PASHR`` (heading, roll, pitch and their one-sigmas, deg); none without a heading.
+
+    Roll is positive with the right side down, pitch with the nose up, as ours.
+    """
+    if not answer.heading_known:
+        return []
+    heading, pitch, roll = np.degrees(answer.euler)
+    sigma = np.degrees(answer.sigma)
+    hours, rest = divmod(answer.time % 86400.0, 3600.0)
+    stamp = f"{int(hours):02d}{int(rest // 60):02d}{rest % 60:06.3f}"
+    attitude = f"{heading:.3f},T,{roll:+.3f},{pitch:+.3f},,{sigma[2]:.3f},{sigma[1]:.3f},{sigma[0]:.3f},0,1"
+    return [_sentence(f"HEHDT,{heading:.4f},T"), _sentence(f"PASHR,{stamp},{attitude}")]
+
+
+def _sentence(text: str) -> str:
+    """With the dollar sign and the checksum: all characters between, by exclusive or."""
+    return f"${text}*{reduce(lambda total, letter: total ^ ord(letter), text, 0):02X}"
+
+
+def angle(radians: float) -> str:
+    """An angle in deg, arcmin or arcsec, whichever reads best."""
+    for unit, factor in (("deg", 1.0), ("arcmin", 60.0)):
+        value = np.degrees(radians) * factor
+        if value >= 0.5:
+            return f"{significant(value)} {unit}"
+    return f"{significant(np.degrees(radians) * 3600.0)} arcsec"
+
+
+def waiting(answer: Answer, goal: float) -> str:
+    """How long until heading is as good as wished, in words."""
+    left = answer.remaining(goal)
+    if left is None:
+        if answer.floor[0] >= goal:
+            return f"{angle(goal)} is out of reach: the floor of these gyros is {angle(answer.floor[0])}"
+        return f"{angle(goal)} is not in sight yet"
+    if left == 0.0:
+        return f"good to {angle(goal)}"
+    return f"about {significant(left, 2)} s more to {angle(goal)}"
+
+
+def view(aligner: Aligner, answer: Answer | None, goal: float, note: str = "") -> Table:
+    """A small table for the terminal."""
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    rate = 0.0
+    if len(aligner.log) > 1:
+        rate = aligner.log.merged / float(np.median(np.diff(aligner.log.rows[-500:, 0])))
+    rows = f"{aligner.intake.counts.taken} rows, {significant(rate)} Hz, {significant(aligner.duration)} s"
+    if answer is None:
+        table.add_row("heading", f"the first answer comes after {aligner.first_answer:g} s of log")
+    else:
+        heading, pitch, roll = np.degrees(answer.euler)
+        sigma = [angle(value) for value in answer.sigma]
+        colour = COLOURS.get(answer.status, "red")
+        shown = f"{heading:9.4f} deg  ± {sigma[0]}" if answer.heading_known else "not known"
+        table.add_row("heading", f"[bold {colour}]{shown}[/]")
+        table.add_row("pitch, roll", f"{pitch:9.4f} deg ± {sigma[1]}, {roll:9.4f} deg ± {sigma[2]}")
+        table.add_row("floor", f"{angle(answer.floor[0])}: what waiting does not improve")
+        table.add_row("verdict", f"[{colour}]{answer.status}[/]; {waiting(answer, goal)}")
+        for reason in answer.reasons[:4]:
+            table.add_row("", _plain(reason))
+    table.add_row(
+        "rows", rows + (f"; {_plain(aligner.intake.counts.words())}" if aligner.intake.counts.words() else "")
+    )
+    if note or aligner.failure:
+        table.add_row("note", _plain("; ".join(filter(None, (note, aligner.failure)))))
+    return table
+
+
+def _plain(text: str) -> str:
+    """Brackets stay brackets."""
+    return text.replace("[", "\\[")

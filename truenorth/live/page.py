@@ -1,0 +1,146 @@
+"""A page in the browser while a log runs: heading and its band over time, compass, level, verdict, time that is left.
+
+The page holds all it needs; nothing is fetched from elsewhere, and nothing can be changed from it. It is bound to this machine
+alone unless another address is named, and answers no page of another origin.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import threading
+import time as clock
+from collections import deque
+from collections.abc import AsyncIterator
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from truenorth.core.errors import UsageError
+from truenorth.live.aligner import Aligner, Answer
+from truenorth.live.outputs import waiting
+from truenorth.live.spectrum import motion_spectrum
+
+HISTORY = 3600  # answers that a page which is opened late still sees
+BEAT = 15.0  # s between two signs of life to a silent page
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+
+
+class Page:
+    """A small web server in a thread of its own; make it by :func:`serve`.
+
+    Attributes
+    ----------
+    address : str
+        For the browser.
+    """
+
+    def __init__(self, host: str, port: int, goal: float) -> None:
+        self._goal = goal
+        self._events: deque[tuple[int, str]] = deque(maxlen=HISTORY)
+        self._number = 0
+        self._closing = False
+        self._socket = socket.create_server((host, port))
+        port = self._socket.getsockname()[1]
+        self._hosts = {f"{host}:{port}", f"localhost:{port}", f"127.0.0.1:{port}"}
+        self.address = f"http://{host}:{port}/"
+        self._server = self._make_server()
+        self._thread = threading.Thread(target=self._server.run, args=([self._socket],), daemon=True)
+        self._thread.start()
+
+    def publish(self, aligner: Aligner, answer: Answer | None, note: str) -> None:
+        """Show an answer; a listener of :class:`truenorth.live.session.Session`."""
+        self._number += 1
+        event: dict[str, Any] = {"number": self._number, "rows": aligner.intake.counts.taken, "note": note}
+        event["log_s"] = aligner.duration
+        event["left_out"] = aligner.intake.counts.words()
+        if answer is not None:
+            event |= answer.summary() | {
+                "waiting": waiting(answer, self._goal),
+                "goal_deg": float(np.degrees(self._goal)),
+            }
+            if self._number % 5 == 1:
+                event["spectrum"] = motion_spectrum(aligner.log)
+        self._events.append((self._number, json.dumps(event, allow_nan=False)))
+
+    def close(self) -> None:
+        """End the server."""
+        self._closing = True
+        self._server.should_exit = True
+        self._thread.join(timeout=5.0)
+
+    def _make_server(self) -> Any:
+        try:
+            import uvicorn
+            from starlette.applications import Starlette
+            from starlette.responses import HTMLResponse, Response, StreamingResponse
+            from starlette.routing import Route
+        except ImportError:
+            raise UsageError("a page needs Starlette and uvicorn: pip install 'truenorth[live]'") from None
+        text = (resources.files("truenorth.live") / "page.html").read_text(encoding="utf-8")
+
+        def refused(request: Any) -> bool:
+            """A page of another origin, or a name that some other server gave this address."""
+            origin = request.headers.get("origin")
+            there = request.headers.get("host", "")
+            return there not in self._hosts or (origin is not None and origin.split("//")[-1] not in self._hosts)
+
+        async def home(request: Any) -> Any:
+            return Response(status_code=403) if refused(request) else HTMLResponse(text, headers=HEADERS)
+
+        async def events(request: Any) -> Any:
+            if refused(request):
+                return Response(status_code=403)
+            seen = request.headers.get("last-event-id", "0")
+            stream = self._stream(int(seen) if seen.isdigit() else 0)
+            return StreamingResponse(stream, media_type="text/event-stream", headers=HEADERS)
+
+        application = Starlette(routes=[Route("/", home), Route("/events", events)])
+        return uvicorn.Server(uvicorn.Config(application, log_level="error", lifespan="off", access_log=False))
+
+    async def _stream(self, seen: int) -> AsyncIterator[str]:
+        """Server-sent events: those of the past that the page has not seen, then each as it comes."""
+        spoken = clock.monotonic()
+        yield "retry: 1000\n\n"
+        while not self._closing:
+            new = [(number, text) for number, text in list(self._events) if number > seen]
+            for number, text in new:
+                yield f"id: {number}\ndata: {text}\n\n"
+                seen = number
+            if new:
+                spoken = clock.monotonic()
+            elif clock.monotonic() - spoken > BEAT:
+                yield ": still here\n\n"
+                spoken = clock.monotonic()
+            await asyncio.sleep(0.2)
+
+
+def serve(address: str, goal: float) -> Page:
+    """Start the page.
+
+    Parameters
+    ----------
+    address : str
+        ``:8080`` is this machine alone; ``0.0.0.0:8080`` all of its addresses. Port 0 takes a free one.
+    goal : float, rad
+        One-sigma of heading that is wished.
+
+    Raises
+    ------
+    UsageError
+        An address that cannot be had, or the extra is not installed.
+    """
+    host, _, port = address.rpartition(":")
+    if not port.isdigit() or int(port) > 65535:
+        raise UsageError(f"page address {address!r}; expected :8080 or HOST:8080")
+    try:
+        return Page(host or "127.0.0.1", int(port), goal)
+    except OSError as error:
+        raise UsageError(f"page address {address}: {error.strerror or error}") from None
