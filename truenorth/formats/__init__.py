@@ -17,11 +17,11 @@ from truenorth.formats.aiding import (
     read_trajectory,
     read_velocity,
 )
-from truenorth.formats.columns import columns_of
 from truenorth.formats.detect import FORMATS, format_of
 from truenorth.formats.gnss import read_gnss
 from truenorth.formats.guesses import UnsureError, write_layout
 from truenorth.formats.layout import layout_for
+from truenorth.formats.opening import columns_of
 from truenorth.formats.table import record_of
 from truenorth.records import ImuRecord, Record
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.formats.columns import columns_of
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
+from truenorth.formats.opening import columns_of
 from truenorth.formats.order import ordered
 from truenorth.formats.places import check_degrees
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find

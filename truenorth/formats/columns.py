@@ -114,29 +114,6 @@ def _unwrapped(time: Array) -> Array:
     return np.asarray(time + DAY * midnights, dtype=np.float64)
 
 
-def columns_of(path: Path, format: str) -> Columns:
-    """A log of any format as columns; of two-dimensional arrays each column is ``name[i]``, counted from 0.
-
-    Raises
-    ------
-    DataError
-        A damaged file, or one without a table.
-    """
-    if format in ("csv", "kf-gins", "psins"):
-        from truenorth.formats.text import open_table
-
-        table = open_table(path)
-        notes = (*table.notes, table.dialect.words())
-        return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, table.above)
-    if format in ("parquet", "feather"):
-        from truenorth.formats import parquet
-
-        return parquet.columns(path, format)
-    from truenorth.formats import mat, npz
-
-    return columns_of_arrays(path, (npz if format == "npz" else mat).variables_of(path))
-
-
 def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
     """Columns of named arrays."""
     parts: dict[str, Any] = {}
