@@ -9,18 +9,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from truenorth.core.version import __version__ as __version__
-from truenorth.results import Views, load, plot, register_result, save
 
 if TYPE_CHECKING:
-    from truenorth.advice import advise, advise_manoeuvre
-    from truenorth.alignment import (
-        Alignment,
-        align,
-        align_in_motion,
-        align_positions,
-        align_rotary,
-        align_transfer,
+    from truenorth import (
+        aiding as aiding,
     )
+    from truenorth import (
+        analysis as analysis,
+    )
+    from truenorth import (
+        campaign as campaign,
+    )
+    from truenorth import (
+        coarse as coarse,
+    )
+    from truenorth import (
+        damping as damping,
+    )
+    from truenorth import (
+        errors as errors,
+    )
+    from truenorth import (
+        estimate as estimate,
+    )
+    from truenorth import (
+        filters as filters,
+    )
+    from truenorth import (
+        formats as formats,
+    )
+    from truenorth import (
+        quality as quality,
+    )
+    from truenorth import (
+        records as records,
+    )
+    from truenorth import (
+        simulation as simulation,
+    )
+    from truenorth import (
+        strapdown as strapdown,
+    )
+    from truenorth.advice import advise, advise_manoeuvre
+    from truenorth.aiding.aids import Barometer, Gnss, Indexer, Master, Odometer, Positions, VelocityLog
+    from truenorth.alignment import Alignment, Recipe, Request, align, register_recipe
     from truenorth.campaign import run_campaign
     from truenorth.core.errors import AlignmentError, DataError, TruenorthError, UsageError
     from truenorth.core.position import Position
@@ -50,36 +82,45 @@ if TYPE_CHECKING:
     from truenorth.records.calibration import Calibration
     from truenorth.records.specs import ImuSpec, imu_spec
     from truenorth.report import write_report
+    from truenorth.results import Views, load, plot, register_result, save
     from truenorth.simulation import simulate
 
 _HOMES = {
     "Alignment": "alignment",
     "AlignmentError": "core.errors",
+    "Barometer": "aiding.aids",
     "Calibration": "records.calibration",
     "DataError": "core.errors",
+    "Gnss": "aiding.aids",
     "GnssRecord": "records",
     "HeightRecord": "records",
     "ImuRecord": "records",
     "ImuSpec": "records.specs",
+    "Indexer": "aiding.aids",
+    "Master": "aiding.aids",
     "MasterRecord": "records",
     "Mounting": "navigation",
     "Navigation": "navigation",
+    "Odometer": "aiding.aids",
     "OdometerRecord": "records",
     "Position": "core.position",
+    "Positions": "aiding.aids",
+    "Recipe": "alignment",
+    "Request": "alignment",
     "Trajectory": "records",
     "TruenorthError": "core.errors",
     "UsageError": "core.errors",
+    "VelocityLog": "aiding.aids",
     "VelocityRecord": "records",
+    "Views": "results",
     "advise": "advice",
     "advise_manoeuvre": "advice",
     "align": "alignment",
-    "align_in_motion": "alignment",
-    "align_positions": "alignment",
-    "align_rotary": "alignment",
-    "align_transfer": "alignment",
     "imu_spec": "records.specs",
     "inspect": "quality",
+    "load": "results",
     "navigate": "navigation",
+    "plot": "results",
     "read_encoder": "formats",
     "read_gnss": "formats",
     "read_height": "formats",
@@ -88,7 +129,10 @@ _HOMES = {
     "read_odometer": "formats",
     "read_trajectory": "formats",
     "read_velocity": "formats",
+    "register_recipe": "alignment",
+    "register_result": "results",
     "run_campaign": "campaign",
+    "save": "results",
     "simulate": "simulation",
     "write_imu": "formats",
     "write_record": "formats",
@@ -98,29 +142,34 @@ _HOMES = {
 __all__ = [
     "Alignment",
     "AlignmentError",
+    "Barometer",
     "Calibration",
     "DataError",
+    "Gnss",
     "GnssRecord",
     "HeightRecord",
     "ImuRecord",
     "ImuSpec",
+    "Indexer",
+    "Master",
     "MasterRecord",
     "Mounting",
     "Navigation",
+    "Odometer",
     "OdometerRecord",
     "Position",
+    "Positions",
+    "Recipe",
+    "Request",
     "Trajectory",
     "TruenorthError",
     "UsageError",
+    "VelocityLog",
     "VelocityRecord",
     "Views",
     "advise",
     "advise_manoeuvre",
     "align",
-    "align_in_motion",
-    "align_positions",
-    "align_rotary",
-    "align_transfer",
     "imu_spec",
     "inspect",
     "load",
@@ -134,6 +183,7 @@ __all__ = [
     "read_odometer",
     "read_trajectory",
     "read_velocity",
+    "register_recipe",
     "register_result",
     "run_campaign",
     "save",
@@ -144,7 +194,26 @@ __all__ = [
 ]
 
 
+_SUBMODULES = (
+    "aiding",
+    "analysis",
+    "campaign",
+    "coarse",
+    "damping",
+    "errors",
+    "estimate",
+    "filters",
+    "formats",
+    "quality",
+    "records",
+    "simulation",
+    "strapdown",
+)
+
+
 def __getattr__(name: str) -> Any:
+    if name in _SUBMODULES:
+        return import_module(f"truenorth.{name}")
     if name not in _HOMES:
         raise AttributeError(f"module 'truenorth' has no attribute {name!r}")
     value = getattr(import_module(f"truenorth.{_HOMES[name]}"), name)
@@ -153,4 +222,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOMES])
+    return sorted(["__version__", *_HOMES, *_SUBMODULES])

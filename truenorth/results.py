@@ -41,5 +41,5 @@ RESULTS = {
     "truenorth.campaign.tuning:Tuned": Views(files="truenorth.report.files:tuned_files", archive=False),
 }
 
-for kind, views in RESULTS.items():
-    register_result(kind, views)
+for _kind, _views in RESULTS.items():
+    register_result(_kind, _views)

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty.harness import Case, Log, main
-from truenorth.alignment import align, align_rotary
+from truenorth.alignment import align
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.rotary import align_rotary
 
 UNSCALED = {
     "gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "bias_instability": "0.001 deg/h"},

@@ -9,7 +9,8 @@ import pytest
 
 from truenorth.advice import advise
 from truenorth.advice.positions import SCHEMES
-from truenorth.alignment import align, align_positions
+from truenorth.alignment import align
+from truenorth.alignment.positions import align_positions
 from truenorth.cli import main
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position

@@ -33,7 +33,7 @@ def still(seed, duration=300.0):
 def in_form(record, form, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(steps_of_align, "pick_form", lambda *_: (form, form))
-        return align(record, PLACE, SPEC, "kalman")
+        return align(record, PLACE, SPEC, method="kalman")
 
 
 def test_both_forms_agree_on_a_still_base(monkeypatch):
@@ -79,7 +79,7 @@ def test_a_base_that_moves_a_little_is_taken_by_its_velocity(amplitude):
     """A millimetre per second of sway, which no second of the log shows by itself, colours the force."""
     sway = Sway(PLACE, 0.6, east_tones=(Tone(amplitude * 6.0 / (2 * math.pi), 6.0),))
     record = simulate(sway, imu=SPEC, rate=10.0, duration=300.0, seed=1).record
-    answer = align(record, PLACE, SPEC, "kalman")
+    answer = align(record, PLACE, SPEC, method="kalman")
     assert "velocity form" in answer.method_reason
     assert abs(answer.heading - 0.6) < 4 * answer.euler_sigma[0]
 

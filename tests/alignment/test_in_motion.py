@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth import OdometerRecord, UsageError, align_in_motion, imu_spec, navigate
+from truenorth import OdometerRecord, UsageError, imu_spec, navigate
+from truenorth.aiding.aids import Odometer
+from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import backtracked, departures, path_to_the_end
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
@@ -138,13 +140,13 @@ def test_navigation_goes_on_from_it(ring, tmp_path):
     sim, odometer = logs(ring, 0)
     answer = align_in_motion(sim.record.between(0.0, 300.0), RING.imu_spec, odometer=odometer, position=PLACE)
     wheel = Mounting(scale_sigma=0.01)
-    track = navigate(sim.record, answer, odometer=odometer, wheel=wheel, check_clocks=False).track
+    track = navigate(sim.record, answer, aid=Odometer(odometer, wheel), check_clocks=False).track
     end = sim.motion.states(track.time[-1:])
     assert abs(track.v_n[-1] - end.v_n[0]).max() < 0.05
     start_off = 6371e3 * (answer.position.lat - sim.motion.states(np.array([300.0])).lat[0])
     assert abs(6371e3 * (track.position[-1, 0] - end.lat[0]) - start_off) < 10.0
     answer.save(tmp_path)
-    again = navigate(sim.record, tmp_path, odometer=odometer, wheel=wheel, check_clocks=False).track
+    again = navigate(sim.record, tmp_path, aid=Odometer(odometer, wheel), check_clocks=False).track
     assert np.allclose(again.position, track.position, rtol=0.0, atol=1e-12)
     assert np.allclose(again.P[0, BG, BG], answer.moving.P[BG, BG], rtol=1e-6)
 

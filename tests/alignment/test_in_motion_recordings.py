@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from tests import recordings
-from truenorth import align, align_in_motion, navigate
+from truenorth import align, navigate
+from truenorth.aiding.aids import Odometer
+from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import backtracked
 from truenorth.coarse.odometer import gnss_track
 from truenorth.navigation import Mounting
@@ -97,7 +99,7 @@ def test_car_dead_reckons_by_the_odometer(car):
         np.diag(sigma**2),
     )
     wheel = Mounting(C_mb=moving.wheel.C_mb, lever_arm=moving.wheel.lever_arm, scale_sigma=0.02, noise=0.4)
-    result = navigate(imu, start, imu="consumer", odometer=odometer, wheel=wheel, check_clocks=False)
+    result = navigate(imu, start, aid=Odometer(odometer, wheel), imu="consumer", check_clocks=False)
     _, place = gnss_track(gnss, result.track.time)
     off = 6371e3 * (result.track.position[-1, :2] - place[-1, :2]) * [1.0, math.cos(place[-1, 0])]
     assert moving.distance > 900.0

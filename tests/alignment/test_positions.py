@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from truenorth.alignment import align, align_positions
-from truenorth.alignment.positions import find_positions
+from truenorth.alignment import align
+from truenorth.alignment.positions import align_positions, find_positions
 from truenorth.alignment.task import deflection_covariance
 from truenorth.alignment.touched import find_touch
 from truenorth.cli import main

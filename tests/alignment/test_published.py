@@ -67,7 +67,7 @@ def test_their_sigma_is_honest(content, methods):
     squares = {method: [] for method in methods}
     for record, spec, true in logs(content, RUNS):
         for method in methods:
-            answer = align(record, PLACE, spec, method)
+            answer = align(record, PLACE, spec, method=method)
             assert answer.method == method
             if method not in ("makf", "imakf"):
                 assert answer.status == "aligned"
@@ -84,7 +84,7 @@ def test_their_sigma_is_honest(content, methods):
 def test_ten_and_eight_states_refuse_a_base_that_sways(method):
     record, spec, _ = next(logs(SWAY, 1))
     with pytest.raises(AlignmentError, match=r"the base is swaying.* choose another method"):
-        align(record, PLACE, spec, method)
+        align(record, PLACE, spec, method=method)
 
 
 @pytest.mark.parametrize("method", ["imakf", "states10", "states8"])

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from truenorth.alignment import align_rotary
-from truenorth.alignment.rotary import angles_at, angles_from_gyros
+from truenorth.aiding.aids import Indexer as IndexerAid
+from truenorth.alignment import align
+from truenorth.alignment.rotary import align_rotary, angles_at, angles_from_gyros
 from truenorth.cli import app
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import ecef_axes
@@ -78,7 +79,8 @@ def simulate_errors(ship):
 
 def test_a_known_arm_gives_the_same(ship, answer):
     """The arm is told by the sway itself; to know it changes nothing beyond a sigma."""
-    known = align_rotary(ship.record, ship.encoder, ship.place, ship.imu, lever_arm=ship.arm)
+    aid = IndexerAid(ship.encoder, lever_arm=-ship.arm)  # from the IMU to the centre
+    known = align(ship.record, ship.place, ship.imu, aid=aid)
     apart = rotation_vector_from_dcm(known.C_nb @ answer.C_nb.T) / ARCMIN
     assert np.all(np.abs(apart) < np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
 

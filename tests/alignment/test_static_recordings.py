@@ -37,10 +37,10 @@ def test_every_method_on_the_laboratory_log_against_its_reference():
     spec = imu_spec("navigation")
     found = {}
     for method in ("analytic", "inertial", "oba", "kalman", "auto"):
-        answer = align(record, position, spec, method)
+        answer = align(record, position, spec, method=method)
         found[method] = answer.euler
         assert abs(np.degrees(answer.heading) - given["heading_cw"]) < 3 * np.degrees(answer.euler_sigma[0]) + 0.02
-    level = align(record, position, spec, "analytic").euler[1:]
+    level = align(record, position, spec, method="analytic").euler[1:]
     start = dcm_from_rotation_vector([0.0, 0.0, 2.4]) @ dcm_from_euler(np.radians(given["heading_cw"]), *level)
     dtheta, dvel = increments(record)
     loop = gyrocompass_loop(dtheta[None], dvel[None], record.interval, start[None], position.lat, position.alt)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests import recordings
-from truenorth.alignment import align, align_positions
+from truenorth.alignment import align
+from truenorth.alignment.positions import align_positions
 from truenorth.coarse import means, two_position
 from truenorth.records.specs import imu_spec
 

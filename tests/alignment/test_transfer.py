@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests import recordings
-from truenorth.alignment import align_transfer
+from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks

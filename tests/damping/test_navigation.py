@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
 from tests.recordings import rlg_vehicle_xian
+from truenorth.aiding.aids import VelocityLog
 from truenorth.alignment import align
 from truenorth.cli import app
 from truenorth.core.errors import UsageError
@@ -55,7 +56,8 @@ class Ship:
         return VelocityRecord(self.truth.time, v, "navigation")
 
     def navigate(self, damper, log=None):
-        return navigate(self.record, self.start, velocity=log, altitude="fixed", imu=SPEC, damping=damper, output=1.0)
+        aid = () if log is None else VelocityLog(log)
+        return navigate(self.record, self.start, aid=aid, altitude="fixed", imu=SPEC, damping=damper, output=1.0)
 
     def errors(self, result):
         found = Course(result.time, result.C_nb, result.v_n, result.position)
@@ -199,7 +201,9 @@ def test_a_real_recording():
     noise = 0.02 * np.random.default_rng(0).standard_normal((len(time), 2))
     log = VelocityRecord(time, np.column_stack([0.1 + noise, np.zeros(len(time))]), "navigation")
     found = {
-        method: navigate(record, start, velocity=log, altitude="fixed", damping=Damper(method, reference_sigma=0.1))
+        method: navigate(
+            record, start, aid=VelocityLog(log), altitude="fixed", damping=Damper(method, reference_sigma=0.1)
+        )
         for method in ("none", "kalman", "augmented")
     }
     away = {m: np.linalg.norm(r.displacement[-1]) for m, r in found.items()}
@@ -220,14 +224,14 @@ def test_a_log_in_body_axes_mounted_askew(ship):
     v_b = np.einsum("kij,ki->kj", ship.truth.C_nb, log.velocity)
     body = VelocityRecord(log.time, v_b @ C_mb.T, "body")
     options = {"altitude": "fixed", "imu": SPEC, "damping": Damper("augmented"), "output": 1.0}
-    one = navigate(ship.record, ship.start, velocity=log, **options)
-    two = navigate(ship.record, ship.start, velocity=body, log=Mounting(C_mb=C_mb), **options)
+    one = navigate(ship.record, ship.start, aid=VelocityLog(log), **options)
+    two = navigate(ship.record, ship.start, aid=VelocityLog(body, Mounting(C_mb=C_mb)), **options)
     late = one.time > 12 * 3600.0
     assert np.abs(one.v_n - two.v_n)[late].max() < 0.05  # the INS's heading error of .1 deg turns 12.8 m/s by .02
     with pytest.raises(UsageError, match="no lever arm"):
-        navigate(ship.record, ship.start, velocity=body, log=Mounting(lever_arm=np.array([0, 1.0, 0])), **options)
+        navigate(ship.record, ship.start, aid=VelocityLog(body, Mounting(lever_arm=np.array([0, 1.0, 0]))), **options)
     with pytest.raises(UsageError, match="see --every"):
-        navigate(ship.record, ship.start, velocity=body, **options | {"output": 40.0})
+        navigate(ship.record, ship.start, aid=VelocityLog(body), **options | {"output": 40.0})
 
 
 def test_a_ramp_throws_the_switch_slowly(ship):

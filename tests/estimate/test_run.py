@@ -371,17 +371,18 @@ def test_covariance_of_the_loop_is_that_of_many_runs():
 PROGRAM = """
 import numpy as np
 from truenorth.estimate import loop as kernel
-from truenorth.navigation import Start, navigate
+from truenorth.aiding.aids import Barometer, Gnss, Odometer
+from truenorth.navigation import Mounting, Start, navigate
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord
 from truenorth.records.specs import imu_spec
 t, seconds = 0.02 * np.arange(1, 1001), np.arange(1.0, 20.0)
 still = np.tile([0.0, 0.0, 9.8], (len(t), 1))
 start = Start(0.0, np.eye(3), np.zeros(3), 0.6, 0.1, 0.0, np.zeros(3), np.zeros(3), 1e-4 * np.eye(15))
 place = [np.full(19, x) for x in (0.6, 0.1, 0.0)]
-aids = {
-    "gnss": GnssRecord(seconds, *place), "baro": HeightRecord(seconds, np.zeros(19)),
-    "odometer": OdometerRecord(seconds, np.zeros(19), "speed"),
-}
+aids = {"aid": [
+    Gnss(GnssRecord(seconds, *place)), Barometer(HeightRecord(seconds, np.zeros(19)), Mounting()),
+    Odometer(OdometerRecord(seconds, np.zeros(19), "speed")),
+]}
 for kind, scale in (("rates", 1.0), ("increments", 0.02)):
     record = ImuRecord(t, np.zeros((1000, 3)), still * scale, kind)
     for options in ({}, {"zupt": "auto"}, {"smooth": True, "altitude": "free"}, aids):

@@ -54,7 +54,7 @@ def test_a_folder_with_all_results(folder):
     assert done.returncode == 0, done.stderr
     assert "navigated" in done.stdout
     assert "GNSS position: 59 measurements" in done.stdout
-    names = {"summary.json", "track.parquet", "innovations.parquet", "track.geojson", "report.html"}
+    names = {"summary.json", "track.parquet", "innovations.parquet", "track.geojson", "report.html", "result.npz"}
     assert {path.name for path in out.iterdir()} == names
     assert json.loads((out / "summary.json").read_text())["altitude"] == "gnss"
 

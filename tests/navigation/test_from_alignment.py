@@ -18,7 +18,7 @@ def test_what_an_alignment_balances_navigation_knows_to_be_balanced(tmp_path):
     """Tilt against accelerometer bias, heading against east gyro bias: free inertial at rest sees the small differences only."""
     spec = imu_spec("navigation")
     record = simulate(ideal_log(rest(PLACE, 0.7), rate=20.0, duration=600.0), imu=spec, seed=3).record
-    alignment = align(record, PLACE, spec, "kalman")
+    alignment = align(record, PLACE, spec, method="kalman")
     start = start_from_alignment(alignment)
     g, level = 9.80, 7.292115e-5 * np.cos(PLACE.lat)
     C = start.C_nb

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
 from truenorth.alignment import align
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
@@ -76,7 +77,7 @@ def test_odometer_bounds_what_free_inertial_does_not(drive):
     at = replace(start, C_nb=start.C_nb @ C_mb)
     free = navigate(turned, at, imu=SPEC, altitude="fixed")
     wheel = Mounting(scale_sigma=0.05, angle_sigma=np.radians(5.0))
-    aided = navigate(turned, at, imu=SPEC, odometer=odometer, wheel=wheel, zupt=[(1.0, 29.0)])
+    aided = navigate(turned, at, aid=Odometer(odometer, wheel), imu=SPEC, zupt=[(1.0, 29.0)])
     for result in (free, aided):
         assert np.all(np.abs(metres_off(result, motion)[:2]) < 4 * result.position_sigma[-1, :2])
     assert np.hypot(*aided.position_sigma[-1, :2]) < 0.2 * np.hypot(*free.position_sigma[-1, :2])
@@ -96,13 +97,14 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
     motion, record, start = drive
     time = np.arange(1.0, 179.0)
     late = fixes(motion, time, sigma=0.3).shifted(0.3)
-    found = navigate(record, start, imu=SPEC, gnss=late)
+    found = navigate(record, start, aid=Gnss(late), imu=SPEC)
     words = [reason for reason in found.reasons if reason.startswith("warning: the clock")]
     assert len(words) == 1
     assert "late" in words[0]
     assert "by -0.3" in words[0] or "by -0.29" in words[0]
-    for options in ({"offset": -0.3}, {"antenna": Mounting(latency=0.3)}, {"antenna": Mounting(latency_sigma=0.5)}):
-        result = navigate(record, start, imu=SPEC, gnss=late, **options)
+    aids = Gnss(late.shifted(-0.3)), Gnss(late, Mounting(latency=0.3)), Gnss(late, Mounting(latency_sigma=0.5))
+    for aid in aids:
+        result = navigate(record, start, aid=aid, imu=SPEC)
         assert not any(reason.startswith("warning: the clock") for reason in result.reasons)
         assert np.all(np.abs(metres_off(result, motion)) < 4 * result.position_sigma[-1])
 
@@ -110,9 +112,9 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
 def test_a_wrong_lever_arm_is_told(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.1, arm=(1.5, 2.5, 1.0))
-    wrong = navigate(record, start, imu=SPEC, gnss=gnss)
+    wrong = navigate(record, start, aid=Gnss(gnss), imu=SPEC)
     assert any("lever arm of the GNSS seems to be right +1.5" in reason for reason in wrong.reasons)
-    right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([1.5, 2.5, 1.0])))
+    right = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=np.array([1.5, 2.5, 1.0]))), imu=SPEC)
     assert not any("lever arm" in reason for reason in right.reasons)
 
 
@@ -122,7 +124,7 @@ def test_height_from_a_barometer_and_from_nothing(drive):
     time = np.arange(0.2, 179.0, 0.2)
     baro = HeightRecord(time, motion.states(time).alt + 4.0 + 0.5 * np.random.default_rng(4).standard_normal(len(time)))
     barometer = Mounting(bias_sigma=5.0, bias_time=3600.0)
-    held = navigate(record, start, imu=SPEC, baro=baro, barometer=barometer)
+    held = navigate(record, start, aid=Barometer(baro, barometer), imu=SPEC)
     free = navigate(record, start, imu=SPEC, altitude="free")
     fixed = navigate(record, start, imu=SPEC)
     assert (held.altitude, free.altitude, fixed.altitude) == ("baro", "free", "fixed")
@@ -163,7 +165,7 @@ def test_a_gap_is_bridged_counted_and_believed(drive):
 def test_smoothing_is_at_least_as_good(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0, 5.0), sigma=1.0)
-    one, two = (navigate(record, start, imu=SPEC, gnss=gnss, smooth=smooth) for smooth in (False, True))
+    one, two = (navigate(record, start, aid=Gnss(gnss), imu=SPEC, smooth=smooth) for smooth in (False, True))
     assert two.smoothed
     assert np.all(two.position_sigma <= one.position_sigma * (1 + 1e-9))
     np.testing.assert_allclose(two.position[-1], one.position[-1], rtol=0, atol=1e-9)
@@ -204,17 +206,17 @@ def test_wrong_input_is_found_and_said(drive, tmp_path):
     motion, record, start = drive
     time = np.arange(1.0, 179.0)
     good = fixes(motion, time, with_velocity=True)
-    with pytest.raises(DataError, match=r"no overlap.*--offset"):
-        navigate(record, start, imu=SPEC, gnss=good.shifted(1e6))
+    with pytest.raises(DataError, match=r"no overlap.*one clock"):
+        navigate(record, start, aid=Gnss(good.shifted(1e6)), imu=SPEC)
     ned = replace(good, v_n=good.v_n[:, [1, 0, 2]] * [1, 1, -1])
     with pytest.raises(DataError, match="north, east, down"):
-        navigate(record, start, imu=SPEC, gnss=ned)
+        navigate(record, start, aid=Gnss(ned), imu=SPEC)
     exchanged = replace(good, lat=good.lon, lon=good.lat, v_n=None)
     with pytest.raises(DataError, match=r"gnss\.csv: row \d, columns lat and lon: 11\..*exchanged they fit"):
-        navigate(record, start, imu=SPEC, gnss=exchanged)
+        navigate(record, start, aid=Gnss(exchanged), imu=SPEC)
     high = HeightRecord(time, np.full(len(time), 900.0), source="baro.csv")
     with pytest.raises(DataError, match=r"baro\.csv: row 3, column alt: 900\.0 m, 400 m from"):
-        navigate(record, start, imu=SPEC, baro=high)
+        navigate(record, start, aid=Barometer(high), imu=SPEC)
     with pytest.raises(UsageError, match="centimetres"):
         Mounting(lever_arm=np.array([120.0, 50.0, 80.0]))
     with pytest.raises(UsageError, match="expected one of fixed, free, baro, gnss"):
@@ -245,7 +247,7 @@ def test_files_with_late_rows_navigate_as_sorted_ones(drive, tmp_path):
     results = []
     for _ in range(2):
         gnss, odometer = read_gnss(tmp_path / "gnss.csv"), read_odometer(tmp_path / "odo.csv")
-        results.append(navigate(record, start, imu=SPEC, gnss=gnss, odometer=odometer))
+        results.append(navigate(record, start, aid=[Gnss(gnss), Odometer(odometer)], imu=SPEC))
         for name in ("gnss.csv", "odo.csv"):
             header, *lines = (tmp_path / name).read_text().splitlines()
             lines[20:320:3], lines[21:321:3] = lines[21:321:3], lines[20:320:3]
@@ -269,9 +271,9 @@ def test_a_reference_in_wrong_axes_is_refused(drive):
     v = motion.states(time).v_n
     swapped = VelocityRecord(time, v[:, [1, 0, 2]] * [1, 1, -1], "navigation", source="ref.csv")
     with pytest.raises(DataError, match=r"ref\.csv: velocities change otherwise.* taken for north, east, down"):
-        navigate(record, start, imu=SPEC, velocity=swapped, altitude="fixed")
+        navigate(record, start, aid=VelocityLog(swapped), imu=SPEC, altitude="fixed")
     right = VelocityRecord(time, v, "navigation", source="ref.csv")
-    assert navigate(record, start, imu=SPEC, velocity=right, altitude="fixed").status == "navigated"
+    assert navigate(record, start, aid=VelocityLog(right), imu=SPEC, altitude="fixed").status == "navigated"
 
 
 def test_results_on_disk(drive, tmp_path):
@@ -279,7 +281,7 @@ def test_results_on_disk(drive, tmp_path):
 
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0))
-    result = navigate(record, start, imu=SPEC, gnss=gnss)
+    result = navigate(record, start, aid=Gnss(gnss), imu=SPEC)
     paths = result.save(tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
     track = pd.read_parquet(tmp_path / "track.parquet")

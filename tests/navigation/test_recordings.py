@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests import recordings
+from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.alignment import align
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.navigation import Mounting, Start, navigate
@@ -41,7 +42,7 @@ def test_fog_with_gnss_while_the_engine_idles():
     start = align(record.between(None, 55.0), position, "navigation")
     if not start.heading_known:
         pytest.skip("55 s are too short for this recording's heading")
-    result = navigate(record, start, gnss=recordings.fog_gps_xian_gnss())
+    result = navigate(record, start, aid=Gnss(recordings.fog_gps_xian_gnss()))
     assert result.status == "navigated", result.reasons
     assert result.altitude == "gnss"
     assert np.hypot(*result.displacement[-1]) < 2.0
@@ -90,7 +91,7 @@ def test_car_with_gnss_and_odometer(car):
     """Innovations as large as expected; the car looks where it drives; the record's gap is bridged and told."""
     imu, odometer, gnss, start, wheel = car
     result = navigate(
-        imu, start, imu="consumer", gnss=gnss, antenna=RECEIVER, odometer=odometer, wheel=wheel, zupt=[(1.0, 20.0)]
+        imu, start, aid=[Gnss(gnss, RECEIVER), Odometer(odometer, wheel)], imu="consumer", zupt=[(1.0, 20.0)]
     )
     assert result.status == "navigated", result.reasons
     assert len(result.gaps) == 1
@@ -116,7 +117,7 @@ def test_car_through_an_outage_of_a_minute(car, begin, end):
     """
     imu, odometer, gnss, start, wheel = car
     whole = navigate(
-        imu, start, imu="consumer", gnss=gnss, odometer=odometer, wheel=wheel, smooth=True, check_clocks=False
+        imu, start, aid=[Gnss(gnss), Odometer(odometer, wheel)], imu="consumer", smooth=True, check_clocks=False
     )
     k = int(np.argmin(np.abs(whole.time - (end - 1.0))))
     away = {}
@@ -127,8 +128,8 @@ def test_car_through_an_outage_of_a_minute(car, begin, end):
         result = navigate(
             imu,
             start,
+            aid=Gnss(_without(gnss, begin, end)),
             imu="consumer",
-            gnss=_without(gnss, begin, end),
             zupt=[(1.0, 20.0)],
             check_clocks=False,
             **sensors,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.navigation.test_navigate import SPEC, drive, fixes
+from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.errors import DataError
 from truenorth.navigation import Mounting, navigate
@@ -37,12 +38,12 @@ def test_an_antenna_of_a_metre_given_in_centimetres(drive):
     """.2, .3 and .5 m given as 20, 30, 50: the fixes are rejected, and the second look says why and what the arm is."""
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.3, arm=(0.2, 0.3, 0.5))
-    result = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([20.0, 30.0, 50.0])))
+    result = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=np.array([20.0, 30.0, 50.0]))), imu=SPEC)
     assert result.status == "inconsistent"
     (words,) = warnings(result)
     assert words.startswith("the lever arm of the GNSS seems to be right +0.")
     assert "not 20,30,50: was it given in centimetres?; check the arm; metres are expected" in words
-    right = navigate(record, start, imu=SPEC, gnss=gnss, antenna=Mounting(lever_arm=np.array([0.2, 0.3, 0.5])))
+    right = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=np.array([0.2, 0.3, 0.5]))), imu=SPEC)
     assert warnings(right) == []
 
 
@@ -53,7 +54,7 @@ def test_a_wheel_given_in_centimetres_and_a_clock_are_told_apart(drive):
 
     def told(log, arm):
         return warnings(
-            navigate(record, start, imu=SPEC, odometer=log, wheel=Mounting(lever_arm=np.array(arm)), altitude="fixed")
+            navigate(record, start, aid=Odometer(log, Mounting(lever_arm=np.array(arm))), imu=SPEC, altitude="fixed")
         )
 
     assert told(odometer, (-0.5, 0.0, 0.0)) == []
@@ -69,17 +70,17 @@ def test_scale_and_mounting_that_are_not_estimated(drive):
     motion, record, start = drive
     log = wheel_log(motion)
     fast = OdometerRecord(log.time, 1.03 * log.values, "speed", source="odo.csv")
-    (words,) = warnings(navigate(record, start, imu=SPEC, odometer=fast, altitude="fixed"))
+    (words,) = warnings(navigate(record, start, aid=Odometer(fast), imu=SPEC, altitude="fixed"))
     assert words.startswith("the odometer seems to count +")
     assert words.endswith("%: let it be estimated")
     value, sigma = (float(x) for x in words.split("count +")[1].split(" %")[0].split(" ± "))
     assert abs(value - 3.0) < 4 * sigma < 1.0
     assert (
-        warnings(navigate(record, start, imu=SPEC, odometer=fast, wheel=Mounting(scale_sigma=0.05), altitude="fixed"))
+        warnings(navigate(record, start, aid=Odometer(fast, Mounting(scale_sigma=0.05)), imu=SPEC, altitude="fixed"))
         == []
     )
     turned = Mounting(C_mb=dcm_from_rotation_vector(np.array([0.0, 0.0, 0.04])))
-    (words,) = warnings(navigate(record, start, imu=SPEC, odometer=log, wheel=turned, altitude="fixed"))
+    (words,) = warnings(navigate(record, start, aid=Odometer(log, turned), imu=SPEC, altitude="fixed"))
     assert "turned against the vehicle of the odometer" in words
     assert "give the mounting; let it be estimated" in words
 
@@ -122,7 +123,7 @@ def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
     time = np.arange(0.5, 179.0, 0.5)
     v = motion.states(time).v_n + np.array([0.0, 0.0, 0.6])
     log = VelocityRecord(time, v, "navigation", source="ref.csv")
-    result = navigate(record, start, imu=SPEC, velocity=log, gnss=fixes(motion, time, 0.05))
+    result = navigate(record, start, aid=[Gnss(fixes(motion, time, 0.05)), VelocityLog(log)], imu=SPEC)
     assert result.status == "inconsistent"
     assert warnings(result) == []
 
@@ -141,13 +142,15 @@ def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
         lon=white.lon + drift[:, 0] / 4.27e6,
         alt=white.alt + drift[:, 2],
     )
-    assert not any("hang together" in words for words in warnings(navigate(record, start, imu=SPEC, gnss=white)))
-    told = [words for words in warnings(navigate(record, start, imu=SPEC, gnss=wandering)) if "hang together" in words]
+    assert not any("hang together" in words for words in warnings(navigate(record, start, aid=Gnss(white), imu=SPEC)))
+    told = [
+        words for words in warnings(navigate(record, start, aid=Gnss(wandering), imu=SPEC)) if "hang together" in words
+    ]
     assert len(told) == 1
     assert "give the size and the time of that wander" in told[0]
     antenna = Mounting(bias_sigma=1.5, bias_time=60.0)
     assert not any(
-        "hang together" in w for w in warnings(navigate(record, start, imu=SPEC, gnss=wandering, antenna=antenna))
+        "hang together" in w for w in warnings(navigate(record, start, aid=Gnss(wandering, antenna), imu=SPEC))
     )
 
 
@@ -177,7 +180,7 @@ def test_a_latency_on_a_shaking_vehicle():
     wheel = Mounting(
         lever_arm=np.array([-0.3, -0.8, -0.5]), scale_sigma=0.05, angle_sigma=0.05, latency_sigma=0.3, gate=0.0
     )
-    result = navigate(record, start, imu=spec, odometer=late, wheel=wheel, check_clocks=False)
+    result = navigate(record, start, aid=Odometer(late, wheel), imu=spec, check_clocks=False)
     assert result.estimated()["odometer lag"]["value"][0] == pytest.approx(0.2, abs=0.02)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from truenorth.aiding.aids import Odometer
 from truenorth.core.position import Position
 from truenorth.navigation import Start, navigate
 from truenorth.navigation.stops import seconds_at_rest
@@ -74,5 +75,5 @@ def test_an_ins_that_falls_for_minutes_is_no_fault_of_the_aiding(standing):
     start = Start(
         0.0, C, np.zeros(3), PLACE.lat, PLACE.lon, PLACE.alt, np.zeros(3), np.array([0.0, 0.0, 0.5]), np.diag(sigma**2)
     )
-    result = navigate(standing, start, imu=SPEC, odometer=OdometerRecord(T, 0 * T, "speed"), check_clocks=False)
+    result = navigate(standing, start, aid=Odometer(OdometerRecord(T, 0 * T, "speed")), imu=SPEC, check_clocks=False)
     assert result.position[-1, 2] == pytest.approx(PLACE.alt, abs=10.0)

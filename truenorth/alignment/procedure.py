@@ -1,4 +1,4 @@
-"""`align`: from a log of a base that stays where it is to attitude, biases and a verdict."""
+"""From a log of a base that stays where it is to attitude, biases and a verdict."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be told
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
 
-def align(
+def align_base(
     record: ImuRecord,
     position: Position,
     imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,

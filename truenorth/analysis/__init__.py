@@ -1,1 +1,35 @@
-"""What a record or a result tells about noise, observability and consistency."""
+"""Noise, observability, consistency and bounds: of data, of linear systems, of estimates."""
+
+from truenorth.analysis.allan import AllanDeviation, NoiseCoefficients, overlapping_adev
+from truenorth.analysis.combinations import Entangled, entangled_states
+from truenorth.analysis.consistency import Consistency, chi_square_band, consistency, nees, nis, whiteness
+from truenorth.analysis.cramer_rao import CramerRao, cramer_rao
+from truenorth.analysis.error_budget import ErrorBudget, error_budget
+from truenorth.analysis.observability import (
+    Observability,
+    PiecewiseObservability,
+    observability,
+    piecewise_observability,
+)
+
+__all__ = [
+    "AllanDeviation",
+    "Consistency",
+    "CramerRao",
+    "Entangled",
+    "ErrorBudget",
+    "NoiseCoefficients",
+    "Observability",
+    "PiecewiseObservability",
+    "chi_square_band",
+    "consistency",
+    "cramer_rao",
+    "entangled_states",
+    "error_budget",
+    "nees",
+    "nis",
+    "observability",
+    "overlapping_adev",
+    "piecewise_observability",
+    "whiteness",
+]

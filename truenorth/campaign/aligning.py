@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truenorth.alignment import Alignment, align, align_in_motion
+from truenorth.aiding.aids import Gnss, Odometer
+from truenorth.alignment import Alignment, align
 from truenorth.campaign.rows import Row
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
@@ -72,7 +73,7 @@ def _aligned(
             assert spec is not None  # the plan sees to it
             answer = _in_motion(plan, case, run, spec, record, place)
         else:
-            answer = align(record, place, spec, method.method, heading_limit=plan.heading_limit)
+            answer = align(record, place, spec, method=method.method, heading_limit=plan.heading_limit)
         errors = [
             Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
             for quantity, value, sigma, unit in _errors(answer, simulated)
@@ -89,8 +90,9 @@ def _in_motion(plan: Plan, case: Case, run: int, spec: ImuSpec, record: ImuRecor
     """By the odometer and the receiver that the scenario has, as far as the log goes; where they sit is estimated."""
     logs = case.built.simulate_aiding(seed=plan.seed, run=run, number=case.scenario_number)
     stop = float(record.time[-1])
-    aiding = {key: logs[key].record.between(None, stop) for key in ("odometer", "gnss") if key in logs}
-    return align_in_motion(record, spec, position=place, heading_limit=plan.heading_limit, **aiding)
+    kinds = {"odometer": Odometer, "gnss": Gnss}
+    aid = [kind(logs[key].record.between(None, stop)) for key, kind in kinds.items() if key in logs]
+    return align(record, place, spec, aid=aid, heading_limit=plan.heading_limit)
 
 
 def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, float, float, str]]:

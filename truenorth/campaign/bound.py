@@ -61,7 +61,7 @@ def _bound(case: Case, ideal: IdealLog, time: float) -> Array:
     lat, alt = float(start.lat), float(start.alt)
     place = Position(lat, float(start.lon), alt, horizontal_sigma=0.0, vertical_sigma=0.0)
     try:
-        answer = align(record, place, case.built.imu_spec, "kalman")
+        answer = align(record, place, case.built.imu_spec, method="kalman")
     except TruenorthError:
         return np.full(3, np.nan)
     # The simulated vertical is the ellipsoid's normal: its deflection, which the answer allows for, is not in the data.

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment import align, align_in_motion, align_rotary, align_transfer
+from truenorth.aiding.aids import Gnss, Indexer, Master, Odometer
+from truenorth.alignment import align
 from truenorth.alignment.result import Alignment
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.navigation import navigate
 from truenorth.navigation.result import Navigation
 from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -175,7 +177,8 @@ def _flight(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _transfer(i: Inputs) -> Alignment:
-    return align_transfer(i["record"], i["master"], i["imu"], matching="velocity", mounting_sigma=math.radians(1.0))
+    mounting = Mounting(lever_arm_sigma=1.0, angle_sigma=math.radians(1.0), latency_sigma=0.05)
+    return align(i["record"], imu=i["imu"], aid=Master(i["master"], mounting, "velocity"))
 
 
 BENCHES: dict[str, Bench] = {
@@ -183,22 +186,22 @@ BENCHES: dict[str, Bench] = {
     for bench in (
         Bench("still", _still, lambda i: align(i["record"], i["place"], i["imu"])),
         Bench("swaying", _swaying, lambda i: align(i["record"], i["place"], i["imu"])),
-        Bench("rotary", _rotary, lambda i: align_rotary(i["record"], i["encoder"], i["place"], i["imu"])),
+        Bench("rotary", _rotary, lambda i: align(i["record"], i["place"], i["imu"], aid=Indexer(i["encoder"]))),
         Bench(
             "odometer",
             lambda rng: _drive(rng, "navigation") | {"odometer": WHEEL},
-            lambda i: align_in_motion(i["record"], i["imu"], odometer=i["odometer"], position=i["place"]),
+            lambda i: align(i["record"], i["place"], i["imu"], aid=Odometer(i["odometer"])),
         ),
         Bench(
             "gnss",
             lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER},
-            lambda i: align_in_motion(i["record"], i["imu"], gnss=i["gnss"], position=i["place"]),
+            lambda i: align(i["record"], i["place"], i["imu"], aid=Gnss(i["gnss"])),
         ),
         Bench("transfer", _flight, _transfer),
         Bench(
             "navigate",
             lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER, "odometer": WHEEL},
-            lambda i: navigate(i["record"], i["start"], imu=i["imu"], gnss=i["gnss"]),
+            lambda i: navigate(i["record"], i["start"], imu=i["imu"], aid=Gnss(i["gnss"])),
         ),
     )
 }

@@ -44,7 +44,7 @@ class MethodPlan(Strict):
     ----------
     name : str
     method : str
-        As :func:`truenorth.align` takes it; or ``in_motion``, :func:`truenorth.align_in_motion` by the odometer and the GNSS
+        As :func:`truenorth.align` takes it; or ``in_motion``, by the odometer and the GNSS
         receiver that the scenario has.
     imu : "simulated", "none", preset, file or mapping
         The specification that the method is given: that of the simulated IMU, none (it then asks the log), or another one.

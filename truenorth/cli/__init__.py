@@ -22,6 +22,7 @@ from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
+from truenorth.cli.wording import in_options
 from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
 from truenorth.core.version import __version__
@@ -32,8 +33,7 @@ app = typer.Typer(
     name="truenorth",
     help="Find level and true north from an IMU log, and say how far the answer can be trusted.",
     no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
+    rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -98,7 +98,7 @@ def main() -> None:
         with protected(_inputs(sys.argv[1:])):
             app(args=_language_first(sys.argv[1:]))
     except TruenorthError as error:
-        print(f"truenorth: {error}", file=sys.stderr)
+        print(f"truenorth: {in_options(str(error))}", file=sys.stderr)
         sys.exit(error.exit_code)
     except SystemExit as stop:
         if stop.code == INTERRUPTED:  # typer has turned the interrupt into this

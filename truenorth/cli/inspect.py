@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from truenorth.cli.console import make_console
-from truenorth.cli.reading import Axes, Columns, Format, From, Kind, Log, Rate, To, Topic, Units, in_line, read_log
+from truenorth.cli.options import grouped
+from truenorth.cli.reading import Log, ReadingWindow, in_line
 
 FIGURES = (".png", ".svg", ".pdf")
 
@@ -26,18 +27,10 @@ Examples:
 
 def inspect(
     log: Log,
+    reading: ReadingWindow,
     lat: Annotated[
         float | None, typer.Option(help="Latitude, deg: lets the earth's rate be checked.", show_default=False)
     ] = None,
-    axes: Axes = None,
-    units: Units = None,
-    rate: Rate = None,
-    columns: Columns = None,
-    format: Format = None,
-    kind: Kind = None,
-    topic: Topic = None,
-    start: From = None,
-    stop: To = None,
     plot: Annotated[Path | None, typer.Option(help="Write a figure (.png, .svg, .pdf).", show_default=False)] = None,
     layout: Annotated[
         bool, typer.Option("--write-layout", help="Write what the log was taken for as LOG.yaml beside it.")
@@ -58,18 +51,7 @@ def inspect(
     from truenorth.quality import inspect as inspect_record
 
     try:
-        record = read_log(
-            log,
-            axes=axes,
-            units=units,
-            rate=rate,
-            columns=columns,
-            format=format,
-            kind=kind,
-            topic=topic,
-            start=start,
-            stop=stop,
-        )
+        record = reading.read(log)
     except DataError as error:
         for line in getattr(error, "__notes__", []):  # what was found before the question
             make_console(stderr=as_json).print(line, soft_wrap=True)
@@ -100,3 +82,4 @@ def inspect(
 
 
 inspect.__doc__ = f"{inspect.__doc__}\n{EXAMPLES}"
+inspect = grouped(inspect)

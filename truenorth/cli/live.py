@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truenorth.cli.reading import Axes, Columns, Kind, Units, names_of
+from truenorth.cli.options import grouped
+from truenorth.cli.reading import Rows, names_of
 
 if TYPE_CHECKING:
     from truenorth.live.aligner import Aligner, Answer
@@ -44,6 +45,7 @@ def live(
         ),
     ],
     lat: Annotated[float, typer.Option(help="Latitude, deg, north positive.", show_default=False)],
+    rows: Rows,
     lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0,
     alt: Annotated[float, typer.Option(help="Height above the ellipsoid, m.")] = 0.0,
     position_sigma: Annotated[float, typer.Option(help="One-sigma error of that position, m.")] = 10.0,
@@ -54,10 +56,6 @@ def live(
         ),
     ] = None,
     method: Annotated[str, typer.Option(help="As for `truenorth align`.")] = "auto",
-    axes: Axes = None,
-    units: Units = None,
-    columns: Columns = None,
-    kind: Kind = None,
     until: Annotated[
         str | None,
         typer.Option(help="Stop when heading is as good as this, such as '0.1 deg' (one sigma).", show_default=False),
@@ -90,7 +88,7 @@ def live(
     if not (every > 0.0 and 0.0 < share <= 1.0):
         raise UsageError(f"--every {every:g}, --share {share:g}: expected seconds above 0, and a part of 1")
     goal = None if until is None else parse(until, "angle")
-    given = {"units": units, "axes": axes, "columns": names_of(columns), "kind": kind}
+    given = {"units": rows.units, "axes": rows.axes, "columns": names_of(rows.columns), "kind": rows.kind}
     place = Position.from_degrees(lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2.0 * position_sigma)
     session = Session(
         source,
@@ -111,9 +109,9 @@ def live(
         print(json.dumps({"final": True} | result.summary(), allow_nan=False), flush=True)
     paths = [] if output is None else result.save(output)
     if not (as_json or nmea):
-        from truenorth.cli.align import print_answer
+        from truenorth.cli.print_alignment import print_alignment
 
-        print_answer(result, paths)
+        print_alignment(result, paths)
     if result.status not in ("aligned", "level_only"):
         raise typer.Exit(4)
 
@@ -156,3 +154,4 @@ def _listeners(as_json: bool, nmea: bool, page: str | None, goal: float | None) 
 
 
 live.__doc__ = f"{live.__doc__}\n{EXAMPLES}"
+live = grouped(live)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
@@ -20,84 +21,82 @@ Log = Annotated[
         show_default=False,
     ),
 ]
-Axes = Annotated[
-    str | None,
-    typer.Option(
-        help="Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, even FLD.",
-        show_default=False,
-    ),
-]
-Units = Annotated[
-    str | None,
-    typer.Option(
-        help="Units of the columns, as 'deg/s,g' or 'gyro=deg/s'; else found or asked.",
-        show_default=False,
-    ),
-]
-Rate = Annotated[
-    float | None,
-    typer.Option(help="Samples a second, of a log without time, or with bad stamps.", show_default=False),
-]
-Columns = Annotated[
-    str | None,
-    typer.Option(
-        help="Names of the columns in the log, as 'time=t,gyro_x=wx,gyro_y=-wy'; for .npz and .mat the variables.",
-        show_default=False,
-    ),
-]
-Format = Annotated[
-    str | None, typer.Option("--format", help="Format, where the suffix does not tell.", show_default=False)
-]
-Kind = Annotated[
-    str | None,
-    typer.Option(help="What a row is, where the names do not tell: rates or increments.", show_default=False),
-]
-Topic = Annotated[str | None, typer.Option(help="Topic of a ROS bag with several IMUs.", show_default=False)]
-From = Annotated[float | None, typer.Option("--from", help="Use the log from this time on, s.", show_default=False)]
-To = Annotated[float | None, typer.Option("--to", help="Use the log up to this time, s.", show_default=False)]
 
 
-def read_log(
-    log: Path,
-    *,
-    axes: str | None,
-    units: str | None,
-    rate: float | None,
-    columns: str | None,
-    format: str | None,
-    kind: str | None,
-    topic: str | None,
-    start: float | None,
-    stop: float | None,
-) -> ImuRecord:
-    """Read a log as the options say, and cut the window out of it."""
-    from truenorth.core.errors import DataError, UsageError
-    from truenorth.formats import UnsureError, read_imu
+@dataclass(frozen=True)
+class Rows:
+    """What the rows of a log are."""
 
-    for option, value in (("--from", start), ("--to", stop)):
-        if value is not None and not math.isfinite(value):
-            raise UsageError(f"{option} {value}: expected seconds on the log's clock")
-    if start is not None and stop is not None and start >= stop:
-        raise UsageError(f"--from {start:g} --to {stop:g}: the window ends before it begins")
-    try:
-        record = read_imu(
-            log,
-            format=format,
-            units=units,
-            axes=axes,
-            rate=rate,
-            columns=names_of(columns),
-            kind=kind,  # type: ignore[arg-type]  # checked there, with the choices in the message
-            topic=topic,
-        )
-    except UnsureError as unsure:
-        choices = " or ".join(as_options(option) for option in unsure.options)
-        error = DataError(f"{unsure.question}; say which: {choices}")
-        error.add_note("\n".join(map(in_line, unsure.guesses)))
-        raise error from unsure
-    if start is not None or stop is not None:
-        record = record.between(start, stop)
-    return record
+    PANEL: ClassVar = "The log"
+    axes: Annotated[
+        str | None, typer.Option(help="Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, even FLD.")
+    ] = None
+    units: Annotated[
+        str | None, typer.Option(help="Units of the columns, as 'deg/s,g' or 'gyro=deg/s'; else found or asked.")
+    ] = None
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help="Names of the columns in the log, as 'time=t,gyro_x=wx,gyro_y=-wy'; for .npz and .mat the variables."
+        ),
+    ] = None
+    kind: Annotated[
+        str | None, typer.Option(help="What a row is, where the names do not tell: rates or increments.")
+    ] = None
+
+
+@dataclass(frozen=True)
+class Reading(Rows):
+    """How a log is read."""
+
+    rate: Annotated[float | None, typer.Option(help="Samples a second, of a log without time, or with bad stamps.")] = (
+        None
+    )
+    format: Annotated[str | None, typer.Option("--format", help="Format, where the suffix does not tell.")] = None
+    topic: Annotated[str | None, typer.Option(help="Topic of a ROS bag with several IMUs.")] = None
+    stop: Annotated[float | None, typer.Option("--to", help="Use the log up to this time, s.")] = None
+
+    def read(self, log: Path) -> ImuRecord:
+        """The log, up to --to."""
+        return self._read(log, None)
+
+    def _read(self, log: Path, start: float | None) -> ImuRecord:
+        from truenorth.core.errors import DataError, UsageError
+        from truenorth.formats import UnsureError, read_imu
+
+        for option, value in (("--from", start), ("--to", self.stop)):
+            if value is not None and not math.isfinite(value):
+                raise UsageError(f"{option} {value}: expected seconds on the log's clock")
+        if start is not None and self.stop is not None and start >= self.stop:
+            raise UsageError(f"--from {start:g} --to {self.stop:g}: the window ends before it begins")
+        try:
+            record = read_imu(
+                log,
+                format=self.format,
+                units=self.units,
+                axes=self.axes,
+                rate=self.rate,
+                columns=names_of(self.columns),
+                kind=self.kind,  # type: ignore[arg-type]  # checked there, with the choices in the message
+                topic=self.topic,
+            )
+        except UnsureError as unsure:
+            choices = " or ".join(as_options(option) for option in unsure.options)
+            error = DataError(f"{unsure.question}; say which: {choices}")
+            error.add_note("\n".join(map(in_line, unsure.guesses)))
+            raise error from unsure
+        return record if start is None and self.stop is None else record.between(start, self.stop)
+
+
+@dataclass(frozen=True)
+class ReadingWindow(Reading):
+    """How a log is read, and from when on."""
+
+    start: Annotated[float | None, typer.Option("--from", help="Use the log from this time on, s.")] = None
+
+    def read(self, log: Path) -> ImuRecord:
+        """The log from --from to --to."""
+        return self._read(log, self.start)
 
 
 def as_options(option: Mapping[str, Any]) -> str:

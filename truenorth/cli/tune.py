@@ -35,7 +35,7 @@ def tune(
     search: Annotated[Path, typer.Argument(help="YAML file: scenario, method, ranges.", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the result.", show_default=False)],
 ) -> None:
-    """Search for the specification with which a method errs least and says so honestly; needs truenorth[tune]."""
+    """Search for the specification with which a method errs least and says so honestly, with the extra 'tune'."""
     from truenorth.campaign.tuning import read_search
     from truenorth.campaign.tuning import tune as search_for
     from truenorth.core.atomic import writable_folder

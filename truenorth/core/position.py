@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from truenorth.core.errors import UsageError
@@ -38,9 +39,9 @@ class Position:
     def __post_init__(self) -> None:
         lat, lon = math.degrees(self.lat), math.degrees(self.lon)
         if not abs(lat) <= 90.0:
-            raise UsageError(f"latitude {lat:g} deg; expected -90 to 90 deg, north positive: check --lat")
+            raise UsageError(f"latitude {lat:g} deg; expected -90 to 90 deg, north positive")
         if not abs(lon) <= 360.0:
-            raise UsageError(f"longitude {lon:g} deg; expected -180 to 180 deg, east positive: check --lon")
+            raise UsageError(f"longitude {lon:g} deg; expected -180 to 180 deg, east positive")
         if not -12_000.0 <= self.alt <= 50_000.0:
             raise UsageError(f"height {self.alt:g} m; expected metres between -12000 and 50000")
         if not (self.horizontal_sigma >= 0.0 and self.vertical_sigma >= 0.0):
@@ -50,6 +51,33 @@ class Position:
     def from_degrees(cls, lat: float, lon: float = 0.0, alt: float = 0.0, **sigmas: float) -> Position:
         """Latitude and longitude in degrees, height in metres."""
         return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
+
+    @classmethod
+    def of(cls, place: Position | Sequence[float]) -> Position:
+        """A position as it is, or (lat, lon[, alt]) in degrees and metres as one.
+
+        Raises
+        ------
+        UsageError
+            Other than two or three numbers, or numbers that could as well be radians.
+        """
+        if isinstance(place, cls):
+            return place
+        try:
+            numbers = [float(x) for x in place]  # type: ignore[union-attr]
+        except (TypeError, ValueError):
+            numbers = []
+        if len(numbers) not in (2, 3):
+            raise UsageError(
+                f"place {place!r}; expected a Position, or (lat, lon) or (lat, lon, alt) in degrees and metres"
+            )
+        lat, lon = numbers[:2]
+        if abs(lat) <= math.pi / 2 and abs(lon) <= math.pi and (lat, lon) != (0.0, 0.0):
+            raise UsageError(
+                f"place {place!r} could be degrees or radians; expected Position.from_degrees({lat:g}, {lon:g}) for degrees, "
+                f"Position({lat:g}, {lon:g}) for radians"
+            )
+        return cls.from_degrees(*numbers)
 
     @property
     def lat_sigma(self) -> float:

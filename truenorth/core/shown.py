@@ -1,7 +1,7 @@
 """What can be done with any result: draw it, write it into a folder, read it back, show it in a notebook.
 
-A result is data and imports neither figures nor reports. Who draws and writes each type stands in one table, filled from above by
-:func:`register_result`; the functions and the mixin here look it up when they are called.
+A result is data and imports neither figures nor reports. Who draws and writes each type stands in one table above, in
+:mod:`truenorth.results`; the functions and the mixin here look it up when they are called.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Write = Callable[[Path], object]
 Lazy = str | Callable[..., Any] | None  # a function, or its "module:name", imported when it is needed
 
+TABLE = "truenorth.results"
 ARCHIVE = "result.npz"
 REPORT = "report.html"
 PICTURE_DPI = 80
@@ -145,6 +146,7 @@ def load(folder: str | PathLike[str]) -> Any:
     """
     from truenorth.core.archive import read_archive
 
+    _own_table()
     path = Path(folder)
     for views in _VIEWS.values():
         if views.load is not None and (path / views.marker).is_file():
@@ -173,6 +175,7 @@ def views_of(result: Any) -> Views:
     UsageError
         Nothing is registered.
     """
+    _own_table()
     for kind in type(result).__mro__:
         if (found := _VIEWS.get(name_of(kind))) is not None:
             return found
@@ -253,6 +256,11 @@ def as_xarray(frame: Any) -> xarray.Dataset:
 def name_of(kind: type) -> str:
     """``module:name`` of a type."""
     return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def _own_table() -> None:
+    """Have the package's own types registered; by name, since the table stands above."""
+    import_module(TABLE)
 
 
 def _view(result: Any, which: str) -> Callable[..., Any]:

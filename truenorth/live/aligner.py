@@ -288,7 +288,7 @@ class Aligner:
     def _solve(self, record: ImuRecord) -> Alignment:
         begun = clock.thread_time()
         try:
-            return align(record, self.place, self.imu, self.method)
+            return align(record, self.place, self.imu, method=self.method)
         finally:
             self._cost = clock.thread_time() - begun
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
+from truenorth.aiding.aids import WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
@@ -24,7 +24,7 @@ from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
 from truenorth.quality.innovations import innovation_evidence
-from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, Record, Trajectory, VelocityRecord
+from truenorth.records import ImuRecord, Late, Trajectory
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import BA, BG, DP, PHI
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from truenorth.records.calibration import Calibration
 
 Array = NDArray[np.float64]
-R = TypeVar("R", bound=Record)
 
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
 FINE, COARSE = 0.2, 1.0
@@ -46,38 +45,22 @@ FINE, COARSE = 0.2, 1.0
 AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
 SHORTEST_AXES = 20.0  # s
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
-
-
-@dataclass(frozen=True)
-class Sources:
-    """Records of the aiding sensors and how they sit."""
-
-    gnss: GnssRecord | None = None
-    odometer: OdometerRecord | None = None
-    velocity: VelocityRecord | None = None
-    baro: HeightRecord | None = None
+AIDS = (Gnss, Odometer, VelocityLog, Barometer)
+USUAL = {"baro": WEATHER}
+NEVER = Late(0, 0.0)
 
 
 def navigate(
     record: ImuRecord,
     start: Alignment | Start | str | PathLike[str],
     *,
-    gnss: GnssRecord | None = None,
-    odometer: OdometerRecord | None = None,
-    velocity: VelocityRecord | None = None,
-    baro: HeightRecord | None = None,
+    aid: Aid | Sequence[Aid] = (),
     altitude: Altitude | None = None,
     zupt: str | Sequence[tuple[float, float]] | None = None,
     smooth: bool = False,
     imu: ImuSpec | str | None = None,
-    antenna: Mounting | None = None,
-    wheel: Mounting | None = None,
-    log: Mounting | None = None,
-    barometer: Mounting | None = None,
-    baro_loop: float = 0.0,
     scale_factors: bool = False,
     calibration: Calibration | None = None,
-    offset: float = 0.0,
     check_clocks: bool = True,
     interval: float | None = None,
     output: float | None = None,
@@ -88,41 +71,35 @@ def navigate(
 
     Parameters
     ----------
-    record : ImuRecord
+    record : ImuRecord or DataFrame
         Holds the alignment's epoch, or begins there.
     start : Alignment, Start, or path
         Of the alignment, or the folder it was saved in.
-    gnss, odometer, velocity, baro : records, optional
-        Aiding sensors.
+    aid : aid or sequence of aids
+        :class:`Gnss`, :class:`Odometer`, :class:`VelocityLog`, :class:`Barometer`, or one of your own. An odometer without a
+        mounting has that which an alignment on the move has found.
     altitude : {"fixed", "free", "baro", "gnss"}, optional
-        How height is kept; by default what the sensors allow, and fixed (at sea) where there is none.
+        How height is kept; by default what the aids allow, and fixed (at sea) where there is none.
     zupt : "auto" or pairs of seconds, optional
         Stops, with zero velocity (and zero rotation where nothing moves at all).
     smooth : bool
-        Give each epoch what the whole log says of it.
+        Estimate each epoch from the whole log.
     imu : ImuSpec or str, optional
         Specification; the alignment's own when left out.
-    antenna, wheel, log, barometer : Mounting, optional
-        How each sensor sits, and what of that is to be estimated. Without `wheel` an odometer sits and counts as an
-        alignment on the move has found.
-    baro_loop : float, s
-        Time constant of a third-order loop on the barometer instead of a Kalman gain; 0: none.
     scale_factors : bool
         Estimate the IMU's scale factors.
     calibration : Calibration, optional
         Known errors, taken off first.
-    offset : float, s
-        Added to the times of all aiding logs, to bring them onto the IMU's clock.
     check_clocks : bool
-        Look for a clock offset, a wrong lever arm, scale or mounting in a second pass; told as warnings.
+        Look for a clock offset, a wrong lever arm, scale or mounting in a second pass; what is found is a warning.
     interval : float, s, optional
         Of the filter; .2 s, and 1 s for logs beyond an hour.
     output : float, s, optional
         Of the track; 1 s, more for very long logs.
     damping : Damper, optional
-        Damp the oscillations of a free INS at sea; `velocity` is then the reference, and there is no other aiding.
+        Damp the oscillations of a free INS at sea; a :class:`VelocityLog` is then the reference, and there is no other aid.
     progress : callable, optional
-        Told what is being done.
+        Called with a word about each stage.
 
     Returns
     -------
@@ -139,53 +116,46 @@ def navigate(
         The alignment has no usable heading.
     """
     tell = progress or (lambda stage: None)
-    logs: dict[str, Record | None] = {"gnss": gnss, "odometer": odometer, "velocity": velocity, "baro": baro}
-    given = {name: aid for name, aid in logs.items() if aid is not None}
+    given = _by_key(aid)
     begin, spec, imu_source = _start_of(start, imu)
-    wheel = wheel or begin.wheel
-    if calibration is not None:
-        record = calibration.apply(record)
-    record = _from_start(record, begin)
-    record, gaps, disturbances = bridge_gaps(record)
-    reference = None if damping is None else _shifted(velocity, offset)
-    velocity = velocity if damping is None else None
-    sources = Sources(
-        _shifted(gnss, offset), _shifted(odometer, offset), _shifted(velocity, offset), _shifted(baro, offset)
+    record = ImuRecord.of(record)
+    record, gaps, disturbances = bridge_gaps(
+        _from_start(record if calibration is None else calibration.apply(record), begin)
     )
-    height, why = _altitude(altitude, sources)
-    mountings = {"gnss": antenna, "odometer": wheel, "velocity": log, "baro": barometer}
-    mounting = {name: m or Mounting() for name, m in mountings.items()}
-    aiding = _aiding(sources, mounting, height, baro_loop)
-    _check_overlap(record, aiding)
-    _check_places(sources, begin, height)
-    interval = (FINE if record.duration <= LONG else COARSE) if interval is None else interval
-    output = max(1.0, record.duration / 20_000.0) if output is None else output
-    if not (interval > 0.0 and output > 0.0):
-        raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
-    tell("looking for stops" if zupt is not None else "navigating")
-    seen = sources.odometer, sources.gnss, sources.velocity
-    stops = [] if zupt is None else zero_updates(record, zupt, interval, *seen)
-    every = max(1, round(output / interval))
     noise = spec.with_random_walks(record.interval)
-    plain = InsModel.from_spec(noise, scale_factors=scale_factors, fixed_altitude=height == "fixed")
-
-    def run(sensors: Sequence[Aiding], **options: Any) -> Track:
-        used = [*sensors, *stops, *disturbances]
-        return navigate_track(record, begin, with_states(plain, used), used, interval=interval, every=every, **options)
-
-    _check_axes(record, begin, plain, sources, mounting)
+    said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
+    late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
+    reference = given.pop("velocity", None) if damping is not None else None
+    found = _sits_as_found(given, begin)
+    height, why = _altitude(altitude, given)
+    plan = _Plan(
+        record,
+        begin,
+        InsModel.from_spec(noise, scale_factors=scale_factors, fixed_altitude=height == "fixed"),
+        height,
+        disturbances,
+        *_intervals(record, interval, output),
+    )
+    aiding = plan.sources(given)
+    _check_overlap(record, aiding)
+    _check_places(given, begin, height)
+    tell("looking for stops" if zupt is not None else "navigating")
+    if zupt is not None:
+        seen = (_record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
+        plan = replace(plan, always=[*zero_updates(record, zupt, plan.interval, *seen), *disturbances])
+    _check_axes(plan, given)
     tell("navigating")
-    track = run(aiding, smooth=smooth)
+    track = plan.run(aiding, smooth=smooth)
     evidence = innovation_evidence(track.residuals) + why
-    if odometer is not None and _is_the_alignments(wheel, begin):
+    if found:
         evidence.append(note("odometer.taken_over"))
-    if baro is not None and height != "baro":
+    if "baro" in given and height != "baro":
         evidence.append(note("height.barometer_unused", "use_barometer", altitude=height))
-    evidence += slow_errors(track, mounting["gnss"])
-    evidence += [item for aid in given.values() for item in notes(aid.notes)]
+    mountings = _looked_at(given)
+    evidence += [*slow_errors(track, mountings["gnss"]), *said]
     if check_clocks and aiding:
         tell("checking clocks and mountings")
-        evidence += second_look(lambda loose: run(_aiding(sources, loose, height, baro_loop)), track, mounting)
+        evidence += second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, mountings)
     result = Navigation(
         status="navigated",
         evidence=(),
@@ -196,25 +166,88 @@ def navigate(
         stops=sum(len(r.time) for r in track.residuals if r.name == "zero velocity"),
         imu_source=imu_source,
         source=record.source,
-        late={name: aid.late for name, aid in given.items() if aid.late.rows},
+        late=late,
     )
     if damping is None:
         return judged_navigation(result, evidence)
     from truenorth.damping.navigation import damp_navigation
 
     tell(f"damping: {damping.method}")
-    return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, log)
+    velocity, mounting = (None, None) if reference is None else (reference.record, reference.mounting)
+    return damp_navigation(replace(result, evidence=tuple(evidence)), velocity, noise, damping, mounting)
 
 
-def _is_the_alignments(wheel: Mounting | None, start: Start) -> bool:
-    """Whether an odometer is taken to sit and count as the alignment has found."""
-    found = start.wheel
-    return (
-        wheel is not None
-        and found is not None
-        and bool(np.all(wheel.C_mb == found.C_mb))
-        and wheel.scale_sigma == found.scale_sigma
-    )
+@dataclass(frozen=True)
+class _Plan:
+    """One navigation, ready to run with any set of measurements."""
+
+    record: ImuRecord
+    start: Start
+    model: InsModel
+    altitude: Altitude
+    always: Sequence[Aiding]  # gaps and stops
+    interval: float
+    every: int
+
+    def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
+        """Measurements of all aids."""
+        return [source for a in given.values() for source in a.sources(self.altitude)]
+
+    def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
+        """Filter (and smooth) with these measurements."""
+        used = [*sensors, *self.always]
+        model = with_states(self.model, used)
+        return navigate_track(self.record, self.start, model, used, interval=self.interval, every=self.every, **options)
+
+
+def _by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
+    """The aids in the order in which their measurements are taken."""
+    aids: Sequence[Aid] = aid if isinstance(aid, list | tuple) else (aid,)
+    for a in aids:
+        if not isinstance(a, Aid):
+            raise UsageError(
+                f"aid {type(a).__name__} is not for navigation; expected {', '.join(k.__name__ for k in AIDS)}, or an object "
+                "with key, record and sources"
+            )
+    found = {a.key: a for a in aids}
+    if len(found) < len(aids):
+        raise UsageError(f"aid holds two of one kind: {', '.join(a.key for a in aids)}; expected one of each")
+    order = [kind.key for kind in AIDS]
+    return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
+
+
+def _sits_as_found(given: dict[str, Any], begin: Start) -> bool:
+    """Whether the odometer sits and counts as an alignment on the move has found; mounts it so where nothing else is said."""
+    odometer, found = given.get("odometer"), begin.wheel
+    if found is None or not isinstance(odometer, Odometer):
+        return False
+    if odometer.mounting is None:
+        given["odometer"] = odometer.mounted(found)
+        return True
+    return bool(np.all(odometer.mounting.C_mb == found.C_mb)) and odometer.mounting.scale_sigma == found.scale_sigma
+
+
+def _record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:
+    return next((a.record for a in given.values() if isinstance(a, kind)), None)
+
+
+def _mounted(given: Mapping[str, Any], mountings: Mapping[str, Mounting]) -> dict[str, Any]:
+    return {key: a.mounted(mountings[key]) if isinstance(a, AIDS) else a for key, a in given.items()}
+
+
+def _looked_at(given: Mapping[str, Any]) -> dict[str, Mounting]:
+    """Mountings that a second look can open."""
+    found = {kind.key: USUAL.get(kind.key, Mounting()) for kind in AIDS}
+    return found | {key: a.mounting for key, a in given.items() if getattr(a, "mounting", None) is not None}
+
+
+def _intervals(record: ImuRecord, interval: float | None, output: float | None) -> tuple[float, int]:
+    """Interval of the filter (s), and how many of them to a row of the track."""
+    interval = (FINE if record.duration <= LONG else COARSE) if interval is None else interval
+    output = max(1.0, record.duration / 20_000.0) if output is None else output
+    if not (interval > 0.0 and output > 0.0):
+        raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
+    return interval, max(1, round(output / interval))
 
 
 def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
@@ -232,10 +265,6 @@ def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, st
         own, where = start.imu, start.imu_source
         begin = start_from_alignment(start)
     return begin, spec or own, where if spec is None else spec.name
-
-
-def _shifted(record: R | None, offset: float) -> R | None:
-    return None if record is None else record.shifted(offset)
 
 
 def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
@@ -280,66 +309,53 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
     return record, gaps, [Aiding("gap", "disturbance", record.time[rows], push**2, turn)]
 
 
-def _altitude(wanted: str | None, sources: Sources) -> tuple[Altitude, list[Evidence]]:
-    heights = sources.gnss is not None and bool(np.isfinite(sources.gnss.alt).any())
+def _altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:
+    gnss = _record_of(given, Gnss)
+    heights = gnss is not None and bool(np.isfinite(gnss.alt).any())
     if wanted is not None and wanted not in get_args(Altitude):
         raise UsageError(f"altitude {wanted!r}; expected one of {', '.join(get_args(Altitude))}")
-    if wanted == "baro" and sources.baro is None:
-        raise UsageError("altitude 'baro' without a barometer's record; expected baro=record")
+    if wanted == "baro" and "baro" not in given:
+        raise UsageError("altitude 'baro' without a barometer's record; expected an aid Barometer(record)")
     if wanted == "gnss" and not heights:
-        raise UsageError("altitude 'gnss' without heights of GNSS; expected gnss=record with a column of heights")
+        raise UsageError("altitude 'gnss' without heights of GNSS; expected an aid Gnss(record) with heights")
     if wanted is not None:
         return wanted, []  # type: ignore[return-value]  # one of the four
     if heights:
         return "gnss", []
-    if sources.baro is not None:
+    if "baro" in given:
         return "baro", []
-    if sources.odometer is not None or sources.velocity is not None:
+    if given.keys() - {"gnss"}:
         return "free", [note("height.free")]
     return "fixed", [note("height.fixed", "height_sensor")]
 
 
-def _aiding(sources: Sources, mounting: Mapping[str, Mounting], altitude: str, loop: float) -> list[Aiding]:
-    found: list[Aiding] = []
-    if sources.gnss is not None:
-        found += from_gnss(sources.gnss, mounting["gnss"], heights=altitude in ("gnss", "free"))
-    if sources.odometer is not None:
-        found += from_odometer(sources.odometer, mounting["odometer"])
-    if sources.velocity is not None:
-        found += from_velocity(sources.velocity, mounting["velocity"])
-    if sources.baro is not None and altitude == "baro":
-        found += from_height(sources.baro, mounting["baro"], loop)
-    return found
-
-
-def _check_places(sources: Sources, begin: Start, altitude: str) -> None:
+def _check_places(given: Mapping[str, Aid], begin: Start, altitude: str) -> None:
     """Refuse fixes and heights that lie far from where the alignment stands."""
     sigma = np.sqrt(np.diag(begin.P)[DP])
     place = Position(begin.lat, begin.lon, begin.alt, float(sigma[:2].max()), float(sigma[2]))
-    if sources.gnss is not None:
-        check_fixes(sources.gnss, place, begin.time, heights=altitude in ("gnss", "free"))
-    if sources.baro is not None and altitude == "baro":
-        check_heights(sources.baro, place, begin.time)
+    if (gnss := _record_of(given, Gnss)) is not None:
+        check_fixes(gnss, place, begin.time, heights=altitude in ("gnss", "free"))
+    if altitude == "baro" and (baro := _record_of(given, Barometer)) is not None:
+        check_heights(baro, place, begin.time)
 
 
-def _check_axes(
-    record: ImuRecord, begin: Start, model: InsModel, sources: Sources, mounting: Mapping[str, Mounting]
-) -> None:
+def _check_axes(plan: _Plan, given: Mapping[str, Any]) -> None:
     """Refuse velocities in other axes, by the IMU's own changes of velocity over the log's first part."""
-    logs = {"gnss": sources.gnss, "odometer": sources.odometer, "velocity": sources.velocity}
-    given = {name: log for name, log in logs.items() if log is not None}
-    if not given:
+    record, begin = plan.record, plan.start
+    seen = [a for a in given.values() if isinstance(a, Gnss | Odometer | VelocityLog)]
+    if not seen:
         return
     sigma = np.sqrt(np.diag(begin.P))
     trusted = min(AXES_TIME, AXES_TILT / sigma[BG].max(), math.sqrt(2.0 * AXES_DRIFT / sigma[BA].max()))
     if trusted < SHORTEST_AXES or sigma[PHI][:2].max() > AXES_TILT:
         return
     part = record.between(None, record.time[0] + trusted)
-    free = navigate_track(part, begin, model, interval=FINE, every=1, covariance=False)
+    free = navigate_track(part, begin, plan.model, interval=FINE, every=1, covariance=False)
     lat, lon, alt = free.position.T
     own = Trajectory(free.time, free.C_nb, free.v_n, lat, lon, alt, source=record.source)
-    for name, log in given.items():
-        check_axes(log, own, mounting[name].latency, mounting[name].C_mb)
+    for a in seen:
+        mounting = a.mounting or Mounting()
+        check_axes(a.record, own, mounting.latency, mounting.C_mb)
 
 
 def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
@@ -349,5 +365,5 @@ def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
             raise DataError(
                 f"{sensor.name}: runs from {sensor.time.min():.3f} s to {sensor.time.max():.3f} s, the navigated part of "
                 f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
-                "expected one clock: bring the aiding log onto the IMU's with --offset SECONDS"
+                "expected one clock: shift the aiding log onto the IMU's"
             )

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.errors import DataError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
@@ -74,6 +74,41 @@ class ImuRecord(Record):
                     f"{self.source}: row {row + 1}, column {names[i]}: {values[row, i]:g}; no such sensor measures more than "
                     f"{limit * scale:g}: check the units, or repair the row"
                 )
+
+    @classmethod
+    def of(cls, table: Any) -> ImuRecord:
+        """A record as it is, or a pandas table as one.
+
+        Parameters
+        ----------
+        table : ImuRecord or DataFrame
+            Columns ``gyro_x .. accel_z`` of rates (rad/s, m/s^2) or ``dtheta_x .. dvel_z`` of increments (rad, m/s), named as
+            `to_frame` names them; ``time`` (s) as a column or the index, which may hold dates too.
+
+        Raises
+        ------
+        UsageError
+            Something else, or a table without these columns.
+        """
+        if isinstance(table, cls):
+            return table
+        if not hasattr(table, "columns"):
+            raise UsageError(f"record is a {type(table).__name__}; expected an ImuRecord (read_imu) or a pandas table")
+        kind: Any = next((k for k, names in COLUMNS.items() if set(names) <= set(table.columns)), None)
+        if kind is None:
+            raise UsageError(
+                f"record: a table with columns {', '.join(map(str, table.columns))}; expected {', '.join(COLUMNS['rates'])}, or "
+                f"{', '.join(COLUMNS['increments'])}, and time"
+            )
+        time = table["time"] if "time" in table.columns else table.index
+        if getattr(time.dtype, "kind", "") == "M":
+            time = (
+                (time - time[0]) / np.timedelta64(1, "s")
+                if time is table.index
+                else (time - time.iloc[0]).dt.total_seconds()
+            )
+        values = np.array(table[list(COLUMNS[kind])], dtype=np.float64)
+        return cls(np.array(time, dtype=np.float64), values[:, :3], values[:, 3:], kind, "table")
 
     def rotated(self, C_new_old: ArrayLike) -> ImuRecord:
         """The same measurements in other body axes: ``v_new = C_new_old @ v_old``."""

@@ -56,7 +56,7 @@ def _static(drives: Drives, seed: int) -> Array:
     for run in range(len(drives.records)):
         record = drives.scenario.simulate(seed=seed, run=run, ideal=ideal).record
         rest = record.between(STOPPED, drives.scenario.duration)
-        found.append(align(rest, drives.position, drives.spec, "oba").C_nb)
+        found.append(align(rest, drives.position, drives.spec, method="oba").C_nb)
     return np.stack(found)
 
 

@@ -1,0 +1,198 @@
+"""What aids an alignment or a navigation besides the IMU: each sensor's record and how it is mounted.
+
+Arms, angles and latencies mean the same for every aid; see :mod:`truenorth.state.mounting`. An aid of your own is a frozen
+dataclass with a `key`, a `record` and a method `sources`, as :class:`Gnss` has; navigation takes it as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
+
+from numpy.typing import ArrayLike
+
+from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
+from truenorth.aiding.source import Aiding
+from truenorth.records import EncoderRecord, GnssRecord, HeightRecord, MasterRecord, OdometerRecord, VelocityRecord
+from truenorth.records.flexure import FlexureSpec
+from truenorth.state.mounting import Mounting
+
+ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
+WEATHER = Mounting(bias_sigma=10.0, bias_time=3600.0)  # of a barometer whose mounting is not given
+
+
+@runtime_checkable
+class Aid(Protocol):
+    """What navigation needs of an aid.
+
+    Attributes
+    ----------
+    key : str
+        Name in summaries; one aid of a key at a time.
+    record : record or None
+        Its rows; ``record.notes`` go into the reasons.
+    """
+
+    key: ClassVar[str]
+
+    @property
+    def record(self) -> Any:
+        """Rows of the sensor."""
+
+    def sources(self, altitude: str) -> list[Aiding]:
+        """Measurements for the closed loop; `altitude` says how height is kept (fixed, free, baro, gnss)."""
+
+
+@dataclass(frozen=True)
+class _Mounted:
+    """An aid with a mounting; None: the usual one of the procedure."""
+
+    def mounted(self, mounting: Mounting) -> Self:
+        """The same aid, mounted so."""
+        return replace(self, mounting=mounting)  # type: ignore[call-arg]  # a field of each subclass
+
+
+@dataclass(frozen=True)
+class Gnss(_Mounted):
+    """A GNSS receiver.
+
+    Attributes
+    ----------
+    record : GnssRecord
+    mounting : Mounting, optional
+        Of the antenna.
+    """
+
+    record: GnssRecord
+    mounting: Mounting | None = None
+    key: ClassVar[str] = "gnss"
+
+    def sources(self, altitude: str) -> list[Aiding]:
+        """Positions and velocities."""
+        return from_gnss(self.record, self.mounting or Mounting(), heights=altitude in ("gnss", "free"))
+
+
+@dataclass(frozen=True)
+class Odometer(_Mounted):
+    """A wheel that counts distance or speed.
+
+    Attributes
+    ----------
+    record : OdometerRecord
+    mounting : Mounting, optional
+        Lever arm: to the wheel, the rear axle where nothing steers it.
+    """
+
+    record: OdometerRecord
+    mounting: Mounting | None = None
+    key: ClassVar[str] = "odometer"
+
+    def sources(self, altitude: str) -> list[Aiding]:
+        """Body velocities."""
+        return from_odometer(self.record, self.mounting or Mounting())
+
+
+@dataclass(frozen=True)
+class VelocityLog(_Mounted):
+    """A Doppler or electromagnetic log, or any reference velocity.
+
+    Attributes
+    ----------
+    record : VelocityRecord
+    mounting : Mounting, optional
+    """
+
+    record: VelocityRecord
+    mounting: Mounting | None = None
+    key: ClassVar[str] = "velocity"
+
+    def sources(self, altitude: str) -> list[Aiding]:
+        """Velocities, in body or navigation axes."""
+        return from_velocity(self.record, self.mounting or Mounting())
+
+
+@dataclass(frozen=True)
+class Barometer(_Mounted):
+    """A sensor of height.
+
+    Attributes
+    ----------
+    record : HeightRecord
+    mounting : Mounting, optional
+        The weather's slow error (10 m, 1 h) is estimated when it is left out.
+    loop : float, s
+        Time constant of a third-order vertical loop; 0: a Kalman gain.
+    """
+
+    record: HeightRecord
+    mounting: Mounting | None = None
+    loop: float = 0.0
+    key: ClassVar[str] = "baro"
+
+    def sources(self, altitude: str) -> list[Aiding]:
+        """Heights, where height is kept by the barometer."""
+        return from_height(self.record, self.mounting or WEATHER, self.loop) if altitude == "baro" else []
+
+
+@dataclass(frozen=True)
+class Master(_Mounted):
+    """The solution of a master INS on the same vehicle.
+
+    Attributes
+    ----------
+    record : MasterRecord
+    mounting : Mounting, optional
+        Lever arm from the IMU to the master, ``C_mb`` from the IMU's to the master's axes, and what they are uncertain by. Left
+        out: arm and angles zero to 1 m and 3 deg, latency zero to 50 ms.
+    matching : {"auto", "velocity", "attitude", "both"}
+    flexure : FlexureSpec, optional
+        The IMU's seat bends.
+    velocity_noise, attitude_noise : float, optional, m/s and rad
+        White noise of the master's rows; fitted when left out.
+    heading : float, rad, optional
+        Of the IMU at the start, where the master has no attitude.
+    """
+
+    record: MasterRecord
+    mounting: Mounting | None = None
+    matching: Literal["auto", "velocity", "attitude", "both"] = "auto"
+    flexure: FlexureSpec | None = None
+    velocity_noise: float | None = None
+    attitude_noise: float | None = None
+    heading: float | None = None
+    key: ClassVar[str] = "master"
+
+
+@dataclass(frozen=True)
+class Indexer:
+    """An indexer (rotation mechanism) that carries the IMU on the body.
+
+    Attributes
+    ----------
+    record : EncoderRecord or None
+        Angles of its axes. None: the body is still, its axes are the IMU's at the record's beginning.
+    axes : sequence of {"x", "y", "z"}
+        The outermost first.
+    lever_arm : (3,) array, m, optional
+        From the IMU to the body's centre of rotation, body axes; estimated when it is left out.
+    """
+
+    record: EncoderRecord | None
+    axes: tuple[str, ...] = ("z", "x")
+    lever_arm: ArrayLike | None = None
+    key: ClassVar[str] = "indexer"
+
+
+@dataclass(frozen=True)
+class Positions:
+    """A turntable that takes the IMU from position to position; turns are found in the log.
+
+    Attributes
+    ----------
+    arm_sigma : float, m
+        How far the IMU may sit from the table's axes.
+    """
+
+    arm_sigma: float = ARM_SIGMA
+    record: None = None
+    key: ClassVar[str] = "positions"

@@ -1,0 +1,346 @@
+"""Options of the aids: what `align` and `navigate` read besides the IMU's log, and how it is mounted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import typer
+
+from truenorth.cli.reading import numbers_of
+
+if TYPE_CHECKING:
+    from truenorth.records.flexure import FlexureSpec
+    from truenorth.state.mounting import Mounting
+
+GYROS = "gyros"
+PARTS = ("scale", "mounting", "lever_arm", "latency", "scale_factors")
+SIGMAS = {"scale": 0.05, "mounting": math.radians(5.0), "lever_arm": 2.0, "latency": 0.3}
+
+
+def arm_of(text: str, option: str) -> Any:
+    """A lever arm: right, forward, up, m."""
+    import numpy as np
+
+    return np.array(numbers_of(text, option, 3, "right,forward,up in metres"))
+
+
+def angles_of(text: str) -> Any:
+    """``C_mb`` of --mounting."""
+    from truenorth.state.mounting import mounting_angles
+
+    return mounting_angles(
+        *(math.radians(x) for x in numbers_of(text, "--mounting", 3, "heading,pitch,roll in degrees"))
+    )
+
+
+@dataclass(frozen=True)
+class Turntable:
+    """Options of an alignment on a turntable."""
+
+    PANEL: ClassVar = "Turntable"
+    positions: Annotated[
+        str | None,
+        typer.Option(help="auto: a turntable takes the IMU from position to position; turns are found in the gyros."),
+    ] = None
+    arm_sigma: Annotated[float, typer.Option(help="How far the IMU may sit from the table's axes, m.")] = 0.05
+    advise: Annotated[
+        float | None,
+        typer.Option(
+            help="A wanted one-sigma of heading, deg: how long, and in which positions, this IMU on this base needs for it."
+        ),
+    ] = None
+
+    def aids(self) -> list[Any]:
+        """Positions, where a turntable is named."""
+        from truenorth.aiding.aids import Positions
+        from truenorth.core.errors import UsageError
+
+        if self.positions is None:
+            return []
+        if self.positions != "auto":
+            raise UsageError(f"--positions {self.positions!r}; expected auto: turns and positions are found in the log")
+        return [Positions(self.arm_sigma)]
+
+
+@dataclass(frozen=True)
+class OnIndexer:
+    """Options of an IMU on an indexer."""
+
+    PANEL: ClassVar = "IMU on an indexer"
+    indexer: Annotated[
+        str | None,
+        typer.Option(
+            help="Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns."
+        ),
+    ] = None
+    indexer_axes: Annotated[str, typer.Option(help="Axes of the indexer, the outermost first.")] = "z,x"
+    lever_arm: Annotated[
+        str | None,
+        typer.Option(
+            help="Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it."
+        ),
+    ] = None
+
+    @property
+    def arm(self) -> Any:
+        """From the IMU to the centre or the master, which is the library's sense; None: not given."""
+        return None if self.lever_arm is None else -arm_of(self.lever_arm, "--lever-arm")
+
+    def aids(self) -> list[Any]:
+        """The indexer, where one is named."""
+        from truenorth.aiding.aids import Indexer
+        from truenorth.formats import read_encoder
+
+        if self.indexer is None:
+            return []
+        encoder = None if self.indexer == GYROS else read_encoder(self.indexer)
+        axes = tuple(self.indexer_axes.replace(" ", "").lower().replace(",", ""))
+        return [Indexer(encoder, axes, self.arm)]
+
+
+@dataclass(frozen=True)
+class ByMaster:
+    """Options of a transfer alignment."""
+
+    PANEL: ClassVar = "Against a master INS"
+    master: Annotated[
+        Path | None,
+        typer.Option(
+            help="Log of the master: time, heading, pitch, roll and/or VE, VN, VU, and lat, lon, alt where it has them."
+        ),
+    ] = None
+    master_columns: Annotated[
+        str | None, typer.Option(help="Names of the columns in the master's log, as 'time=t,VE=ve'.")
+    ] = None
+    master_units: Annotated[str | None, typer.Option(help="Units of its columns, as 'attitude=rad,position=rad'.")] = (
+        None
+    )
+    matching: Annotated[str, typer.Option(help="What is matched: auto, velocity, attitude or both.")] = "auto"
+    delay: Annotated[
+        str | None,
+        typer.Option(
+            help="By which the master's stamps are late: '30 ms', or with its uncertainty '30 ms,5 ms'; 0 and 50 ms without it."
+        ),
+    ] = None
+    lever_arm_sigma: Annotated[
+        float, typer.Option(help="What --lever-arm (master to IMU) is uncertain by, m; 0: known.")
+    ] = 1.0
+    flexure: Annotated[
+        str | None,
+        typer.Option(help="The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time."),
+    ] = None
+
+    def aids(self, arm: Any, mounting: str | None, mounting_sigma: float) -> list[Any]:
+        """The master, where one is named; `arm` from the IMU to it."""
+        import numpy as np
+
+        from truenorth.aiding.aids import Master
+        from truenorth.alignment.transfer import DELAY_SIGMA
+        from truenorth.formats import read_master
+        from truenorth.state.mounting import Mounting
+
+        if self.master is None:
+            return []
+        late, late_sigma = _delay(self.delay, DELAY_SIGMA)
+        mounted = Mounting(
+            lever_arm=np.zeros(3) if arm is None else arm,
+            lever_arm_sigma=self.lever_arm_sigma,
+            C_mb=np.eye(3) if mounting is None else angles_of(mounting),
+            angle_sigma=math.radians(mounting_sigma),
+            latency=late,
+            latency_sigma=late_sigma,
+        )
+        record = read_master(self.master, columns=self.master_columns, units=self.master_units)
+        flexure = None if self.flexure is None else _flexure(self.flexure)
+        return [Master(record, mounted, self.matching, flexure)]  # type: ignore[arg-type]  # checked there, with the choices
+
+
+@dataclass(frozen=True)
+class OnTheMove:
+    """Options of an alignment on the move."""
+
+    PANEL: ClassVar = "On the move"
+    odometer: Annotated[
+        Path | None, typer.Option(help="Odometer log of a vehicle that moves from the first second on (needs --imu).")
+    ] = None
+    gnss: Annotated[
+        Path | None,
+        typer.Option(
+            help="GNSS log, positions and/or velocities, alone or with an odometer; --lat is then not needed."
+        ),
+    ] = None
+    offset: Annotated[float, typer.Option(help="Added to the times of the odometer's and the GNSS log, s.")] = 0.0
+    wheel_arm: Annotated[
+        str | None,
+        typer.Option(help="IMU to the odometer's wheel, m: right,forward,up; estimated without it."),
+    ] = None
+    antenna_arm: Annotated[str | None, typer.Option(help="IMU to the GNSS antenna, m: right,forward,up.")] = None
+    latency: Annotated[
+        float | None,
+        typer.Option(help="GNSS measurements are older than their stamps by this, s; estimated without it."),
+    ] = None
+    mounting: Annotated[
+        str | None, typer.Option(help="Heading,pitch,roll of the IMU against the vehicle (or the master), deg.")
+    ] = None
+    mounting_sigma: Annotated[float, typer.Option(help="How far off those may be, one sigma, deg; estimated.")] = 3.0
+    odometer_noise: Annotated[float | None, typer.Option(help="One-sigma noise of the odometer's speed, m/s.")] = None
+
+    @property
+    def given(self) -> bool:
+        """Whether a sensor of motion is named."""
+        return self.odometer is not None or self.gnss is not None
+
+    def aids(self) -> list[Any]:
+        """Odometer and GNSS, where they are named."""
+        from dataclasses import replace
+
+        from truenorth.aiding.aids import Gnss, Odometer
+        from truenorth.alignment.in_motion import WHEEL, usual_antenna
+        from truenorth.core.errors import UsageError
+        from truenorth.formats import read_gnss, read_odometer
+
+        if self.given and not self.mounting_sigma > 0.0:
+            raise UsageError(f"--mounting-sigma {self.mounting_sigma:g}: expected degrees above zero")
+        found: list[Any] = []
+        if self.odometer is not None:
+            wheel = replace(WHEEL, angle_sigma=math.radians(self.mounting_sigma), noise=self.odometer_noise)
+            if self.mounting is not None:
+                wheel = replace(wheel, C_mb=angles_of(self.mounting))
+            if self.wheel_arm is not None:
+                wheel = replace(wheel, lever_arm=arm_of(self.wheel_arm, "--wheel-arm"), lever_arm_sigma=0.0)
+            found.append(Odometer(read_odometer(self.odometer).shifted(self.offset), wheel))
+        if self.gnss is not None:
+            receiver = read_gnss(self.gnss).shifted(self.offset)
+            antenna = usual_antenna(receiver)
+            if self.antenna_arm is not None:
+                antenna = replace(antenna, lever_arm=arm_of(self.antenna_arm, "--antenna-arm"))
+            if self.latency is not None:
+                antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
+            found.append(Gnss(receiver, antenna))
+        return found
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Options of the aids of a navigation."""
+
+    PANEL: ClassVar = "Aiding sensors"
+    gnss: Annotated[Path | None, typer.Option(help="GNSS log: CSV, Parquet, NMEA, ...")] = None
+    odometer: Annotated[Path | None, typer.Option(help="Odometer log.")] = None
+    velocity: Annotated[
+        Path | None, typer.Option(help="Log of a Doppler or speed log, or of a reference velocity.")
+    ] = None
+    baro: Annotated[Path | None, typer.Option(help="Log of a barometer.")] = None
+    baro_loop: Annotated[
+        float, typer.Option(help="Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
+    ] = 0.0
+    lever_arm: Annotated[str | None, typer.Option(help="IMU to GNSS antenna, m: right,forward,up.")] = None
+    wheel_arm: Annotated[str | None, typer.Option(help="IMU to the odometer's wheel, m: right,forward,up.")] = None
+    mounting: Annotated[
+        str | None, typer.Option(help="Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log).")
+    ] = None
+    estimate: Annotated[str | None, typer.Option(help=f"What is not known and estimated, of: {', '.join(PARTS)}.")] = (
+        None
+    )
+    odometer_noise: Annotated[float | None, typer.Option(help="One-sigma noise of the odometer's speed, m/s.")] = None
+    offset: Annotated[float, typer.Option(help="Added to the times of all aiding logs, s.")] = 0.0
+    latency: Annotated[float, typer.Option(help="GNSS measurements are older than their stamps by this, s.")] = 0.0
+    gnss_drift: Annotated[
+        str | None,
+        typer.Option(
+            help="Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."
+        ),
+    ] = None
+
+    @property
+    def parts(self) -> set[str]:
+        """What --estimate names."""
+        from truenorth.core.errors import UsageError
+
+        parts = {part.strip().replace("-", "_") for part in self.estimate.split(",")} if self.estimate else set()
+        if unknown := parts - set(PARTS):
+            raise UsageError(f"--estimate {min(unknown)!r} is not known; choose of {', '.join(PARTS)}")
+        return parts
+
+    def antenna(self) -> Mounting:
+        """Of the GNSS receiver."""
+        from dataclasses import replace
+
+        from truenorth.core.errors import UsageError
+
+        antenna = self._mounted(self.lever_arm, "--lever-arm", None, self.parts & {"lever_arm", "latency"})
+        if self.gnss_drift is not None:
+            sigma, time = numbers_of(self.gnss_drift, "--gnss-drift", 2, "one sigma in metres, time in seconds")
+            if not (sigma > 0.0 and time > 0.0):
+                raise UsageError(
+                    f"--gnss-drift {self.gnss_drift}: expected metres and seconds above zero, such as 2,60"
+                )
+            antenna = replace(antenna, bias_sigma=sigma, bias_time=time)
+        return replace(antenna, latency=self.latency)
+
+    def wheel(self) -> Mounting:
+        """Of the odometer, and of a velocity log."""
+        return self._mounted(self.wheel_arm, "--wheel-arm", self.mounting, self.parts - {"latency"})
+
+    def aids(self, found: Mounting | None) -> list[Any]:
+        """The sensors that are named; `found` is how an alignment on the move found the odometer."""
+        from dataclasses import replace
+
+        from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
+        from truenorth.formats import read_gnss, read_height, read_odometer, read_velocity
+
+        antenna, wheel = self.antenna(), self.wheel()
+        told = self.wheel_arm is not None or self.mounting is not None
+        told = told or bool(self.parts & {"scale", "mounting", "lever_arm"})
+        known = told or found is None or self.odometer_noise is not None
+        sits = replace(wheel if told or found is None else found, noise=self.odometer_noise) if known else None
+        aids: list[Any] = []
+        if self.gnss is not None:
+            aids.append(Gnss(read_gnss(self.gnss).shifted(self.offset), antenna))
+        if self.odometer is not None:
+            aids.append(Odometer(read_odometer(self.odometer).shifted(self.offset), sits))
+        if self.velocity is not None:
+            log = replace(wheel, lever_arm_sigma=0.0)
+            aids.append(VelocityLog(read_velocity(self.velocity).shifted(self.offset), log))
+        if self.baro is not None:
+            aids.append(Barometer(read_height(self.baro).shifted(self.offset), loop=self.baro_loop))
+        return aids
+
+    @staticmethod
+    def _mounted(arm: str | None, option: str, angles: str | None, parts: set[str]) -> Mounting:
+        import numpy as np
+
+        from truenorth.state.mounting import Mounting
+
+        sigma = {part: SIGMAS[part] for part in parts if part in SIGMAS}
+        return Mounting(
+            lever_arm=np.zeros(3) if arm is None else arm_of(arm, option),
+            lever_arm_sigma=sigma.get("lever_arm", 0.0),
+            C_mb=np.eye(3) if angles is None else angles_of(angles),
+            angle_sigma=sigma.get("mounting", 0.0),
+            scale_sigma=sigma.get("scale", 0.0),
+            latency_sigma=sigma.get("latency", 0.0),
+        )
+
+
+def _delay(text: str | None, usual: float) -> tuple[float, float]:
+    from truenorth.core.units import parse
+
+    if text is None:
+        return 0.0, usual
+    first, _, second = text.partition(",")
+    return parse(first, "time"), parse(second, "time") if second.strip() else usual
+
+
+def _flexure(text: str) -> FlexureSpec:
+    from truenorth.core.errors import UsageError
+    from truenorth.core.units import parse
+    from truenorth.records.flexure import FlexureSpec
+
+    first, comma, second = text.partition(",")
+    if not comma:
+        raise UsageError(f"--flexure {text!r}: expected an angle and a time, such as '3 arcmin,5 s'")
+    return FlexureSpec(sigma=(parse(first, "angle"),) * 3, correlation_time=parse(second, "time"))

@@ -1,0 +1,64 @@
+"""Options in groups: a frozen dataclass declares the options of one panel, and builds what they mean.
+
+A command is a function whose parameters may be such groups; :func:`grouped` lays their fields out as options.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from copy import copy
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from typer.models import OptionInfo
+
+
+def grouped(run: Callable[..., None]) -> Callable[..., None]:
+    """A command of a function whose parameters are options, arguments or groups of options.
+
+    Each field of a group is ``name: Annotated[type, typer.Option(help=...)] = default``; its panel is the group's `PANEL`.
+    """
+    hints = get_type_hints(run, include_extras=True)
+    groups: dict[str, Any] = {}
+    parameters: list[inspect.Parameter] = []
+    for name, parameter in inspect.signature(run).parameters.items():
+        kind = hints[name]
+        if is_dataclass(kind):
+            groups[name] = kind
+            parameters += _laid_out(kind)
+        else:
+            parameters.append(parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY))
+
+    @wraps(run)
+    def command(**given: Any) -> None:
+        for name, kind in groups.items():
+            given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
+        run(**given)
+
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # which typer reads
+    command.__annotations__ = {p.name: p.annotation for p in parameters}
+    return command
+
+
+def _laid_out(group: Any) -> list[inspect.Parameter]:
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=field.default,
+            annotation=_in_panel(hints[field.name], getattr(group, "PANEL", None), field.default),
+        )
+        for field in fields(group)
+    ]
+
+
+def _in_panel(hint: Any, panel: str | None, default: Any) -> Any:
+    kind, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+    infos = [copy(mark) for mark in marks if isinstance(mark, OptionInfo)]
+    for info in infos:
+        info.rich_help_panel = info.rich_help_panel or panel
+        info.show_default = info.show_default and default is not None
+    return Annotated[kind, *infos] if infos else kind
