@@ -12,7 +12,7 @@ import socket
 import threading
 import time as clock
 from collections import deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from importlib import resources
 from typing import Any
 
@@ -99,17 +99,17 @@ class Page:
             if refused(request):
                 return Response(status_code=403)
             seen = request.headers.get("last-event-id", "0")
-            stream = self._stream(int(seen) if seen.isdigit() else 0)
+            stream = self._stream(int(seen) if seen.isdigit() else 0, request.is_disconnected)
             return StreamingResponse(stream, media_type="text/event-stream", headers=HEADERS)
 
         application = Starlette(routes=[Route("/", home), Route("/events", events)])
         return uvicorn.Server(uvicorn.Config(application, log_level="error", lifespan="off", access_log=False))
 
-    async def _stream(self, seen: int) -> AsyncIterator[str]:
+    async def _stream(self, seen: int, gone: Callable[[], Awaitable[bool]]) -> AsyncIterator[str]:
         """Server-sent events: those of the past that the page has not seen, then each as it comes."""
         spoken = clock.monotonic()
         yield "retry: 1000\n\n"
-        while not self._closing:
+        while not (self._closing or await gone()):
             new = [(number, text) for number, text in list(self._events) if number > seen]
             for number, text in new:
                 yield f"id: {number}\ndata: {text}\n\n"
