@@ -350,6 +350,26 @@ def test_no_command_writes_over_its_input(capsys, monkeypatch, log, tmp_path, ca
     assert "is an input of the command" in err
 
 
+def test_a_result_of_another_kind_is_not_overwritten_unless_forced(capsys, monkeypatch, log, tmp_path):
+    out = tmp_path / "start"
+    assert run(capsys, monkeypatch, "align", log, *WHERE, "--imu", "navigation", "-o", out)[0] == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    for arguments in (
+        ["navigate", log, "--start", out, "-o", out],
+        ["advise", "--lat", "40", "--imu", "navigation", "--heading", "1", "-o", out],
+        ["simulate", "quay", f"--output={out}"],
+    ):
+        code, _, err = run(capsys, monkeypatch, *arguments)
+        assert code == 2
+        assert "Alignment" in err
+        assert "--force" in err
+        assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    advised = ["advise", "--lat", "40", "--imu", "navigation", "--heading", "1", "-o", out]
+    assert run(capsys, monkeypatch, *advised, "--force")[0] in (0, 4)
+    assert run(capsys, monkeypatch, "align", log, *WHERE, "--imu", "navigation", "-o", out, "--force")[0] == 0
+    assert run(capsys, monkeypatch, "align", log, *WHERE, "--imu", "navigation", "-o", out)[0] == 0  # of the same kind
+
+
 def test_brackets_in_names_are_no_markup(capsys, monkeypatch, log, tmp_path):
     odd = tmp_path / "run[red]1.csv"
     odd.write_bytes(log.read_bytes())

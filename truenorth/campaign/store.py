@@ -164,8 +164,10 @@ def _claim(store: Store, plan: Plan) -> None:
                 "begun with, name another folder with -o, or begin anew with --no-resume"
             )
     text = yaml.safe_dump(plan.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
-    with atomic_path(folder / "plan.yaml") as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    kept = folder / "plan.yaml"
+    if not (kept.is_file() and kept.read_text(encoding="utf-8") == text):  # it may be the plan that was read
+        with atomic_path(kept) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     if not manifest.is_file():
         facts = {
             "plan_sha256": plan.fingerprint,

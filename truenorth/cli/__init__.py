@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Iterator
 
 import typer
 
@@ -16,6 +15,7 @@ from truenorth.cli.advise import advise
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.faults import faults
+from truenorth.cli.files import FORCE, check_output, inputs
 from truenorth.cli.inspect import inspect
 from truenorth.cli.live import live
 from truenorth.cli.navigate import navigate
@@ -59,6 +59,9 @@ def _version(wanted: bool) -> None:
 def _main(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
     lang: str = typer.Option("en", "--lang", help="Language of verdicts and reports: en or zh; anywhere on the line."),
+    force: bool = typer.Option(  # taken off the line before, see main
+        False, FORCE, help="Write over inputs, and into a folder with a result of another kind; anywhere on the line."
+    ),
 ) -> None:
     from truenorth.core.language import speak
 
@@ -74,19 +77,6 @@ def _language_first(arguments: list[str]) -> list[str]:
     return arguments
 
 
-OUTPUTS = ("-o", "--output", "--plot")
-
-
-def _inputs(arguments: list[str]) -> Iterator[str]:
-    """What on the command line may name an input: every word but those that name an output."""
-    before = ""
-    for word in arguments:
-        option, _, value = word.partition("=")
-        if before not in OUTPUTS and option not in OUTPUTS:
-            yield value or word
-        before = word
-
-
 def main() -> None:
     """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
@@ -95,8 +85,13 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still told
             stream.reconfigure(errors="replace")
     try:
-        with protected(_inputs(sys.argv[1:])):
-            app(args=_language_first(sys.argv[1:]))
+        words = sys.argv[1:]
+        forced = FORCE in words
+        words = [word for word in words if word != FORCE]
+        if not forced:
+            check_output(words)
+        with protected([] if forced else inputs(words)):
+            app(args=_language_first(words))
     except TruenorthError as error:
         print(f"truenorth: {in_options(str(error))}", file=sys.stderr)
         sys.exit(error.exit_code)

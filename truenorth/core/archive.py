@@ -67,6 +67,15 @@ def read_archive(path: str | PathLike[str], more: Collection[str] = ()) -> Any:
         raise DataError(f"{path}: damaged ({error})") from None
 
 
+def type_in(path: str | PathLike[str]) -> str:
+    """The name of the type that an archive holds, such as ``Alignment``; empty where it cannot be read."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return str(json.loads(file[TREE].tobytes())["type"]).rpartition(":")[2]
+    except Exception:  # whatever a damaged or foreign file raises: it holds no result of ours
+        return ""
+
+
 def _packed(value: Any, arrays: dict[str, NDArray[Any]], where: str) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
