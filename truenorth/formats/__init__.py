@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 from truenorth.core.errors import UsageError
+from truenorth.formats import devices
 from truenorth.formats.aiding import (
     read_encoder,
     read_height,
@@ -46,7 +48,6 @@ READERS = {
     "psins": ("psins", "read"),
     "kf-gins": ("kf_gins", "read_text"),
     "kf-gins-binary": ("kf_gins", "read_binary"),
-    "ros": ("ros", "read"),
 }
 WRITERS = {".csv": "text", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
 
@@ -112,6 +113,9 @@ def read_imu(
     try:
         chosen = format_of(path, format)
         layout = layout_for(path, given)
+        if chosen in devices.DEVICES:
+            layout = replace(layout, axes=layout.axes or devices.module_of(chosen).AXES)
+            return record_of(devices.columns(path, chosen, "imu", layout.topic), layout)
         if chosen not in READERS:
             return record_of(columns_of(path, chosen), layout)
         module, function = READERS[chosen]

@@ -17,11 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.formats import devices
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.layout import options_for
 from truenorth.formats.opening import columns_of
 from truenorth.formats.order import ordered
 from truenorth.formats.places import check_degrees
+from truenorth.formats.positions import columns_of_positions
 from truenorth.formats.quantities import TIME, Found, Options, Quantity, checked_options, find
 from truenorth.records import EncoderRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
@@ -155,6 +157,7 @@ def read_velocity(
     units: Pairs | None = None,
     axes: str | None = None,
     frame: Literal["body", "navigation"] | None = None,
+    topic: str | None = None,
 ) -> VelocityRecord:
     """Read the log of a Doppler or speed log, or of any reference velocity.
 
@@ -170,6 +173,8 @@ def read_velocity(
         Where x, y and z point, such as ``"FRD"``; RFU when left out.
     frame : {"body", "navigation"}, optional
         Where a log has columns of both.
+    topic : str, optional
+        Of a ROS bag with several.
 
     Raises
     ------
@@ -180,7 +185,11 @@ def read_velocity(
     three = sigmas([*names["body"], *names["navigation"]], "speed", "m/s", "sigma")
     quantities = (TIME, *BODY, *AXES, *NAVIGATION, *three)
     found, others = open_log(
-        path, format, quantities, {"columns": columns, "units": units, "axes": axes, "frame": frame}
+        path,
+        format,
+        quantities,
+        {"columns": columns, "units": units, "axes": axes, "frame": frame, "topic": topic},
+        "velocity",
     )
     frames = [key for key, of in names.items() if any(found.has(name) for name in of)]
     if any(found.has(q.name) for q in AXES):
@@ -269,7 +278,9 @@ def read_master(
     UsageError, DataError
         As for :func:`read_odometer`.
     """
-    found, others = open_log(path, format, (*POSES, *SENSORS), {"columns": columns, "units": units, "axes": axes})
+    found, others = open_log(
+        path, format, (*POSES, *SENSORS), {"columns": columns, "units": units, "axes": axes}, "poses"
+    )
     values = _poses(found)
     for ours, sensor in (("w_ib_b", "gyro"), ("f_b", "accel")):
         values[ours] = _turned(whole(found, *(f"{sensor}_{axis}" for axis in "xyz")), others.get("axes"))
@@ -290,7 +301,7 @@ def read_trajectory(
     UsageError, DataError
         As for :func:`read_odometer`.
     """
-    found, _ = open_log(path, format, POSES, {"columns": columns, "units": units})
+    found, _ = open_log(path, format, POSES, {"columns": columns, "units": units}, "poses")
     values = _poses(found)
     for name, what in (("C_nb", "heading, pitch, roll"), ("v_n", "VE, VN, VU"), ("lat", "lat, lon, alt")):
         if values[name] is None:
@@ -299,9 +310,11 @@ def read_trajectory(
 
 
 def open_log(
-    path: FilePath, format: str | None, quantities: Sequence[Quantity], given: Mapping[str, Any]
+    path: FilePath, format: str | None, quantities: Sequence[Quantity], given: Mapping[str, Any], part: str = ""
 ) -> tuple[Found, Mapping[str, Any]]:
     """What a log has of some quantities, in order of time, and the options that only its kind has.
+
+    `part` is what is read of a device's log: ``gnss``, ``velocity`` or ``poses``.
 
     Raises
     ------
@@ -315,7 +328,12 @@ def open_log(
         values = options_for(path, given, lambda content: checked_options(content, quantities, known_keys))
         others = {key: value for key, value in values.items() if key in known_keys}
         options = Options(values.get("columns", {}), values.get("units", {}), others)
-        columns = columns_of(path, chosen)
+        if chosen in devices.DEVICES:
+            columns = devices.columns(path, chosen, part or "gnss", values.get("topic"))
+        else:
+            columns = (columns_of_positions(path) if part == "gnss" and chosen == "csv" else None) or columns_of(
+                path, chosen
+            )
         if not columns.named:
             example = ",".join(q.name for q in quantities[:4])
             raise DataError(

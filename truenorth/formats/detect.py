@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.formats import devices
 from truenorth.formats.content import check_regular, first_bytes, suffix_of
 
 SUFFIXES = {
@@ -22,11 +23,9 @@ SUFFIXES = {
     ".txt": "csv",
     ".asc": "csv",
     ".bin": "kf-gins-binary",
-    ".bag": "ros",
-    ".mcap": "ros",
-    ".db3": "ros",
+    **devices.SUFFIXES,
 }
-FORMATS = (*dict.fromkeys(SUFFIXES.values()), "kf-gins")
+FORMATS = tuple(dict.fromkeys((*SUFFIXES.values(), "kf-gins", *devices.DEVICES)))
 AIDING_SUFFIXES = {
     ".csv": "csv",
     ".tsv": "csv",
@@ -37,15 +36,15 @@ AIDING_SUFFIXES = {
     ".arrow": "feather",
     ".npz": "npz",
     ".mat": "mat",
+    **devices.SUFFIXES,
 }
+ANYTHING = (".bin", ".txt", ".asc", ".log", ".dat", "")  # suffixes that say little: the content decides
 BEGINNINGS = {
     b"PAR1": "parquet",
     b"ARROW1": "feather",
     b"PK\x03\x04": "npz",
     b"MATLAB": "mat",
-    b"#ROSBAG": "ros",
-    b"\x89MCAP": "ros",
-    b"SQLite format 3": "ros",
+    **devices.BEGINNINGS,
 }
 FOREIGN = {
     b"\x89HDF": "HDF5 data; save it as .npz, .mat (version 7), .csv or .parquet",
@@ -80,7 +79,7 @@ def format_of(
     DataError
         An empty file, or one that is not what its suffix says.
     """
-    formats = FORMATS if suffixes is SUFFIXES else tuple(dict.fromkeys(suffixes.values()))
+    formats = FORMATS if suffixes is SUFFIXES else tuple(dict.fromkeys((*suffixes.values(), *devices.DEVICES)))
     check_regular(path)
     if given is not None and given not in formats:
         raise UsageError(f"format {given!r} is not known; choose one of {', '.join(formats)}")
@@ -94,7 +93,8 @@ def format_of(
     if not head:
         raise DataError(f"{path.name}: the file is empty; expected {what}")
     found = next((name for beginning, name in BEGINNINGS.items() if head.startswith(beginning)), None)
-    chosen = given or suffixes.get(suffix_of(path)) or found
+    by_content = found if suffix_of(path) in ANYTHING and found in devices.DEVICES else None
+    chosen = given or by_content or suffixes.get(suffix_of(path)) or found
     foreign = next((what for beginning, what in FOREIGN.items() if head.startswith(beginning)), None)
     if found == "npz" and not _is_npz(path):
         found, foreign = None, "a zip archive, such as an Excel workbook; save its sheet as CSV, or unpack it"
@@ -117,7 +117,7 @@ def _check_content(source: str, head: bytes, chosen: str, found: str | None) -> 
         raise DataError(
             f"{source}: read as {chosen}, but it holds {found} data; rename the file, or read it as {found}"
         )
-    if chosen in BEGINNINGS.values() and found is None:
+    if chosen in BEGINNINGS.values() and found is None and chosen not in ("novatel", "ubx", "sbf", "mavlink"):
         raise DataError(
             f"{source}: read as {chosen}, but it does not begin as such a file does; it is damaged, or of another format: "
             "name that"

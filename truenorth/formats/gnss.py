@@ -46,8 +46,12 @@ def read_gnss(
     columns: Pairs | None = None,
     units: Pairs | None = None,
     origin: Position | None = None,
+    topic: str | None = None,
 ) -> GnssRecord:
-    """Read the log of a GNSS receiver: CSV, Parquet, npz, mat, or NMEA 0183 (GGA, RMC, VTG).
+    """Read the log of a GNSS receiver.
+
+    A table of named columns, NMEA 0183 (GGA, RMC, VTG), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's own log
+    (u-blox, Septentrio, NovAtel, PX4, ArduPilot, ROS).
 
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
     up`` (or ``down``) from an `origin`; velocity as ``VE, VN, VU`` (or ``VD``), ``ecef_vx, ecef_vy, ecef_vz``, or ``speed`` and
@@ -61,6 +65,8 @@ def read_gnss(
         As for :func:`truenorth.read_odometer`; `units` also by group: ``"position=rad"``.
     origin : Position, optional
         Of local coordinates, which are taken in its tangent plane.
+    topic : str, optional
+        Of a ROS bag with several receivers.
 
     Returns
     -------
@@ -76,11 +82,12 @@ def read_gnss(
     """
     path = Path(path)
     try:
-        if format == "nmea" or (format is None and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))):
+        if format == "nmea" or (format is None and path.is_file() and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))):
             return read_nmea(path)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
-    found, _ = open_log(path, format, QUANTITIES, {"columns": columns, "units": units})
+    given = {"columns": columns, "units": units, "topic": topic}
+    found, _ = open_log(path, "csv" if format == "kf-gins" else format, QUANTITIES, given, "gnss")
     values = _geodetic(found) or _earth_fixed(found) or _local(found, origin)
     track = _velocity(found)
     if not values and track is None:

@@ -1,0 +1,100 @@
+"""u-blox UBX by pyubx2: NAV-PVT (position, velocity), ESF-RAW and ESF-MEAS (gyros and accelerometers of M8, F9 and M9 modules).
+
+Time is the GPS time of week, s. The inertial messages carry counts of the sensor's own clock, which are carried over to it by
+the NAV-PVT around them: no message comes before its data, so the clock is the one that lies below all arrivals. Scales: u-blox
+F9 interface description, ESF-MEAS data types (2^-12 deg/s, 2^-10 m/s^2, 24 bits).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Tables = dict[str, dict[str, Array]]
+
+EXTRA = "ublox"
+AXES = "RFU"
+GYROS, ACCELS = {14: 0, 13: 1, 5: 2}, {16: 0, 17: 1, 18: 2}
+TICKS = (1e-3, 39.0625e-6, 1e-6)  # s, of the sensor clocks of the modules
+
+
+def tables(path: Path, part: str, topic: str | None = None) -> Tables:
+    """Position and velocity; rates and specific forces, where the module writes them."""
+    from pyubx2 import ERR_IGNORE, UBX_PROTOCOL, UBXReader
+
+    fixes: list[tuple[float, ...]] = []
+    samples: dict[int, dict[tuple[str, int], float]] = {}
+    arrivals: list[tuple[int, float]] = []
+    with path.open("rb") as stream:
+        for _, message in UBXReader(stream, protfilter=UBX_PROTOCOL, quitonerror=ERR_IGNORE):
+            kind = getattr(message, "identity", "")
+            if kind == "NAV-PVT" and message.fixType >= 2:
+                fixes.append(_fix(message))
+            elif kind in ("ESF-RAW", "ESF-MEAS"):
+                for tag, key, value in _values(message):
+                    samples.setdefault(tag, {})[key] = value
+                    if fixes:
+                        arrivals.append((tag, fixes[-1][0]))
+    return {"gnss": _gnss(fixes), "imu": _imu(samples, arrivals)}
+
+
+def _fix(m: Any) -> tuple[float, ...]:
+    tow = getattr(m, "iTOW", 0)
+    seconds = (
+        float(tow.hour * 3600 + tow.minute * 60 + tow.second + tow.microsecond * 1e-6)
+        if hasattr(tow, "hour")
+        else tow / 1e3
+    )
+    raw = int.from_bytes(m.payload[:4], "little") / 1e3  # the library makes a time of day of it
+    return (
+        raw if raw else seconds, m.lat, m.lon, m.height * 1e-3, m.velE * 1e-3, m.velN * 1e-3, -m.velD * 1e-3,
+        m.hAcc * 1e-3, m.vAcc * 1e-3, m.sAcc * 1e-3, float(m.fixType),
+    )  # fmt: skip
+
+
+def _values(message: Any) -> list[tuple[int, tuple[str, int], float]]:
+    found = []
+    index = 1
+    while hasattr(message, f"dataType_{index:02d}"):
+        kind, raw = getattr(message, f"dataType_{index:02d}"), getattr(message, f"dataField_{index:02d}")
+        tag = getattr(message, f"sTtag_{index:02d}", getattr(message, "timeTag", 0))
+        value = raw - (1 << 24) if raw >= 1 << 23 else raw
+        if kind in GYROS:
+            found.append((tag, ("gyro", GYROS[kind]), value * 2.0**-12))
+        elif kind in ACCELS:
+            found.append((tag, ("accel", ACCELS[kind]), value * 2.0**-10))
+        index += 1
+    return found
+
+
+def _gnss(fixes: list[tuple[float, ...]]) -> dict[str, Array]:
+    if not fixes:
+        return {}
+    t, lat, lon, alt, ve, vn, vu, h, v, s, quality = np.array(fixes).T
+    return {
+        "time [s]": t, "lat [deg]": lat, "lon [deg]": lon, "alt [m]": alt, "VE [m/s]": ve, "VN [m/s]": vn, "VU [m/s]": vu,
+        "sigma_E [m]": h / np.sqrt(2.0), "sigma_N [m]": h / np.sqrt(2.0), "sigma_U [m]": v,
+        "sigma_VE [m/s]": s / np.sqrt(3.0), "sigma_VN [m/s]": s / np.sqrt(3.0), "sigma_VU [m/s]": s / np.sqrt(3.0),
+        "quality": quality,
+    }  # fmt: skip
+
+
+def _imu(samples: dict[int, dict[tuple[str, int], float]], arrivals: list[tuple[int, float]]) -> dict[str, Array]:
+    keys = [(sensor, axis) for sensor in ("gyro", "accel") for axis in range(3)]
+    tags = [tag for tag, row in samples.items() if len(row) == len(keys)]
+    if not tags:
+        return {}
+    values = np.array([[samples[tag][key] for key in keys] for tag in tags])
+    names = [f"gyro_{axis} [deg/s]" for axis in "xyz"] + [f"accel_{axis} [m/s^2]" for axis in "xyz"]
+    table = dict(zip(names, values.T))
+    clock = np.array(tags, dtype=np.float64)
+    if len({when for _, when in arrivals}) < 3:
+        return {"time": clock, **table}
+    tag, when = np.array(arrivals, dtype=np.float64).T
+    slope = float(np.polyfit(tag - tag[0], when - when[0], 1)[0])
+    tick = min(TICKS, key=lambda size: abs(np.log(max(slope, 1e-12) / size)))
+    return {"time [s]": clock * tick + float(np.median(when - tag * tick)), **table}

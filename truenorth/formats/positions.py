@@ -1,0 +1,79 @@
+"""Positions in text without named columns of ours: RTKLIB's ``.pos`` and the GNSS files of KF-GINS."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError
+from truenorth.formats.columns import Columns
+from truenorth.formats.text import TextTable, open_table
+
+Array = NDArray[np.float64]
+
+RTKLIB = {
+    "latitude(deg)": "lat [deg]", "longitude(deg)": "lon [deg]", "height(m)": "alt [m]", "Q": "quality", "sdn(m)": "sigma_N [m]",
+    "sde(m)": "sigma_E [m]", "sdu(m)": "sigma_U [m]", "vn(m/s)": "VN [m/s]", "ve(m/s)": "VE [m/s]", "vu(m/s)": "VU [m/s]",
+    "sdvn": "sigma_VN [m/s]", "sdve": "sigma_VE [m/s]", "sdvu": "sigma_VU [m/s]",
+}  # fmt: skip
+KF_GINS = ["time [s]", "lat [deg]", "lon [deg]", "alt [m]", "sigma_N [m]", "sigma_E [m]", "sigma_U [m]"]
+KF_GINS_VELOCITY = ["VN [m/s]", "VE [m/s]", "VD [m/s]", "sigma_VN [m/s]", "sigma_VE [m/s]", "sigma_VU [m/s]"]
+LARGEST_SIGMA = 1e4  # m
+
+
+def columns_of_positions(path: Path, asked: bool = False) -> Columns | None:
+    """The columns of such a file; None where it is of another kind.
+
+    Raises
+    ------
+    DataError
+        The file is not KF-GINS's though the caller `asked` for that, or its times are none.
+    """
+    table = open_table(path)
+    header = next(
+        (line for line in (*table.above, table.header) if "latitude(deg)" in line and "longitude(deg)" in line), None
+    )
+    if header is not None:
+        return _rtklib(table, header)
+    if not table.named and len(table.names) in (7, 13):
+        names = KF_GINS if len(table.names) == 7 else [*KF_GINS, *KF_GINS_VELOCITY]
+        renamed = replace(table, names=names)
+        head = renamed.read(names)
+        fits = (
+            np.all(np.abs(head[:, 1]) <= 90.0)
+            and np.all(np.abs(head[:, 2]) <= 360.0)
+            and np.all(np.diff(head[:, 0]) > 0.0)
+        )
+        if fits and np.all((head[:, 4:7] > 0.0) & (head[:, 4:7] < LARGEST_SIGMA)):
+            return Columns(path, names, renamed.read, renamed.column, renamed.place)
+    if asked:
+        raise DataError(
+            f"{path.name}: not a GNSS file of KF-GINS; expected rows of {', '.join(KF_GINS)} (and velocity with its sigmas)"
+        )
+    return None
+
+
+def _rtklib(table: TextTable, header: str) -> Columns:
+    words = header.lstrip("% \t").split()
+    names = ["first", "second", *(RTKLIB.get(word, word) for word in words[1:])]
+    if len(names) != len(table.names):
+        raise DataError(
+            f"{table.path.name}: a header of {len(words)} words above rows of {len(table.names)}; expected one less"
+        )
+    table = replace(table, names=names)
+
+    def column(name: str) -> Any:
+        if name != "time":
+            return table.column(name)
+        import pyarrow as pa
+
+        first, second = (table.column(part).to_pylist() for part in ("first", "second"))
+        if isinstance(first[0], int | float):  # week and time of week
+            return pa.chunked_array([pa.array([float(tow) for tow in second])])
+        return pa.chunked_array([pa.array([f"{day} {time}" for day, time in zip(first, second)])])
+
+    return Columns(table.path, ["time", *names[2:]], table.read, column, table.place)
