@@ -28,61 +28,45 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
         values = message.to_dict() if name.startswith(("RAWIMU", "BESTPOS", "BESTVEL", "INSPVA")) else None
         if values is None:
             continue
-        header, body = values["header"], values["body"]
-        tow = float(header.get("milliseconds", 0.0)) * 1e-3
+        tow = float(values["header"].get("milliseconds", 0.0)) * 1e-3
         if name.startswith("RAWIMU"):
-            rows["imu"].append([float(body.get("seconds", tow)), *_counts(body)])
-        elif name.startswith("BESTPOS") and _solved(body):
-            height = float(body["orthometric_height"]) + float(body["undulation"])
-            sigmas = [float(body[f"{key}_std_dev"]) for key in ("longitude", "latitude", "height")]
-            rows["place"].append([tow, float(body["latitude"]), float(body["longitude"]), height, *sigmas])
-        elif name.startswith("BESTVEL") and _solved(body):
-            speed, course = float(body["horizontal_speed"]), np.radians(float(body["track_ground"]))
-            rows["velocity"].append(
-                [tow, speed * np.sin(course), speed * np.cos(course), float(body["vertical_speed"])]
-            )
+            rows["imu"].append([float(values["gps_seconds"]), *_counts(values)])
+        elif name.startswith("BESTPOS") and _solved(values):
+            height = float(values["orthometric_height"]) + float(values["undulation"])
+            sigmas = [float(values[f"{key}_std_dev"]) for key in ("longitude", "latitude", "height")]
+            rows["place"].append([tow, float(values["latitude"]), float(values["longitude"]), height, *sigmas])
+        elif name.startswith("BESTVEL") and _solved(values):
+            speed, course = float(values["horizontal_speed"]), np.radians(float(values["ground_track"]))
+            rows["velocity"].append([tow, speed * np.sin(course), speed * np.cos(course), float(values["z"])])
         elif name.startswith("INSPVA"):
-            rows["poses"].append(_pose(body, tow))
+            rows["poses"].append(_pose(values, tow))
     return {"imu": _imu(rows["imu"]), "gnss": _gnss(rows["place"], rows["velocity"]), "poses": _poses(rows["poses"])}
 
 
-def _solved(body: dict[str, Any]) -> bool:
-    return "SOL_COMPUTED" in str(body.get("solution_status", "")) or str(body.get("solution_status")) == "0"
+def _solved(values: dict[str, Any]) -> bool:
+    return int(values.get("solution_status", values.get("status", 1))) == 0
 
 
-def _counts(body: dict[str, Any]) -> list[float]:
-    def of(*names: str) -> float:
-        return next(float(body[name]) for name in names if name in body)
-
-    gyro = [
-        of("x_gyro", "x_gyro_output"),
-        -of("y_gyro", "minus_y_gyro_output", "y_gyro_output"),
-        of("z_gyro", "z_gyro_output"),
-    ]
-    accel = [
-        of("x_accel", "x_accel_output"),
-        -of("y_accel", "minus_y_accel_output", "y_accel_output"),
-        of("z_accel", "z_accel_output"),
-    ]
-    return [*gyro, *accel]
+def _counts(values: dict[str, Any]) -> list[float]:
+    """x, y and z of gyros and accelerometers."""
+    long = "del_ang_body_x" in values
+    gyro, accel = ("del_ang_body", "del_vel_body") if long else ("gyro", "accel")
+    signs = {"x": 1.0, "y": -1.0, "z": 1.0}
+    return [signs[axis] * float(values[f"{sensor}_{axis}"]) for sensor in (gyro, accel) for axis in "xyz"]
 
 
-def _pose(body: dict[str, Any], tow: float) -> list[float]:
-    def of(*names: str) -> float:
-        return next(float(body[name]) for name in names if name in body)
-
-    up = float(body["height"]) + float(
-        body.get("undulation", 0.0)
-    )  # INSPVA's height is the ellipsoid's, INSPVAX adds undulation
-    return [
-        float(body.get("seconds", tow)), of("latitude"), of("longitude"), up, of("east_velocity"), of("north_velocity"),
-        of("up_velocity"), of("roll"), of("pitch"), of("azimuth"),
-    ]  # fmt: skip
+def _pose(values: dict[str, Any], tow: float) -> list[float]:
+    up = values["height"] if "height" in values else values["orthometric_height"] + values["undulation"]
+    names = ("latitude", "longitude", "", "east_vel", "north_vel", "up_vel", "roll", "pitch", "azimuth")
+    return [float(values.get("seconds", tow)), *(float(values[name]) if name else float(up) for name in names)]
 
 
 def _imu(rows: list[list[float]]) -> dict[str, Array]:
-    names = ["time [s]", *(f"dtheta_{x}_counts" for x in "xyz"), *(f"dvel_{x}_counts" for x in "xyz")]
-    names = [name.replace("_counts", "") for name in names]
+    names = [
+        "time [s]",
+        *(f"d_theta_{x}" for x in "xyz"),
+        *(f"d_vel_{x}" for x in "xyz"),
+    ]  # no names of ours: these mean SI
     return dict(zip(names, np.array(rows).T)) if rows else {}
 
 

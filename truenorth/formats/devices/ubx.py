@@ -7,6 +7,7 @@ F9 interface description, ESF-MEAS data types (2^-12 deg/s, 2^-10 m/s^2, 24 bits
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -43,31 +44,28 @@ def tables(path: Path, part: str, topic: str | None = None) -> Tables:
 
 
 def _fix(m: Any) -> tuple[float, ...]:
-    tow = getattr(m, "iTOW", 0)
-    seconds = (
-        float(tow.hour * 3600 + tow.minute * 60 + tow.second + tow.microsecond * 1e-6)
-        if hasattr(tow, "hour")
-        else tow / 1e3
-    )
-    raw = int.from_bytes(m.payload[:4], "little") / 1e3  # the library makes a time of day of it
+    tow = int.from_bytes(m.payload[:4], "little") * 1e-3  # the library makes a time of day of it
     return (
-        raw if raw else seconds, m.lat, m.lon, m.height * 1e-3, m.velE * 1e-3, m.velN * 1e-3, -m.velD * 1e-3,
+        tow, m.lat, m.lon, m.height * 1e-3, m.velE * 1e-3, m.velN * 1e-3, -m.velD * 1e-3,
         m.hAcc * 1e-3, m.vAcc * 1e-3, m.sAcc * 1e-3, float(m.fixType),
     )  # fmt: skip
 
 
 def _values(message: Any) -> list[tuple[int, tuple[str, int], float]]:
+    payload: bytes = message.payload
+    if message.identity == "ESF-RAW":  # blocks of a datum and its tag
+        words = struct.iter_unpack("<II", payload[4 : len(payload) - (len(payload) - 4) % 8])
+    else:
+        tag, flags = struct.unpack_from("<IH", payload)
+        words = ((word, tag) for (word,) in struct.iter_unpack("<I", payload[8 : 8 + 4 * (flags >> 11)]))
     found = []
-    index = 1
-    while hasattr(message, f"dataType_{index:02d}"):
-        kind, raw = getattr(message, f"dataType_{index:02d}"), getattr(message, f"dataField_{index:02d}")
-        tag = getattr(message, f"sTtag_{index:02d}", getattr(message, "timeTag", 0))
+    for word, tag in words:
+        raw, kind = word & 0xFFFFFF, word >> 24 & 0x3F
         value = raw - (1 << 24) if raw >= 1 << 23 else raw
         if kind in GYROS:
             found.append((tag, ("gyro", GYROS[kind]), value * 2.0**-12))
         elif kind in ACCELS:
             found.append((tag, ("accel", ACCELS[kind]), value * 2.0**-10))
-        index += 1
     return found
 
 

@@ -1,0 +1,243 @@
+"""Logs of devices, written by the decoders' own encoders where they have one, read back as the truth they hold."""
+
+import struct
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.formats.corpus.truth import truth
+from truenorth.core.errors import DataError, TruenorthError
+from truenorth.formats import read_gnss, read_imu, read_trajectory
+
+SWAY = truth("swaying", "tactical", 100.0, 10.0)
+TIME = SWAY.time
+TOW = 208800.0
+LAT, LON, ALT = 48.1, 11.5, 500.0
+FRD = lambda v: v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]  # noqa: E731
+
+
+def assert_is_sway(record, atol_gyro, atol_accel, start):
+    assert len(record) == len(TIME)
+    np.testing.assert_allclose(record.time - start, TIME, atol=1e-4)
+    np.testing.assert_allclose(record.gyro, SWAY.gyro, atol=atol_gyro)
+    np.testing.assert_allclose(record.accel, SWAY.accel, atol=atol_accel)
+
+
+def assert_is_at_home(record, count, velocity=(2.0, 1.0, -0.5)):
+    assert len(record) == count
+    np.testing.assert_allclose(np.degrees(record.lat), LAT, atol=1e-6)
+    np.testing.assert_allclose(np.degrees(record.lon), LON, atol=1e-6)
+    np.testing.assert_allclose(record.alt, ALT, atol=1e-3)
+    np.testing.assert_allclose(record.v_n[:, : len(velocity)], np.tile(velocity, (count, 1)), atol=2e-2)
+
+
+def test_ublox(tmp_path):
+    pyubx2 = pytest.importorskip("pyubx2")
+    path = tmp_path / "log.ubx"
+    with path.open("wb") as file:
+        for k, t in enumerate(TIME):
+            if k % 20 == 0:
+                fix = pyubx2.UBXMessage(
+                    "NAV", "NAV-PVT", pyubx2.GET, iTOW=round((TOW + t) * 1e3), lat=LAT, lon=LON, height=500000, velE=2000,
+                    velN=1000, velD=500, hAcc=1000, vAcc=2000, sAcc=100, fixType=3,
+                )  # fmt: skip
+                file.write(fix.serialize())
+            counts = [*np.degrees(SWAY.gyro[k]) * 2**12, *SWAY.accel[k] * 2**10]
+            kinds = (14, 13, 5, 16, 17, 18)
+            words = [kind << 24 | round(value) % (1 << 24) for kind, value in zip(kinds, counts)]
+            payload = bytes(4) + b"".join(struct.pack("<II", word, k * 256) for word in words)
+            file.write(pyubx2.UBXMessage("ESF", "ESF-RAW", pyubx2.GET, payload=payload).serialize())
+    record = read_imu(path)
+    assert_is_sway(record, 1e-5, 1e-3, record.time[0] - TIME[0])
+    assert abs(record.time[0] - TOW - TIME[0]) < 0.11  # the clock is known to the spacing of the fixes
+    fixes = read_gnss(path)
+    assert_is_at_home(fixes, 50)
+    np.testing.assert_allclose(fixes.position_sigma[0], [0.7071, 0.7071, 2.0], atol=1e-3)
+
+
+def test_septentrio(tmp_path):
+    pysbf2 = pytest.importorskip("pysbf2")
+    path = tmp_path / "log.sbf"
+    with path.open("wb") as file:
+        for k in range(10):
+            fix = {"TOW": round(TOW * 1e3) + 1000 * k, "WNc": 2300}
+            place = {
+                "Latitude": np.radians(LAT),
+                "Longitude": np.radians(LON),
+                "Height": ALT,
+                "Vn": 1.0,
+                "Ve": 2.0,
+                "Vu": -0.5,
+            }
+            file.write(pysbf2.SBFMessage("PVTGeodetic", Error=0, **fix, **place).serialize())
+            file.write(
+                pysbf2.SBFMessage("PosCovGeodetic", **fix, Cov_latlat=4.0, Cov_lonlon=1.0, Cov_hgthgt=9.0).serialize()
+            )
+    record = read_gnss(path)
+    assert_is_at_home(record, 10)
+    np.testing.assert_allclose(record.position_sigma, np.tile([1.0, 2.0, 3.0], (10, 1)))
+    assert record.time[0] == TOW
+    with pytest.raises(DataError, match="no rates and specific forces in this sbf log; found positions"):
+        read_imu(path)
+
+
+def ulog_bytes():
+    """A ULog as PX4 writes it: header, flags, formats, subscriptions, data."""
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
+    parts.append(message("F", b"sensor_combined:uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;"))
+    parts.append(message("F", b"sensor_gps:uint64_t timestamp;double latitude_deg;double longitude_deg;double altitude_ellipsoid_m;"
+                         b"float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;float eph;float epv;uint8_t fix_type;"))  # fmt: skip
+    parts += [
+        message("A", struct.pack("<BH", 0, 0) + b"sensor_combined"),
+        message("A", struct.pack("<BH", 0, 1) + b"sensor_gps"),
+    ]
+    gyro, accel = FRD(SWAY.gyro), FRD(SWAY.accel)
+    for k, t in enumerate(TIME):
+        parts.append(message("D", struct.pack("<HQ6f", 0, round(t * 1e6), *gyro[k], *accel[k])))
+        if k % 100 == 0:
+            values = (LAT, LON, ALT, 1.0, 2.0, 0.5, 1.0, 2.0, 3)
+            parts.append(message("D", struct.pack("<HQ3d5fB", 1, round(t * 1e6), *values)))
+    return b"".join(parts)
+
+
+def test_px4(tmp_path):
+    pytest.importorskip("pyulog")
+    path = tmp_path / "log.ulg"
+    path.write_bytes(ulog_bytes())
+    assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
+    assert_is_at_home(read_gnss(path), 10)
+
+
+def dataflash_bytes():
+    """A DataFlash log as ArduPilot writes it: formats, then messages."""
+
+    def form(kind, length, name, types, names):
+        return struct.pack("<BBBBB4s16s64s", 0xA3, 0x95, 0x80, kind, length, name, types, names)
+
+    parts = [form(0x80, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")]
+    parts.append(form(0x81, 3 + 8 + 1 + 24, b"IMU", b"QBffffff", b"TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"))
+    parts.append(form(0x82, 3 + 8 + 2 + 8 + 4 + 12, b"GPS", b"QBBLLefff", b"TimeUS,I,Status,Lat,Lng,Alt,Spd,GCrs,VZ"))
+    gyro, accel = FRD(SWAY.gyro), FRD(SWAY.accel)
+    for k, t in enumerate(TIME):
+        parts.append(struct.pack("<BBBQB6f", 0xA3, 0x95, 0x81, round(t * 1e6), 0, *gyro[k], *accel[k]))
+        if k % 100 == 0:
+            course = np.degrees(np.arctan2(2.0, 1.0))
+            values = (0, 3, round(LAT * 1e7), round(LON * 1e7), round(ALT * 100), np.hypot(1, 2), course, 0.5)
+            parts.append(struct.pack("<BBBQBBiiifff", 0xA3, 0x95, 0x82, round(t * 1e6), *values))
+    return b"".join(parts)
+
+
+def test_ardupilot(tmp_path):
+    pytest.importorskip("pymavlink")
+    path = tmp_path / "00000001.bin"
+    path.write_bytes(dataflash_bytes())
+    assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
+    assert_is_at_home(read_gnss(path), 10)
+
+
+def test_mavlink(tmp_path):
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    path = tmp_path / "log.tlog"
+    link = mavutil.mavlink.MAVLink(SimpleNamespace(write=lambda _: None), srcSystem=1, srcComponent=1)
+    gyro, accel = FRD(SWAY.gyro), FRD(SWAY.accel)
+    with path.open("wb") as file:
+
+        def write(message, t):
+            file.write(struct.pack(">Q", 1_700_000_000_000_000 + round(t * 1e6)) + message.pack(link))
+
+        for k, t in enumerate(TIME):
+            write(link.highres_imu_encode(round(t * 1e6), *accel[k], *gyro[k], 0, 0, 0, 0, 0, 0, 0, 63), t)
+            if k % 100 == 0:
+                course = round(np.degrees(np.arctan2(2.0, 1.0)) * 100)
+                place = (round(LAT * 1e7), round(LON * 1e7), round(ALT * 1e3))
+                write(
+                    link.gps_raw_int_encode(
+                        round(t * 1e6), 3, *place, 100, 100, round(np.hypot(1, 2) * 100), course, 9
+                    ),
+                    t,
+                )
+    assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
+    assert_is_at_home(read_gnss(path), 10, (2.0, 1.0))
+
+
+def novatel_line(name, body, tow):
+    """An ASCII log with its checksum, as an OEM7 receiver writes it."""
+    head = f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,cdba,16809;"
+    text = head + body
+    crc = 0
+    for byte in text.encode():
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ 0xEDB88320 if crc & 1 else crc >> 1
+    return f"#{text}*{crc:08x}\r\n"
+
+
+def test_novatel(tmp_path):
+    pytest.importorskip("novatel_edie")
+    path = tmp_path / "log.gps"
+    place, errors = f"{LAT},{LON},{ALT - 45.0},45.0", ",".join(["0.1"] * 9)
+    course = f"{np.hypot(1, 2)},{np.degrees(np.arctan2(2, 1))}"
+    lines = []
+    for k in range(10):
+        fix = f'SOL_COMPUTED,SINGLE,{place},WGS84,2.0,1.0,3.0,"",0.0,0.0,12,12,12,0,00,06,00,33'
+        lines.append(novatel_line("BESTPOSA", fix, TOW + k))
+        lines.append(novatel_line("BESTVELA", f"SOL_COMPUTED,DOPPLER_VELOCITY,0.15,0.0,{course},-0.5,0.0", TOW + k))
+        ins = f"INS_SOLUTION_GOOD,INS_RTKFIXED,{place},1.0,2.0,-0.5,1.5,-0.7,123.0,{errors},0,0"
+        lines.append(novatel_line("INSPVAXA", ins, TOW + k))
+    path.write_text("".join(lines))
+    record = read_gnss(path)
+    assert_is_at_home(record, 10)
+    np.testing.assert_allclose(record.position_sigma, np.tile([1.0, 2.0, 3.0], (10, 1)))
+    assert record.time[0] == TOW
+    solution = read_trajectory(path)
+    assert_is_at_home(solution, 10)
+
+
+def test_rtklib(tmp_path):
+    path = tmp_path / "rover.pos"
+    head = ("% program   : RTKPOST ver.2.4.2\n% ( lat/lon/height=WGS84/ellipsoidal,Q=1:fix )\n"
+            "%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)\n")  # fmt: skip
+    days = [f"2024/03/05 10:00:{k:02d}.000 {LAT:14.9f} {LON:14.9f} {ALT:10.4f} 1 9 2.0 1.0 3.0" for k in range(10)]
+    weeks = [f"2304 {TOW + k:.3f} {LAT:14.9f} {LON:14.9f} {ALT:10.4f} 1 9 2.0 1.0 3.0" for k in range(10)]
+    for rows, start in ((days, 1709632800.0), (weeks, TOW)):
+        path.write_text(head + "\n".join(rows) + "\n")
+        record = read_gnss(path)
+        np.testing.assert_allclose(np.degrees(record.lat), LAT)
+        np.testing.assert_allclose(record.alt, ALT)
+        np.testing.assert_allclose(record.position_sigma, np.tile([1.0, 2.0, 3.0], (10, 1)))
+        np.testing.assert_allclose(record.time, start + np.arange(10.0), atol=1e-6)
+
+
+def test_the_gnss_text_of_kf_gins(tmp_path):
+    path = tmp_path / "gnss.txt"
+    path.write_text("\n".join(f"{TOW + k:.3f} {LAT:.9f} {LON:.9f} {ALT:.4f} 0.02 0.01 0.03" for k in range(10)) + "\n")
+    record = read_gnss(path)
+    np.testing.assert_allclose(np.degrees(record.lat), LAT)
+    np.testing.assert_allclose(record.position_sigma, np.tile([0.01, 0.02, 0.03], (10, 1)))
+
+
+NOISE = [
+    b"",
+    bytes(200),
+    b"\xb5\x62\x10\x03",
+    b"\xa3\x95\x80" + bytes(range(256)),
+    np.random.default_rng(3).bytes(4000),
+]
+
+
+@pytest.mark.parametrize(
+    "name", ["log.ubx", "log.sbf", "log.ulg", "log.tlog", "log.gps", "log.bag", "log.mcap", "a.bin"]
+)
+@pytest.mark.parametrize("content", NOISE, ids=range(len(NOISE)))
+def test_damage_is_one_message(name, content, tmp_path):
+    path = tmp_path / name
+    path.write_bytes(content)
+    for read in (read_imu, read_gnss):
+        with pytest.raises(TruenorthError) as error:
+            read(path)
+        assert name in str(error.value)
