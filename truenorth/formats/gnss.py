@@ -82,7 +82,8 @@ def read_gnss(
     """
     path = Path(path)
     try:
-        if format == "nmea" or (format is None and path.is_file() and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))):
+        by_content = format is None and path.is_file() and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))
+        if format == "nmea" or by_content:
             return read_nmea(path)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
