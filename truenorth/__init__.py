@@ -69,6 +69,7 @@ if TYPE_CHECKING:
         write_record,
     )
     from truenorth.navigation import Mounting, Navigation, navigate
+    from truenorth.navigation.known import known_start, with_heading
     from truenorth.quality import inspect
     from truenorth.records import (
         GnssRecord,
@@ -118,6 +119,7 @@ _HOMES = {
     "align": "alignment",
     "imu_spec": "records.specs",
     "inspect": "quality",
+    "known_start": "navigation.known",
     "load": "results",
     "navigate": "navigation",
     "plot": "results",
@@ -134,6 +136,7 @@ _HOMES = {
     "run_campaign": "campaign",
     "save": "results",
     "simulate": "simulation",
+    "with_heading": "navigation.known",
     "write_imu": "formats",
     "write_record": "formats",
     "write_report": "report",
@@ -172,6 +175,7 @@ __all__ = [
     "align",
     "imu_spec",
     "inspect",
+    "known_start",
     "load",
     "navigate",
     "plot",
@@ -188,6 +192,7 @@ __all__ = [
     "run_campaign",
     "save",
     "simulate",
+    "with_heading",
     "write_imu",
     "write_record",
     "write_report",

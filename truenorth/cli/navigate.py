@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +14,14 @@ import typer
 from truenorth.cli.aiding_options import Sensors
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.options import grouped
-from truenorth.cli.reading import Log, Reading
+from truenorth.cli.reading import Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
 
 if TYPE_CHECKING:
     from truenorth.damping.options import Damper
     from truenorth.navigation import Navigation
+    from truenorth.records import ImuRecord
+    from truenorth.state.state import Start
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -30,6 +33,7 @@ Examples:
   truenorth navigate log.csv --start start --odometer odo.csv --estimate scale,mounting --zupt auto
   truenorth navigate log.csv --start start --velocity dvl.csv --altitude fixed --json
   truenorth navigate log.csv --start start --baro baro.csv --altitude baro --offset -0.35
+  truenorth navigate log.csv --heading 123,1 --position 48.1,11.5,520 --imu consumer --gnss gnss.csv
   truenorth navigate log.csv --start start --damping augmented --velocity log.csv -o damped
 
 Exit codes: 0 navigated; 2 wrong usage; 3 bad data; 4 the alignment has no usable heading, or the measurements contradict
@@ -72,9 +76,77 @@ class Damping:
         )
 
 
+@dataclass(frozen=True)
+class KnownStart:
+    """Options of a start of which the heading is known."""
+
+    PANEL: ClassVar = "A start that is known"
+    heading: Annotated[
+        str | None,
+        typer.Option(
+            help="Heading and its one-sigma, deg: '123,1'; with --position, or with a --start that has levelled."
+        ),
+    ] = None
+    position: Annotated[
+        str | None,
+        typer.Option(help="Where the log begins: lat,lon or lat,lon,alt in degrees and metres; needs --imu."),
+    ] = None
+    pitch: Annotated[float | None, typer.Option(help="Deg; without it the level is that of the log's beginning.")] = (
+        None
+    )
+    roll: Annotated[float | None, typer.Option(help="Deg; with --pitch.")] = None
+
+    def given(self) -> tuple[float, float]:
+        """Heading and sigma, rad."""
+        heading, sigma = numbers_of(self.heading or "", "--heading", 2, "heading and its one-sigma in degrees")
+        return math.radians(heading), math.radians(sigma)
+
+    def of_folder(self, folder: Path | None) -> Start | None:
+        """The start that a folder holds, turned to the heading; None: it comes from the log."""
+        from truenorth.core.errors import UsageError
+        from truenorth.navigation.start import read_start, start_from_alignment
+
+        if folder is None:
+            if self.heading is None or self.position is None:
+                raise UsageError("no start; expected --start FOLDER, or --heading DEG,SIGMA with --position LAT,LON")
+            self.given()
+            return None
+        if self.position is not None or self.pitch is not None or self.roll is not None:
+            raise UsageError("--start has place and level; expected --position, --pitch and --roll without it")
+        if self.heading is None:
+            return read_start(folder)[0]
+        from truenorth.navigation.known import with_heading
+        from truenorth.results import load
+
+        return start_from_alignment(with_heading(load(folder), *self.given()))
+
+    def of_log(self, record: ImuRecord, imu: str) -> Start:
+        """The start from heading, place and the log's own level."""
+        from truenorth.core.errors import UsageError
+        from truenorth.core.position import Position
+        from truenorth.navigation.known import known_start
+
+        text = self.position or ""
+        place = numbers_of(text, "--position", 2 if text.count(",") == 1 else 3, "lat,lon or lat,lon,alt")
+        if (self.pitch is None) != (self.roll is None):
+            raise UsageError("--pitch or --roll alone; expected both, or none: the level then comes from the log")
+        level = (
+            {} if self.pitch is None else {"pitch": math.radians(self.pitch), "roll": math.radians(self.roll or 0.0)}
+        )
+        return known_start(record, Position.from_degrees(*place), imu, *self.given(), **level)
+
+    def imu_of(self, folder: Path | None) -> Any:
+        """The specification in the folder, where a heading turns its start."""
+        from truenorth.results import load
+
+        return None if self.heading is None or folder is None else load(folder).imu
+
+
 def navigate(
     log: Log,
-    start: Annotated[Path, typer.Option(help="Folder that `truenorth align -o` wrote.", show_default=False)],
+    start: Annotated[
+        Path | None, typer.Option(help="Folder that `truenorth align -o` wrote.", show_default=False)
+    ] = None,
     altitude: Annotated[
         str | None,
         typer.Option(help="fixed, free, baro or gnss; by default what the logs allow, else fixed.", show_default=False),
@@ -101,33 +173,39 @@ def navigate(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
     *,
+    known: KnownStart,
     sensors: Sensors,
     reading: Reading,
     damped: Damping,
 ) -> None:
     """Carry an IMU log on from an alignment: position, velocity and attitude with their uncertainty."""
     from truenorth.core.atomic import writable_folder
+    from truenorth.core.errors import UsageError
     from truenorth.navigation import navigate as navigate_record
-    from truenorth.navigation.start import read_start
     from truenorth.records.calibration import Calibration
 
     sensors.antenna(), sensors.wheel()  # what is wrong with them, before a long log is read
     stops = _stops(zupt)
     damper = damped.damper()
-    begin, _, _ = read_start(start)
+    if (begin := known.of_folder(start)) is None and imu is None:
+        raise UsageError(
+            "the specification of the IMU is missing; expected --imu navigation, tactical, ... or a YAML file"
+        )
     if output is not None:
         writable_folder(output)
     paths: list[Path] = []
     with stages(quiet=as_json) as tell:
         tell(f"reading {log.name}")
+        record = reading.read(log)
+        begin = begin or known.of_log(record, imu or "")
         result = navigate_record(
-            reading.read(log),
-            start,
+            record,
+            begin if known.heading is not None or start is None else start,
             aid=sensors.aids(begin.wheel),
             altitude=altitude,  # type: ignore[arg-type]  # checked there, with the choices in the message
             zupt=stops,
             smooth=smooth,
-            imu=imu,
+            imu=imu or known.imu_of(start),
             scale_factors="scale_factors" in sensors.parts,
             calibration=None if calibration is None else Calibration.from_file(calibration),
             output=every,

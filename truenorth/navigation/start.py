@@ -48,7 +48,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
         )
     moving = alignment.moving or alignment.transfer
     if moving is not None:
-        start = _moving_start(
+        start = moving_start(
             alignment.time,
             alignment.C_nb,
             moving.v_n,
@@ -136,7 +136,7 @@ def _by_static_limits(
     return Handover(C_nb, accel_bias, P, prior)
 
 
-def _moving_start(
+def moving_start(
     time: float,
     C_nb: Array,
     v_n: Array,
@@ -221,7 +221,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         if "P" in n:
             v_n, P = np.array(n["v_n"], dtype=np.float64), np.array(n["P"], dtype=np.float64)
             biases = numbers["gyro_bias"], numbers["accel_bias"]
-            start = _moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
+            start = moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
             start = replace(start, wheel=_found_wheel(s))
             return start, spec, str(s.get("source", ""))
         gyro_bias = numbers.pop("gyro_bias")

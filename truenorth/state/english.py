@@ -149,6 +149,7 @@ SENTENCES = {
     "log.silent": "velocity log: silent for {length:.0f} s after {time:.0f} s; undamped in between",
     "log.rejected": "velocity log: {count} measurements rejected by the filter's gate",
     "damping.internal": "internal damping: what the vehicle's own manoeuvres add is not in the bands",
+    "heading.given": "heading {heading:.3f} deg ± {sigma:angle} is given",
     # ---- height
     "height.free": "height is carried on by velocity alone: no sensor of height is given",
     "height.fixed": "height is held fixed, as at sea",

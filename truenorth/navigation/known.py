@@ -1,0 +1,201 @@
+"""A start of which the heading is known: from a survey, a compass, two antennas, a painted line.
+
+An alignment that knows its heading's error together with its biases takes a given heading as a measurement: heading and east gyro
+bias of a base at rest hide each other, and to know the one tells the other. An alignment that has levelled only is turned to the
+heading; the level part of the earth's rate, which it could not tell from gyro bias, is then known too.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.alignment.recipes import align
+from truenorth.alignment.result import Alignment
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_jacobian
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.position import Position
+from truenorth.navigation.start import moving_start, positive, start_from_alignment
+from truenorth.quality.regimes import motion_summary
+from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import note
+from truenorth.state.state import Start
+
+Array = NDArray[np.float64]
+
+SHORTEST_LEVEL, LONGEST_LEVEL = 5.0, 120.0  # s of log, from which the level is taken
+VELOCITY_SIGMA = 0.1  # m/s, of a vehicle whose attitude is given whole
+LEVEL_SIGMA = math.radians(0.5)
+
+
+def with_heading(alignment: Alignment, heading: float, sigma: float) -> Alignment:
+    """An alignment whose heading is known from elsewhere.
+
+    Parameters
+    ----------
+    alignment : Alignment
+        Of a base that stays: aligned, or level only.
+    heading : float, rad
+        Of the forward axis, clockwise from true north.
+    sigma : float, rad
+        Its one-sigma error.
+
+    Returns
+    -------
+    Alignment
+        With status ``aligned``.
+
+    Raises
+    ------
+    UsageError
+        A sigma that is not positive, or an alignment on the move, which has its heading.
+    AlignmentError
+        An alignment whose level is not to be trusted either.
+    """
+    if not (math.isfinite(heading) and 0.0 < sigma < math.inf):
+        raise UsageError(f"heading {heading}, sigma {sigma}; expected a finite angle and a positive sigma, rad")
+    if alignment.moving is not None or alignment.transfer is not None:
+        raise UsageError("a heading is given for an alignment on the move; expected one of a base that stays")
+    if alignment.status == "inconsistent":
+        raise AlignmentError(
+            f"{alignment.source}: the alignment is inconsistent; its level is not to be trusted either"
+        )
+    known = _measured if alignment.handover is not None and alignment.heading_known else _turned
+    answer = known(alignment, heading, sigma)
+    said = note("heading.given", heading=math.degrees(heading % (2.0 * math.pi)), sigma=sigma)
+    return replace(answer, status="aligned", evidence=(*answer.evidence, said), history=None)
+
+
+def _measured(alignment: Alignment, heading: float, sigma: float) -> Alignment:
+    """A Kalman update of the joint estimate; at level ``heading_hat - heading = phi_U``."""
+    joint = alignment.handover
+    assert joint is not None  # asked before
+    off = math.remainder(alignment.heading - heading, 2.0 * math.pi)
+    H = np.concatenate([euler_jacobian(alignment.C_nb)[0], np.zeros(len(joint.P) - 3)])
+    gain = joint.P @ H / (H @ joint.P @ H + sigma**2)
+    x = gain * off
+    left = np.eye(len(gain)) - np.outer(gain, H)
+    P = left @ joint.P @ left.T + sigma**2 * np.outer(gain, gain)
+    C_nb = dcm_from_rotation_vector(x[:3]) @ alignment.C_nb
+    return replace(
+        alignment,
+        C_nb=C_nb,
+        phi_covariance=P[:3, :3],
+        phi_floor=_lowered(alignment.phi_floor, float(P[2, 2])),
+        gyro_bias=alignment.gyro_bias + x[3:6],
+        gyro_bias_sigma=np.sqrt(np.diag(P)[3:6]),
+        handover=replace(
+            joint, C_nb=dcm_from_rotation_vector(x[:3]) @ joint.C_nb, accel_bias=joint.accel_bias + x[6:9], P=P
+        ),
+    )
+
+
+def _turned(alignment: Alignment, heading: float, sigma: float) -> Alignment:
+    """The level kept, turned about the vertical to the heading; the earth's level rate taken off the gyro bias."""
+    C_nb = dcm_from_euler(heading, alignment.pitch, alignment.roll)
+    turn = C_nb @ alignment.C_nb.T
+    P, floor = (turn @ M @ turn.T for M in (alignment.phi_covariance, alignment.phi_floor))
+    J = euler_jacobian(C_nb)[0]
+    of_heading = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-J[0] / J[2], -J[1] / J[2], 1.0 / J[2]]])
+    P[2], P[:, 2] = 0.0, 0.0
+    P[2, 2] = sigma**2
+    P = of_heading @ P @ of_heading.T  # of phi, from that of the level and the heading
+    gyro_bias, gyro_sigma = alignment.gyro_bias, alignment.gyro_bias_sigma
+    if not alignment.heading_known:
+        rate, level = EARTH_RATE * math.cos(alignment.position.lat), 1.0 - C_nb[2] ** 2
+        gyro_bias = gyro_bias - rate * C_nb[1]  # north part of the earth's rate along each axis
+        variance = gyro_sigma**2 - 0.5 * rate**2 * level + (rate * min(sigma, 1.0)) ** 2 * level
+        gyro_sigma = np.sqrt(np.maximum(variance, 0.01 * gyro_sigma**2))
+    return replace(
+        alignment,
+        C_nb=C_nb,
+        phi_covariance=P,
+        phi_floor=_lowered(floor, 0.0),
+        gyro_bias=gyro_bias,
+        gyro_bias_sigma=gyro_sigma,
+        handover=None,
+    )
+
+
+def _lowered(floor: Array, variance: float) -> Array:
+    """The floor, that of heading no larger than this."""
+    scale = np.array([1.0, 1.0, math.sqrt(min(1.0, variance / max(float(floor[2, 2]), 1e-30)))])
+    return floor * np.outer(scale, scale)
+
+
+def known_start(
+    record: ImuRecord,
+    place: Position | tuple[float, ...],
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any],
+    heading: float,
+    sigma: float,
+    *,
+    pitch: float | None = None,
+    roll: float | None = None,
+    level_sigma: float = LEVEL_SIGMA,
+    velocity: ArrayLike = (0.0, 0.0, 0.0),
+    velocity_sigma: float = VELOCITY_SIGMA,
+) -> Start:
+    """A start of navigation from a known heading and place.
+
+    Parameters
+    ----------
+    record : ImuRecord or DataFrame
+    place : Position or (lat, lon[, alt])
+        At the start.
+    imu : ImuSpec, str, path or mapping
+    heading, sigma : float, rad
+    pitch, roll : float, rad, optional
+        Both or none. Left out, the level is that of the log, whose beginning the vehicle then spends at rest or swaying.
+    level_sigma : float, rad
+        Of a given pitch and roll.
+    velocity, velocity_sigma : (3,) floats and float, m/s
+        East, north, up, where pitch and roll are given.
+
+    Returns
+    -------
+    Start
+        At the end of what was levelled on; at the record's beginning where pitch and roll are given.
+
+    Raises
+    ------
+    UsageError
+        Pitch without roll; sigmas that are not positive.
+    AlignmentError
+        The vehicle moves from the first seconds on, and no level is given.
+    """
+    log, spec, at = ImuRecord.of(record), imu_spec(imu), Position.of(place)
+    if (pitch is None) != (roll is None):
+        raise UsageError("pitch or roll is given alone; expected both, or none: the level then comes from the log")
+    if pitch is None or roll is None:
+        return start_from_alignment(with_heading(align(_resting(log), at, spec), heading, sigma))
+    if not (sigma > 0.0 and level_sigma > 0.0 and velocity_sigma > 0.0):
+        raise UsageError(f"sigmas {sigma:g}, {level_sigma:g} rad, {velocity_sigma:g} m/s; expected all above zero")
+    C_nb = dcm_from_euler(heading, pitch, roll)
+    phi_of = np.linalg.inv(euler_jacobian(C_nb))
+    P = np.zeros((15, 15))
+    P[:3, :3] = phi_of @ np.diag([sigma, level_sigma, level_sigma]) ** 2 @ phi_of.T
+    P[3:6, 3:6] = velocity_sigma**2 * np.eye(3)
+    P[6:9, 6:9] = np.diag([at.horizontal_sigma, at.horizontal_sigma, at.vertical_sigma]) ** 2
+    P[9:, 9:] = np.diag(spec.bias_variance)
+    zero, begin = np.zeros(3), float(log.time[0] - log.interval)
+    return moving_start(begin, C_nb, np.array(velocity, dtype=np.float64), positive(P), zero, zero, at, spec)
+
+
+def _resting(record: ImuRecord) -> ImuRecord:
+    """The beginning of the log, in which the vehicle goes nowhere."""
+    begin = float(record.time[0])
+    goes = [r.start for r in motion_summary(record).regimes if r.kind in ("moving", "rotating")]
+    end = min([begin + LONGEST_LEVEL, float(record.time[-1]), *goes])
+    if end - begin < SHORTEST_LEVEL:
+        raise AlignmentError(
+            f"{record.source}: the vehicle moves from {end:.1f} s on; {SHORTEST_LEVEL:g} s at rest are needed: give pitch and roll"
+        )
+    return record.between(None, end)
