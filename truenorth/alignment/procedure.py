@@ -31,6 +31,7 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.models.static import STATES, StaticModel
 from truenorth.models.static_force import gained_velocity
+from truenorth.quality.record_evidence import record_evidence
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
@@ -131,7 +132,8 @@ def align_base(
     moves = _moves_from(task.motion)
     if chosen == "swaying" and _all_along(task.motion) and float(np.max(answer.disturbance[:2])) < STAYS:
         moves = None  # lever arm and bounded motion explain all of it
-    evidence = leaves(moves) + base_evidence(answer, found.check, found.drift, settled=found.settled)
+    evidence = record_evidence(task.record, task.motion) + leaves(moves)
+    evidence += base_evidence(answer, found.check, found.drift, settled=found.settled)
     return judged(answer, evidence, heading_limit)
 
 

@@ -14,11 +14,14 @@ from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import Alignment, Status
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity
-from truenorth.state.evidence import Effect, Evidence, Figure, contradiction, note
+from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
+
+
+FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
 
 
 def judged(
@@ -58,7 +61,7 @@ def judged(
             and stays,
             able=stays and bias < heading_limit * EARTH_RATE * math.cos(lat),
         ),
-        evidence,
+        [*evidence, *bias_evidence(answer)],
     )
     answer = grown(answer, verdict.added)
     reached = [] if verdict.finding == "inconsistent" else _reached(answer, verdict, heading_limit, remedies)
@@ -136,6 +139,9 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
                 ("height", "units", "specification"),
             )
         )
+    speed = float(np.max(answer.disturbance[:2]))
+    if speed > FASTEST_BASE:
+        found.append(contradiction("base.fast", speed=speed))
     return found + model_evidence(drift, settled=settled)
 
 
@@ -143,6 +149,32 @@ def model_evidence(drift: Drift | None, *, settled: bool) -> list[Evidence]:
     """What contradicts the model of a base that stays: it drifts, or the passes did not come to rest."""
     found = [] if drift is None or not drift.found else [drift.evidence()]
     return found if settled else [*found, contradiction("base.unsettled")]
+
+
+def bias_evidence(answer: Alignment) -> list[Evidence]:
+    """Estimated biases that are larger than the specification allows.
+
+    The one that takes the blame may be right, and the model wrong; on a base that stays, heading is what a gyro spoils, and
+    level what an accelerometer does.
+    """
+    found = []
+    place = answer.position
+    g = float(normal_gravity(place.lat, place.alt))
+    stays = answer.moving is None and answer.transfer is None
+    for kind, bias, sigma, prior in (
+        ("gyro", answer.gyro_bias, answer.gyro_bias_sigma, answer.gyro_bias_prior),
+        ("accel", answer.accel_bias, answer.accel_bias_sigma, answer.accel_bias_prior),
+    ):
+        for axis in range(3):
+            size, allowed = abs(float(bias[axis])), float(prior[axis])
+            if size <= limit("specification") * math.hypot(allowed, float(sigma[axis])):
+                continue
+            effect = ANY_EFFECT
+            if stays:
+                effect = Effect(heading=UNIFORM_SIGMA) if kind == "gyro" else Effect(level=size / g)
+            figures: dict[str, Figure] = {"axis": "xyz"[axis], "bias": size, "allowed": allowed, "imu": answer.imu_source}
+            found.append(Evidence(f"bias.{kind}", figures, "bounded", effect, ("specification",)))
+    return found
 
 
 def leaves(time: float | None) -> list[Evidence]:

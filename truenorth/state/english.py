@@ -13,6 +13,11 @@ TITLES = {
     "drift": "The base drifts",
     "rate": "The gyros contradict the place or their specification",
     "force": "The accelerometers contradict the place or their specification",
+    "record": "The log has faults",
+    "tilt": "The gyros contradict the accelerometers",
+    "bias": "The biases contradict the specification",
+    "encoder": "The indexer's angles contradict the gyros",
+    "gnss": "GNSS positions and velocities contradict each other",
     "table": "The table was touched",
     "innovations": "The measurements contradict the track",
     "second_look": "The measurements contradict how their sensors sit",
@@ -84,6 +89,43 @@ SENTENCES = {
         "the table was touched, or an accelerometer's offset jumped, at about {time:.0f} s: the level specific force steps by "
         "{step:mg|.2g} mg (as a tilt of {tilt:angle} would make it; usual {usual:mg|.2g} mg), and the gyros show no turn"
     ),
+    # ---- the record itself
+    "record.saturated": "{text}",
+    "record.constant_channel": "{text}",
+    "record.gyro_unit": "{text}",
+    "record.accel_unit": "{text}",
+    "record.no_gravity": "{text}",
+    "record.repeated_rows": "{text}",
+    "record.frozen": "{text}",
+    "record.gaps": "{text}",
+    "record.jitter": "{text}",
+    "record.time_unit": "{text}",
+    "tilt.axes": (
+        "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
+        "gyro columns x y z read as {axes}"
+    ),
+    "tilt.gyros_late": (
+        "the gyros are {delay:.3f} s late against the accelerometers: the turns of gravity fit {best:.2g} m/s^2 then, "
+        "{given:.2g} m/s^2 as given"
+    ),
+    "tilt.gyros_early": (
+        "the gyros are {delay:.3f} s early against the accelerometers: the turns of gravity fit {best:.2g} m/s^2 then, "
+        "{given:.2g} m/s^2 as given"
+    ),
+    "bias.gyro": (
+        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu}) allows {allowed:deg/h|} deg/h"
+    ),
+    "bias.accel": (
+        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu}) allows {allowed:ug|} ug"
+    ),
+    "base.fast": "a base that stays would move with {speed:.3g} m/s RMS",
+    "encoder.turns": (
+        "the base would turn by {given:deg/s|.2g} deg/s RMS with these angles of the indexer, and by {best:deg/s|.2g} deg/s with "
+        "{reading:term}"
+    ),
+    "gnss.turned": (
+        "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
+    ),
     # ---- measurements against the prediction
     "innovations.rejected": (
         "{name}: {rejected} of {count} measurements rejected: they contradict the track (half of them by more than "
@@ -119,6 +161,7 @@ SENTENCES = {
         "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
         "specification ({imu}) allows, or the master drifts"
     ),
+    "transfer.jumps": "the master's solution jumps {count} times: it does not fit this slave",
     "transfer.more_jumps": "{count} more jumps of the master were followed",
     "transfer.open": "this motion does not separate them well: {states}",
     # ---- clocks, arms, scales and mountings left open
@@ -167,6 +210,9 @@ REMEDIES = {
     "units": "check the units",
     "specification": "check the specification",
     "source": "check axes, units, clock, lever arm and sigmas of that sensor",
+    "common_clock": "check that both come from one clock and one filter",
+    "grid_north": "check whether they count from grid north",
+    "encoder": "check the order, signs, zero and clock of the indexer's angles",
     "sensor_axes": "check its axes and unit",
     "imu_axes": "check the IMU's axes",
     "mounting": "give the mounting",
@@ -201,4 +247,8 @@ REMEDIES = {
     "north": "an odometer tells nothing of north; use gyros that see the earth turn, or GNSS",
 }
 
-TERMS = {"earth": "the earth's rate"}
+TERMS = {
+    "exchanged": "their axes exchanged",
+    "signs": "other signs",
+    "rate": "another clock rate",
+}

@@ -1,0 +1,243 @@
+"""Tilt by gyros against tilt by accelerometers, while a base sways or turns: exchanged, flipped, late and scaled axes.
+
+Carried by the right gyros into axes that do not turn, the specific force of a base that stays is gravity's reaction, the lever
+arm's ``(w' x + w x w x) r``, and the base's own accelerations, whose mean is zero. Wrong gyros leave gravity swinging in these
+axes. Each reading of the columns (48 signed orders, times shifts of the gyros against the accelerometers) is tried: over short
+pieces, so that biases and the earth do not matter, a constant and a slope are taken off, then the best arm for all, and what is
+left is compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.attitude import dcm_from_quaternion
+from truenorth.records import ImuRecord
+from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.inertial_integration import integrate_attitude
+
+Array = NDArray[np.float64]
+
+CELL = 0.2  # s, over which rates and forces are averaged
+PIECE = 20.0  # s, of a constant and a slope: biases and the earth turn gravity by less than a straight line
+MOST_TIME = 160.0  # s of a log that are looked at: its middle
+LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
+SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
+PLAIN = (
+    0.05  # of the squares that gyros at rest would leave: what is left where the gyros are right, but for rough bases
+)
+CLEARER = 3.0  # times smaller squares that another reading must leave
+EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may leave at most
+SURE = 6.0  # sigmas of a small delay
+LEAST_DELAY = 0.01  # s: a shorter one is that of sensors' own filters
+IDENTITY = "+x +y +z"
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """What the readings leave.
+
+    Attributes
+    ----------
+    given : float, m/s^2
+        RMS of specific force that the gyros as given do not explain.
+    unturned : float, m/s^2
+        The same with the gyros at rest.
+    best : float, m/s^2
+        Of the best reading.
+    axes : str
+        The best reading of the gyro columns x, y, z, such as ``+y +x +z``.
+    delay, delay_sigma : float, s
+        By which the gyros are late with the columns as given, and its one-sigma.
+    tilt : float, rad
+        RMS of the tilt that such a delay makes.
+    """
+
+    given: float
+    unturned: float
+    best: float
+    axes: str
+    delay: float
+    delay_sigma: float
+    tilt: float
+
+    def evidence(self) -> list[Evidence]:
+        """Another reading that explains what the one given does not."""
+        figures: dict[str, Figure] = {"given": self.given, "best": self.best, "axes": self.axes, "delay": abs(self.delay)}
+        explains = self.best**2 < min(self.given**2 / CLEARER, EXPLAINED * self.unturned**2)
+        if explains and self.axes != IDENTITY:
+            return [Evidence("tilt.axes", figures, "unknown", ANY_EFFECT, ("imu_axes",))]
+        late = "tilt.gyros_late" if self.delay > 0.0 else "tilt.gyros_early"
+        if explains:
+            return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
+        if abs(self.delay) < max(LEAST_DELAY, SURE * self.delay_sigma):
+            return []
+        return [Evidence(late, figures, "bounded", Effect(level=self.tilt), ("common_clock",))]
+
+
+def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) -> Tilt | None:
+    """Try all readings of the gyros on the middle of a record.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    C_sb : callable, optional
+        Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
+
+    Returns
+    -------
+    Tilt or None
+        None where the IMU does not turn enough, or the record is too short.
+    """
+    cells = _cells(record)
+    if cells is None:
+        return None
+    theta, force, interval, middle = cells
+    bench = _Bench(force, interval, None if C_sb is None else C_sb(middle.ravel()).reshape(*middle.shape, 3, 3))
+    turned = np.cumsum(theta - theta.mean(axis=1, keepdims=True), axis=1)
+    if math.sqrt(float(np.mean(np.sum(turned**2, axis=2)))) < LEAST_TURN:
+        return None
+    unturned, given = bench.left(np.zeros_like(theta)), bench.left(theta)
+    best, axes, delay = given, IDENTITY, 0.0
+    few = [(o, s) for o, s in READINGS if _is_near(o, s)]
+    likely = min(bench.left(theta[..., order] * signs) for order, signs in few)
+    rough = given**2 > PLAIN * unturned**2
+    for order, signs in READINGS if rough or 1.5 * likely**2 < given**2 else []:
+        left = bench.left(theta[..., order] * signs)
+        if left < 0.99 * best:
+            best, axes = left, _columns(order, signs)
+    squares = {shift: bench.left(_shifted(theta, shift / interval)) ** 2 for shift in SHIFTS if rough} | {0.0: given**2}
+    shift = min(squares, key=squares.__getitem__)
+    if squares[shift] < min(0.98 * best**2, 0.5 * given**2):
+        delay, small = _lowest(squares, shift)
+        return Tilt(given, unturned, math.sqrt(small), IDENTITY, delay, 0.0, abs(delay) * bench.rate(theta))
+    late, sigma = bench.late(theta)
+    return Tilt(given, unturned, best, axes, late, sigma, abs(late) * bench.rate(theta))
+
+
+READINGS = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
+
+
+def _is_near(order: tuple[int, ...], signs: tuple[float, ...]) -> bool:
+    """One exchange, one sign, or a cycle."""
+    return (order == (0, 1, 2) and sum(signs) == 1.0) or (order != (0, 1, 2) and sum(signs) == 3.0)
+
+
+def _lowest(squares: dict[float, float], at: float) -> tuple[float, float]:
+    """Where the parabola through the lowest point and its neighbours is lowest, and its value there."""
+    shifts = sorted(squares)
+    k = min(max(shifts.index(at), 1), len(shifts) - 2)
+    x, y = np.array(shifts[k - 1 : k + 2]), np.array([squares[s] for s in shifts[k - 1 : k + 2]])
+    a, b, c = np.polyfit(x, y, 2)
+    low = float(np.clip(-b / (2.0 * a), x[0], x[-1])) if a > 0.0 else at
+    return low, max(float(a * low**2 + b * low + c), 1e-12)
+
+
+class _Bench:
+    """Specific force (P, L, 3) of pieces, and what readings of the gyros leave of it."""
+
+    def __init__(self, force: Array, interval: float, C_sb: Array | None) -> None:
+        self.force, self.interval, self.C_sb = force, interval, C_sb
+        self.basis = _line(force.shape[1])
+
+    def _carried(self, theta: Array) -> tuple[Array, Array]:
+        """Force and the arm's columns (P L 3, 4) in axes that do not turn, pieces freed of a line, and ``C_is`` (P, L, 3, 3)."""
+        C = np.stack([dcm_from_quaternion(integrate_attitude(piece)) for piece in theta])
+        C = 0.5 * (C[:, 1:] + C[:, :-1])  # in the middle of a cell, to second order in its turn
+        base = C if self.C_sb is None else C @ self.C_sb
+        w = theta / self.interval
+        if self.C_sb is not None:
+            turn = np.swapaxes(base[:, :-1], -1, -2) @ base[:, 1:]
+            w = np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1) / self.interval
+            w = np.concatenate([w[:, :1], 0.5 * (w[:, 1:] + w[:, :-1]), w[:, -1:]], axis=1)
+        W = _cross(np.gradient(w, self.interval, axis=1)) + _cross(w) @ _cross(w)
+        columns = np.concatenate([C @ self.force[..., None], base @ W], axis=3)
+        return self._freed(columns).reshape(-1, 4), C
+
+    def _freed(self, x: Array) -> Array:
+        """Without a constant and a slope in each piece."""
+        flat = x.reshape(len(x), x.shape[1], -1)
+        return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(x.shape))
+
+    def left(self, theta: Array) -> float:
+        """RMS of specific force that gyros with these increments do not explain, m/s^2."""
+        flat, _ = self._carried(theta)
+        return math.sqrt(_left(flat[:, 0], flat[:, 1:]) / len(flat))
+
+    def late(self, theta: Array) -> tuple[float, float]:
+        """A small delay of the gyros, and its one-sigma from the scatter of pieces, the base's own motion in it."""
+        flat, C = self._carried(theta)
+        up = (C @ self.force[..., None])[..., 0]
+        rate = (C @ (theta / self.interval)[..., None])[..., 0]
+        lag = self._freed(np.cross(rate - rate.mean(axis=1, keepdims=True), up)).ravel()
+        A = np.column_stack([lag, flat[:, 1:]])
+        scale = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
+        A = A / scale
+        inverse = np.linalg.pinv(A.T @ A, rcond=1e-9)
+        x = inverse @ (A.T @ flat[:, 0])
+        scores = np.einsum("pnk,pn->pk", A.reshape(len(theta), -1, 4), (flat[:, 0] - A @ x).reshape(len(theta), -1))
+        covariance = inverse @ (scores.T @ scores) @ inverse * len(scores) / max(1, len(scores) - 2)
+        return float(x[0] / scale[0]), float(math.sqrt(max(covariance[0, 0], 0.0)) / scale[0])
+
+    def rate(self, theta: Array) -> float:
+        """RMS of the rates, rad/s."""
+        return float(np.sqrt(np.mean(np.sum((theta / self.interval) ** 2, axis=-1))))
+
+
+def _cells(record: ImuRecord) -> tuple[Array, Array, float, Array] | None:
+    """Turns (rad) and mean specific forces (m/s^2) of even cells of the record's middle, by pieces (P, L, 3), and their times."""
+    middle = 0.5 * (record.time[0] + record.time[-1])
+    first, last = np.searchsorted(record.time, [middle - 0.5 * MOST_TIME, middle + 0.5 * MOST_TIME])
+    rows = max(1, round(CELL / record.interval))
+    interval = rows * record.interval
+    length = round(PIECE / interval)
+    pieces = (last - first) // (rows * length)
+    if pieces < 3:
+        return None
+    part = slice(first, first + pieces * length * rows)
+    dtheta, dvel = (x[part].reshape(pieces, length, rows, 3).sum(axis=2) for x in increments(record))
+    time = record.time[part].reshape(pieces, length, rows)
+    return dtheta, dvel / interval, interval, 0.5 * (time[..., 0] - record.interval + time[..., -1])
+
+
+def _line(length: int) -> Array:
+    """(L, 2) orthonormal constant and slope."""
+    t = np.arange(length) - 0.5 * (length - 1)
+    return np.stack([np.full(length, length**-0.5), t / np.linalg.norm(t)], axis=1)
+
+
+def _left(y: Array, A: Array) -> float:
+    """Squares that least squares leaves, by the normal equations."""
+    size = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
+    unit = A / size
+    b = unit.T @ y
+    return max(float(y @ y - b @ np.linalg.pinv(unit.T @ unit, rcond=1e-9) @ b), 0.0)
+
+
+def _cross(w: Array) -> Array:
+    """(..., 3, 3) matrices ``[w x]``."""
+    out = np.zeros((*w.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -w[..., 2], w[..., 1], -w[..., 0]
+    return np.asarray(out - np.swapaxes(out, -1, -2))
+
+
+def _shifted(theta: Array, cells: float) -> Array:
+    """The turns (P, L, 3) of gyros late by so many cells, put right; the ends stay."""
+    flat = theta.reshape(-1, 3)
+    at = np.arange(len(flat)) + cells
+    return np.stack([np.interp(at, np.arange(len(flat)), column) for column in flat.T], axis=1).reshape(theta.shape)
+
+
+def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:
+    """What the columns x, y, z hold when axis i is column ``order[i]`` times ``signs[i]``."""
+    names = [""] * 3
+    for axis, (column, sign) in enumerate(zip(order, signs, strict=True)):
+        names[column] = ("+" if sign > 0 else "-") + "xyz"[axis]
+    return " ".join(names)
