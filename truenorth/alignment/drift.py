@@ -93,6 +93,26 @@ def detect_drift(fine: FineAlignment) -> Drift:
                 columns.append(z)
     signature = np.stack(columns, axis=-1)  # (K, 3, 12)
 
+    ratio, size, x = matched(fine, signature)
+    best = int(np.argmax(ratio))
+    kind, axis_name, start = names[best]
+    turned = np.where(ratio > limit("drift"), np.abs(x[PHI] * size), 0.0)  # (3, 12): E, N, U
+    heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
+    return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
+
+
+def matched(fine: FineAlignment, signature: Array) -> tuple[Array, Array, Array]:
+    """Match innovations with those that signatures (K, 3, S) in the measurements make.
+
+    Returns
+    -------
+    ratio : (S,) array
+        Twice the logarithm of each likelihood ratio.
+    size : (S,) array
+        Of each signature, the most likely.
+    x : (n, S) array
+        What the filter estimates in the end of a signature of size one.
+    """
     gain, _, step = fine.gains
     H_Phi = fine.system.H @ fine.system.Phi
     expected = np.empty_like(signature)
@@ -100,14 +120,7 @@ def detect_drift(fine: FineAlignment) -> Drift:
     for k in range(len(signature)):
         expected[k] = signature[k] - H_Phi[k] @ x
         x = step[k] @ x + gain[k] @ signature[k]
-
     weighted = np.linalg.solve(fine.estimates.innovation_covariance, expected)
     match = np.einsum("kis,ki->s", weighted, fine.estimates.innovation)
-    energy = np.einsum("kis,kis->s", weighted, expected)
-    ratio = match**2 / energy
-    best = int(np.argmax(ratio))
-    kind, axis_name, start = names[best]
-    turned = np.where(ratio > limit("drift"), np.abs(x[PHI] * (match / energy)), 0.0)  # (3, 12): E, N, U
-    heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
-    velocity = match[best] / energy[best]
-    return Drift(float(ratio[best]), kind, axis_name, float(start), float(velocity), float(heading), float(level))
+    energy = np.maximum(np.einsum("kis,kis->s", weighted, expected), 1e-300)
+    return match**2 / energy, match / energy, x

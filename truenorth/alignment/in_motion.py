@@ -37,6 +37,8 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
+from truenorth.quality.gnss import gnss_evidence
+from truenorth.quality.record_evidence import sampling_evidence
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -218,6 +220,8 @@ def align_in_motion(
     answer = _answer(task, track, method, why, spread)
     more = [item for log in (odometer, gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
+    more += [] if gnss is None else gnss_evidence(gnss)
+    more += sampling_evidence(task.record, turns=True)
     return judge_moving(answer, track, heading_limit, more)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal, get_args
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
 from truenorth.alignment.bias import true_bias
+from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
@@ -36,6 +37,7 @@ from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence
 from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
@@ -133,7 +135,7 @@ def align_base(
     if chosen == "swaying" and _all_along(task.motion) and float(np.max(answer.disturbance[:2])) < STAYS:
         moves = None  # lever arm and bounded motion explain all of it
     evidence = record_evidence(task.record, task.motion) + leaves(moves)
-    evidence += base_evidence(answer, found.check, found.drift, settled=found.settled)
+    evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     return judged(answer, evidence, heading_limit)
 
 
@@ -146,6 +148,7 @@ class _Found:
     settled: bool = True
     drift: Drift | None = None
     form: str = ""
+    steps: Sequence[Evidence] = ()
 
 
 def _choose(method: Method, task: Task) -> tuple[str, str]:
@@ -228,9 +231,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     sways = method == "swaying"
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
-    return _Found(
-        answer_of(task, fine, used, where, P, sways), check, fine.settled, detect_drift(fine), "" if sways else form
-    )
+    answer = answer_of(task, fine, used, where, P, sways)
+    steps = bias_step_evidence(fine)
+    return _Found(answer, check, fine.settled, detect_drift(fine), "" if sways else form, steps)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.inference import noise_of
@@ -26,11 +27,13 @@ from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
 from truenorth.alignment.task import Task, bridged, make_task
-from truenorth.alignment.verdict import judged, model_evidence
+from truenorth.alignment.verdict import base_speed, judged, model_evidence
 from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
+from truenorth.quality.encoder import encoder_evidence
+from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import notes
@@ -126,7 +129,27 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), the base may sway: its own motion is fitted to the log",
     )
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
-    return judged(answer, evidence + notes(() if encoder is None else encoder.notes), heading_limit)
+    evidence += base_speed(answer) + bias_step_evidence(fine)
+    if encoder is None:
+        return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
+    readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
+    given = readings.pop("given")
+    evidence = encoder_evidence(record, given, readings) + record_evidence(record, task.motion, given) + evidence
+    return judged(answer, evidence + notes(encoder.notes), heading_limit)
+
+
+def _orders(count: int) -> dict[str, Array]:
+    """Columns of angles and their signs, by the name of the reading: (count, count) matrices."""
+    own = np.eye(count)
+    signs = np.ones(count)
+    signs[0] = -1.0
+    orders = {"given": own, "first_reversed": own * signs, "last_reversed": own * signs[::-1]}
+    return orders if count == 1 else orders | {"exchanged": own[::-1]}
+
+
+def _reading(encoder: EncoderRecord, axes: Sequence[str], order: Array) -> Callable[[Array], Array]:
+    """``C_sb`` (K, 3, 3) at times, by the angles in an order."""
+    return lambda time: np.swapaxes(C_bs_from_angles(axes, angles_at(encoder, time, axes) @ order.T), -1, -2)
 
 
 def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:

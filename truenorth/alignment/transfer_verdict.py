@@ -39,8 +39,10 @@ def judge_transfer(
         remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
         evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
     evidence += notes(transfer.notes) + notes(transfer.jumps[:MOST_JUMPS])
-    if len(transfer.jumps) > MOST_JUMPS:
-        evidence.append(note("transfer.more_jumps", count=len(transfer.jumps) - MOST_JUMPS))
+    if len(transfer.jumps) > MOST_JUMPS:  # a master that is reset now and then does not do that
+        evidence.append(
+            contradiction("transfer.jumps", "transfer_geometry", "put_times_right", count=len(transfer.jumps))
+        )
     evidence += [note("transfer.open", states=words) for words in transfer.open]
     needs = "match_velocity" if transfer.matching == "attitude" else "manoeuvre"
     return judged(answer, evidence, heading_limit, waiting=False, remedies=(needs,))

@@ -20,10 +20,13 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation
 from truenorth.navigation.second_look import second_look, slow_errors
 from truenorth.navigation.start import read_start, start_from_alignment
+from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
+from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
+from truenorth.quality.record_evidence import sampling_evidence
 from truenorth.records import ImuRecord, Late, Trajectory
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
@@ -118,10 +121,11 @@ def navigate(
     tell = progress or (lambda stage: None)
     given = _by_key(aid)
     begin, spec, imu_source = _start_of(start, imu)
+    check_start(begin)
     record = ImuRecord.of(record)
-    record, gaps, disturbances = bridge_gaps(
-        _from_start(record if calibration is None else calibration.apply(record), begin)
-    )
+    record = _from_start(record if calibration is None else calibration.apply(record), begin)
+    check_start_at_rest(begin, record)
+    record, gaps, disturbances = bridge_gaps(record)
     noise = spec.with_random_walks(record.interval)
     said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
@@ -146,7 +150,9 @@ def navigate(
     _check_axes(plan, given)
     tell("navigating")
     track = plan.run(aiding, smooth=smooth)
-    evidence = innovation_evidence(track.residuals) + why
+    evidence = innovation_evidence(track.residuals) + sampling_evidence(record, turns=True) + why
+    receiver = _record_of(given, Gnss)
+    evidence += [] if receiver is None else gnss_evidence(receiver)
     if found:
         evidence.append(note("odometer.taken_over"))
     if "baro" in given and height != "baro":

@@ -15,6 +15,7 @@ Severity = Literal["error", "warning", "note"]
 
 JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
 REPEATED_SHARE = 0.002  # of the rows, beyond chance
+HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
 FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
@@ -129,7 +130,10 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
 def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding]) -> int:
     repeated = int(np.count_nonzero(same.all(axis=0)))
     chance = float(np.prod(_chance_of_repeat(same))) * same.shape[1]
-    if repeated > 3 + 5.0 * chance + REPEATED_SHARE * same.shape[1]:
+    # Samples that are held repeat in all channels at once; quiet ones of a coarse quantum repeat each by itself.
+    share, least = repeated / same.shape[1], float(same.mean(axis=1).min())
+    held = share > HELD_SHARE and share > 0.98 * least and chance < 0.9 * repeated
+    if held or repeated > 3 + 5.0 * chance + REPEATED_SHARE * same.shape[1]:
         share = 100.0 * repeated / len(record)
         findings.append(
             Finding(

@@ -70,7 +70,12 @@ class Tilt:
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
-        figures: dict[str, Figure] = {"given": self.given, "best": self.best, "axes": self.axes, "delay": abs(self.delay)}
+        figures: dict[str, Figure] = {
+            "given": self.given,
+            "best": self.best,
+            "axes": self.axes,
+            "delay": abs(self.delay),
+        }
         explains = self.best**2 < min(self.given**2 / CLEARER, EXPLAINED * self.unturned**2)
         if explains and self.axes != IDENTITY:
             return [Evidence("tilt.axes", figures, "unknown", ANY_EFFECT, ("imu_axes",))]
@@ -189,6 +194,15 @@ class _Bench:
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""
         return float(np.sqrt(np.mean(np.sum((theta / self.interval) ** 2, axis=-1))))
+
+
+def whole_cells(record: ImuRecord) -> tuple[Array, float, Array]:
+    """Turns (K, 3) of even cells of a whole record, rad; their length, s; the times of their middles (K,), s."""
+    rows = max(1, round(CELL / record.interval))
+    count, interval = len(record) // rows, rows * record.interval
+    dtheta = increments(record)[0][: count * rows].reshape(count, rows, 3).sum(axis=1)
+    time = record.time[: count * rows].reshape(count, rows)
+    return dtheta, interval, 0.5 * (time[:, 0] - record.interval + time[:, -1])
 
 
 def _cells(record: ImuRecord) -> tuple[Array, Array, float, Array] | None:

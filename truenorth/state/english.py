@@ -15,7 +15,7 @@ TITLES = {
     "force": "The accelerometers contradict the place or their specification",
     "record": "The log has faults",
     "tilt": "The gyros contradict the accelerometers",
-    "bias": "The biases contradict the specification",
+    "bias": "The biases are not what the specification allows",
     "encoder": "The indexer's angles contradict the gyros",
     "gnss": "GNSS positions and velocities contradict each other",
     "table": "The table was touched",
@@ -31,7 +31,7 @@ SENTENCES = {
     "heading.known": (
         "heading is known to {sigma:angle} (one sigma); {floor:angle} of it is sensor bias, which waiting does not improve"
     ),
-    "heading.known_from": "heading is known to {sigma:angle} (one sigma), from {source:term}",
+    "heading.known_from": "heading is known to {sigma:angle} (one sigma), from {source}",
     "heading.known_with_level": "heading is known to {sigma:angle}, level to {level:angle} (one sigma)",
     "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
     "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
@@ -118,10 +118,22 @@ SENTENCES = {
     "bias.accel": (
         "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu}) allows {allowed:ug|} ug"
     ),
+    "bias.gyro_steps": (
+        "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
+        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "bias.accel_steps": (
+        "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
+        "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
+    ),
     "base.fast": "a base that stays would move with {speed:.3g} m/s RMS",
     "encoder.turns": (
         "the base would turn by {given:deg/s|.2g} deg/s RMS with these angles of the indexer, and by {best:deg/s|.2g} deg/s with "
         "{reading:term}"
+    ),
+    "encoder.drifts": (
+        "with these angles of the indexer the base turns by {net:deg|.0f} deg from the first third of the log to the last "
+        "({rate:deg/s|.2g} deg/s RMS): no base that stays does"
     ),
     "gnss.turned": (
         "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
@@ -162,7 +174,6 @@ SENTENCES = {
         "specification ({imu}) allows, or the master drifts"
     ),
     "transfer.jumps": "the master's solution jumps {count} times: it does not fit this slave",
-    "transfer.more_jumps": "{count} more jumps of the master were followed",
     "transfer.open": "this motion does not separate them well: {states}",
     # ---- clocks, arms, scales and mountings left open
     "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
@@ -249,6 +260,6 @@ REMEDIES = {
 
 TERMS = {
     "exchanged": "their axes exchanged",
-    "signs": "other signs",
-    "rate": "another clock rate",
+    "first_reversed": "the other sign of the first angle",
+    "last_reversed": "the other sign of the last angle",
 }

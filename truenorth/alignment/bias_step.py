@@ -1,0 +1,53 @@
+"""Did a bias change on the way? The same likelihood ratio test as for a base that leaves, of steps of the six biases.
+
+A bias that steps at an epoch moves the errors of attitude and velocity as the model says, ``d_k = Phi_k d_(k-1) + G_k s``, and is
+seen as ``H_k d_k``. The filter follows with what it estimates; what is left between both is the error of the answer.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.drift import matched
+from truenorth.alignment.fine import FineAlignment
+from truenorth.models.static import BA, BG, PHI
+from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
+
+ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
+SENSORS = slice(BG.start, BA.stop)
+
+
+def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
+    """The step of a bias that matches the innovations best, if chance is ruled out, with the error it leaves."""
+    Phi, H = fine.system.Phi, fine.system.H
+    count, n = len(fine.estimates.innovation), fine.system.states
+    first = [round(onset * count) for onset in ONSETS]
+    d = np.zeros((n, len(first) * 6))
+    signature = np.empty((count, H.shape[-2], d.shape[1]))
+    for k in range(count):
+        d = Phi[min(k, len(Phi) - 1)] @ d
+        for i, at in enumerate(first):
+            if k == at:
+                d[SENSORS, 6 * i : 6 * i + 6] = np.eye(6)
+        signature[k] = H[min(k, len(H) - 1)] @ d
+    ratio, size, x = matched(fine, signature)
+    best = int(np.argmax(ratio))
+    if ratio[best] <= limit("drift"):
+        return []
+    left = np.where(ratio > limit("drift"), np.abs((d[PHI] - x[PHI]) * size), 0.0)
+    heading, level = float(left[2].max()), float(np.hypot(left[0], left[1]).max())
+    axis, sensor = best % 3, "gyro" if best % 6 < 3 else "accel"
+    figures: dict[str, Figure] = {
+        "axis": "xyz"[axis],
+        "onset": ONSETS[best // 6] * float(fine.integrals.time[-1]),
+        "size": abs(float(size[best])),
+        "ratio": float(ratio[best]),
+        "chance": limit("drift"),
+        "heading": heading,
+        "level": level,
+    }
+    return [Evidence(f"bias.{sensor}_steps", figures, "bounded", Effect(heading, level), ("still_part",))]
