@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.task import Task
+from truenorth.alignment.touched import find_touch
 from truenorth.models.static import BA, BG, PHI
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
+FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
 SENSORS = slice(BG.start, BA.stop)
 
@@ -51,3 +54,18 @@ def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
         "level": level,
     }
     return [Evidence(f"bias.{sensor}_steps", figures, "bounded", Effect(heading, level), ("still_part",))]
+
+
+def turn_evidence(task: Task) -> list[Evidence]:
+    """On a quiet base: a step of the rate about the vertical. No force shows it, and heading turns with it."""
+    motion = task.motion
+    if motion.overall not in ("still", "disturbed") or len(motion.time) < FEWEST:
+        return []
+    up = motion.specific_force.mean(axis=0)
+    rate = motion.rate @ (up / np.linalg.norm(up))
+    found = find_touch(motion.time, np.stack([rate, 0.0 * rate], axis=1), 0.0)
+    if found is None:
+        return []
+    turned = found.size * max(0.0, float(motion.time[-1]) - found.time)
+    figures: dict[str, Figure] = {"onset": found.time, "size": found.size, "heading": turned}
+    return [Evidence("bias.vertical_steps", figures, "bounded", Effect(heading=turned), ("still_part",))]

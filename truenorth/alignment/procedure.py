@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
 from truenorth.alignment.bias import true_bias
-from truenorth.alignment.bias_step import bias_step_evidence
+from truenorth.alignment.bias_step import bias_step_evidence, turn_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
@@ -136,6 +136,7 @@ def align_base(
         moves = None  # lever arm and bounded motion explain all of it
     evidence = record_evidence(task.record, task.motion) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
+    evidence += turn_evidence(task)
     return judged(answer, evidence, heading_limit)
 
 

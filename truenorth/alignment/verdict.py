@@ -14,6 +14,7 @@ from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import Alignment, Status
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.errors import AlignmentError
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
 from truenorth.state.limits import limit
@@ -44,7 +45,16 @@ def judged(
         Whether more of the same data improves heading.
     remedies : tuple of str
         What a heading that is not good enough needs.
+
+    Raises
+    ------
+    AlignmentError
+        The attitude is no number.
     """
+    if not (np.isfinite(answer.C_nb).all() and np.isfinite(answer.phi_covariance).all()):
+        raise AlignmentError(
+            f"{answer.source}: the log gives no attitude: are sensors dead, or all their values the same?"
+        )
     _, floor = azimuth_sigmas(answer)
     lat = answer.position.lat
     bias = float(np.max(answer.gyro_bias_prior))

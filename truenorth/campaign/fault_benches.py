@@ -18,7 +18,6 @@ from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.navigation import navigate
 from truenorth.navigation.result import Navigation
 from truenorth.simulation.scenario import Scenario, read_scenario
-from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -177,8 +176,7 @@ def _flight(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _transfer(i: Inputs) -> Alignment:
-    mounting = Mounting(lever_arm_sigma=1.0, angle_sigma=math.radians(1.0), latency_sigma=0.05)
-    return align(i["record"], imu=i["imu"], aid=Master(i["master"], mounting, "velocity"))
+    return align(i["record"], imu=i["imu"], aid=[Master(i["master"], matching="velocity")])
 
 
 BENCHES: dict[str, Bench] = {
@@ -200,7 +198,7 @@ BENCHES: dict[str, Bench] = {
         Bench("transfer", _flight, _transfer),
         Bench(
             "navigate",
-            lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER, "odometer": WHEEL},
+            lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER},
             lambda i: navigate(i["record"], i["start"], imu=i["imu"], aid=Gnss(i["gnss"])),
         ),
     )

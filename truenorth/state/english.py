@@ -126,6 +126,10 @@ SENTENCES = {
         "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
         "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "bias.vertical_steps": (
+        "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
+        "{heading:angle}"
+    ),
     "base.fast": "a base that stays would move with {speed:.3g} m/s RMS",
     "encoder.turns": (
         "the base would turn by {given:deg/s|.2g} deg/s RMS with these angles of the indexer, and by {best:deg/s|.2g} deg/s with "
