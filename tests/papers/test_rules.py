@@ -137,6 +137,7 @@ def test_a_sweep_says_whether_a_verdict_depends_on_a_choice():
     for value, ratio in ((0.1, 0.5), (1.0, 2.0)):
         table.value(sweep.case_of(value), "one", "x", "value", ratio, "1")
         table.value(sweep.case_of(value), "two", "x", "value", 1.0, "1")
+    table.value("b", "one", "x", "value", 0.5, "1")
     rules = [
         Rule("one is better", (exact("a one x value < a two x value"),)),
         Rule("not swept", (exact("a z x value < 1"),)),

@@ -69,12 +69,12 @@ class Swept:
 
 
 def swept(rules: Sequence[Rule], table: Table, sweeps: Sequence[Sweep]) -> list[Swept]:
-    """Settle anew, for each value of each choice, the rules whose conditions can all be had there."""
+    """Settle anew, for each value of each choice, the rules that ask for its case and whose conditions can all be had there."""
     found = []
     for sweep in sweeps:
         for rule in rules:
             moved = {value: _moved(rule, sweep, value) for value in sweep.values}
-            if all(_there(m, table) for m in moved.values()):
+            if moved[sweep.values[0]].conditions != rule.conditions and all(_there(m, table) for m in moved.values()):
                 verdicts = {value: settled(m, table, {}).verdict for value, m in moved.items()}
                 found.append(Swept(sweep, rule.claim, verdicts))
     return found
