@@ -12,7 +12,7 @@ from truenorth.papers.study import STUDIES, Study, save_all
 from truenorth.papers.sweeps import Sweep, swept
 from truenorth.papers.table import OF_RUNS, STATISTICS, UNITS, Figure, Reference, Table
 
-RULES = [(name, rule) for name in STUDIES for rule in import_module(f"truenorth.papers.{name}.rules").RULES]
+RULES = [(name, rule) for name, module in STUDIES.items() for rule in import_module(module).RULES]
 IDS = [f"{name}: {rule.claim[:40]}" for name, rule in RULES]
 FAR = 1.5  # by which a condition is met or missed
 RUNS = 60

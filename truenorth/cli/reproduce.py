@@ -21,6 +21,7 @@ Studies:
   damping   Double-filter external damping of a marine INS over 48 h
   static    Kalman filters for static alignment, with ten and with eight states
   odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
+  networks  Internal damping networks by design, and a fuzzy damping ratio (related work)
   all       All of them, and index.html: which claims hold, in part, or not
 \b
 Examples:

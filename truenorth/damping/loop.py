@@ -188,6 +188,7 @@ def network_correction(
     ramp: float = 0.0,
     x0: Array | None = None,
     warm: bool = True,
+    mu: Array | None = None,
 ) -> Array:
     """The errors that a damping loop would have taken off the course.
 
@@ -205,6 +206,8 @@ def network_correction(
         Errors known at the switch (of a Kalman filter): taken off there, so that nothing is left to swing.
     warm : bool
         The network has listened before it was switched on; else its states begin at zero, the worst switch.
+    mu : (K+1,) array, optional
+        How far it is damped at each epoch of the course, 0 to 1, after the switch; see :mod:`truenorth.damping.adaptive`.
 
     Returns
     -------
@@ -225,8 +228,10 @@ def network_correction(
     F, _ = coarse.linearise(_QUIET)
     since = coarse.time[1:] - (coarse.time[0] if start is None else start)
     on = since > 1e-6
-    mu: Array = np.asarray(np.clip(since / ramp, 0.0, 1.0) if ramp > 0.0 else on, dtype=np.float64)
-    M, N = loop.matrices(F, coarse.position[1:, 0], mu)
+    damped: Array = np.asarray(np.clip(since / ramp, 0.0, 1.0) if ramp > 0.0 else on, dtype=np.float64)
+    if mu is not None:
+        damped = damped * np.interp(coarse.time[1:], course.time, mu)
+    M, N = loop.matrices(F, coarse.position[1:, 0], damped)
     listening = np.full(len(on), True) if warm else on
     s = np.zeros(M.shape[1])
     out = np.zeros((coarse.epochs + 1, MOTION.stop))

@@ -8,7 +8,8 @@ velocity passes unchanged, and the platform stays level on a moving base.
 - Second order, ``H = (s^2 + d s + b)/(s^2 + a s + b)``, which is 1 at high frequency too, so that no noise is amplified:
   ``s^2 (s^2 + a s + b) + w_s^2 (s^2 + d s + b) = (s^2 + 2 zeta w s + w^2)(s^2 + 2 zeta_2 w_2 s + w_2^2)``.
 
-Compared term by term, each follows in closed form from the damping ratio ``zeta`` and ``w = stretch w_s``.
+Compared term by term, each follows in closed form from the damping ratio ``zeta`` and ``w = stretch w_s``; a third order places
+all five poles of its channel (:func:`third_order`). :mod:`truenorth.damping.design` chooses among them by overshoot and time.
 
 Sources: D. Huang, L. Cheng, *Inertial Navigation Systems* (1986), ch. 5 (horizontal damping); F. Qin, A. Li, J. Xu,
 J. Chin. Inert. Technol. 19 (3), 2011 (continuously adjustable damping). The closed forms are derived here.
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,12 +63,9 @@ class Network:
         """States of a channel."""
         return len(self.denominator) - 1
 
-    def response(self, s: complex) -> complex:
-        """``H(s)`` at a complex rate (rad/s)."""
-        top, bottom = 0.0 + 0.0j, 0.0 + 0.0j
-        for a, b in zip(self.numerator, self.denominator, strict=True):
-            top, bottom = top * s + a, bottom * s + b
-        return top / bottom
+    def response(self, s: Any) -> Any:
+        """``H(s)`` at complex rates (rad/s), one or an array."""
+        return np.polyval(self.numerator, s) / np.polyval(self.denominator, s)
 
     def realised(self) -> tuple[Array, Array, Array, float]:
         """``A, B, C, D`` of ``xi' = A xi + B v``, ``H v = C xi + D v`` (controllable form)."""
@@ -132,6 +131,43 @@ def second_order(damping: float = DAMPING, stretch: float = STRETCH, second_damp
     below = 2.0 * damping * w + 2.0 * second_damping * w2
     above = (2.0 * damping * w * w2**2 + 2.0 * second_damping * w2 * w**2) / SCHULER_RATE**2
     return Network((1.0, above, constant), (1.0, below, constant))
+
+
+def third_order(
+    damping: float = DAMPING,
+    stretch: float = STRETCH,
+    second: float = 2.5,
+    second_damping: float = 1.0,
+    third: float = 2.5,
+) -> Network:
+    """The network of third order that puts all five poles of a level channel where they are asked for.
+
+    ``s^2 D + w_s^2 N = (s^2 + 2 zeta w s + w^2)(s^2 + 2 zeta_2 w_2 s + w_2^2)(s + q)``, with N and D of third degree, both with
+    the first coefficient 1 (high frequencies pass) and the same last one (``H(0) = 1``): five coefficients, five unknowns.
+
+    Parameters
+    ----------
+    damping, stretch : float
+        As in :func:`first_order`.
+    second, second_damping : float
+        Of the other pair: its rate over Schuler's, and its damping ratio.
+    third : float
+        The real pole over Schuler's rate.
+
+    Raises
+    ------
+    UsageError
+        A figure out of range, or poles that no stable network gives.
+    """
+    _check(damping, stretch)
+    if not (second > 0.0 and third > 0.0 and 0.0 < second_damping < 10.0):
+        raise UsageError(f"poles at {second:g} and {third:g} times Schuler's rate; expected above 0")
+    ws = SCHULER_RATE
+    one = (1.0, 2.0 * damping * stretch * ws, (stretch * ws) ** 2)
+    two = (1.0, 2.0 * second_damping * second * ws, (second * ws) ** 2)
+    _, c4, c3, c2, c1, c0 = np.convolve(np.convolve(one, two), (1.0, third * ws)).tolist()
+    last = c0 / ws**2
+    return Network((1.0, (c2 - last) / ws**2, c1 / ws**2, last), (1.0, c4, c3 - ws**2, last))
 
 
 def _check(damping: float, stretch: float) -> None:

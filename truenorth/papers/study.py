@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure as Drawing
 
-# Systems that can be reproduced, and where each study stands: a function `reproduce(runs, seed, full, workers, progress) -> Study`.
+# What can be reproduced, and where each study stands: RULES, and `reproduce(runs, seed, full, workers, progress) -> Study`.
 STUDIES = {
     "static": "truenorth.papers.static.study",
     "rotary": "truenorth.papers.rotary.study",
     "transfer": "truenorth.papers.transfer.study",
     "damping": "truenorth.papers.damping.study",
     "odometer": "truenorth.papers.odometer.study",
+    "networks": "truenorth.papers.related.networks",
 }
 Progress = Callable[[str], None]
 

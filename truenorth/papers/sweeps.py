@@ -110,9 +110,17 @@ def draw_sweeps(
         for ax, sweep in zip(axes, sweeps, strict=True):
             first = sweep.case_of(sweep.values[0])
             methods = list(dict.fromkeys(f.method for f in table.figures if f.case == first))
-            for method, colour in zip(methods, COLOURS, strict=False):
+            for number, (method, colour) in enumerate(zip(methods, COLOURS, strict=False)):
                 values = [table.number_of(f"{sweep.case_of(v)} {method} {quantity}") for v in sweep.values]
-                ax.plot(sweep.values, values, "o-", markersize=4, color=colour, label=method)
+                ax.plot(
+                    sweep.values,
+                    values,
+                    "o-",
+                    markersize=4,
+                    linewidth=max(1.0, 3.0 - 0.5 * number),
+                    color=colour,
+                    label=method,
+                )
             ax.axvline(sweep.chosen, color=REFERENCE, linestyle="--", linewidth=0.8)
             ax.set(yscale="log", xlabel=sweep.label, xscale="log" if sweep.logarithmic else "linear")
             ax.set_xticks(sweep.values, [f"{v:g}" for v in sweep.values])

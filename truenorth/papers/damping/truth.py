@@ -72,15 +72,13 @@ class Voyage:
         return Course(self.truth.time, C_nb, v_n, position)
 
 
-def sail(interval: float, seed: int, run: int = 0) -> Voyage:
-    """The shipped scenario `marine_damping`, sampled at an interval (s).
+def sail(interval: float, seed: int, run: int = 0, scenario: str = "marine_damping") -> Voyage:
+    """A shipped scenario of a ship that keeps its course, sampled at an interval (s).
 
     Its motion is smooth: an IMU and a log at 1 Hz lose nothing (3 cm in two days). The IMU sits with its axes east, north,
     up (the paper's heading 0), not along the hull.
     """
-    scenario = read_scenario("marine_damping")
-    scenario = scenario.model_copy(update={"rate": 1.0 / interval})
-    ideal = scenario.ideal()
+    ideal = read_scenario(scenario).model_copy(update={"rate": 1.0 / interval}).ideal()
     at = ideal.motion.states(ideal.edges)
     C = at.C_nb[0]  # the ship keeps its course: this mounting has the heading 0 throughout
     ideal = replace(ideal, dtheta=ideal.dtheta @ C.T, dvel=ideal.dvel @ C.T)

@@ -1,0 +1,1 @@
+"""What the five papers cite and build on: one page each."""

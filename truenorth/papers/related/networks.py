@@ -1,0 +1,175 @@
+"""`truenorth reproduce networks`: internal networks designed to overshoot and time, and damping that follows the ship.
+
+Related work of system 3: networks of second and third order, and a fuzzy, adaptive damping ratio.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from truenorth.damping.adaptive import FuzzyDamping
+from truenorth.damping.course import errors_of
+from truenorth.damping.design import SPAN, Design, design, step_response
+from truenorth.damping.loop import Loop, network_correction
+from truenorth.damping.networks import SCHULER_RATE
+from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.models.marine import DV
+from truenorth.papers.claims import Rule, exact, interval, paired, settle
+from truenorth.papers.damping.truth import HOUR, sail
+from truenorth.papers.study import Study
+from truenorth.papers.table import Table
+
+Array = NDArray[np.float64]
+
+TITLE = "Internal damping networks by design, and a fuzzy damping ratio"
+RUNS = 20
+OVERSHOOT, SETTLING = 0.4, 90.0 * 60.0
+EPOCH = 10.0  # s
+ON = 2.5 * HOUR
+CALM = ((6.5, 8.0), (11.5, 12.0), (15.5, 16.0), (21.0, 24.0))  # h: three hours and more after a change of speed
+AFTER = ((8.3, 10.3), (12.3, 14.3), (16.3, 18.3))  # h: two hours from each
+NAMES = {"undamped": "undamped", "second": "second order", "third": "third order", "fuzzy": "third order, fuzzy"}
+
+RULES = (
+    Rule(
+        "An internal network can be designed to an overshoot of 40 % and a settling time of 90 min.",
+        tuple(
+            condition
+            for order in ("second", "third")
+            for condition in (
+                exact(f"design {order} overshoot value < 0.4001"),
+                exact(f"design {order} settling value < 90.01"),
+            )
+        ),
+        "Second order: {design second overshoot value:.2f} and {design second settling value:.0f} min; third order: "
+        "{design third overshoot value:.2f} and {design third settling value:.0f} min. None is without overshoot: the loop holds "
+        "two integrators.",
+        "related work",
+    ),
+    Rule(
+        "A network of third order lets less of a manoeuvre in than one of second order with the same overshoot and time.",
+        (
+            exact("design third leak value < design second leak value"),
+            paired("voyage third manoeuvre < voyage second manoeuvre"),
+        ),
+        "Largest |1 - H|: {design second leak value:.2f} and {design third leak value:.2f}; largest velocity error in two hours "
+        "after a change of speed by 6 to 9 m/s: {voyage second manoeuvre:.1f} and {voyage third manoeuvre:.1f} m/s.",
+        "related work",
+    ),
+    Rule(
+        "An internal network damps the Schuler oscillation of a ship that keeps its speed.",
+        (
+            paired("voyage second calm < 0.5 * voyage undamped calm"),
+            paired("voyage third calm < 0.5 * voyage undamped calm"),
+        ),
+        by="related work",
+    ),
+    Rule(
+        "A fuzzy damping ratio keeps manoeuvres out and damps as well when the ship is calm.",
+        (
+            paired("voyage fuzzy manoeuvre < 0.5 * voyage third manoeuvre"),
+            interval("voyage fuzzy calm < 1.2 * voyage third calm"),
+        ),
+        "Velocity error after changes of speed {voyage fuzzy manoeuvre:.2f} m/s against {voyage third manoeuvre:.2f} with the same "
+        "network always on; calm {voyage fuzzy calm:.2f} against {voyage third calm:.2f}, undamped {voyage undamped calm:.2f} m/s.",
+        "related work",
+    ),
+)
+
+
+def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
+    """Run the study; see :func:`truenorth.papers.reproduce`."""
+    count, table = runs or RUNS, Table()
+    progress("design")
+    designs = {name: design(order, OVERSHOOT, SETTLING) for name, order in (("second", 2), ("third", 3))}
+    for name, found in designs.items():
+        table.value("design", name, "overshoot", "value", found.overshoot, "1")
+        table.value("design", name, "settling", "value", found.settling / 60.0, "min")
+        table.value("design", name, "leak", "value", found.leak, "1")
+    voyage = sail(EPOCH, seed, scenario="marine_manoeuvres")
+    time, left = voyage.truth.time, {}
+    sizes: dict[str, dict[str, list[float]]] = {name: {"calm": [], "manoeuvre": []} for name in NAMES}
+    for run in range(count):
+        progress(f"voyage {run + 1} of {count}")
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(6, run)))
+        course = voyage.navigate(voyage.paper_errors() * rng.choice([-1.0, 1.0], 13))
+        free = errors_of(course, voyage.truth)[:, DV]
+        third = designs["third"].network
+        mu = FuzzyDamping().of_course(course, third)
+        left = {
+            "undamped": free,
+            "second": free - network_correction(course, Loop(designs["second"].network), start=ON)[:, DV],
+            "third": free - network_correction(course, Loop(third), start=ON)[:, DV],
+            "fuzzy": free - network_correction(course, Loop(third), start=ON, mu=mu)[:, DV],
+        }
+        for name, v in left.items():
+            size = np.linalg.norm(v, axis=1)
+            sizes[name]["calm"].append(math.sqrt(np.mean(size[_within(time, CALM)] ** 2)))
+            sizes[name]["manoeuvre"].append(float(size[_within(time, AFTER)].max()))
+    for name, kinds in sizes.items():
+        for quantity, values in kinds.items():
+            table.errors("voyage", name, quantity, np.array(values), "m/s", statistics=("rms", "max"))
+    drawings = {"networks": draw_networks(designs), "voyage": draw_voyage(time, left)}
+    captions = {
+        "networks": "Left: tilt after a step of an accelerometer's bias, over its final value. Middle and right: |H| and |1 - H| "
+        "over frequency (Bode); the dotted line is Schuler's.",
+        "voyage": "Size of the velocity error in one voyage; grey: two hours from each change of speed. Networks on at 2.5 h.",
+    }
+    remarks = [
+        f"Among the networks on a grid of poles that meet {OVERSHOOT:.0%} and {SETTLING / 60:.0f} min, each order has the one "
+        "with the smallest leak.",
+        "Errors and biases of the INS are those of system 3 with random signs.",
+        "The fuzzy sets are on the size of what the network lets in, (1 - H) v: calm up to .3 m/s, a manoeuvre from 1.5 m/s.",
+    ]
+    return Study(TITLE, table, settle(RULES, table), drawings, captions, remarks)
+
+
+def _within(time: Array, spans: tuple[tuple[float, float], ...]) -> NDArray[np.bool_]:
+    inside = [(time >= a * HOUR) & (time < b * HOUR) for a, b in spans]
+    return np.asarray(np.any(inside, axis=0))
+
+
+def draw_networks(designs: Mapping[str, Design]) -> Figure:
+    """Step responses with their overshoot, and the amplitude of H and of 1 - H."""
+    time, rate = np.arange(0.0, SPAN / 2, 60.0), SCHULER_RATE * np.geomspace(0.02, 50.0, 300)
+    with style():
+        figure = new_figure(12.0, 4.2)
+        step, bode, leak = figure.subplots(1, 3)
+        for (name, found), colour in zip(designs.items(), COLOURS, strict=False):
+            y = step_response(found.network, time)
+            step.plot(time / 60.0, y, color=colour, label=NAMES[name])
+            top = int(np.argmax(y))
+            step.annotate(f"+{found.overshoot:.0%}", (time[top] / 60.0, y[top]), color=colour, va="bottom", fontsize=9)
+            H = found.network.response(1j * rate)
+            bode.plot(rate, np.abs(H), color=colour)
+            leak.plot(rate, np.abs(1.0 - H), color=colour)
+        step.axhline(1.0, color=REFERENCE, linewidth=0.8)
+        step.axvline(SETTLING / 60.0, color=REFERENCE, linewidth=0.8, linestyle="--")
+        step.set(
+            xlabel="time, min", title="Step response, final value 1", ylim=(0.0, None), xlim=(0.0, time[-1] / 60.0)
+        )
+        for ax, title in ((bode, "|H|"), (leak, "|1 - H|, the leak")):
+            ax.axvline(SCHULER_RATE, color=REFERENCE, linewidth=0.8, linestyle=":")
+            ax.set(xscale="log", yscale="log", xlabel="rad/s", title=title)
+        figure.legend(*step.get_legend_handles_labels(), loc="outside lower left", ncols=2)
+    return figure
+
+
+def draw_voyage(time: Array, left: Mapping[str, Array]) -> Figure:
+    """Size of the velocity error of one voyage."""
+    with style():
+        figure = new_figure(10.0, 4.2)
+        ax = figure.subplots()
+        for (name, v), colour in zip(left.items(), ("#BBBBBB", *COLOURS), strict=False):
+            ax.plot(time / HOUR, np.linalg.norm(v, axis=1), color=colour, linewidth=1.0, label=NAMES[name])
+        for a, b in AFTER:
+            ax.axvspan(a, b, color=REFERENCE, alpha=0.08, linewidth=0.0)
+        ax.set(xlabel="time, h", ylabel="velocity error, m/s", yscale="log", ylim=(0.01, None), xlim=(0.0, 24.0))
+        ax.set_xticks(range(0, 25, 4))
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=4)
+    return figure
