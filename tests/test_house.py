@@ -23,6 +23,7 @@ FLOORS = [
 ]
 FLOOR = {folder: number for number, folders in enumerate(FLOORS) for folder in folders}
 FLOOR["simulation"] = FLOOR["state"] + 0.5  # it stands aside: on floors up to the strapdown algorithms
+FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, beside the package itself
 SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
 LONGEST = 120
 LONG = {  # known ones; each goes when its file is rebuilt

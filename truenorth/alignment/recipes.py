@@ -14,7 +14,7 @@ from truenorth.aiding.aids import Gnss, Indexer, Master, Odometer, Positions
 from truenorth.alignment.result import Alignment
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.errors import AlignmentError, UsageError
-from truenorth.core.plugins import plugins
+from truenorth.core.plugins import plugin, plugins
 from truenorth.core.position import Position
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
@@ -291,8 +291,8 @@ def align(
     if callable(method):
         return _checked(method(request), request.method)
     recipe = _recipe(set(aids))
-    if method != "auto" and (own := plugins("truenorth.methods").get(method)) is not None:
-        return _checked(own.load()(request), method)
+    if method != "auto" and method in plugins("truenorth.methods"):
+        return _checked(plugin("truenorth.methods", method)(request), method)
     if method != "auto" and not recipe.methods:
         raise UsageError(f"method {method!r} with {recipe.name}; expected auto: it has a method of its own")
     if at is not None and not recipe.at:

@@ -21,12 +21,13 @@ from collections.abc import Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, get_args
 
 from pydantic import Field, PrivateAttr, field_validator
 
 from truenorth.alignment.procedure import Method
 from truenorth.core.errors import DataError, TruenorthError
+from truenorth.core.plugins import plugins
 from truenorth.core.schema import Angle, Strict, Time, validated
 from truenorth.core.yaml_file import read_mapping
 from truenorth.records.specs import PRESETS
@@ -51,8 +52,16 @@ class MethodPlan(Strict):
     """
 
     name: str = Field(min_length=1)
-    method: Literal[Method, "in_motion"]
+    method: str
     imu: str | dict[str, Any] = "simulated"
+
+    @field_validator("method")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        own = (*get_args(Method), "in_motion")
+        if value not in own and value not in plugins("truenorth.methods"):
+            raise ValueError(f"{value!r}; expected {', '.join(map(repr, (*own, *plugins('truenorth.methods'))))}")
+        return value
 
 
 class Case(Strict):

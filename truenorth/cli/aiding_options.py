@@ -234,6 +234,9 @@ class Sensors:
         Path | None, typer.Option(help="Log of a Doppler or speed log, or of a reference velocity.")
     ] = None
     baro: Annotated[Path | None, typer.Option(help="Log of a barometer.")] = None
+    aid: Annotated[
+        list[str] | None, typer.Option(help="Log of a plug-in's sensor, as NAME=FILE; more than one by repeating it.")
+    ] = None
     baro_loop: Annotated[
         float, typer.Option(help="Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
     ] = 0.0
@@ -290,6 +293,8 @@ class Sensors:
         from dataclasses import replace
 
         from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
+        from truenorth.core.errors import UsageError
+        from truenorth.core.plugins import plugin
         from truenorth.formats import read_gnss, read_height, read_odometer, read_velocity
 
         antenna, wheel = self.antenna(), self.wheel()
@@ -307,6 +312,11 @@ class Sensors:
             aids.append(VelocityLog(read_velocity(self.velocity).shifted(self.offset), log))
         if self.baro is not None:
             aids.append(Barometer(read_height(self.baro).shifted(self.offset), loop=self.baro_loop))
+        for text in self.aid or ():
+            name, _, file = text.partition("=")
+            if not file:
+                raise UsageError(f"--aid {text!r}: expected NAME=FILE")
+            aids.append(plugin("truenorth.aiding", name)(Path(file)))
         return aids
 
     @staticmethod

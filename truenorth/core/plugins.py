@@ -1,15 +1,38 @@
 """Plug-ins of other packages, by entry points: found when they are first asked for, imported when they are used.
 
-Groups: ``truenorth.formats``, ``truenorth.methods``, ``truenorth.motions``, ``truenorth.errors``, ``truenorth.aiding``.
+- ``truenorth.formats``: ``read(path, layout) -> ImuRecord``, by ``read_imu(path, format=NAME)`` or the suffix ``.NAME``;
+- ``truenorth.methods``: ``align(request) -> Alignment``, by ``align(..., method=NAME)``, in campaigns too;
+- ``truenorth.motions``: ``build(position, arm, rng, **options) -> Motion``, by ``motion: {kind: plug-in, name: NAME}``;
+- ``truenorth.aiding``: ``read(path) -> aid``, by ``truenorth navigate --aid NAME=FILE``; the aid brings its own error states.
+
+``examples/plugin`` has one of each.
 """
 
 from __future__ import annotations
 
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from truenorth.core.errors import UsageError
 
 
 @cache
 def plugins(group: str) -> dict[str, EntryPoint]:
     """Entry points of a group by name; ``.load()`` gives the object."""
     return {point.name: point for point in entry_points(group=group)}
+
+
+def plugin(group: str, name: str) -> Any:
+    """The object of one plug-in.
+
+    Raises
+    ------
+    UsageError
+        None of that name is installed.
+    """
+    found = plugins(group)
+    if name not in found:
+        installed = ", ".join(sorted(found)) or "none"
+        raise UsageError(f"plug-in {name!r} of {group} is not installed; installed: {installed}")
+    return found[name].load()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib import import_module
 from os import PathLike
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from truenorth.core.errors import UsageError
+from truenorth.core.plugins import plugin, plugins
 from truenorth.formats import devices
 from truenorth.formats.aiding import (
     read_encoder,
@@ -19,7 +20,7 @@ from truenorth.formats.aiding import (
     read_trajectory,
     read_velocity,
 )
-from truenorth.formats.detect import FORMATS, format_of
+from truenorth.formats.detect import FORMATS, SUFFIXES, format_of
 from truenorth.formats.gnss import read_gnss
 from truenorth.formats.guesses import UnsureError, write_layout
 from truenorth.formats.layout import layout_for
@@ -75,7 +76,7 @@ def read_imu(
     path : path
         A file, which may be packed (gzip, zstd, bzip2, lz4), or the folder of a ROS 2 bag.
     format : str, optional
-        One of `FORMATS`; told by suffix and content when left out.
+        One of `FORMATS`, or of a plug-in; by suffix and content when left out.
     units : str or mapping, optional
         Of the gyro and accelerometer columns and of time, such as ``"deg/s,g"``, ``"deg/s,g,ms"`` or
         ``{"gyro": "0.05 deg/s", "time": "us"}`` (a number is the size of one count). Documented names mean SI.
@@ -111,6 +112,9 @@ def read_imu(
     path = Path(path)
     given = {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind, "topic": topic}
     try:
+        if (own := _plugged(path, format)) is not None:
+            plugged: ImuRecord = own(path, layout_for(path, given))
+            return plugged
         chosen = format_of(path, format)
         layout = layout_for(path, given)
         if chosen in devices.DEVICES:
@@ -124,6 +128,14 @@ def read_imu(
         return record
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _plugged(path: Path, format: str | None) -> Callable[..., ImuRecord] | None:
+    """The reader of a plug-in, where the format or the suffix is not one of ours."""
+    name = path.suffix.lstrip(".").lower() if format is None else format
+    if name in FORMATS or f".{name}" in SUFFIXES or not name:
+        return None
+    return plugin("truenorth.formats", name) if name in plugins("truenorth.formats") else None
 
 
 def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from truenorth.core.plugins import plugin
 from truenorth.core.position import Position
 from truenorth.core.schema import (
     Acceleration,
@@ -206,8 +207,21 @@ class TurntableMotion(Strict):
         return turntable(position, holds, rate=self.rate, onset=self.onset, lever_arm=arm)
 
 
+class PlugInMotion(Strict):
+    """A motion of another package, by the name of its entry point."""
+
+    kind: Literal["plug-in"]
+    name: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    def build(self, position: Position, arm: Arm, rng: Rng, folder: Path) -> Motion:
+        """The motion."""
+        motion: Motion = plugin("truenorth.motions", self.name)(position, arm, rng, **self.options)
+        return motion
+
+
 MotionModel = Annotated[
-    RestMotion | SwayMotion | SeaMotion | RingMotion | LegsMotion | RouteMotion | TurntableMotion,
+    RestMotion | SwayMotion | SeaMotion | RingMotion | LegsMotion | RouteMotion | TurntableMotion | PlugInMotion,
     Field(discriminator="kind"),
 ]
 
