@@ -115,8 +115,8 @@ class KnownStart:
             raise UsageError("--start has place and level; expected --position, --pitch and --roll without it")
         if self.heading is None:
             return read_start(folder)[0]
+        from truenorth.core.shown import load
         from truenorth.navigation.known import with_heading
-        from truenorth.results import load
 
         return start_from_alignment(with_heading(load(folder), *self.given()))
 
@@ -137,7 +137,7 @@ class KnownStart:
 
     def imu_of(self, folder: Path | None) -> Any:
         """The specification in the folder, where a heading turns its start."""
-        from truenorth.results import load
+        from truenorth.core.shown import load
 
         return None if self.heading is None or folder is None else load(folder).imu
 
