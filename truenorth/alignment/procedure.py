@@ -45,6 +45,7 @@ Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying", Pub
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
+MOSTLY = 0.95  # of the seconds
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be told
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
@@ -131,9 +132,7 @@ def align_base(
         found = _align_inertial(task, spec, chosen)
     why = f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
-    moves = _moves_from(task.motion)
-    if chosen == "swaying" and _all_along(task.motion) and float(np.max(answer.disturbance[:2])) < STAYS:
-        moves = None  # lever arm and bounded motion explain all of it
+    moves = None if chosen == "swaying" and _explained(task.motion, found) else _moves_from(task.motion)
     evidence = record_evidence(task.record, task.motion) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task)
@@ -172,7 +171,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
         why += " (where a turntable does it, --positions auto tells more)"
-    if task.record.duration < SHORTEST_SWAYING or not (overall in words or _all_along(task.motion)):
+    if task.record.duration < SHORTEST_SWAYING or not (overall in words or _rocks_all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
 
@@ -276,9 +275,19 @@ def answer_of(
     )
 
 
-def _all_along(motion: MotionSummary) -> bool:
-    """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does."""
-    return len(motion.regimes) == 1
+def _rocks_all_along(motion: MotionSummary) -> bool:
+    """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does.
+
+    Its arm accelerates it now less and now more: sway and acceleration may take turns.
+    """
+    return len(motion.regimes) == 1 or motion.fraction("swaying") + motion.fraction("moving") > MOSTLY
+
+
+def _explained(motion: MotionSummary, found: _Found) -> bool:
+    """Whether a lever arm and bounded motion explain all that the base does: what moves by its arm goes nowhere."""
+    leaves = found.drift is not None and found.drift.found
+    small = float(np.max(found.answer.disturbance[:2])) < STAYS
+    return _rocks_all_along(motion) and found.settled and small and not leaves
 
 
 def _moves_from(motion: MotionSummary) -> float | None:

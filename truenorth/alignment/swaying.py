@@ -7,7 +7,9 @@ attitude, biases, lever arm and motion together, twice: the second time about th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
-from truenorth.alignment.windowed import windowed_fit
+from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.core.earth import normal_gravity
 from truenorth.core.position import Position
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
@@ -33,7 +35,8 @@ Array = NDArray[np.float64]
 ARM_PRIOR = 30.0  # m, one sigma along each axis, where nobody knows the arm
 WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
-FILTER_PASSES = 3
+DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
+FILTER_PASSES = 8
 
 
 @dataclass(frozen=True)
@@ -172,18 +175,31 @@ def _settled(
     mount: Mount,
     turned: ImuSpec | None = None,
 ) -> tuple[StayingLog, Array]:
-    """A log about windowed fits until the attitude stands still, and what the last fit leaves of its measurements."""
-    prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma)
-    log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, sways=True, C_sb=mount.C_sb)
+    """A log about windowed fits until the attitude stands still, and what the last fit leaves of its measurements.
 
-    def fit(system: LinearSystem) -> _Fitted:
-        found = windowed_fit(system)
-        return _Fitted(found.x, found.residual)
+    The fit knows no random walk. Of gyros that make a large one it takes the wander for signal, and its passes may run away:
+    then the log is fitted with as little weight as the walk leaves it.
+    """
+    prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma)
+    g = float(normal_gravity(position.lat, position.alt))
+    walked = math.sqrt(record.duration / 3.0) * math.hypot(
+        model.accel_random_walk, g * model.gyro_random_walk * record.duration
+    )
 
     def turn(found: _Fitted) -> float:
         return float(np.max(np.abs(found.end[PHI])))
 
-    return log, settle(log, fit, turn, enough=SMALL_TURN, most=WINDOWED_PASSES).found.residual
+    for base_velocity in (BASE_VELOCITY, max(BASE_VELOCITY, walked)):
+        log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, sways=True, C_sb=mount.C_sb)
+        last = settle(log, partial(_fitted, base_velocity), turn, enough=SMALL_TURN, most=WINDOWED_PASSES)
+        if last.moved < DIVERGED:
+            break
+    return log, last.found.residual
+
+
+def _fitted(base_velocity: float, system: LinearSystem) -> _Fitted:
+    found = windowed_fit(system, base_velocity)
+    return _Fitted(found.x, found.residual)
 
 
 def _fit(
