@@ -3,40 +3,50 @@
 import math
 
 import numpy as np
+import pytest
 
-from truenorth.alignment.inference import predictive_sigma
-
-
-def test_two_noiseless_residuals_give_students_t():
-    """68.27 % of Student's t with two degrees of freedom lies within t / sqrt(2 + t^2) = .6827."""
-    p = math.erf(math.sqrt(0.5))
-    t = math.sqrt(2 * p**2 / (1 - p**2))
-    residuals = np.array([3e-6, 4e-6])
-    rms = math.sqrt(np.mean(residuals**2))
-    assert math.isclose(predictive_sigma(residuals, np.zeros(2), 1e-12, 1e3), t * rms, rel_tol=2e-3)
+from truenorth.alignment.inference import predictive_sigma, usual_bias
+from truenorth.records.specs import PRESETS, imu_spec
 
 
-def test_one_noiseless_residual_gives_cauchy():
-    p = math.erf(math.sqrt(0.5))
-    expected = 2e-4 * math.tan(math.pi * p / 2)
-    assert math.isclose(predictive_sigma(np.array([2e-4]), np.zeros(1), 1e-14, 1e6), expected, rel_tol=2e-3)
+def test_the_prior_alone_gives_the_standard_deviation_of_a_scale_mixture():
+    """``E s^2`` of a log-normal s is ``typical^2 exp(2 width^2)``, where no residual says anything."""
+    width = math.log(2.0)
+    found = predictive_sigma(np.zeros(2), np.full(2, 1e6), 1e-6, width, 1e-12, 1.0)
+    assert math.isclose(found, 1e-6 * math.exp(width**2), rel_tol=2e-3)
+
+
+def test_many_residuals_give_their_rms():
+    rng = np.random.default_rng(1)
+    residuals = 3e-6 * rng.standard_normal(5000)
+    found = predictive_sigma(residuals, np.zeros(5000), 1e-4, math.log(10.0), 1e-9, 1.0)
+    assert math.isclose(found, math.sqrt(np.mean(residuals**2)), rel_tol=2e-2)
 
 
 def test_noise_alone_proves_no_bias():
     """Residuals well inside their noise leave every scale below the noise open; far above it they exclude it."""
     noise = np.full(2, 1e-6)
-    quiet = predictive_sigma(np.zeros(2), noise, 1e-9, 1.0)
+    quiet = predictive_sigma(np.zeros(2), noise, 1e-7, math.log(3.0), 1e-9, 1.0)
     assert quiet < 1e-6
-    assert predictive_sigma(np.array([1e-4, 1e-4]), noise, 1e-9, 1.0) > 1e-4
+    assert predictive_sigma(np.array([1e-4, 1e-4]), noise, 1e-7, math.log(3.0), 1e-9, 1.0) > 3e-5
 
 
-def test_covers_the_unseen_component():
-    """Over populations of every scale the interval holds the third draw in 68 % of 4000 cases (4 sigma: 2.9 %)."""
+@pytest.mark.parametrize(("count", "width"), [(2, math.log(7.0)), (1, math.log(2.0))])
+def test_sigma_is_the_rms_of_the_unseen_component(count, width):
+    """Over scales drawn from the prior, unseen / sigma has mean square 1, and few beyond four (20000 draws, +-.1)."""
     rng = np.random.default_rng(5)
-    inside = 0
-    for _ in range(4000):
-        s = 10 ** rng.uniform(-7, -3)
-        a, b, unseen = s * rng.standard_normal(3)
-        noise = np.full(2, 1e-9)
-        inside += abs(unseen) < predictive_sigma(np.array([a, b]), noise, 1e-9, 1e-1)
-    assert abs(inside / 4000 - 0.6827) < 0.03
+    ratio = np.empty(20000)
+    for k in range(len(ratio)):
+        s = 1e-6 * math.exp(width * rng.standard_normal())
+        *seen, unseen = s * rng.standard_normal(count + 1)
+        ratio[k] = unseen / predictive_sigma(np.array(seen), np.full(count, 1e-15), 1e-6, width, 1e-12, 1.0)
+    assert abs(np.sqrt(np.mean(ratio**2)) - 1.0) < 0.15
+    assert np.mean(np.abs(ratio) > 4.0) < 0.02
+
+
+@pytest.mark.parametrize("sensor", ["gyro", "accel"])
+def test_the_usual_bias_is_that_of_the_presets(sensor):
+    for name in PRESETS:
+        spec = imu_spec(name)
+        walk, bias = getattr(spec, f"{sensor}_random_walk"), getattr(spec, f"{sensor}_bias")
+        assert math.isclose(usual_bias(sensor, walk), bias, rel_tol=1e-9)

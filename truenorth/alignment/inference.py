@@ -2,7 +2,7 @@
 
 Biases: three components can be checked (:mod:`truenorth.alignment.check`). The rate along *east*, which turns heading, and
 the level components of force, which tilt, cannot: their size is inferred from those that can, as drawn from the same
-population.
+population, and from what is usual of sensors with the random walk that the log shows.
 
 Random walks: by maximum likelihood of the filter (:mod:`truenorth.alignment.noise`), which tells them from the base's
 motion.
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,26 +21,33 @@ from truenorth.alignment.check import LogCheck
 from truenorth.models.static import StaticModel
 from truenorth.quality.noise import noise_coefficients
 from truenorth.records import ImuRecord
-from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
 
-ONE_SIGMA = math.erf(1.0 / math.sqrt(2.0))  # .6827
+GYRO_WIDTH = math.log(7.0)  # one sigma of the logarithm of a bias about what is usual with such a random walk
+ACCEL_WIDTH = math.log(2.0)  # narrower: an accelerometer's offset goes with its noise, a gyro's with its maker's care
 CORRELATION_TIME = 300.0  # s: of a bias that wanders, where nobody names one
 WORST_GYRO = np.radians(10.0)  # rad/s: end of the search for a bias scale
 WORST_ACCEL = 10.0  # m/s^2
 
 
-def predictive_sigma(residuals: Array, noises: Array, smallest: float, largest: float) -> float:
-    """Half width of the central 68 % interval for one more draw from the population that `residuals` came from.
+def predictive_sigma(
+    residuals: Array, noises: Array, typical: float, width: float, smallest: float, largest: float
+) -> float:
+    """Standard deviation of one more draw from the population that `residuals` came from.
 
-    The population is N(0, s^2), each residual is seen through noise of its own, and s is unknown with every order of
-    magnitude in ``[smallest, largest]`` equally likely beforehand (Jeffreys). Two residuals without noise give
-    1.32 times their RMS, Student's t with two degrees of freedom.
+    The population is N(0, s^2), each residual is seen through noise of its own, and s is unknown: log-normal about what is
+    typical. Such a draw has long tails (Student's t, had nothing been known of s), since two residuals may be small by
+    chance; its standard deviation counts them, where the width of the middle of its distribution does not.
 
     Parameters
     ----------
     residuals, noises : (M,) arrays
+    typical : float
+        Median of s beforehand.
+    width : float
+        One sigma of its logarithm.
     smallest, largest : float
         Range of s.
 
@@ -49,16 +57,18 @@ def predictive_sigma(residuals: Array, noises: Array, smallest: float, largest: 
     """
     s = np.geomspace(smallest, largest, 400)
     variance = s[:, None] ** 2 + np.square(noises)
-    log_likelihood = -0.5 * np.sum(np.square(residuals) / variance + np.log(variance), axis=1)
-    weight = np.exp(log_likelihood - log_likelihood.max())
-    weight /= weight.sum()
-    low, high = smallest * 0.1, largest * 10.0
-    erf = np.vectorize(math.erf)
-    for _ in range(40):
-        middle = math.sqrt(low * high)
-        inside = float(weight @ erf(middle / (s * math.sqrt(2.0))))
-        low, high = (middle, high) if inside < ONE_SIGMA else (low, middle)
-    return math.sqrt(low * high)
+    log_density = -0.5 * np.sum(np.square(residuals) / variance + np.log(variance), axis=1)
+    log_density -= 0.5 * (np.log(s / typical) / width) ** 2
+    weight = np.exp(log_density - log_density.max())
+    return math.sqrt(float(weight @ s**2) / float(weight.sum()))
+
+
+def usual_bias(sensor: Literal["gyro", "accel"], random_walk: float) -> float:
+    """The bias that is usual of a sensor with a random walk: between the presets by a power law, SI."""
+    presets = [imu_spec(name) for name in PRESETS]
+    walks = np.log([getattr(spec, f"{sensor}_random_walk") for spec in presets])
+    biases = np.log([getattr(spec, f"{sensor}_bias") for spec in presets])
+    return math.exp(float(np.interp(math.log(max(random_walk, 1e-12)), walks, biases)))
 
 
 def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
@@ -75,14 +85,15 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     ImuSpec
     """
     best = imu_spec("navigation")
-    gyro_bias = predictive_sigma(check.rate_residual, check.rate_noise, best.gyro_bias, WORST_GYRO)
-    accel_bias = predictive_sigma(
-        np.array([check.force_residual]), np.array([check.force_noise]), best.accel_bias, WORST_ACCEL
-    )
+    typical_gyro = usual_bias("gyro", noise.gyro_random_walk)
+    typical_accel = usual_bias("accel", noise.accel_random_walk)
+    force, force_noise = np.array([check.force_residual]), np.array([check.force_noise])
     return ImuSpec(
         name="inferred",
-        gyro_bias=gyro_bias,
-        accel_bias=accel_bias,
+        gyro_bias=predictive_sigma(
+            check.rate_residual, check.rate_noise, typical_gyro, GYRO_WIDTH, best.gyro_bias, WORST_GYRO
+        ),
+        accel_bias=predictive_sigma(force, force_noise, typical_accel, ACCEL_WIDTH, best.accel_bias, WORST_ACCEL),
         gyro_random_walk=noise.gyro_random_walk,
         accel_random_walk=noise.accel_random_walk,
         gyro_bias_instability=noise.gyro_rate_walk * math.sqrt(0.5 * CORRELATION_TIME),
