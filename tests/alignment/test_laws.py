@@ -44,7 +44,7 @@ def test_static_limits(method, lat):
     C = motion.states(0.0).C_nb
     g = float(normal_gravity(position.lat, position.alt))
     eps_n, nabla_n = np.array([3e-8, 0.0, 0.0]), np.array([4e-4, -2e-4, 0.0])
-    answer = align(biased(clean, C.T @ eps_n, C.T @ nabla_n), position, "navigation", method)
+    answer = align(biased(clean, C.T @ eps_n, C.T @ nabla_n), position, "navigation", method=method)
     phi_N = nabla_n[0] / g
     expected = [
         -nabla_n[1] / g,
@@ -59,7 +59,7 @@ def test_static_limits(method, lat):
 def test_a_perfect_imu_is_aligned_perfectly(method, lat):
     position = Position.from_degrees(lat, 10.0, 0.0)
     motion = rest(position, np.radians(222.0), 0.2, -0.4)
-    answer = align(simulate(motion, rate=50.0, duration=120.0).record, position, "navigation", method)
+    answer = align(simulate(motion, rate=50.0, duration=120.0).record, position, "navigation", method=method)
     assert np.max(np.abs(misalignment(answer, motion.states(0.0).C_nb))) < 2e-7
 
 
@@ -73,7 +73,7 @@ def test_turned_body_axes_turn_the_answer(method):
     @settings(max_examples=8, deadline=None)
     def turned(seed):
         C_new_old = Rotation.random(random_state=seed).as_matrix()
-        answer = align(log.rotated(C_new_old), XIAN, "navigation", method)
+        answer = align(log.rotated(C_new_old), XIAN, "navigation", method=method)
         expected = reference.C_nb @ C_new_old.T
         # Biases' priors are alike on all axes, so that nothing but rounding and the last pass's residue is left.
         sigma = np.sqrt(np.min(np.diag(reference.phi_covariance)))
@@ -161,7 +161,7 @@ def test_innovations_of_a_still_base_are_as_large_as_expected():
     scenario = read_scenario("static_kalman")
     for run in range(6):
         sim = scenario.simulate(seed=0, run=run)
-        found = align(sim.record, Position(scenario.position.lat), scenario.imu_spec, "kalman").history
+        found = align(sim.record, Position(scenario.position.lat), scenario.imu_spec, method="kalman").history
         count = np.isfinite(found.innovation).sum()
         assert abs(np.nansum(found.nis) / count - 1.0) < 0.1
 
