@@ -73,6 +73,32 @@ def test_navigation_goes_on_from_what_was_read(record, results, tmp_path):
     np.testing.assert_array_equal(again.track.C_nb, results["navigation"].track.C_nb)
 
 
+def test_estimates_of_a_filter_are_a_table():
+    """One run, and runs by name; the short text has their sizes."""
+    from truenorth.filters import LinearSystem, kalman
+
+    z = np.random.default_rng(0).standard_normal((3, 5, 1))
+    one, eye = np.ones((1, 1, 1)), np.eye(1)
+    system = LinearSystem(Phi=one, Q=0.1 * one, H=one, R=one, z=z, x0=np.zeros(1), P0=eye)
+    found = kalman(system, history="sigma", innovations=True)
+    table = found.to_frame()
+    assert table.index.names == ["run_0", "epoch"]
+    assert list(table.columns) == ["x_0", "sigma_0", "nis"]
+    assert table.loc[(2, 4), "x_0"] == found.x[2, 4, 0]
+    assert repr(found).startswith("Estimates(runs: 3, epochs: 5, states: 1, NIS over rows: ")
+    assert "<table>" in found._repr_html_()
+
+
+def test_xarray_where_it_is_installed(results):
+    try:
+        import xarray  # noqa: F401
+    except ImportError:
+        with pytest.raises(UsageError, match="xarray is not installed"):
+            results["alignment"].to_xarray()
+    else:
+        assert "heading_deg" in results["alignment"].to_xarray()
+
+
 @dataclass(frozen=True, repr=False)
 class Mine(Shown):
     values: np.ndarray

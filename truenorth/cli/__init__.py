@@ -16,6 +16,7 @@ from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
 from truenorth.cli.faults import faults
 from truenorth.cli.files import FORCE, check_output, inputs
+from truenorth.cli.imu import imu
 from truenorth.cli.inspect import inspect
 from truenorth.cli.live import live
 from truenorth.cli.navigate import navigate
@@ -39,6 +40,7 @@ app = typer.Typer(
 )
 app.command("align")(align)
 app.command("advise")(advise)
+app.command("imu")(imu)
 app.command("inspect")(inspect)
 app.command("live")(live)
 app.command("navigate")(navigate)

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from truenorth.core.errors import DataError, UsageError
+from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.core.units import parse
 
 LARGEST = 1 << 20  # bytes
@@ -91,7 +91,7 @@ def read_mapping(path: str | PathLike[str]) -> dict[Any, Any]:
         content = yaml.load(text, Loader)
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
-    except DataError:
+    except TruenorthError:
         raise
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         why = getattr(error, "problem", None) or str(error).splitlines()[0]

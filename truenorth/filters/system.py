@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.shown import Shown
 from truenorth.filters.stack import Array, System, flatten_runs
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Axes of each argument behind the leading (run) axes.
 AXES: dict[str, str] = {
@@ -97,8 +101,8 @@ class FilterState:
     memory: Array
 
 
-@dataclass(frozen=True)
-class Estimates:
+@dataclass(frozen=True, repr=False)
+class Estimates(Shown):
     """What a filter found. Time axes hold every epoch where the history was asked for, else the last one only.
 
     Parameters
@@ -137,6 +141,29 @@ class Estimates:
     def nis_rows(self) -> NDArray[np.int64]:
         """(..., K or 0) rows present: the degrees of freedom of `nis`."""
         return np.sum(np.isfinite(self.innovation), axis=-1)
+
+    def in_brief(self) -> dict[str, str]:
+        """Runs, epochs and states, and the mean NIS over its rows."""
+        *runs, epochs, states = self.x.shape
+        shown = {"runs": " x ".join(map(str, runs)) or "1", "epochs": str(epochs), "states": str(states)}
+        rows = int(self.nis_rows.sum())
+        return shown | ({"NIS over rows": f"{float(np.sum(self.nis)) / rows:.3f}"} if rows else {})
+
+    def to_frame(self) -> pd.DataFrame:
+        """States and their sigmas at each epoch kept: ``x_0, sigma_0, ...``, and ``nis``; index run and epoch, or epoch alone."""
+        import pandas as pd
+
+        states, epochs = self.x.shape[-1], self.x.shape[-2]
+        columns: dict[str, Array] = {}
+        for i in range(states):
+            columns[f"x_{i}"] = self.x[..., i].reshape(-1)
+            if self.sigma.shape[:-1] == self.x.shape[:-1]:
+                columns[f"sigma_{i}"] = self.sigma[..., i].reshape(-1)
+        if self.nis.shape == self.x.shape[:-1]:
+            columns["nis"] = self.nis.reshape(-1)
+        runs = [f"run_{i}" for i in range(self.x.ndim - 2)]
+        index = pd.MultiIndex.from_product([range(n) for n in (*self.x.shape[:-2], epochs)], names=[*runs, "epoch"])
+        return pd.DataFrame(columns, index=index if runs else pd.RangeIndex(epochs, name="epoch"))
 
 
 class Runs(NamedTuple):
