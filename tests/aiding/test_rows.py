@@ -8,10 +8,13 @@ from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector
 from truenorth.core.linalg import padded
 from truenorth.errors.group import Group
 from truenorth.errors.model import InsModel
-from truenorth.estimate import loop as kernel
-from truenorth.estimate.run import _sources, with_states
+from truenorth.estimate.correct import feed_back, measure
+from truenorth.estimate.memory import Model, memory
+from truenorth.estimate.predict import describe, set_matrix
+from truenorth.estimate.run import kernel_sources, with_states
 from truenorth.filters.recursion import workspace
 from truenorth.state.layout import BG
+from truenorth.state.now import NOW_LENGTH
 from truenorth.strapdown import wander
 
 LAT, LON, ALT = 1.2, -2.0, 500.0
@@ -55,16 +58,14 @@ def _predicted(kind, dx):
     for role, group in source.states.items():  # small-angle mounting is exact for small assumed angles only
         aux[model.layout.slice_of(group.name)] = 1e-4 if role == "mounting" else 0.02
     x = -dx.copy()
-    kernel.feed_back(s, aux, n, x)
-    sums = kernel.Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1))
-    means = kernel.Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1))
-    kernel.set_matrix(s, sums.C_now)
-    means.vectors[2] = W_B + dx[BG] + dx[model.layout.slice_of("slow gyro bias")]
-    w = workspace(padded(n), 3)
-    compiled_model = kernel.Model(model.decay, model.noise, model.sensor_states, False, 0.0, 0.0, False)
-    kernel.measure(
-        s, sums, means, _sources([source], model), 0, compiled_model, source.measured[0], aux, np.zeros((3, 3)), w
-    )
+    feed_back(s, aux, x, np.zeros(0, np.int64))
+    m = memory(s, aux, np.eye(n), 0.0, 1)
+    set_matrix(s, m.sums.C_now)
+    m.means.vectors[2] = W_B + dx[BG] + dx[model.layout.slice_of("slow gyro bias")]
+    w, now, R = workspace(padded(n), 3), np.zeros(NOW_LENGTH), np.ones(3)
+    compiled_model = Model(model.dynamics, model.sensor_states, False, 0.0, 0.0, False, True, False)
+    describe(m, compiled_model, now)
+    measure(m, compiled_model, kernel_sources([source], model), 0, source.measured[0].copy(), now, w, R)
     return w.z.copy(), w.H[:, :n].copy(), n
 
 

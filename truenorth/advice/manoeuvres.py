@@ -16,11 +16,11 @@ from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import Shown
 from truenorth.filters import kalman
-from truenorth.models.transfer import PHI
 from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, s_turn, straight, turn, wing_rock
+from truenorth.state.layout import PHI
 
 if TYPE_CHECKING:
     import pandas as pd

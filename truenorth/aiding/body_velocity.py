@@ -18,8 +18,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from truenorth.core.attitude import cross
+import numpy as np
+
+from truenorth.aiding.row import (
+    ARM,
+    AT_ARM,
+    AT_BIAS,
+    AT_LAG,
+    AT_MOUNT,
+    AT_SCALE,
+    MOUNT,
+    Row,
+    lag_now,
+    row,
+    state_of,
+    with_state,
+)
+from truenorth.core.attitude import cross, quaternion_from_rotation_vector, rotate
 from truenorth.core.compiled import compiled
+from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 
 _PHI, _DV, _BG = 0, 3, 9
 
@@ -114,3 +131,40 @@ def _into_body(C: Any, v: Any) -> Any:
         C[0, 1] * v[0] + C[1, 1] * v[1] + C[2, 1] * v[2],
         C[0, 2] * v[0] + C[1, 2] * v[1] + C[2, 2] * v[2],
     )
+
+
+@row
+def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    arm = with_state(figures, ARM, assumed, at[AT_ARM])
+    bias, angles = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if at[AT_BIAS] >= 0:
+        bias = vector_of(assumed, at[AT_BIAS])
+    if at[AT_MOUNT] >= 0:
+        angles = (-assumed[at[AT_MOUNT]], 0.0, -assumed[at[AT_MOUNT] + 1])
+    q = quaternion_from_rotation_vector(angles)
+    C_mb = np.empty((3, 3))
+    for j in range(3):
+        axis = (figures[MOUNT + j], figures[MOUNT + 3 + j], figures[MOUNT + 6 + j])
+        C_mb[0, j], C_mb[1, j], C_mb[2, j] = rotate(q, axis)
+    body_velocity_row(
+        now,
+        matrix_of(now, NOW_C),
+        vector_of(now, NOW_TURN),
+        vector_of(now, NOW_PUSH),
+        C_mb,
+        arm,
+        state_of(assumed, at[AT_SCALE]),
+        bias,
+        lag_now(now, assumed, at[AT_LAG]),
+        at[AT_ARM],
+        at[AT_SCALE],
+        at[AT_MOUNT],
+        at[AT_BIAS],
+        at[AT_LAG],
+        measured,
+        H,
+        z,
+    )
+
+
+BODY_VELOCITY = Row("body velocity", _body_velocity, {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1})

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, Row, row, state_of, with_state
 from truenorth.core.compiled import compiled
+from truenorth.state.now import NOW_C, matrix_of
 
 _PHI, _DP = 0, 6
 
@@ -24,3 +26,12 @@ def height_row(s: Any, C: Any, arm: Any, bias: float, at_bias: int, measured: An
     H[0, _DP + 2] = 1.0
     if at_bias >= 0:
         H[0, at_bias] = -1.0
+
+
+@row
+def _height(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    arm = with_state(figures, ARM, assumed, at[AT_ARM])
+    height_row(now, matrix_of(now, NOW_C), arm, state_of(assumed, at[AT_BIAS]), at[AT_BIAS], measured, H, z)
+
+
+HEIGHT = Row("height", _height, {"bias": 1}, rows=1)

@@ -19,21 +19,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross, rotate
 from truenorth.core.compiled import compiled
-from truenorth.strapdown.wander import curvature, earth_axis
+from truenorth.state.now import NOW_C, matrix_of, vector_of
+from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
 _PHI, _DV, _DP = 0, 3, 6
-
-
-@compiled
-def azimuth(s: Any) -> Any:
-    """Direction of north in w: its sine and cosine, x and y; at the pole itself y is called north."""
-    axis = earth_axis(s)
-    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
-    if level == 0.0:
-        return 0.0, 1.0
-    return axis[0] / level, axis[1] / level
 
 
 @compiled
@@ -116,3 +108,17 @@ def position_row(
         z[j] += bias[j]
         if at_bias >= 0:
             H[j, at_bias + j] = -1.0
+
+
+@row
+def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    arm = with_state(figures, ARM, assumed, at[AT_ARM])
+    bias = (0.0, 0.0, 0.0)
+    if at[AT_BIAS] >= 0:
+        bias = vector_of(assumed, at[AT_BIAS])
+    lag = lag_now(now, assumed, at[AT_LAG])
+    C = matrix_of(now, NOW_C)
+    position_row(now, C, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
+
+
+POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1})

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from truenorth.aiding.row import Row, row
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
+from truenorth.state.now import NOW_C, NOW_EARTH, NOW_GYRO_NOISE, NOW_MEAN_RATE, NOW_SINCE, matrix_of, vector_of
 
 _PHI, _BG = 0, 9
 
@@ -40,3 +42,14 @@ def rotation_row(C: Any, w_b: Any, w_ie: Any, H: Any, z: Any) -> None:
             H[i, _PHI + j] = C[0, i] * c[0] + C[1, i] * c[1] + C[2, i] * c[2]
         H[j, _BG + j] = 1.0
         z[j] = w_b[j] - (C[0, j] * w_ie[0] + C[1, j] * w_ie[1] + C[2, j] * w_ie[2])
+
+
+@row
+def _rotation(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    rotation_row(matrix_of(now, NOW_C), vector_of(now, NOW_MEAN_RATE), vector_of(now, NOW_EARTH), H, z)
+    if now[NOW_SINCE] > 0.0:  # a mean rate has the gyros' noise, too
+        for i in range(3):
+            R[i] += now[NOW_GYRO_NOISE] / now[NOW_SINCE]
+
+
+ROTATION = Row("rotation", _rotation, {})

@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.aiding import row
+from truenorth.aiding.body_velocity import BODY_VELOCITY
+from truenorth.aiding.height import HEIGHT
+from truenorth.aiding.position import POSITION
+from truenorth.aiding.rest import ROTATION
+from truenorth.aiding.row import Row
+from truenorth.aiding.velocity import VELOCITY
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.group import Group
 from truenorth.state.mounting import FALSE_REJECTION
 
 Array = NDArray[np.float64]
-Kind = Literal["position", "velocity", "body velocity", "height", "rotation", "disturbance"]
-Role = Literal["lever arm", "scale", "mounting", "bias", "lag"]
+Role = Literal["lever arm", "scale", "mounting", "bias", "lag", "flexure", "own"]
+Does = Literal["measurement", "disturbance", "place"]
 
-KINDS: dict[str, int] = {
-    "position": row.POSITION,
-    "velocity": row.VELOCITY,
-    "body velocity": row.BODY_VELOCITY,
-    "height": row.HEIGHT,
-    "rotation": row.ROTATION,
-    "disturbance": row.DISTURBANCE,
-}
-LENGTHS: dict[str, int] = {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1}
-COLUMNS: dict[str, int] = {
-    "lever arm": row.AT_ARM,
-    "scale": row.AT_SCALE,
-    "mounting": row.AT_MOUNT,
-    "bias": row.AT_BIAS,
-    "lag": row.AT_LAG,
-}
+KINDS: dict[str, Row] = {row.name: row for row in (POSITION, VELOCITY, BODY_VELOCITY, HEIGHT, ROTATION)}
 NO_GATE = math.inf
 
 
@@ -46,13 +36,13 @@ class Aiding:
     ----------
     name : str
         Such as "GNSS position"; the states it adds are named after it ("odometer scale").
-    kind : str
+    kind : str or Row
         "position" (lat, lon in rad, height in m), "velocity" (east, north, up), "body velocity" (right, forward, up),
-        "height", or "rotation" (the base does not turn).
+        "height", "rotation" (the base does not turn); or a row of one's own.
     time : (M,) array, s
         When the measurement holds, on the IMU's clock; any order.
-    measured : (M, 3) array
-        NaN where absent.
+    measured : (M, k) array
+        NaN where absent; of as many numbers as its row takes.
     sigma : (M, 3) array
         One-sigma noise; of a position in metres (east, north, up).
     lever_arm : (3,) array, m
@@ -66,10 +56,23 @@ class Aiding:
         Probability of rejecting a sound measurement by its normalised innovation squared; 0: no gate.
     loop : float, s
         Of heights: time constant of a third-order loop that takes the place of the Kalman gain; 0: none.
+    figures : sequence of float
+        Of a row of one's own: what it needs beyond arm and axes, eight numbers at most.
+    retimed : bool
+        Taken at its stamp less the delay as known at the time (its "lag"), not at its stamp.
+    patience : int
+        With `opens`: so many rejections in a row are a jump that is believed.
+    opens : str, int or None
+        The group, or the first state, that takes up a jump; None: none is believed.
+    does : {"measurement", "disturbance", "place"}
+        "disturbance" adds to the covariance (velocity by `measured`, attitude by the square of `sigma`); "place" puts the
+        vehicle where a position says.
+    output : bool or (M,) array of bool
+        Put out the state after each row, or after these.
     """
 
     name: str
-    kind: Kind
+    kind: str | Row
     time: Array
     measured: Array
     sigma: Array
@@ -78,14 +81,20 @@ class Aiding:
     states: Mapping[Role, Group] = field(default_factory=dict)
     gate: float = FALSE_REJECTION
     loop: float = 0.0
+    figures: Sequence[float] = ()
+    retimed: bool = False
+    patience: int = 0
+    opens: str | int | None = None
+    does: Does = "measurement"
+    output: bool | NDArray[np.bool_] = False
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
+        if isinstance(self.kind, str) and self.kind not in KINDS:
             raise UsageError(f"{self.name}: kind {self.kind!r} is not known; choose one of {', '.join(KINDS)}")
-        count = len(np.atleast_1d(self.time))
+        count, width = len(np.atleast_1d(self.time)), self.row.width
         for name, shape in (
             ("time", (count,)),
-            ("measured", (count, 3)),
+            ("measured", (count, width)),
             ("sigma", (count, 3)),
             ("lever_arm", (3,)),
             ("C_mb", (3, 3)),
@@ -99,16 +108,22 @@ class Aiding:
         if not np.all(np.isfinite(self.time)):
             row = int(np.flatnonzero(~np.isfinite(self.time))[0])
             raise DataError(f"{self.name}: row {row + 1}, column time: {self.time[row]}; expected a finite number")
-        bad = np.isfinite(self.measured) & ~((self.sigma > 0.0) & np.isfinite(self.sigma))
+        given = np.isfinite(self.measured) if width == 3 else np.isfinite(self.measured[:, :1])
+        bad = given[:, : self.row.rows] & ~((self.sigma > 0.0) & np.isfinite(self.sigma))[:, : self.row.rows]
         if bad.any():
             row, column = np.argwhere(bad)[0]
             raise DataError(
                 f"{self.name}: row {row + 1}: sigma {self.sigma[row, column]}; expected a positive one-sigma noise"
             )
         for role, group in self.states.items():
-            length = 1 if role == "bias" and self.kind == "height" else LENGTHS[role]
+            length = self.row.sizes.get(role, 0)
             if len(group.sigma) != length:
                 raise UsageError(f"{self.name}: {role} has {len(group.sigma)} states; expected {length}")
+
+    @property
+    def row(self) -> Row:
+        """Its compiled row."""
+        return KINDS[self.kind] if isinstance(self.kind, str) else self.kind
 
     def gates(self) -> Array:
         """(3,) limits of the normalised innovation squared of one, two and three rows."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from truenorth.aiding.position import azimuth, into_north
+from truenorth.aiding.position import into_north
+from truenorth.aiding.row import ARM, AT_ARM, AT_LAG, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
-from truenorth.strapdown.wander import curvature, earth_axis
+from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
+from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
 
@@ -61,3 +63,14 @@ def velocity_row(
     into_north(s, H, z)
     for j in range(3):
         z[j] -= measured[j]
+
+
+@row
+def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    arm = with_state(figures, ARM, assumed, at[AT_ARM])
+    lag = lag_now(now, assumed, at[AT_LAG])
+    C, w_b, push = matrix_of(now, NOW_C), vector_of(now, NOW_TURN), vector_of(now, NOW_PUSH)
+    velocity_row(now, C, w_b, push, arm, lag, at[AT_ARM], at[AT_LAG], measured, H, z)
+
+
+VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1})

@@ -123,7 +123,15 @@ def _track(found: Solution, time: Array, C_mb: Array, wheel: Mounting) -> Track:
     sensors = np.zeros((len(time), STATES))
     sensors[:, BG], sensors[:, BA], sensors[:, DK] = errors[:, :3] @ C_mb, errors[:, 3:6] @ C_mb, errors[:, 6]
     residuals = Residuals(
-        "odometer displacement", time, found.innovation[0], found.innovation_sigma[0], found.nis[0], found.used[0], 0
+        "odometer displacement",
+        time,
+        found.innovation[0],
+        found.innovation_sigma[0],
+        found.nis[0],
+        found.used[0],
+        outside=0,
+        stamp=time,
+        jumped=np.zeros(len(time), dtype=bool),
     )
     layout = Layout(("odometer scale",), ((wheel.scale_sigma,),))
     return Track(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truenorth.core import earth
 from truenorth.core.compiled import compiled
-from truenorth.estimate.loop import set_matrix
+from truenorth.estimate.predict import set_matrix
 from truenorth.models.in_motion_azimuth import PARAMETERS
 from truenorth.strapdown.wander import advance, curvature, earth_axis
 

@@ -61,7 +61,7 @@ def align_transfer(
     """Find attitude and biases of a slave IMU from a master INS on the same vehicle, with delay, lever arm and mounting.
 
     The known delay and lever arm are compensated first; what is left of them is estimated (see
-    :mod:`truenorth.models.transfer`). A master on another clock, or late by more than was said, is recognised by its motion.
+    :mod:`truenorth.errors.master`). A master on another clock, or late by more than was said, is recognised by its motion.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def align_transfer(
             "and the clocks"
         )
     matched = Matching(*noise, gate=GATE)
-    track = transfer_filter(part, master, model, start, matched, covariances=True, linear=linear)
+    track = transfer_filter(part, master, model, start, matched, linear=linear)
     parted = parted_clocks(slave, master, C_mb)
     answer = assemble_transfer(
         part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, parted

@@ -7,12 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment import transfer_loop as loop
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
-from truenorth.alignment.transfer_system import system_along
+from truenorth.alignment.transfer_system import system_along, without_place
 from truenorth.alignment.transfer_verdict import judge_transfer
 from truenorth.analysis.observability import observability
 from truenorth.core.attitude import (
@@ -23,11 +22,14 @@ from truenorth.core.attitude import (
 )
 from truenorth.core.earth import earth_rate_n, transport_rate_n
 from truenorth.core.position import Position
-from truenorth.models.transfer import ARM, BA, BG, MOUNT, TAU, TransferModel
+from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
+from truenorth.estimate.loop import SAME_TIME
+from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
+from truenorth.state.layout import BA, BG, DP, STATES
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -46,6 +48,11 @@ WORDS = {
     "phi_E": "tilt about east",
     "phi_N": "tilt about north",
     "phi_U": "heading error",
+    **{f"master_dv_{axis}": f"master's velocity error {side}" for axis, side in zip("ENU", ("east", "north", "up"))},
+    **{
+        f"master_phi_{axis}": f"master's attitude error about {side}"
+        for axis, side in zip("ENU", ("east", "north", "up"))
+    },
     "tau": "delay",
     "r_right": "lever arm right",
     "r_forward": "lever arm forward",
@@ -119,7 +126,7 @@ def _transfer(
     notes: tuple[str, ...],
 ) -> Transfer:
     sigma, aux = track.sigma[-1], track.aux[-1]
-    tau, arm, mount = (model.slice_of(which) for which in (TAU, ARM, MOUNT))
+    tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
     silences = tuple(
         f"the master is silent for {master.steps[k]:.1f} s after {master.time[k - 1]:.1f} s" for k in silent[:3]
@@ -139,8 +146,8 @@ def _transfer(
         mounting_prior=np.full(3, 0.0 if mount is None else assumed.mounting_sigma),
         velocity_noise=noise[0] if np.isfinite(noise[0]) else math.nan,
         attitude_noise=noise[1] if np.isfinite(noise[1]) else math.nan,
-        used=int(np.sum(np.any((verdict == loop.USED) | (verdict == loop.REOPENED), axis=1))),
-        rejected=int(np.sum(np.any(verdict == loop.REJECTED, axis=1))),
+        used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
+        rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
         P=_fifteen(track.last_P, Position(0.0)),
         jumps=_jumps(track),
@@ -151,11 +158,9 @@ def _transfer(
 
 def _fifteen(P: Array, place: Position) -> Array:
     """(15, 15) covariance as navigation takes it, the place as uncertain as `place` says by default."""
-    order = np.r_[3:6, 0:3, 9:12, 6:9]  # phi, dv, gyro and accelerometer bias
-    at = np.r_[0:6, 9:15]
-    result = np.zeros((15, 15))
-    result[np.ix_(at, at)] = P[np.ix_(order, order)]
-    result[range(6, 9), range(6, 9)] = np.square([place.horizontal_sigma, place.horizontal_sigma, place.vertical_sigma])
+    result = P[:STATES, :STATES].copy()
+    result[DP, :], result[:, DP] = 0.0, 0.0
+    result[DP, DP] = np.diag(np.square([place.horizontal_sigma, place.horizontal_sigma, place.vertical_sigma]))
     return result
 
 
@@ -165,7 +170,7 @@ def _signed(angles: Array) -> Array:
 
 def _jumps(track: TransferTrack) -> tuple[str, ...]:
     found = []
-    for k, kind in np.argwhere(track.verdict == loop.REOPENED):
+    for k, kind in np.argwhere(track.verdict == REOPENED):
         size = float(np.linalg.norm(track.innovation[k, 3 * kind : 3 * kind + 3]))
         what = f"velocity jumped by {size:.2g} m/s" if kind == 0 else f"attitude jumped by {math.degrees(size):.2g} deg"
         found.append(f"the master's {what} shortly before {track.time[k]:.1f} s and stays so: taken up from there")
@@ -199,8 +204,9 @@ def _open(
     )
     R = np.repeat([s**2 / every if np.isfinite(s) else np.inf for s in noise], 3)
     system = system_along(middle, at, T, model, P0, R, assumed.lever_arm, assumed.C_mb)
-    names = [WORDS[name] for name in model.names]
-    told = observability(system, names, model.units)
+    seen = without_place(model)
+    names = [WORDS[model.names[i]] for i in seen]
+    told = observability(system, names, [model.units[i] for i in seen])
     if not np.isfinite(noise[0]):  # attitude alone: nothing of velocity and force is expected
         quiet = {WORDS[f"dv_{axis}"] for axis in "ENU"} | {WORDS[f"nabla_{axis}"] for axis in "xyz"}
     else:
@@ -209,7 +215,7 @@ def _open(
     words = [str(group) for group in told.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
     if unseen:
         words.append(f"not seen at all: {', '.join(unseen)}")
-    return (*words, *_tied(names, track.last_P, quiet | set(unseen)))
+    return (*words, *_tied(names, track.last_P[np.ix_(seen, seen)], quiet | set(unseen)))
 
 
 def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
@@ -235,7 +241,7 @@ def _states(slave: ImuRecord, track: TransferTrack, k: NDArray[np.intp]) -> tupl
     dtheta, dvel = increments(slave)
     turned = np.vstack([np.zeros(3), np.cumsum(dtheta, axis=0)])
     moved = np.vstack([np.zeros(3), np.cumsum(dvel, axis=0)])
-    row = track.sample[k] + 1
+    row = np.searchsorted(slave.time, track.time[k] - 0.5 * slave.interval) + 1
     keep = np.concatenate([[True], np.diff(row) > 0])
     k, row = k[keep], row[keep]
     T = np.diff(slave.time[row - 1])
@@ -280,7 +286,13 @@ def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
     """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases taken off."""
     dtheta, _ = increments(slave)
     dtheta = dtheta - track.aux[-1, BG] * interval_lengths(slave)[:, None]
-    C_0b = dcm_from_quaternion(integrate_attitude(dtheta)[1:][track.sample])
+    # The sample that each row falls into, and how much of it is past by then.
+    ends, steps_of = slave.time, interval_lengths(slave)
+    inside = np.clip(np.searchsorted(ends, track.time - SAME_TIME), 0, len(ends) - 1)
+    part = 1.0 - (ends[inside] - track.time) / steps_of[inside]
+    C_0b = dcm_from_quaternion(integrate_attitude(dtheta)[inside]) @ dcm_from_rotation_vector(
+        part[:, None] * dtheta[inside]
+    )
     lat, alt, v = track.position[:, 0], track.position[:, 2], track.v_n
     w_in = earth_rate_n(lat) + transport_rate_n(lat, alt, v)
     steps = np.diff(track.time, prepend=track.time[0])[:, None]

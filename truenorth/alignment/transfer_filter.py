@@ -1,4 +1,4 @@
-"""From records to the closed loop of transfer alignment and back: what the compiled loop takes and what it leaves."""
+"""From records to the closed loop for transfer alignment and back: the master's rows as aiding, the loop's track as the slave's."""
 
 from __future__ import annotations
 
@@ -7,20 +7,34 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment import transfer_loop as loop
-from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
+from truenorth.aiding.master import MASTER_ATTITUDE, MASTER_VELOCITY
+from truenorth.aiding.source import Aiding, Role
+from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.core.errors import DataError
-from truenorth.core.linalg import padded
-from truenorth.filters.recursion import SOUND
-from truenorth.models.transfer import TransferModel
+from truenorth.errors.group import Group
+from truenorth.errors.master import (
+    ARM,
+    ATTITUDE_ERROR,
+    DELAY,
+    FLEXURE,
+    MOUNTING,
+    PLACE_SIGMA,
+    VELOCITY_ERROR,
+    TransferModel,
+)
+from truenorth.estimate.memory import ABSENT, REJECTED, REOPENED, USED
+from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord, MasterRecord
-from truenorth.strapdown.increments import increments, interval_lengths, read_only
+from truenorth.state.layout import BA, BG, DV, PHI
+from truenorth.state.state import Start
+from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
+KINDS = ("master velocity", "master attitude")
 
 
 @dataclass(frozen=True)
@@ -33,7 +47,7 @@ class SlaveStart:
     v_n : (3,) array, m/s
     lat, lon, alt : float, rad, rad, m
     P : (n, n) array
-        Of the states of a :class:`truenorth.models.transfer.TransferModel`.
+        Of the states of a :class:`truenorth.errors.master.TransferModel`.
     C_mb : (3, 3) array
         Slave to master axes.
     arm : (3,) array, m
@@ -91,11 +105,9 @@ class TransferTrack:
     Attributes
     ----------
     time : (K,) array, s
-        End of the slave's sample that is nearest, on the slave's clock.
+        At which the row holds by the delay as known then, on the slave's clock.
     delay : float, s
         The known one.
-    sample : (K,) int array
-        Its row in the slave's record.
     row : (K,) int array
         The master's.
     C_nb : (K, 3, 3) array
@@ -104,18 +116,16 @@ class TransferTrack:
         What is assumed in the places of the states: biases, delay and lever arm beside the known ones, flexure.
     C_mb : (K, 3, 3) array
     sigma : (K, n) array
-    P : (K, n, n) array, or (0, n, n) where it was not kept
-    last_P : (n, n) array
+    P : (K, n, n) array
     innovation, innovation_sigma : (K, 6) arrays
         Velocity (m/s) and attitude (rad); NaN where absent.
     nis : (K, 2) array
     verdict : (K, 2) int array
-        `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.alignment.transfer_loop`.
+        `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`.
     """
 
     time: Array
     delay: float
-    sample: Integers
     row: Integers
     C_nb: Array
     v_n: Array
@@ -124,11 +134,15 @@ class TransferTrack:
     C_mb: Array
     sigma: Array
     P: Array
-    last_P: Array
     innovation: Array
     innovation_sigma: Array
     nis: Array
     verdict: Integers
+
+    @property
+    def last_P(self) -> Array:
+        """(n, n) covariance at the last row."""
+        return np.asarray(self.P[-1])
 
 
 def transfer_filter(
@@ -138,7 +152,6 @@ def transfer_filter(
     start: SlaveStart,
     matching: Matching,
     *,
-    covariances: bool = False,
     linear: Linear | None = None,
 ) -> TransferTrack:
     """Run the closed loop over two records on one clock.
@@ -153,8 +166,6 @@ def transfer_filter(
     start : SlaveStart
         At the beginning of the slave's record.
     matching : Matching
-    covariances : bool
-        Keep ``P`` at each row.
     linear : Linear, optional
         Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
         rows (as much as 1 rad^-2 of information a row), would otherwise tell a little of the mounting and of the delay falsely.
@@ -168,104 +179,159 @@ def transfer_filter(
     DataError
         No row of the master falls into the slave's record; a covariance that broke down.
     """
-    n, count = model.states, len(master)
-    dtheta, dvel = increments(slave)
-    steps = interval_lengths(slave)
-    samples = loop.Samples(*(read_only(x) for x in (steps, slave.time, dtheta, dvel)))
-    rows = _rows(master, start.delay, matching, linear)
-    state = np.concatenate([quaternion_from_dcm(start.C_nb), start.v_n, [start.lat, start.lon, start.alt], np.zeros(9)])
-    aux = np.zeros(n)
-    aux[6:9], aux[9:12] = start.accel_bias, start.gyro_bias
-    C_mb, P = np.array(start.C_mb, dtype=np.float64), np.array(start.P, dtype=np.float64)
-    kept = loop.Kept(
-        np.full(count, -1),
-        np.zeros((count, 10)),
-        np.zeros((count, n)),
-        np.zeros((count, 3, 3)),
-        np.zeros((count, n)),
-        np.zeros((count if covariances else 0, n, n)),
-        np.full((count, 6), np.nan),
-        np.full((count, 6), np.nan),
-        np.full((count, 2), np.nan),
-        np.zeros((count, 2), dtype=np.int64),
+    values = np.zeros(model.states)
+    values[BG], values[BA] = start.gyro_bias, start.accel_bias
+    begin = float(slave.time[0] - slave.steps[0])
+    place = start.lat, start.lon, start.alt
+    at = Start(begin, start.C_nb, start.v_n, *place, start.gyro_bias, start.accel_bias, start.P[:15, :15])
+    track = navigate_track(
+        slave,
+        at,
+        model.ins,
+        master_aiding(master, model, start, matching, linear),
+        interval=LONGEST_STEP,
+        every=0,
+        prior=(start.P, values),
     )
-    failure, row = loop.run(
-        padded(n),
-        samples,
-        rows,
-        _settings(model, matching, start, slave.interval, master.interval),
-        state,
-        aux,
-        C_mb,
-        P,
-        kept,
-    )
-    if failure != SOUND:
-        raise DataError(
-            f"{master.source}: row {row + 1}: the filter's covariance broke down; expected noise and prior sigmas "
-            "that a double can hold beside each other"
-        )
-    found = (kept.sample >= 0) & (kept.verdict.max(axis=1) > loop.ABSENT)
-    if not found.any():
+    if len(track.time) == 0:
         raise DataError(
             f"{master.source}: no row falls into the slave's record ({slave.time[0]:.3f} s to {slave.time[-1]:.3f} s; the master "
             f"runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s): check that both logs have the same clock"
         )
-    return TransferTrack(
-        time=slave.time[kept.sample[found]],
-        delay=start.delay,
-        sample=kept.sample[found],
-        row=np.flatnonzero(found),
-        C_nb=dcm_from_quaternion(kept.state[found, :4]),
-        v_n=kept.state[found, 4:7],
-        position=kept.state[found, 7:10],
-        aux=kept.aux[found],
-        C_mb=kept.C_mb[found],
-        sigma=kept.sigma[found],
-        P=kept.P[found] if covariances else kept.P,
-        last_P=P,
-        innovation=kept.innovation[found],
-        innovation_sigma=kept.innovation_sigma[found],
-        nis=kept.nis[found],
-        verdict=kept.verdict[found],
-    )
+    return _by_rows(track, master.time - start.delay, model, start)
 
 
-def _rows(master: MasterRecord, delay: float, matching: Matching, linear: Linear | None) -> loop.Master:
-    """The master's rows as the loop takes them; what is not matched is NaN."""
-    count = len(master)
-    nothing = np.full((count, 3), np.nan)
-    velocity, C_nm, place, acceleration = nothing, np.full((count, 3, 3), np.nan), nothing, nothing
-    if master.v_n is not None and np.isfinite(matching.velocity_sigma):
-        velocity = master.v_n
-    if master.C_nb is not None and np.isfinite(matching.attitude_sigma):
-        C_nm = master.C_nb
-    smooth = (C_nm, np.full((count, 3, 3), np.nan)) if linear is None else (linear.C_nm, linear.C_nb)
+def master_aiding(
+    master: MasterRecord, model: TransferModel, start: SlaveStart, matching: Matching, linear: Linear | None = None
+) -> list[Aiding]:
+    """The master's rows as the loop takes them: its place, its velocity, its attitude; what is not matched is left out."""
+    count, groups = len(master), model.groups
+    stamps = master.time - start.delay
+    has_v = master.v_n is not None and np.isfinite(matching.velocity_sigma)
+    has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
+    known_v = np.isfinite(master.v_n).all(axis=1) if has_v and master.v_n is not None else np.zeros(count, bool)
+    known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
+    patience = max(2, round(matching.patience / master.interval))
+    found, place = [], None
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
-    if master.f_b is not None and master.C_nb is not None and np.isfinite(place).all() and master.v_n is not None:
-        lat, alt, v = place[:, 0], place[:, 2], master.v_n
-        coriolis = np.cross(2 * earth_rate_n(lat) + transport_rate_n(lat, alt, v), v)
-        acceleration = np.einsum("kij,kj->ki", master.C_nb, master.f_b) - coriolis + gravity_n(lat, alt)
-    return loop.Master(*(read_only(x) for x in (master.time - delay, velocity, place, acceleration, C_nm, *smooth)))
+        sigma = np.full((count, 3), PLACE_SIGMA)
+        lag = _states(groups, {"lag": DELAY})
+        found.append(
+            Aiding(
+                "master place",
+                "position",
+                stamps,
+                place,
+                sigma,
+                -start.arm,
+                states=lag,
+                retimed=True,
+                does="place",
+            )
+        )
+    if has_v and master.v_n is not None:
+        measured = np.full((count, 10), np.nan)
+        measured[:, :3] = master.v_n
+        measured[:, 3:6] = _acceleration(master, place)
+        if linear is not None:
+            measured[:, 6:] = _quaternions(linear.C_nb)
+        found.append(
+            Aiding(
+                KINDS[0],
+                MASTER_VELOCITY,
+                stamps,
+                measured,
+                np.full((count, 3), matching.velocity_sigma),
+                start.arm,
+                states=_states(groups, {"lag": DELAY, "lever arm": ARM, "bias": VELOCITY_ERROR}),
+                gate=matching.gate,
+                retimed=True,
+                patience=patience,
+                opens=DV.start,
+                output=np.asarray(known_v & ~known_C),
+            )
+        )
+    if has_C and master.C_nb is not None:
+        measured = np.full((count, 8), np.nan)
+        measured[:, :4] = _quaternions(master.C_nb)
+        measured[:, 4:] = measured[:, :4] if linear is None else _quaternions(linear.C_nm)
+        roles: dict[Role, str] = {"lag": DELAY, "mounting": MOUNTING, "flexure": FLEXURE, "bias": ATTITUDE_ERROR}
+        found.append(
+            Aiding(
+                KINDS[1],
+                MASTER_ATTITUDE,
+                stamps,
+                measured,
+                np.full((count, 3), matching.attitude_sigma),
+                C_mb=start.C_mb,
+                states=_states(groups, roles),
+                gate=matching.gate,
+                retimed=True,
+                patience=patience,
+                opens=MOUNTING if MOUNTING in groups else PHI.start,
+                output=np.asarray(known_C),
+            )
+        )
+    return found
 
 
-def _settings(
-    model: TransferModel, matching: Matching, start: SlaveStart, interval: float, master_interval: float
-) -> loop.Loop:
-    from scipy.special import chdtri
+def _states(groups: dict[str, Group], roles: dict[Role, str]) -> dict[Role, Group]:
+    return {role: groups[name] for role, name in roles.items() if name in groups}
 
-    gate = chdtri(3.0, matching.gate) if matching.gate > 0.0 else np.inf
-    return loop.Loop(
-        noise=model.noise,
-        places=model.places,
-        flexure=np.array(model.flexure_sigma) ** 2,
-        beta=model.flexure_beta,
-        turn=model.turn_noise,
-        velocity=np.full(3, matching.velocity_sigma**2),
-        attitude=np.full(3, matching.attitude_sigma**2),
-        gates=np.full(2, gate),
-        arm=np.asarray(start.arm, dtype=np.float64),
-        longest=max(1, round(LONGEST_STEP / interval)),
-        patience=max(2, round(matching.patience / master_interval)),
+
+def _quaternions(C: Array) -> Array:
+    """(M, 4), NaN where a matrix is."""
+    found = np.full((len(C), 4), np.nan)
+    known = np.isfinite(C).all(axis=(1, 2))
+    found[known] = quaternion_from_dcm(C[known])
+    return found
+
+
+def _acceleration(master: MasterRecord, place: Array | None) -> Array:
+    """(M, 3) the master's own, along east, north, up; NaN where it does not say its specific force."""
+    nothing = np.full((len(master), 3), np.nan)
+    if master.f_b is None or master.C_nb is None or master.v_n is None or place is None or not np.isfinite(place).all():
+        return nothing
+    lat, alt, v = place[:, 0], place[:, 2], master.v_n
+    coriolis = np.cross(2 * earth_rate_n(lat) + transport_rate_n(lat, alt, v), v)
+    return np.asarray(np.einsum("kij,kj->ki", master.C_nb, master.f_b) - coriolis + gravity_n(lat, alt))
+
+
+def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStart) -> TransferTrack:
+    """The loop's track and residuals, row by row of the master."""
+    residuals = {r.name: r for r in track.residuals}
+    said = [residuals[name] for name in KINDS if name in residuals]
+    row = np.searchsorted(stamps, np.unique(np.concatenate([r.stamp for r in said])))
+    count = len(row)
+    assert count == len(track.time)  # each row is put out once
+    innovation, sigma = np.full((2, count, 6), np.nan)
+    nis, verdict = np.full((count, 2), np.nan), np.full((count, 2), ABSENT)
+    for kind, name in enumerate(KINDS):
+        if name not in residuals:
+            continue
+        r: Residuals = residuals[name]
+        at = np.searchsorted(stamps[row], r.stamp)
+        columns = slice(3 * kind, 3 * kind + 3)
+        innovation[at, columns], sigma[at, columns], nis[at, kind] = r.innovation, r.sigma, r.nis
+        verdict[at, kind] = np.where(r.jumped, REOPENED, np.where(r.used, USED, REJECTED))
+    mount = model.slice_of(MOUNTING)
+    C_mb = np.broadcast_to(start.C_mb, (count, 3, 3))
+    if mount is not None:
+        C_mb = dcm_from_rotation_vector(track.sensors[:, mount]) @ start.C_mb
+    return TransferTrack(
+        time=track.time,
+        delay=start.delay,
+        row=row,
+        C_nb=track.C_nb,
+        v_n=track.v_n,
+        position=track.position,
+        aux=track.sensors,
+        C_mb=C_mb,
+        sigma=track.sigma,
+        P=track.P,
+        innovation=innovation,
+        innovation_sigma=sigma,
+        nis=nis,
+        verdict=verdict,
     )

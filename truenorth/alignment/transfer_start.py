@@ -15,11 +15,12 @@ from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.models.transfer import PHI, TransferModel, turn_noise
+from truenorth.errors.master import TransferModel, turn_noise
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.layout import BG, PHI
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -248,7 +249,7 @@ def misalignment_covariance(P: Array) -> tuple[Array, Array]:
 
     That part (the regression on those states) is what more time in the same motion does not improve.
     """
-    rest = slice(PHI.stop, P.shape[-1])
+    rest = slice(BG.start, P.shape[-1])
     whole, cross, own = P[..., PHI, PHI], P[..., PHI, rest], P[..., rest, rest]
     scale = np.sqrt(np.diagonal(own, axis1=-2, axis2=-1))
     scale = np.where(scale > 0.0, scale, 1.0)

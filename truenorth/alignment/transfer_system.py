@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.source import Aiding
+from truenorth.alignment.transfer_filter import Matching, SlaveStart, master_aiding
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
+from truenorth.errors.master import TransferModel
+from truenorth.estimate.linear import rows_along
 from truenorth.filters import LinearSystem
-from truenorth.models.transfer import TransferModel
+from truenorth.records import MasterRecord
 from truenorth.records.motion import MotionStates, Moving
+from truenorth.state.layout import DP
 
 Array = NDArray[np.float64]
 
@@ -65,18 +72,36 @@ def system_along(
         Slave to master axes; the unit matrix when left out.
     """
     f_n = np.einsum("kij,kj->ki", middle.C_nb, middle.f_b)
-    Phi, Q = model.linearise(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b)
-    w_ie, w_en = earth_rate_n(at.lat), transport_rate_n(at.lat, at.alt, at.v_n)
-    w_eb, w_nb = (at.w_ib_b - np.einsum("kji,kj->ki", at.C_nb, w) for w in (w_ie, w_ie + w_en))
-    a_n = np.einsum("kij,kj->ki", at.C_nb, at.f_b) - np.cross(2 * w_ie + w_en, at.v_n) + gravity_n(at.lat, at.alt)
-    H = model.observe(at.C_nb, at.v_n, a_n, w_eb, w_nb, (0.0, 0.0, 0.0) if arm is None else arm, C_mb)
+    ins = model.ins
+    Phi, Q = ins.linearise(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b)
+    r = np.zeros(3) if arm is None else np.asarray(arm, dtype=np.float64)
+    _, H = rows_along(at, _master_of(at, model, r, np.eye(3) if C_mb is None else np.asarray(C_mb)), ins)
     matched = np.isfinite(R)
+    seen = without_place(model)
+    both = np.ix_(seen, seen)
     return LinearSystem(
-        Phi=Phi,
-        Q=Q,
-        H=H,
+        Phi=np.ascontiguousarray(Phi[:, seen][:, :, seen]),
+        Q=np.ascontiguousarray(Q[:, seen][:, :, seen]),
+        H=np.ascontiguousarray(H[:, :, seen]),
         R=np.diag(np.where(matched, R, 1.0))[None],
         z=np.tile(np.where(matched, 0.0, np.nan), (len(T), 1)),
-        x0=np.zeros(model.states),
-        P0=P0,
+        x0=np.zeros(len(seen)),
+        P0=np.ascontiguousarray(P0[both]),
     )
+
+
+def without_place(model: TransferModel) -> NDArray[np.intp]:
+    """All states but those of the position error: the slave's place is the master's."""
+    return np.delete(np.arange(model.states), range(model.states)[DP])
+
+
+def _master_of(at: MotionStates, model: TransferModel, arm: Array, C_mb: Array) -> list[Aiding]:
+    """A master that moves as the slave does at these epochs, with its own acceleration."""
+    w_ie, w_en = earth_rate_n(at.lat), transport_rate_n(at.lat, at.alt, at.v_n)
+    a_n = np.einsum("kij,kj->ki", at.C_nb, at.f_b) - np.cross(2 * w_ie + w_en, at.v_n) + gravity_n(at.lat, at.alt)
+    master = MasterRecord(at.time, C_nb=at.C_nb @ C_mb.T, v_n=at.v_n)
+    start = SlaveStart(at.C_nb[0], at.v_n[0], 0.0, 0.0, 0.0, np.zeros((model.states, model.states)), C_mb=C_mb, arm=arm)
+    velocity, attitude = master_aiding(master, model, start, Matching(1.0, 1.0))
+    measured = velocity.measured.copy()
+    measured[:, 3:6] = a_n
+    return [replace(velocity, measured=measured), attitude]

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment import transfer_loop as loop
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.estimate.memory import USED
 from truenorth.state.evidence import Evidence, contradiction, note, notes
 from truenorth.state.limits import limit
 
@@ -78,7 +78,7 @@ def _lopsided(track: TransferTrack) -> str:
     later = slice(len(track.time) // 4, None)
     nu, verdict = (track.innovation / track.innovation_sigma)[later], track.verdict[later]
     for kind, name in enumerate(("velocities", "attitudes")):
-        rows = nu[verdict[:, kind] == loop.USED, 3 * kind : 3 * kind + 3]
+        rows = nu[verdict[:, kind] == USED, 3 * kind : 3 * kind + 3]
         if len(rows) < FEWEST:
             continue
         follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)

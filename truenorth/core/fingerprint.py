@@ -21,6 +21,7 @@ import numpy as np
 from numba.core import types
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STEPS = "compiled_steps"  # attribute of a class: functions by name that a kernel takes for arguments of this class
@@ -114,6 +115,8 @@ class _Sources:
             return f"compiled({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
         if isinstance(value, CFunc):
             return f"callback({self.see(value.__wrapped__)})"
+        if isinstance(value, _Intrinsic):
+            return f"intrinsic({self.see(value._defn)})"
         if isinstance(value, CodeType):
             return self.of_code(value, None, names)
         if isinstance(value, type):

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.compiled import compiled
 from truenorth.core.linalg import padded
+from truenorth.errors.dynamics import Dynamics, couple_pairs, dynamics_of, noise_of_pairs
 from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME, couple_sensors, error_dynamics, transition
 from truenorth.records.specs import ImuSpec
@@ -90,7 +91,7 @@ class InsModel:
     @property
     def layout(self) -> Layout:
         """Where the states stand."""
-        return Layout(tuple(g.name for g in self.groups), tuple(tuple(map(float, g.sigma)) for g in self.groups))
+        return Layout(tuple(g.name for g in self.groups), tuple(tuple(map(float, g.prior)) for g in self.groups))
 
     @property
     def states(self) -> int:
@@ -103,24 +104,18 @@ class InsModel:
         return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL, GYRO_SCALE, ACCEL_SCALE)])
 
     @property
-    def decay(self) -> Array:
-        """(n,) inverse correlation time of each state, 1/s."""
-        parts = [np.full(len(group.sigma), 1.0 / group.correlation_time) for group in self.groups]
-        return np.concatenate([np.zeros(STATES), *parts])
+    def dynamics(self) -> Dynamics:
+        """How the states run by themselves, for kernels."""
+        return dynamics_of(self.groups, self.noise)
 
     @property
     def noise(self) -> Array:
-        """(n,) spectral density of the white noise that drives each state, its unit^2/s."""
-        q = np.zeros(self.states)
+        """(15,) spectral density of the white noise that drives the states of the INS, their unit^2/s."""
+        q = np.zeros(STATES)
         q[PHI], q[DV] = self.gyro_random_walk**2, self.accel_random_walk**2
         q[BG], q[BA] = self.gyro_rate_walk**2, self.accel_rate_walk**2
         if self.fixed_altitude:
             q[DV.stop - 1] = 0.0
-        start = STATES
-        for group in self.groups:
-            stop = start + len(group.sigma)
-            q[start:stop] = 2.0 * group.sigma**2 / group.correlation_time + group.walk**2
-            start = stop
         return q
 
     def prior(self, P15: ArrayLike) -> Array:
@@ -131,7 +126,7 @@ class InsModel:
             P[DV.stop - 1, :] = 0.0
             P[:, DV.stop - 1] = 0.0
         if self.groups:
-            P[STATES:, STATES:] = np.diag(np.concatenate([group.sigma for group in self.groups]) ** 2)
+            P[STATES:, STATES:] = np.diag(np.concatenate([group.prior for group in self.groups]) ** 2)
         return P
 
     def linearise(
@@ -169,13 +164,16 @@ class InsModel:
         n = self.states
         Phi = np.empty((len(T), n, n))
         fixed, at = self.fixed_altitude, self.sensor_states
-        _stack(padded(n), T, C, f, f_b, w_b, v, axis, alt, fixed, at, self.decay, Phi)
+        dynamics = self.dynamics
+        pairs = np.zeros((len(T), n, n))
+        speed = np.ascontiguousarray(np.linalg.norm(v, axis=1))
+        _stack(padded(n), T, C, f, f_b, w_b, v, speed, axis, alt, fixed, at, dynamics, Phi, pairs)
         q = np.zeros((len(T), n, n))
-        q[:] = np.diag(self.noise)
+        q[:, range(n), range(n)] = dynamics.noise + speed[:, None] * dynamics.wander
         square = w_b**2
         turning = self.turn_noise[0] * square + self.turn_noise[1] * (square.sum(axis=1, keepdims=True) - square)
         q[:, PHI, PHI] += (C * turning[:, None, :]) @ np.swapaxes(C, 1, 2)
-        return Phi, 0.5 * T[:, None, None] * (Phi @ q @ np.swapaxes(Phi, 1, 2) + q)
+        return Phi, 0.5 * T[:, None, None] * (Phi @ q @ np.swapaxes(Phi, 1, 2) + q) + pairs
 
 
 @compiled
@@ -187,19 +185,23 @@ def _stack(
     f_b: Any,
     w_b: Any,
     v: Any,
+    speed: Any,
     axis: Any,
     alt: Any,
     fixed: bool,
     at: Any,
-    decay: Any,
+    dynamics: Dynamics,
     out: Any,
+    pairs: Any,
 ) -> None:
-    N, n = len(size), len(decay)
+    N, n = len(size), len(dynamics.decay)
     F, Phi, Phi_t = np.zeros((N, N)), np.zeros((N, N)), np.zeros((N, N))
     for k in range(len(T)):
         error_dynamics(C[k], f_n[k], v[k], axis[k], alt[k], True, fixed, F)
         couple_sensors(C[k], w_b[k], f_b[k], at, fixed, F)
-        transition(size, F, decay, T[k], Phi, Phi_t)
+        transition(size, F, dynamics.decay + speed[k] * dynamics.along, T[k], Phi, Phi_t)
+        couple_pairs(dynamics, F, T[k], Phi, Phi_t)
+        noise_of_pairs(dynamics, Phi, pairs[k])
         for i in range(n):
             for j in range(n):
                 out[k, i, j] = Phi[i, j]

@@ -1,96 +1,149 @@
-"""The closed loop over a log: a timeline of events, the compiled run, and its answer turned into ENU."""
+"""The closed loop over a log, or over its chunks as they come: events in order, the compiled run, its answer in ENU."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding import row
-from truenorth.aiding.source import COLUMNS, KINDS, Aiding
-from truenorth.core.earth import radii
+from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.linalg import padded
 from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart
 from truenorth.estimate import loop as kernel
+from truenorth.estimate.axes import convergence, solve
+from truenorth.estimate.events import LoopState, Rows, Setting, planned, received
+from truenorth.estimate.memory import (
+    ABSENT,
+    AHEAD,
+    BACK,
+    DISTURB,
+    MEASURE,
+    PLACE,
+    REJECTED,
+    REOPENED,
+    Events,
+    Kept,
+    Model,
+    Samples,
+    Sources,
+    memory,
+)
 from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
 from truenorth.records import ImuRecord
-from truenorth.state.layout import BA, BG, DP, DV, PHI
+from truenorth.state.layout import BA, BG
 from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
 from truenorth.strapdown import wander
-from truenorth.strapdown.increments import increments, interval_lengths, read_only
-
-if TYPE_CHECKING:
-    pass
+from truenorth.strapdown.increments import ImuRows, increments, interval_lengths, read_only
 
 Array = NDArray[np.float64]
-POLE = np.radians(89.999)  # beyond, north has no meaning that a metre of position leaves
+Integers = NDArray[np.int64]
+
+NEVER = 2**62  # rows: a jump is never believed
 
 
-@dataclass(frozen=True)
-class Timeline:
-    """Events in order: (K,) time, source, output; (K, 3) measured, variance; `outside` counts of each source."""
-
-    time: Array
-    source: NDArray[np.int64]
-    row: NDArray[np.int64]
-    output: NDArray[np.bool_]
-    measured: Array
-    variance: Array
-    outside: list[int]
-
-
-def timeline(ends: Array, begin: float, interval: float, every: int, aiding: Sequence[Aiding]) -> Timeline:
-    """Merge the filter's grid (on sample ends), output and measurements.
+def begin(
+    setting: Setting, start: Start, time: float, interval: float, prior: tuple[Array, Array] | None = None
+) -> LoopState:
+    """A loop at the beginning of its first sample.
 
     Parameters
     ----------
-    ends : (N,) array, s
-        Of the samples.
-    begin : float, s
-        Of the first sample.
+    setting : Setting
+    start : Start
+    time : float, s
+        Of the beginning.
     interval : float, s
-        Of the grid, about.
-    every : int
-        Output at every so many grid points, at the beginning and at the end.
-    aiding : sequence of Aiding
+        Nominal, of the samples.
+    prior : (P, values), optional
+        Covariance (n, n), ENU, and assumed values (n,) of all states; from the start and the groups when left out.
     """
-    stride = max(1, round(interval * len(ends) / (ends[-1] - begin)))
-    grid = np.unique(np.append(np.arange(stride - 1, len(ends), stride), len(ends) - 1))
-    output = (np.arange(1, len(grid) + 1) % every) == 0
-    output[-1] = True
-    nothing = np.zeros((1 + len(grid), 3))
-    times, measured, variance = [np.append(begin, ends[grid])], [nothing], [nothing]
-    sources, rows = [np.full(1 + len(grid), -1, np.int64)], [np.zeros(1 + len(grid), np.int64)]
-    outputs, outside = [np.append(True, output)], []
-    for number, sensor in enumerate(aiding):
-        near = np.clip(np.searchsorted(ends, sensor.time), 0, len(ends) - 1)
-        near = np.where((near > 0) & (sensor.time - ends[near - 1] < ends[near] - sensor.time), near - 1, near)
-        at = np.where(np.abs(ends[near] - sensor.time) < kernel.SAME_TIME, ends[near], sensor.time)
-        inside = np.flatnonzero((at >= begin) & (at <= ends[-1]))
-        outside.append(len(at) - len(inside))
-        times.append(at[inside])
-        sources.append(np.full(len(inside), number, np.int64))
-        rows.append(inside.astype(np.int64))
-        outputs.append(np.zeros(len(inside), dtype=bool))
-        measured.append(sensor.measured[inside])
-        variance.append(sensor.sigma[inside] ** 2)
-    time, source = np.concatenate(times), np.concatenate(sources)
-    order = np.lexsort(np.stack([1.0 * (source == -1), time]))  # by time, measurements before the output of their time
-    return Timeline(
-        time[order],
-        source[order],
-        np.concatenate(rows)[order],
-        np.concatenate(outputs)[order],
-        np.ascontiguousarray(np.concatenate(measured)[order]),
-        np.ascontiguousarray(np.concatenate(variance)[order]),
-        outside,
+    model = setting.model
+    n = model.states
+    s = wander.state_at(start.C_nb, start.v_n, start.lat, start.lon, start.alt)
+    if model.fixed_altitude:
+        s[wander.VELOCITY][2] = 0.0
+    if prior is not None:
+        P0, aux = np.array(prior[0], dtype=np.float64), np.array(prior[1], dtype=np.float64)
+    elif start.whole is None:
+        aux = np.zeros(n)
+        aux[BG], aux[BA] = start.gyro_bias, start.accel_bias
+        P0 = model.prior(start.P)
+    else:
+        P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole)
+    place = np.array([[start.lat, start.lon, start.alt]])
+    J = convergence(np.eye(3)[None], s[None, wander.VELOCITY], place, n)[0]
+    width = max([3, *(source.measured.shape[1] for source in setting.sources)])
+    nothing = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, width)), np.zeros((0, 3)))
+    empty = Samples(np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+    state = LoopState(
+        memory(s, aux, solve(J, P0), time, len(setting.sources)),
+        empty,
+        0,
+        0,
+        nothing,
+        nothing,
+        None,
+        interval,
+        time,
+        (0,) * len(setting.sources),
     )
+    return received(setting, state, setting.sources)
+
+
+def go_on(
+    setting: Setting,
+    state: LoopState,
+    record: ImuRecord | ImuRows,
+    aiding: Sequence[Aiding] = (),
+    *,
+    last: bool = False,
+) -> tuple[LoopState, Track]:
+    """Take more samples and measurements.
+
+    Parameters
+    ----------
+    setting : Setting
+    state : LoopState
+        Left as it is.
+    record : ImuRecord or ImuRows
+        The next samples; one is enough.
+    aiding : sequence of Aiding
+        New measurements of the setting's sources, known by their names; no later than the samples that pass their time.
+    last : bool
+        Nothing follows: samples held back for rates are taken, and the end is put out.
+
+    Returns
+    -------
+    state : LoopState
+    track : Track
+        Epochs that were put out, and what the measurements taken said.
+
+    Raises
+    ------
+    DataError
+        The filter broke down.
+    """
+    if state.finished:
+        raise UsageError("this loop was said to be at its end; expected a state from before it")
+    rows = ImuRows(record.time, record.gyro, record.accel, record.kind, record.source)
+    waited = state.rows is not None and len(state.rows.time) < 2
+    before = None if waited else state.rows
+    new = _stacked(state.rows, rows) if waited and state.rows is not None else rows
+    if before is None and len(new.time) < 2 and not last:  # a rate needs the one before it
+        return _run(setting, received(setting, replace(state, rows=new), aiding), last)
+    parts = (interval_lengths(new, before, state.interval), new.time, *increments(new, before, state.interval))
+    joined = (np.concatenate([a, b]) for a, b in zip(state.samples, parts, strict=True))
+    samples = Samples(*(read_only(np.ascontiguousarray(a)) for a in joined))
+    both = new if before is None else _stacked(before, new)
+    state = replace(state, rows=ImuRows(both.time[-2:], both.gyro[-2:], both.accel[-2:], both.kind, both.source))
+    state = received(setting, replace(state, samples=samples), aiding)
+    return _run(setting, state, last)
 
 
 def navigate_track(
@@ -104,6 +157,7 @@ def navigate_track(
     covariance: bool = True,
     smooth: bool = False,
     invariant: bool = False,
+    prior: tuple[Array, Array] | None = None,
 ) -> Track:
     """Mechanise a log from a start, aided by measurements.
 
@@ -125,6 +179,8 @@ def navigate_track(
         Smooth over the whole log (Rauch, Tung, Striebel).
     invariant : bool
         Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
+    prior : (P, values), optional
+        Of all states, see :func:`begin`.
 
     Returns
     -------
@@ -133,7 +189,7 @@ def navigate_track(
     Raises
     ------
     UsageError
-        Smoothing with a vertical loop, or of invariant errors.
+        Smoothing with a vertical loop, of invariant errors, of considered states or of re-timed measurements.
     DataError
         The filter broke down (see :func:`truenorth.filters.kalman`).
     """
@@ -141,17 +197,111 @@ def navigate_track(
         raise UsageError("a vertical loop has fixed gains and cannot be smoothed; expected a Kalman gain (no loop)")
     if smooth and invariant:
         raise UsageError("invariant errors are not smoothed; align first, then navigate with smooth=True")
-    n = model.states
+    if smooth and (any(g.considered for g in model.groups) or any(source.retimed for source in aiding)):
+        raise UsageError("considered states and re-timed measurements are not smoothed; expected smooth=False")
     steps = interval_lengths(record)
-    begin = float(record.time[0] - steps[0])
-    plan = timeline(record.time, begin, interval, every, aiding)
-    outputs, events = int(plan.output.sum()), len(plan.time)
-    carried = outputs if covariance or aiding else 0
-    links = int(np.sum((plan.source >= 0) | plan.output)) if smooth else 0
-    kept = kernel.Kept(
+    time = float(record.time[0] - steps[0])
+    stride = max(1, round(interval * len(record) / (record.time[-1] - time)))
+    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant)
+    state = begin(setting, start, time, record.interval, prior)
+    return go_on(setting, state, record, last=True)[1]
+
+
+def with_states(model: InsModel, aiding: Sequence[Aiding]) -> InsModel:
+    """The model with the states that the aiding sensors ask for; one that two sources share stands once."""
+    groups = {group.name: group for source in aiding for group in source.states.values()}
+    return replace(model, groups=(*model.groups, *groups.values()))
+
+
+def _stacked(first: ImuRows, second: ImuRows) -> ImuRows:
+    time, gyro, accel = (np.concatenate([a, b]) for a, b in zip(first[:3], second[:3], strict=True))
+    return ImuRows(time, gyro, accel, second.kind, second.source)
+
+
+def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Track]:
+    model, sources = setting.model, setting.sources
+    n, there = model.states, len(state.samples.end)
+    wait = AHEAD if any(source.row.instant for source in sources) and not last else 0
+    # The first sample needs the second: the one before it is not there.
+    horizon = max(state.taken, there - wait) if not state.fresh or there > 1 or last else 0
+    if state.fresh and not horizon:
+        return state, _nothing(model, sources)
+    plan, after = planned(setting, state, horizon, last)
+    m, late = state.memory.copy(), state.late
+    if state.fresh:
+        dtheta, dvel = state.samples.dtheta, state.samples.dvel
+        # Its coning would be missing, a tilt of nanoradians and millimetres an hour on.
+        m.s[wander.LAST_ANGLE] = 2.0 * dtheta[0] - dtheta[min(1, there - 1)]
+        m.s[wander.LAST_VELOCITY] = 2.0 * dvel[0] - dvel[min(1, there - 1)]
+    kept = _room(setting, plan, late, n)
+    code, taken, event, row_, outputs = kernel.run(
+        padded(n),
+        state.samples,
+        state.taken,
+        Events(*plan),
+        Events(*late),
+        kernel_sources(sources, model),
+        Model(
+            model.dynamics,
+            model.sensor_states,
+            model.fixed_altitude,
+            *model.turn_noise,
+            setting.invariant,
+            setting.covariance,
+            any(group.considered for group in model.groups),
+        ),
+        horizon,
+        m,
+        kept,
+    )
+    if code != SOUND:
+        _raise(code, kept.when[event], sources[int(np.append(plan.source, late.source)[event])])
+    residuals = _residuals(sources, plan, late.at(np.arange(row_)), kept, after.outside)
+    left = late.at(np.arange(row_, len(late.time)))
+    first = max(0, taken - BACK)
+    tail = Samples(*(a[first:] for a in state.samples))
+    after = replace(
+        after,
+        memory=m,
+        samples=tail,
+        taken=taken - first,
+        count=state.count + first,
+        late=left,
+        fresh=False,
+        finished=last,
+    )
+    states, sensors, P = kept.state[:outputs], kept.aux[:outputs], kept.P[:outputs]
+    if setting.smooth:
+        from truenorth.estimate.smoothing import smoothed
+
+        states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, model.dynamics.turns)
+    C_nb, v_n, position, C_nw = wander.north(states)
+    if setting.covariance:
+        J = convergence(C_nw, v_n, position, n)
+        P = J @ P @ np.swapaxes(J, 1, 2)
+    return after, Track(kept.time[:outputs], C_nb, v_n, position, sensors, P, model.layout, residuals)
+
+
+def _nothing(model: InsModel, sources: Sequence[Aiding]) -> Track:
+    """What is put out before the first sample is taken."""
+    n, none, three = model.states, np.zeros(0), np.zeros((0, 3))
+    silent = tuple(
+        Residuals(source.name, none, three, three, none, np.zeros(0, bool), 0, none, np.zeros(0, bool))
+        for source in sources
+        if source.does == "measurement"
+    )
+    return Track(none, np.zeros((0, 3, 3)), three, three, np.zeros((0, n)), np.zeros((0, n, n)), model.layout, silent)
+
+
+def _room(setting: Setting, plan: Rows, late: Rows, n: int) -> Kept:
+    outputs, events = int(plan.output.sum() + late.output.sum()), len(plan.time) + len(late.time)
+    links = int(np.sum((plan.source >= 0) | plan.output)) if setting.smooth else 0
+    return Kept(
+        time=np.empty(outputs),
         state=np.empty((outputs, 12)),
         aux=np.zeros((outputs, n)),
-        P=np.empty((carried, n, n)),
+        P=np.empty((outputs if setting.covariance else 0, n, n)),
+        when=np.append(plan.time, late.time),
         innovation=np.full((events, 3), np.nan),
         sigma=np.full((events, 3), np.nan),
         nis=np.full(events, np.nan),
@@ -161,114 +311,69 @@ def navigate_track(
         H=np.zeros((links, 3, n)),
         dx=np.zeros((links, n)),
     )
-    s = wander.state_at(start.C_nb, start.v_n, start.lat, start.lon, start.alt)
-    if model.fixed_altitude:
-        s[wander.VELOCITY][2] = 0.0
-    if start.whole is None:
-        aux = np.zeros(n)
-        aux[BG], aux[BA] = start.gyro_bias, start.accel_bias
-        P0 = model.prior(start.P)
-    else:
-        P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole)
-    place = np.array([[start.lat, start.lon, start.alt]])
-    J = convergence(np.eye(3)[None], s[None, wander.VELOCITY], place, n)[0]
-    P0 = _solve(J, P0)
-    P = P0.copy()
-    dtheta, dvel = increments(record)
-    # The sample before the first is not there: its coning would be missing, a tilt of nanoradians and millimetres an hour on.
-    s[wander.LAST_ANGLE], s[wander.LAST_VELOCITY] = 2.0 * dtheta[0] - dtheta[1], 2.0 * dvel[0] - dvel[1]
-    code, event = kernel.run(
-        padded(n),
-        kernel.Samples(*(read_only(a) for a in (steps, record.time, dtheta, dvel))),
-        kernel.Events(plan.time, plan.source, plan.output, plan.measured, plan.variance),
-        _sources(aiding, model),
-        kernel.Model(model.decay, model.noise, model.sensor_states, model.fixed_altitude, *model.turn_noise, invariant),
-        s,
-        aux,
-        P,
-        carried > 0,
-        kept,
-    )
-    if code != SOUND:
-        _raise(code, plan, event, aiding)
-    state, sensors, P = kept.state, kept.aux, kept.P
-    if smooth:
-        from truenorth.estimate.smoothing import smoothed
-
-        state, sensors, P = smoothed(plan, kept, P0)
-    C_nb, v_n, position, C_nw = wander.north(state)
-    if carried:
-        J = convergence(C_nw, v_n, position, n)
-        P = J @ P @ np.swapaxes(J, 1, 2)
-    residuals = tuple(
-        _residuals(source, plan, kept, number) for number, source in enumerate(aiding) if source.kind != "disturbance"
-    )
-    return Track(plan.time[plan.output], C_nb, v_n, position, sensors, P, model.layout, residuals)
 
 
-def with_states(model: InsModel, aiding: Sequence[Aiding]) -> InsModel:
-    """The model with the states that the aiding sensors ask for; one that two sources share stands once."""
-    groups = {group.name: group for source in aiding for group in source.states.values()}
-    return replace(model, groups=(*model.groups, *groups.values()))
-
-
-def convergence(C_nw: Array, v_n: Array, position: Array, n: int) -> Array:
-    """(K, n, n) from errors along w to errors along ENU.
-
-    Turned into these axes; and since ENU at the computed place is turned against ENU at the true one by the convergence
-    of the meridians, ``c = tan L dp_E/(R_N + h)``: ``phi_U`` grows by it, and velocity is told in axes turned by it.
-    """
-    J = np.zeros((len(C_nw), n, n))
-    J[:] = np.eye(n)
-    for group in (PHI, DV, DP):
-        J[:, group, group] = C_nw
-    lat, alt = position[:, 0], position[:, 2]
-    rate = np.tan(np.clip(lat, -POLE, POLE)) / (radii(lat)[1] + alt)
-    c = rate[:, None] * C_nw[:, 0, :]  # told by dp along w
-    J[:, PHI.stop - 1, DP] = c
-    J[:, DV.start, DP] = c * v_n[:, 1:2]
-    J[:, DV.start + 1, DP] = -c * v_n[:, :1]
-    return J
-
-
-def _solve(J: Array, P: Array) -> Array:
-    inverse = np.linalg.inv(J)
-    return np.ascontiguousarray(inverse @ P @ inverse.T)
-
-
-def _sources(aiding: Sequence[Aiding], model: InsModel) -> kernel.Sources:
-    figures = np.zeros((len(aiding), row.FIGURES))
-    states = np.full((len(aiding), row.PLACES), -1, dtype=np.int64)
+def kernel_sources(aiding: Sequence[Aiding], model: InsModel) -> Sources:
+    """What the kernel needs of the sensors."""
+    count = len(aiding)
+    figures, gates = np.zeros((count, row.FIGURES)), np.full((count, 3), np.inf)
+    states = np.full((count, row.PLACES), -1, dtype=np.int64)
+    opens = np.full(count, -1, dtype=np.int64)
     for number, source in enumerate(aiding):
-        figures[number, row.ARM] = source.lever_arm
-        figures[number, row.MOUNT] = source.C_mb.ravel()
-        figures[number, row.GATES] = source.gates()
-        figures[number, row.LOOP] = source.loop
+        figures[number, row.ARM : row.MOUNT] = source.lever_arm
+        figures[number, row.MOUNT : row.OWN] = source.C_mb.ravel()
+        figures[number, row.OWN : row.OWN + len(source.figures)] = source.figures
+        gates[number] = source.gates()
         for role, group in source.states.items():
-            states[number, COLUMNS[role]] = model.layout.first_of(group.name)
-    return kernel.Sources(np.array([KINDS[source.kind] for source in aiding], dtype=np.int64), figures, states)
-
-
-def _residuals(source: Aiding, plan: Timeline, kept: kernel.Kept, number: int) -> Residuals:
-    rows = np.flatnonzero((plan.source == number) & (kept.verdict != kernel.ABSENT))
-    return Residuals(
-        source.name,
-        plan.time[rows],
-        kept.innovation[rows],
-        kept.sigma[rows],
-        kept.nis[rows],
-        kept.verdict[rows] == kernel.USED,
-        plan.outside[number],
+            states[number, row.ROLES[role]] = model.layout.first_of(group.name)
+        if source.opens is not None:
+            opens[number] = source.opens if isinstance(source.opens, int) else model.layout.first_of(source.opens)
+    does = {"disturbance": DISTURB, "place": PLACE}
+    return Sources(
+        np.array([does.get(source.does, MEASURE) for source in aiding], dtype=np.int64),
+        np.array([source.row.function.address for source in aiding], dtype=np.int64),
+        figures,
+        states,
+        gates,
+        np.array([source.loop for source in aiding], dtype=np.float64),
+        np.array([source.row.instant for source in aiding], dtype=np.bool_),
+        np.array([source.patience if source.opens is not None else NEVER for source in aiding], dtype=np.int64),
+        opens,
     )
 
 
-def _raise(code: int, plan: Timeline, event: int, aiding: Sequence[Aiding]) -> None:
-    name = aiding[plan.source[event]].name
+def _residuals(
+    sources: Sequence[Aiding], plan: Rows, late: Rows, kept: Kept, outside: Sequence[int]
+) -> tuple[Residuals, ...]:
+    of = np.append(plan.source, late.source)
+    verdict = kept.verdict[: len(of)]
+    found = []
+    for number, source in enumerate(sources):
+        if source.does != "measurement":
+            continue
+        rows = np.flatnonzero((of == number) & (verdict != ABSENT))
+        found.append(
+            Residuals(
+                source.name,
+                kept.when[rows],
+                kept.innovation[rows],
+                kept.sigma[rows],
+                kept.nis[rows],
+                verdict[rows] != REJECTED,
+                outside[number],
+                np.append(plan.time, late.time)[rows],
+                verdict[rows] == REOPENED,
+            )
+        )
+    return tuple(found)
+
+
+def _raise(code: int, time: float, source: Aiding) -> None:
     why = (
         "the variance of an innovation is not positive"
         if code == NO_INNOVATION_VARIANCE
         else "the covariance is lost in rounding"
     )
     raise DataError(
-        f"navigation broke down at {plan.time[event]:.3f} s, at a measurement of {name}: {why}; check its sigmas"
+        f"navigation broke down at {time:.3f} s, at a measurement of {source.name}: {why}; check its sigmas"
     )

@@ -7,12 +7,11 @@ Corrections fed back make the loop's errors those of a linear filter less what i
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.estimate import loop as kernel
+from truenorth.estimate.correct import feed_back
+from truenorth.estimate.memory import USED, Events, Kept
 from truenorth.filters import LinearSystem
 from truenorth.filters.smoother import smoother
 from truenorth.strapdown import wander
@@ -20,32 +19,18 @@ from truenorth.strapdown import wander
 Array = NDArray[np.float64]
 
 
-class Timeline(Protocol):
-    """Events in order."""
-
-    @property
-    def source(self) -> NDArray[np.int64]:
-        """(K,) of each event; negative: none."""
-
-    @property
-    def output(self) -> NDArray[np.bool_]:
-        """(K,) whether the state is put out there."""
-
-    @property
-    def variance(self) -> Array:
-        """(K, 3) of what was measured."""
-
-
-def smoothed(plan: Timeline, kept: kernel.Kept, P0: Array) -> tuple[Array, Array, Array]:
+def smoothed(plan: Events, kept: Kept, P0: Array, turns: NDArray[np.int64]) -> tuple[Array, Array, Array]:
     """State, sensors and covariance (along w) at each output, smoothed.
 
     Parameters
     ----------
-    plan : Timeline
-    kept : kernel.Kept
+    plan : Events
+    kept : Kept
         Of a run made for smoothing: with its links from event to event.
     P0 : (n, n) array
         Covariance at the beginning.
+    turns : (T,) array
+        First states of rotations.
 
     Returns
     -------
@@ -54,7 +39,7 @@ def smoothed(plan: Timeline, kept: kernel.Kept, P0: Array) -> tuple[Array, Array
     P : (J, n, n) array
     """
     linked = (plan.source >= 0) | plan.output
-    innovation, used = kept.innovation[linked], kept.verdict[linked] == kernel.USED
+    innovation, used = kept.innovation[linked], kept.verdict[linked] == USED
     count, n = len(innovation), len(P0)
     corrected = np.zeros((count, n))  # after each event
     z = np.full((count, 3), np.nan)
@@ -75,5 +60,5 @@ def smoothed(plan: Timeline, kept: kernel.Kept, P0: Array) -> tuple[Array, Array
     full = np.zeros((len(state), wander.LENGTH))
     full[:, : state.shape[1]] = state
     for k in range(len(state)):
-        kernel.feed_back(full[k], sensors[k], n, left[k].copy())
+        feed_back(full[k], sensors[k], left[k].copy(), turns)
     return full[:, : state.shape[1]], sensors, answer.P[out]

@@ -312,7 +312,7 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
         record = replace(record, gyro=record.gyro * factor[:, None], accel=record.accel * factor[:, None])
     turn, push = (np.tile(missing[:, None] * max(rate, 1e-9), 3) for rate in unrest)
     # The kernel's form of a disturbance: variance of velocity as measured, of attitude as variance.
-    return record, gaps, [Aiding("gap", "disturbance", record.time[rows], push**2, turn)]
+    return record, gaps, [Aiding("gap", "velocity", record.time[rows], push**2, turn, does="disturbance")]
 
 
 def _altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:

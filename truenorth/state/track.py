@@ -28,6 +28,10 @@ class Residuals:
         Not rejected by the gate.
     outside : int
         Measurements before the start or after the end of the IMU's log.
+    stamp : (M,) array, s
+        The measurements' own times, which differ from `time` where they are re-timed.
+    jumped : (M,) array of bool
+        Where a jump was believed, and taken up.
     """
 
     name: str
@@ -37,6 +41,8 @@ class Residuals:
     nis: Array
     used: NDArray[np.bool_]
     outside: int
+    stamp: Array
+    jumped: NDArray[np.bool_]
 
     @property
     def rows(self) -> NDArray[np.int64]:

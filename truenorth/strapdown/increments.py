@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,8 +13,26 @@ from truenorth.records import GAP_FACTOR, ImuRecord
 Array = NDArray[np.float64]
 
 
+class ImuRows(NamedTuple):
+    """Rows of an IMU record as they come, one at least; unlike a record they are not checked.
+
+    `time` (N,), `gyro` and `accel` (N, 3), `kind` "rates" or "increments", `source` for messages.
+    """
+
+    time: Array
+    gyro: Array
+    accel: Array
+    kind: str
+    source: str = ""
+
+    @property
+    def interval(self) -> float:
+        """Median step, s."""
+        return float(np.median(np.diff(self.time)))
+
+
 def increments(
-    record: ImuRecord, before: ImuRecord | None = None, interval: float | None = None
+    record: ImuRecord | ImuRows, before: ImuRecord | ImuRows | None = None, interval: float | None = None
 ) -> tuple[Array, Array]:
     """Angle and velocity increments over the interval that ends at each row.
 
@@ -23,8 +43,8 @@ def increments(
 
     Parameters
     ----------
-    record : ImuRecord
-    before : ImuRecord, optional
+    record : ImuRecord or ImuRows
+    before : ImuRecord or ImuRows, optional
         The rows just before, at least two (see :func:`last_rows`), so that a chunk goes on where another ended.
     interval : float, s, optional
         Nominal sampling interval; the record's own when left out.
@@ -52,7 +72,9 @@ def increments(
     return np.ascontiguousarray(result[earlier:, :3]), np.ascontiguousarray(result[earlier:, 3:])
 
 
-def interval_lengths(record: ImuRecord, before: ImuRecord | None = None, interval: float | None = None) -> Array:
+def interval_lengths(
+    record: ImuRecord | ImuRows, before: ImuRecord | ImuRows | None = None, interval: float | None = None
+) -> Array:
     """(N,) length of the interval that ends at each row, s; with nothing before it, the first row's is the nominal one.
 
     Raises

@@ -14,6 +14,7 @@ representation", J. Navigation 63 (2010).
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,16 @@ def earth_axis(s: Any) -> Any:
     """The earth's axis in w, a tuple: the third row of ``C_ew``."""
     w, x, y, z = s[7], s[8], s[9], s[10]
     return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+@compiled
+def azimuth(s: Any) -> Any:
+    """Direction of north in w: its sine and cosine, x and y; at the pole itself y is called north."""
+    axis = earth_axis(s)
+    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    if level == 0.0:
+        return 0.0, 1.0
+    return axis[0] / level, axis[1] / level
 
 
 @compiled

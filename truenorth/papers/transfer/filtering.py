@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, TransferTrack, transfer_filter
 from truenorth.analysis.consistency import nees
 from truenorth.core.attitude import misalignment
-from truenorth.models.transfer import ARM, BA, BG, PHI, TAU, TransferModel
+from truenorth.errors.master import ARM, DELAY, TransferModel
 from truenorth.papers.transfer.truth import (
     ARM_SIGMA,
     ATTITUDE_NOISE,
@@ -26,6 +26,7 @@ from truenorth.papers.transfer.truth import (
     Run,
 )
 from truenorth.records.specs import ImuSpec
+from truenorth.state.layout import BA, BG, PHI
 
 Array = NDArray[np.float64]
 
@@ -177,7 +178,7 @@ def _track(flights: Flights, run: Run, method: Method, known_delay: float) -> Tr
         delay=run.tau if method.told else known_delay,
     )
     matching = Matching(VELOCITY_NOISE if method.velocity else np.inf, ATTITUDE_NOISE if method.attitude else np.inf)
-    return transfer_filter(run.slave, run.master, model, start, matching, covariances=True)
+    return transfer_filter(run.slave, run.master, model, start, matching)
 
 
 def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
@@ -185,13 +186,13 @@ def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
     k = np.clip(np.searchsorted(track.time, EPOCHS), 1, len(track.time) - 1)
     k -= np.abs(track.time[k - 1] - EPOCHS) < np.abs(track.time[k] - EPOCHS)
     silent = np.abs(track.time[k] - EPOCHS) > NEAR
-    C = run.truth.C_nb[track.sample[k]]
+    C = run.motion.states(track.time[k]).C_nb
     phi = misalignment(track.C_nb[k], C)
     aux, sigma, P = track.aux[k], track.sigma[k], track.P[k][:, PHI, PHI]
     nothing = np.full(len(k), np.nan)
     model = model_of(method, ImuSpec())
     tau, tau_sigma, arm, arm_sigma = nothing, nothing, np.full((len(k), 3), np.nan), np.full((len(k), 3), np.nan)
-    if (at := model.slice_of(TAU)) is not None:
+    if (at := model.slice_of(DELAY)) is not None:
         tau, tau_sigma = aux[:, at.start] + track.delay - run.tau, sigma[:, at.start]
     if (at := model.slice_of(ARM)) is not None:
         arm, arm_sigma = aux[:, at] - run.arm, sigma[:, at]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truenorth.alignment.transfer_system import system_of_motion
+from truenorth.alignment.transfer_system import system_of_motion, without_place
 from truenorth.analysis.observability import observability
-from truenorth.models.transfer import ARM
+from truenorth.errors.master import ARM
 from truenorth.papers.transfer.filtering import METHODS, model_of, prior_of
 from truenorth.papers.transfer.truth import END, TAU_SIGMA, VELOCITY_NOISE, Case
 
@@ -46,7 +46,9 @@ def told_by(case: Case) -> Seen:
     P0[arm, arm] = EVEN_ARM**2 * np.eye(3)
     rows = VELOCITY_NOISE**2 * 0.1 / STEP  # of ten a second, in one
     R = np.array([rows] * 3 + [np.inf] * 3)
-    found = observability(system_of_motion(motion, model, P0, R, END, STEP), model.names, model.units)
+    seen = without_place(model)
+    names, units = [model.names[i] for i in seen], [model.units[i] for i in seen]
+    found = observability(system_of_motion(motion, model, P0, R, END, STEP), names, units)
     hardly = "; ".join(map(str, found.hardly))
     words = f"what keeps more than .9 of its prior sigma: {hardly}" if hardly else "all states are told apart"
     return Seen(found.rank, words)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.records import ImuRecord, MasterRecord
-from truenorth.records.motion import MotionStates
+from truenorth.records.motion import Moving
 from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_master
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
@@ -101,8 +101,8 @@ class Run:
     ----------
     slave : ImuRecord
     master : MasterRecord
-    truth : MotionStates
-        At the slave's samples.
+    motion : Moving
+        Of the slave.
     C_nb, v_n : arrays
         The slave's first attitude, handed over, and velocity.
     mounting : (3,) array, rad
@@ -114,7 +114,7 @@ class Run:
 
     slave: ImuRecord
     master: MasterRecord
-    truth: MotionStates
+    motion: Moving
     C_nb: Array
     v_n: Array
     mounting: Array
@@ -134,7 +134,6 @@ class Flights:
         self.start = self.body.states(np.array(self.scenario.start))
         if not case.flexure:
             self.ideal: IdealLog = self._ideal(self.body)
-            self.truth = self.body.states(self.ideal.edges[1:])
 
     def _ideal(self, motion: Any) -> IdealLog:
         return ideal_log(motion, rate=self.scenario.rate, duration=self.scenario.duration + MORE)
@@ -151,14 +150,13 @@ class Flights:
         elif case.space_time == "drawn":
             tau, arm = TAU_SIGMA * float(rng.standard_normal()), ARM_SIGMA * rng.standard_normal(3)
         ideal, C_start = self._moving(run)
-        truth = self.truth if not case.flexure else ideal.motion.states(ideal.edges[1:])
         log = simulate(ideal, imu=self.scenario.imu_spec, seed=self.seed, run=run, scenario=case.number)
         master = self._master(run, tau + case.extra_delay, arm, mounting)
         C_nb = C_start @ dcm_from_rotation_vector(-mounting)
         return Run(
             log.record,
             master,
-            truth,
+            ideal.motion if case.flexure else self.body,
             C_nb,
             self.start.v_n + dv,
             mounting,

@@ -1,0 +1,195 @@
+"""What a master INS on the same vehicle tells a slave: velocity and attitude, late, from another place and another seat.
+
+The master is late by tau, stands at -r in the slave (r: from master to slave, slave axes) and is turned by ``C_mb`` (slave to
+master axes, ``C_mb true = (I + [mu x]) C_mb assumed``); the slave's seat bends by theta:
+
+    velocity   z = v_hat - C_hat (w_hat x r) - v_master
+                 = dv + a tau + C [w x] dr + phi x C (w x r) - C (eps x r) - db
+    attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C_master mu - C theta - dm
+
+with `a` the *master's* acceleration: the slave's holds that of the arm itself, which would tell a delay from the master's
+smooth motion falsely. The rows are re-timed: they are taken at the stamp less the delay as known now, so that only what
+is left of it is linearised. ``b`` and ``m`` are the master's own slow errors of velocity and attitude, east, north, up.
+
+Sources: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
+and Timing 3 (2016), eq. 6-9, corrected: a zero column is missing in its (9); the sign of tau in its (8) is that of (9) when
+the reference is late; J. Kain, J. Cloutier, "Rapid transfer alignment for tactical weapon applications", AIAA GNC 1989
+(velocity and attitude matching, flexure).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from truenorth.aiding.position import into_north
+from truenorth.aiding.row import (
+    ARM,
+    AT_ARM,
+    AT_BIAS,
+    AT_FLEXURE,
+    AT_LAG,
+    AT_MOUNT,
+    MOUNT,
+    Row,
+    lag_now,
+    row,
+    with_state,
+)
+from truenorth.aiding.velocity import velocity_row
+from truenorth.core.attitude import cross, quaternion_from_rotation_vector, quaternion_product, rotate
+from truenorth.core.compiled import compiled
+from truenorth.state.now import (
+    NOW_C,
+    NOW_EARTH,
+    NOW_FORCE,
+    NOW_NORTH,
+    NOW_RATE,
+    NOW_SPIN,
+    matrix_of,
+    vector_of,
+)
+from truenorth.strapdown.wander import acceleration, curvature, earth_axis
+
+_PHI, _DP = 0, 6
+
+
+@compiled
+def from_north(now: Any, v: Any) -> Any:
+    """A vector of east, north, up along w; tuples."""
+    s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+    return c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]
+
+
+@compiled
+def turned_from_north(now: Any, q: Any, first: int) -> Any:
+    """An attitude against east, north, up (four numbers of a vector), against w: a quaternion, tuple."""
+    # w is turned against ENU about up: x = c E + s N.
+    half = 0.5 * math.atan2(now[NOW_NORTH], now[NOW_NORTH + 1])
+    turn = (math.cos(half), 0.0, 0.0, -math.sin(half))
+    return quaternion_product(turn, (q[first], q[first + 1], q[first + 2], q[first + 3]))
+
+
+@compiled
+def _times(C: Any, v: Any) -> Any:
+    """``C v``, for a matrix and a tuple."""
+    return (
+        C[0, 0] * v[0] + C[0, 1] * v[1] + C[0, 2] * v[2],
+        C[1, 0] * v[0] + C[1, 1] * v[1] + C[1, 2] * v[2],
+        C[2, 0] * v[0] + C[2, 1] * v[1] + C[2, 2] * v[2],
+    )
+
+
+@row
+def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    """Measured: velocity; the master's acceleration; the slave's attitude to linearise with (quaternion); all of n or NaN."""
+    if np.isnan(measured[0]):
+        return
+    r = with_state(figures, ARM, assumed, at[AT_ARM])
+    C, w, spin, f = matrix_of(now, NOW_C), vector_of(now, NOW_RATE), vector_of(now, NOW_SPIN), vector_of(now, NOW_FORCE)
+    earth = vector_of(now, NOW_EARTH)
+    w_eb = (
+        w[0] - (C[0, 0] * earth[0] + C[1, 0] * earth[1] + C[2, 0] * earth[2]),
+        w[1] - (C[0, 1] * earth[0] + C[1, 1] * earth[1] + C[2, 1] * earth[2]),
+        w[2] - (C[0, 2] * earth[0] + C[1, 2] * earth[1] + C[2, 2] * earth[2]),
+    )
+    if not np.isnan(measured[3]):
+        push = from_north(now, (measured[3], measured[4], measured[5]))
+    else:
+        force = _times(C, f)
+        if not np.isnan(measured[6]):
+            force = rotate(turned_from_north(now, measured, 6), f)
+        swing, roll = cross(w, cross(w, r)), cross(spin, r)
+        arms = _times(C, (swing[0] + roll[0], swing[1] + roll[1], swing[2] + roll[2]))
+        own = acceleration(now, force, False)
+        push = (own[0] - arms[0], own[1] - arms[1], own[2] - arms[2])
+    away = (-r[0], -r[1], -r[2])
+    velocity_row(now, C, w_eb, push, away, lag_now(now, assumed, at[AT_LAG]), -1, at[AT_LAG], measured, H, z)
+    if at[AT_ARM] >= 0:
+        for j in range(3):
+            m = _times(C, cross(w_eb, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))))
+            a = at[AT_ARM] + j
+            x, y = m[0], m[1]
+            s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+            H[0, a], H[1, a], H[2, a] = c * x - s * y, s * x + c * y, m[2]
+    if at[AT_BIAS] >= 0:
+        for j in range(3):
+            z[j] += assumed[at[AT_BIAS] + j]
+            H[j, at[AT_BIAS] + j] = -1.0
+
+
+@row
+def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    """Measured: the master's attitude against n, and the one to linearise with (quaternions)."""
+    if np.isnan(measured[0]):
+        return
+    C = matrix_of(now, NOW_C)
+    # The seat as assumed: mounting, then what it bends, then the given axes.
+    mount, bend = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if at[AT_MOUNT] >= 0:
+        mount = vector_of(assumed, at[AT_MOUNT])
+    if at[AT_FLEXURE] >= 0:
+        bend = vector_of(assumed, at[AT_FLEXURE])
+    q_mount, q_bend = quaternion_from_rotation_vector(mount), quaternion_from_rotation_vector(bend)
+    q_m, q_linear = turned_from_north(now, measured, 0), turned_from_north(now, measured, 4)
+    error = (0.0, 0.0, 0.0)
+    if at[AT_BIAS] >= 0:
+        b = vector_of(assumed, at[AT_BIAS])
+        error = from_north(now, b)
+    q_error = quaternion_from_rotation_vector(error)
+    sine, cosine, zx, zy, zz = 0.0, -0.5, 0.0, 0.0, 0.0
+    for k in range(3):  # z: axis times sine of C reference', column by column
+        e = (1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2))
+        b_k = rotate(q_bend, e)
+        a_k = (
+            figures[MOUNT] * b_k[0] + figures[MOUNT + 1] * b_k[1] + figures[MOUNT + 2] * b_k[2],
+            figures[MOUNT + 3] * b_k[0] + figures[MOUNT + 4] * b_k[1] + figures[MOUNT + 5] * b_k[2],
+            figures[MOUNT + 6] * b_k[0] + figures[MOUNT + 7] * b_k[1] + figures[MOUNT + 8] * b_k[2],
+        )
+        r = rotate(q_error, rotate(q_m, rotate(q_mount, a_k)))
+        own = (C[0, k], C[1, k], C[2, k])
+        zx += 0.5 * (own[1] * r[2] - own[2] * r[1])
+        zy += 0.5 * (own[2] * r[0] - own[0] * r[2])
+        zz += 0.5 * (own[0] * r[1] - own[1] * r[0])
+        cosine += 0.5 * (own[0] * r[0] + own[1] * r[1] + own[2] * r[2])
+    sine = math.sqrt(zx * zx + zy * zy + zz * zz)
+    scale = 1.0
+    if sine > 1e-12:
+        scale = math.atan2(sine, cosine) / sine
+    lag = lag_now(now, assumed, at[AT_LAG])
+    axis = earth_axis(now)
+    Kxx, Kxy, Kyy = curvature(axis, now[11])
+    v, w, earth = (now[4], now[5], now[6]), vector_of(now, NOW_RATE), vector_of(now, NOW_EARTH)
+    w_n = (earth[0] - (Kxy * v[0] + Kyy * v[1]), earth[1] + Kxx * v[0] + Kxy * v[1], earth[2])
+    turn = _times(C, w)
+    turn = (turn[0] - w_n[0], turn[1] - w_n[1], turn[2] - w_n[2])
+    z[0], z[1], z[2] = scale * zx + lag * turn[0], scale * zy + lag * turn[1], scale * zz + lag * turn[2]
+    for j in range(3):
+        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
+        m = rotate(q_linear, e)
+        for i in range(3):
+            if at[AT_MOUNT] >= 0:
+                H[i, at[AT_MOUNT] + j] = -m[i]
+            if at[AT_FLEXURE] >= 0:
+                H[i, at[AT_FLEXURE] + j] = -C[i, j]
+        H[j, _PHI + j] = 1.0
+        if at[AT_LAG] >= 0:
+            H[j, at[AT_LAG]] = -turn[j]
+    # East and north at the computed place are turned against those at the master's by the convergence of the meridians.
+    s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    if level > 0.0:
+        rate = axis[2] / level * (c * c * Kxx - 2.0 * s * c * Kxy + s * s * Kyy)
+        H[2, _DP], H[2, _DP + 1] = rate * c, -rate * s
+    into_north(now, H, z)
+    if at[AT_BIAS] >= 0:
+        for j in range(3):
+            H[j, at[AT_BIAS] + j] = -1.0
+
+
+MASTER_VELOCITY = Row("master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1}, width=10, instant=True)
+MASTER_ATTITUDE = Row(
+    "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=8, instant=True
+)

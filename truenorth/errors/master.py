@@ -1,0 +1,239 @@
+"""Groups of transfer alignment: what a slave does not know of its master, and the model they make with the INS.
+
+| group | states | unit |
+| --- | --- | --- |
+| `DELAY` | delay of the master beyond the known one: true minus assumed | s |
+| `ARM` | lever arm from the master to the slave, slave axes: true minus assumed | m |
+| `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
+| `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
+| `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: first-order Gauss-Markov | m/s, rad |
+
+(The mounting stands in the *master's* axes, in which it does not turn with what is estimated: in the slave's axes the filter would
+take its own corrections of tilt for knowledge of heading.) Flexure is ``theta'' = -2 beta theta' - beta^2 theta + white noise``.
+The master's own errors are *considered*: they count in the covariance, and the slave is not corrected for them, since a
+slave that takes up its master's motion cannot tell its own tilt from its master's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.core.errors import UsageError
+from truenorth.errors.group import Group
+from truenorth.errors.ins import TURN_TIME
+from truenorth.errors.model import InsModel
+from truenorth.state.layout import BA, BG, DP, DV, PHI, Layout
+
+Array = NDArray[np.float64]
+
+DELAY, ARM, MOUNTING, FLEXURE = "master delay", "master lever arm", "mounting", "flexure"
+VELOCITY_ERROR, ATTITUDE_ERROR = "master velocity error", "master attitude error"
+SIDES = ("right", "forward", "up")
+PLACE_SIGMA = 10.0  # m: the slave's place is set to the master's, its error moves attitude by parts in a million
+_OF_GROUPS = {
+    DELAY: (("tau",), "s"),
+    ARM: (tuple(f"r_{side}" for side in SIDES), "m"),
+    MOUNTING: (tuple(f"mu_{axis}" for axis in "xyz"), "rad"),
+    FLEXURE: (tuple(f"theta_{axis}" for axis in "xyz") + tuple(f"theta'_{axis}" for axis in "xyz"), "rad"),
+    VELOCITY_ERROR: (tuple(f"master_dv_{axis}" for axis in "ENU"), "m/s"),
+    ATTITUDE_ERROR: (tuple(f"master_phi_{axis}" for axis in "ENU"), "rad"),
+}
+_OF_INS = (
+    ("phi", "ENU", "rad"),
+    ("dv", "ENU", "m/s"),
+    ("dp", "ENU", "m"),
+    ("eps", "xyz", "rad/s"),
+    ("nabla", "xyz", "m/s^2"),
+)
+
+
+@dataclass(frozen=True)
+class MasterErrors:
+    """Slow errors of the master's own solution: first-order Gauss-Markov, one-sigma.
+
+    Attributes
+    ----------
+    level, heading : float, rad
+    velocity : float, m/s
+    correlation_time : float, s
+    """
+
+    level: float = 0.0
+    heading: float = 0.0
+    velocity: float = 0.0
+    correlation_time: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not all(0.0 <= x < math.inf for x in (self.level, self.heading, self.velocity)):
+            raise UsageError(f"{self}: expected sigmas of zero or more")
+        if not self.correlation_time > 0.0:
+            raise UsageError(
+                f"correlation time of the master's errors {self.correlation_time:g} s; expected above zero"
+            )
+
+
+@dataclass(frozen=True)
+class TransferModel:
+    """Noise of the slave, and which groups there are; one-sigma, SI.
+
+    Attributes
+    ----------
+    gyro_random_walk : float, rad/sqrt(s)
+    accel_random_walk : float, m/s/sqrt(s)
+    gyro_rate_walk, accel_rate_walk : float
+        Random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s).
+    turn_noise : float, s
+        What scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.errors.model.InsModel`.
+    delay, lever_arm, mounting : bool
+        Groups for them.
+    delay_walk : float, s/sqrt(s)
+        How the delay wanders, for a master whose clock runs at another rate.
+    flexure_sigma : (3,) tuple, rad
+        Of the seat's angles about right, forward, up; zeros: it does not bend, and there are no such states.
+    flexure_beta : float, rad/s
+        Natural frequency of its critically damped processes.
+    master : MasterErrors
+        Of the master itself; zeros: it is taken for the truth.
+    """
+
+    gyro_random_walk: float
+    accel_random_walk: float
+    gyro_rate_walk: float = 0.0
+    accel_rate_walk: float = 0.0
+    turn_noise: float = 0.0
+    delay: bool = True
+    lever_arm: bool = True
+    mounting: bool = False
+    delay_walk: float = 0.0
+    flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    flexure_beta: float = 1.0
+    master: MasterErrors = MasterErrors()
+
+    def __post_init__(self) -> None:
+        walks = (self.gyro_random_walk, self.accel_random_walk, self.gyro_rate_walk, self.accel_rate_walk)
+        if not all(0.0 <= x < math.inf for x in (*walks, self.turn_noise, self.delay_walk, *self.flexure_sigma)):
+            raise UsageError(f"{self}: a random walk or a sigma is negative or not finite")
+        if not 0.0 < self.flexure_beta < math.inf:
+            raise UsageError(f"flexure_beta is {self.flexure_beta}; expected a positive frequency, rad/s")
+
+    @property
+    def groups(self) -> dict[str, Group]:
+        """Those there are, by name, in order; the priors of delay, arm and mounting are given with :meth:`prior`."""
+        of, found = self.master, []
+        if self.delay:
+            found.append(Group(DELAY, np.zeros(1), walk=self.delay_walk, unit="s"))
+        if self.lever_arm:
+            found.append(Group(ARM, np.zeros(3), unit="m"))
+        if self.mounting:
+            found.append(Group(MOUNTING, np.zeros(3), rotation=True, unit="rad"))
+        if any(self.flexure_sigma):
+            found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
+        time = of.correlation_time
+        if of.velocity > 0.0:
+            sigma = np.full(3, of.velocity)
+            found.append(Group(VELOCITY_ERROR, sigma, correlation_time=time, considered=True, unit="m/s"))
+        if of.level > 0.0 or of.heading > 0.0:
+            sigma = np.array([of.level, of.level, of.heading])
+            found.append(Group(ATTITUDE_ERROR, sigma, correlation_time=time, considered=True, unit="rad"))
+        return {group.name: group for group in found}
+
+    @property
+    def ins(self) -> InsModel:
+        """The error model: fifteen states and the groups."""
+        return InsModel(
+            self.gyro_random_walk,
+            self.accel_random_walk,
+            self.gyro_rate_walk,
+            self.accel_rate_walk,
+            (self.turn_noise, self.turn_noise),
+            tuple(self.groups.values()),
+        )
+
+    @property
+    def layout(self) -> Layout:
+        """Where the states stand."""
+        return self.ins.layout
+
+    @property
+    def states(self) -> int:
+        """How many."""
+        return self.layout.states
+
+    def slice_of(self, name: str) -> slice | None:
+        """Where a group's values (of flexure the angles alone) stand; None where there is none."""
+        found = self.layout.slice_of(name)
+        return slice(found.start, found.start + 3) if found is not None and name == FLEXURE else found
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all states."""
+        own = [f"{state}_{axis}" for state, axes, _ in _OF_INS for axis in axes]
+        return (*own, *(name for group in self.groups for name in _OF_GROUPS[group][0]))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of all states, SI."""
+        own = [unit for _, _, unit in _OF_INS for _ in range(3)]
+        return (*own, *(_unit(name, group) for group in self.groups for name in _OF_GROUPS[group][0]))
+
+    def prior(
+        self,
+        dv: ArrayLike,
+        phi: ArrayLike,
+        accel_bias: ArrayLike,
+        gyro_bias: ArrayLike,
+        *,
+        tau: float = 0.0,
+        arm: ArrayLike = 0.0,
+        mounting: ArrayLike = 0.0,
+        C_nb: ArrayLike | None = None,
+        C_mb: ArrayLike | None = None,
+    ) -> Array:
+        """(n, n) covariance at the start.
+
+        Parameters
+        ----------
+        dv, phi, accel_bias, gyro_bias : one or (3,) sigmas, m/s, rad, m/s^2, rad/s
+        tau : float, s
+        arm, mounting : one or (3,) sigmas, m and rad
+            Of groups that are not there, ignored.
+        C_nb : (3, 3) array, optional
+            The slave's attitude was handed over from the master through the assumed mounting: ``phi = C_nm mu + C theta`` and
+            the master's own error, beside what `phi` says; its velocity with the master's. Without it they are independent.
+        C_mb : (3, 3) array, optional
+            The assumed mounting; the unit matrix when left out.
+        """
+        P = np.diag(np.concatenate([np.zeros(15), *(group.prior for group in self.groups.values())]) ** 2)
+        for part, value in ((DV, dv), (PHI, phi), (DP, PLACE_SIGMA), (BA, accel_bias), (BG, gyro_bias)):
+            P[part, part] = np.eye(3) * np.square(value)
+        for name, sigma in ((DELAY, tau), (ARM, arm), (MOUNTING, mounting)):
+            if (at := self.slice_of(name)) is not None:
+                P[at, at] = np.eye(at.stop - at.start) * np.square(sigma)
+        ties: list[tuple[slice, str, Array]] = [(DV, VELOCITY_ERROR, np.eye(3))]
+        if C_nb is not None:
+            seat = np.asarray(C_nb, dtype=np.float64)
+            C_nm = seat if C_mb is None else seat @ np.asarray(C_mb).T
+            ties += [(PHI, MOUNTING, C_nm), (PHI, FLEXURE, seat), (PHI, ATTITUDE_ERROR, np.eye(3))]
+        for part, name, C in ties:
+            if (at := self.slice_of(name)) is not None:
+                own = P[at, at].copy()
+                P[part, at] = C @ own
+                P[at, part] = P[part, at].T
+                P[part, part] += C @ own @ C.T
+        return P
+
+
+def _unit(name: str, group: str) -> str:
+    return "rad/s" if name.startswith("theta'") else _OF_GROUPS[group][1]
+
+
+def turn_noise(scale_factor: float, misalignment: float) -> float:
+    """What scale factors and misalignments of the gyros do in turns, as noise, for :class:`TransferModel`.
+
+    The larger of both, about every axis: a turn about one axis tilts about the others.
+    """
+    return max(scale_factor, misalignment) ** 2 * TURN_TIME

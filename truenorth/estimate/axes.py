@@ -1,0 +1,37 @@
+"""Errors along the wander frame and along east, north, up: how the closed loop's covariance is put out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.earth import radii
+from truenorth.state.layout import DP, DV, PHI
+
+Array = NDArray[np.float64]
+POLE = np.radians(89.999)  # beyond, north has no meaning that a metre of position leaves
+
+
+def convergence(C_nw: Array, v_n: Array, position: Array, n: int) -> Array:
+    """(K, n, n) from errors along w to errors along ENU.
+
+    Turned into these axes; and since ENU at the computed place is turned against ENU at the true one by the convergence
+    of the meridians, ``c = tan L dp_E/(R_N + h)``: ``phi_U`` grows by it, and velocity is told in axes turned by it.
+    """
+    J = np.zeros((len(C_nw), n, n))
+    J[:] = np.eye(n)
+    for group in (PHI, DV, DP):
+        J[:, group, group] = C_nw
+    lat, alt = position[:, 0], position[:, 2]
+    rate = np.tan(np.clip(lat, -POLE, POLE)) / (radii(lat)[1] + alt)
+    c = rate[:, None] * C_nw[:, 0, :]  # told by dp along w
+    J[:, PHI.stop - 1, DP] = c
+    J[:, DV.start, DP] = c * v_n[:, 1:2]
+    J[:, DV.start + 1, DP] = -c * v_n[:, :1]
+    return J
+
+
+def solve(J: Array, P: Array) -> Array:
+    """``J^-1 P J^-T``."""
+    inverse = np.linalg.inv(J)
+    return np.ascontiguousarray(inverse @ P @ inverse.T)

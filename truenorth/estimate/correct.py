@@ -1,0 +1,173 @@
+"""Corrections in the closed loop: rows evaluated, gated, and what they found fed back."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from truenorth.aiding.row import row_at
+from truenorth.core import earth
+from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product
+from truenorth.core.compiled import compiled
+from truenorth.estimate.memory import Memory, Model, Sources
+from truenorth.filters.recursion import (
+    NO_INNOVATION_VARIANCE,
+    NOT_POSITIVE,
+    ROUNDING,
+    SOUND,
+    row_variance,
+    still_positive,
+)
+from truenorth.state.now import NOW_NORTH
+from truenorth.strapdown.wander import displace
+
+_PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
+GRAVITY_GRADIENT = 2.0 * earth.GRAVITY_EQUATOR / earth.SEMI_MAJOR  # 1/s^2: of the free vertical channel
+
+
+@compiled
+def measure(m: Memory, model: Model, sources: Sources, source: int, measured: Any, now: Any, w: Any, R: Any) -> None:
+    """Fill in `H`, `z` and what the row adds to `R` (3,)."""
+    for i in range(3):
+        w.z[i] = np.nan
+        for j in range(w.H.shape[1]):
+            w.H[i, j] = 0.0
+    row_at(sources.row[source])(now, sources.figures[source], sources.states[source], m.aux, measured, w.H, w.z, R)
+    for slow, whole in ((model.sensors[0], _BG), (model.sensors[1], _BA)):  # a slow bias is a bias like the other
+        if slow >= 0:
+            for i in range(3):
+                for j in range(3):
+                    w.H[i, slow + j] = w.H[i, whole + j]
+
+
+@compiled
+def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
+    """How many rows are present, and ``nu' S^-1 nu`` of them together, by Cholesky's factor of ``S``."""
+    count = 0
+    nis = 0.0
+    for i in range(3):
+        sigma[i] = np.nan
+    for i in range(3):
+        if np.isnan(w.z[i]):
+            continue
+        _, variance, _ = row_variance(size, w, i, False)
+        sigma[i] = np.sqrt(variance)
+        whitened = w.z[i]
+        S[i, i] = variance
+        for j in range(i):
+            if np.isnan(w.z[j]):
+                continue
+            total = 0.0
+            for k in range(len(size)):
+                total += w.a[k] * w.H[j, k]
+            for k in range(j):
+                if not np.isnan(w.z[k]):
+                    total -= S[i, k] * S[j, k]
+            S[i, j] = total / S[j, j]
+            S[i, i] -= S[i, j] * S[i, j]
+            whitened -= S[i, j] * S[j, 3]
+        S[i, i] = np.sqrt(S[i, i])
+        S[i, 3] = whitened / S[i, i]
+        nis += S[i, 3] * S[i, 3]
+        count += 1
+    return count, nis
+
+
+@compiled
+def update_held(size: Any, w: Any, held: Any) -> int:
+    """Condition on all rows with the optimal gain, but none for the states that are considered only (Schmidt).
+
+    With ``a = P h`` and ``k = a/s`` where a state is estimated, 0 where not: ``P = (I - k h') P (I - k h')' + k r k'``,
+    Joseph's form, which is ``P - (k a' + a k') + s k k'``.
+
+    Source: S. Schmidt, "Application of state-space methods to navigation problems", Adv. Control Syst. 3 (1966).
+    """
+    for i in range(len(size)):
+        w.largest[i] = max(w.largest[i], w.P[i, i])
+    for row in range(w.z.shape[0]):
+        if np.isnan(w.z[row]):
+            continue
+        nu, variance, _ = row_variance(size, w, row, False)
+        if not variance > 0.0:
+            return NO_INNOVATION_VARIANCE
+        if variance < (1.0 - ROUNDING) * w.R[row, row]:
+            return NOT_POSITIVE
+        for i in range(len(size)):
+            w.k[i] = w.a[i] / variance
+        for i in range(len(held)):
+            if held[i]:
+                w.k[i] = 0.0
+        for i in range(len(size)):
+            w.x[i] += w.k[i] * nu
+            for j in range(len(size)):
+                w.P[i, j] += variance * w.k[i] * w.k[j] - (w.k[i] * w.a[j] + w.a[i] * w.k[j])
+    return SOUND if still_positive(size, w) else NOT_POSITIVE
+
+
+@compiled
+def damp_height(size: Any, C: Any, T: float, time_constant: float, w: Any) -> None:
+    """Third-order loop in place of a Kalman gain: height, velocity and accelerometer bias, all poles at -1/time_constant.
+
+    ``e_h' = e_v - c1 e_h``, ``e_v' = (2 g/R - c2) e_h + b``, ``b' = -c3 e_h``: ``c1 = 3/tau``, ``c2 = 3/tau^2 + 2 g/R``,
+    ``c3 = 1/tau^3``. The covariance is that of these gains: ``P = (I - k h) P (I - k h)' + k r k'``.
+    """
+    nu, variance, _ = row_variance(size, w, 0, False)
+    rate = 1.0 / time_constant
+    last = T * rate * rate * rate
+    for i in range(len(size)):
+        w.k[i] = 0.0
+    w.k[_DP + 2] = 3.0 * T * rate
+    w.k[_DV + 2] = T * (3.0 * rate * rate + GRAVITY_GRADIENT)
+    for j in range(3):
+        w.k[_BA + j] = C[2, j] * last
+    for i in range(len(size)):
+        w.x[i] += w.k[i] * nu
+        for j in range(len(size)):
+            w.P[i, j] += variance * w.k[i] * w.k[j] - (w.k[i] * w.a[j] + w.a[i] * w.k[j])
+
+
+@compiled
+def rotation_vector_of(q: Any) -> Any:
+    """The rotation vector of a quaternion, tuples; the shorter way round."""
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    scale = 2.0 * sign
+    if sine > 1e-9:
+        scale = 2.0 * sign * math.atan2(sine, sign * q[0]) / sine
+    return scale * q[1], scale * q[2], scale * q[3]
+
+
+@compiled
+def feed_back(s: Any, aux: Any, x: Any, turns: Any) -> None:
+    """Take the estimated errors off the state and the sensors; the estimate is zero again.
+
+    `turns` are the first states of rotations: what is found is composed with what is assumed, not added.
+    """
+    q = quaternion_from_rotation_vector((x[0], x[1], x[2]))
+    s[0], s[1], s[2], s[3] = quaternion_product(q, (s[0], s[1], s[2], s[3]))
+    for j in range(3):
+        s[4 + j] -= x[3 + j]
+    displace(s, -x[6], -x[7], -x[8])
+    for i in turns:
+        found = quaternion_from_rotation_vector((x[i], x[i + 1], x[i + 2]))
+        assumed = quaternion_from_rotation_vector((aux[i], aux[i + 1], aux[i + 2]))
+        aux[i], aux[i + 1], aux[i + 2] = rotation_vector_of(quaternion_product(found, assumed))
+        x[i], x[i + 1], x[i + 2] = 0.0, 0.0, 0.0
+    for j in range(9, len(aux)):
+        aux[j] += x[j]
+    for j in range(len(x)):
+        x[j] = 0.0
+
+
+@compiled
+def set_place(size: Any, m: Memory, now: Any, variance: Any, w: Any) -> None:
+    """Put the vehicle where a row of position says (`z`, along east, north, up), its error independent of all others."""
+    s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+    displace(m.s, -(c * w.z[0] + s * w.z[1]), -(c * w.z[1] - s * w.z[0]), -w.z[2])
+    for i in range(3):
+        for j in range(len(size)):
+            w.P[_DP + i, j] = 0.0
+            w.P[j, _DP + i] = 0.0
+        w.P[_DP + i, _DP + i] = variance[i]

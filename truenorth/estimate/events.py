@@ -1,0 +1,173 @@
+"""Events of a closed loop in order: the filter's grid, output, and measurements that wait until their time has come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.source import Aiding
+from truenorth.core.errors import UsageError
+from truenorth.errors.model import InsModel
+from truenorth.estimate.loop import SAME_TIME
+from truenorth.estimate.memory import Memory, Samples
+from truenorth.strapdown.increments import ImuRows
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a closed loop keeps to as long as it runs.
+
+    Attributes
+    ----------
+    model : InsModel
+        With the groups that the sources ask for (see :func:`with_states`).
+    sources : tuple of Aiding
+        The sensors; of the rows they hold, :func:`begin` takes note, more come with :func:`go_on`.
+    stride : int
+        Samples from one prediction of the filter to the next.
+    every : int
+        Output at every so many of these, at the beginning and at the end; 0: only after measurements that ask for it.
+    covariance : bool
+        Carry the covariance; needed for any aiding.
+    smooth : bool
+        Keep what the smoother needs: of a log in one chunk.
+    invariant : bool
+        Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`).
+    """
+
+    model: InsModel
+    sources: tuple[Aiding, ...] = ()
+    stride: int = 1
+    every: int = 1
+    covariance: bool = True
+    smooth: bool = False
+    invariant: bool = False
+
+
+class Rows(NamedTuple):
+    """Measurements that wait for their time: (K,) stamp, source, output; (K, M) measured, (K, 3) variance."""
+
+    time: Array
+    source: Integers
+    output: NDArray[np.bool_]
+    measured: Array
+    variance: Array
+
+    def at(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
+        """Some of them."""
+        return Rows(*(np.ascontiguousarray(a[chosen]) for a in self))  # type: ignore[arg-type]  # each keeps its kind
+
+
+@dataclass(frozen=True)
+class LoopState:
+    """Where a closed loop is: with it, it goes on as if it had never stopped.
+
+    Attributes
+    ----------
+    memory : Memory
+        Of the kernel.
+    samples : Samples
+        The last that it took, and those that wait.
+    taken : int
+        How many of these it took.
+    count : int
+        Samples before these.
+    waiting, late : Rows
+        Measurements that wait, and re-timed ones.
+    rows : ImuRows or None
+        The last two rows of the record, or one that waits for a second.
+    interval : float, s
+        Nominal, of the samples.
+    begin : float, s
+        Of the first sample.
+    outside : tuple of int
+        Measurements of each source that came for a time already passed.
+    fresh : bool
+        It has taken nothing yet.
+    finished : bool
+        The last sample was said to be the last.
+    """
+
+    memory: Memory
+    samples: Samples
+    taken: int
+    count: int
+    waiting: Rows
+    late: Rows
+    rows: ImuRows | None
+    interval: float
+    begin: float
+    outside: tuple[int, ...]
+    fresh: bool = True
+    finished: bool = False
+
+
+def received(setting: Setting, state: LoopState, aiding: Sequence[Aiding]) -> LoopState:
+    """Measurements put where they wait."""
+    names = [source.name for source in setting.sources]
+    width = state.waiting.measured.shape[1]
+    parts: dict[bool, list[Rows]] = {False: [state.waiting], True: [state.late]}
+    for sensor in aiding:
+        if sensor.name not in names:
+            raise UsageError(f"{sensor.name}: no source of this loop; expected one of {', '.join(names)}")
+        count = len(sensor.time)
+        measured = np.full((count, width), np.nan)
+        measured[:, : sensor.measured.shape[1]] = sensor.measured
+        number = np.full(count, names.index(sensor.name), dtype=np.int64)
+        output = np.array(np.broadcast_to(sensor.output, count), dtype=bool)
+        parts[sensor.retimed].append(Rows(sensor.time, number, output, measured, sensor.sigma**2))
+    waiting, late = (Rows(*(np.concatenate(a) for a in zip(*parts[kind], strict=True))) for kind in (False, True))
+    # Measurements of one stamp in the order of their sources: what puts out comes last.
+    return replace(state, waiting=waiting, late=late.at(np.lexsort(np.stack([late.source, late.time]))))
+
+
+def planned(setting: Setting, state: LoopState, horizon: int, last: bool) -> tuple[Rows, LoopState]:
+    """Events up to the horizon in order: the filter's grid, output and measurements; the state without those."""
+    ends, count = state.samples.end, state.count
+    number = 1 + np.arange(count + state.taken, count + horizon)
+    on, output = number % setting.stride == 0, np.zeros(len(number), dtype=bool)
+    if setting.every:
+        output = number % (setting.stride * setting.every) == 0
+    if last and len(on):
+        on[-1], output[-1] = True, setting.every > 0
+    times, outputs = ends[state.taken : horizon][on], output[on]
+    if state.fresh:
+        times, outputs = np.append(state.begin, times), np.append(setting.every > 0, outputs)
+    grid = len(times)
+    waiting = state.waiting
+    near = np.clip(np.searchsorted(ends, waiting.time), 0, len(ends) - 1)
+    near = np.where((near > 0) & (waiting.time - ends[near - 1] < ends[near] - waiting.time), near - 1, near)
+    at = np.where(np.abs(ends[near] - waiting.time) < SAME_TIME, ends[near], waiting.time)
+    first = _reached(state)
+    edge = ends[horizon - 1] if horizon else state.begin
+    passed, due = at < first, (at >= first) & (at <= edge)
+    outside = tuple(
+        before + int(np.sum(waiting.source[passed | ((at > edge) & last)] == k))
+        for k, before in enumerate(state.outside)
+    )
+    width = waiting.measured.shape[1]
+    events = Rows(
+        np.append(times, at[due]),
+        np.append(np.full(grid, -1, dtype=np.int64), waiting.source[due]),
+        np.append(outputs, waiting.output[due]),
+        np.concatenate([np.zeros((grid, width)), waiting.measured[due]]),
+        np.concatenate([np.zeros((grid, 3)), waiting.variance[due]]),
+    )
+    # By time, measurements before the output of their time.
+    order = np.lexsort(np.stack([1.0 * (events.source == -1), events.time]))
+    return events.at(order), replace(state, waiting=waiting.at(~(passed | due)), outside=outside)
+
+
+def _reached(state: LoopState) -> float:
+    """Time up to which samples are taken."""
+    done = float(state.memory.done[0])
+    if state.taken < len(state.samples.end) and done > 0.0:
+        return float(state.samples.end[state.taken] - (1.0 - done) * state.samples.step[state.taken])
+    return float(state.samples.end[state.taken - 1]) if state.taken else state.begin

@@ -1,0 +1,135 @@
+"""What the closed loop is made of, for kernels: samples, events, sources, histories, and the memory it goes on from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.errors.dynamics import Dynamics
+from truenorth.strapdown import wander
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+MEASURE, DISTURB, PLACE = range(3)  # what an event of a source does
+ABSENT, USED, REJECTED, REOPENED = range(4)  # verdicts
+BACK, AHEAD = 2, 3  # samples before and after an epoch that its rate is taken from
+
+
+class Samples(NamedTuple):
+    """Increments of the IMU: (N,) lengths and ends of the intervals, (N, 3) rad and m/s."""
+
+    step: Array
+    end: Array
+    dtheta: Array
+    dvel: Array
+
+
+class Events(NamedTuple):
+    """What happens when: (K,) times in order, source (-1: none), output; (K, M) measured, (K, 3) variance."""
+
+    time: Array
+    source: Integers
+    output: NDArray[np.bool_]
+    measured: Array
+    variance: Array
+
+
+class Sources(NamedTuple):
+    """Of each source (S,): what it does, the address of its row, figures, places of its states, limits of NIS (S, 3).
+
+    `loop`: time constant of a vertical loop (s); `instant`: it needs the rate at its own time; `patience`: rows rejected
+    in a row until a jump is believed, and `opens`, the first of three states that take it up; `nudge`: how much later
+    than its time a row may be taken (s).
+    """
+
+    action: Integers
+    row: Integers
+    figures: Array
+    states: Integers
+    gates: Array
+    loop: Array
+    instant: NDArray[np.bool_]
+    patience: Integers
+    opens: Integers
+
+
+class Model(NamedTuple):
+    """What of the error model the kernel needs."""
+
+    dynamics: Dynamics
+    sensors: Integers
+    fixed_altitude: bool
+    turn_scale: float
+    turn_cross: float
+    invariant: bool
+    covariance: bool
+    held: bool
+
+
+class Kept(NamedTuple):
+    """Histories; an axis of length 0 keeps nothing.
+
+    `time`, `state`, `aux`, `P` are those at each output; `when`, `innovation`, `sigma`, `nis`, `verdict` those of each
+    event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother.
+    """
+
+    time: Array
+    state: Array
+    aux: Array
+    P: Array
+    when: Array
+    innovation: Array
+    sigma: Array
+    nis: Array
+    verdict: Integers
+    Phi: Array
+    Q: Array
+    H: Array
+    dx: Array
+
+
+class Sums(NamedTuple):
+    """Integrals over the samples since the last event."""
+
+    C: Array  # int C_wb dt
+    C_now: Array
+    vectors: Array  # rows: f_w, v_w, angle and velocity increments in the body, errors taken off
+    T: Array
+
+
+class Memory(NamedTuple):
+    """All that the loop goes on from: with it, chunks of any size give the bits of one batch.
+
+    `s` (24,) the state of :mod:`truenorth.strapdown.wander`; `aux` (n,) what is assumed in the places of the states;
+    `P` (n, n) along w; `largest` (n,) variances so far; `sums` since the last event, `means` up to it; `done` (1,) part of
+    the next sample that is taken; `heard` (1,) when the vertical loop was fed; `refused` (S,) rows rejected in a row.
+    """
+
+    s: Array
+    aux: Array
+    P: Array
+    largest: Array
+    sums: Sums
+    means: Sums
+    done: Array
+    heard: Array
+    refused: Integers
+
+    def copy(self) -> Memory:
+        """Arrays of its own."""
+        sums, means = (Sums(*(a.copy() for a in part)) for part in (self.sums, self.means))
+        s, aux, P, largest = (a.copy() for a in self[:4])
+        return Memory(s, aux, P, largest, sums, means, self.done.copy(), self.heard.copy(), self.refused.copy())
+
+
+def memory(s: Array, aux: Array, P: Array, begin: float, sources: int) -> Memory:
+    """At the beginning."""
+    n = len(aux)
+    sums, means = (Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1)) for _ in range(2))
+    assert len(s) == wander.LENGTH
+    return Memory(
+        s, aux, P, np.zeros(n), sums, means, np.zeros(1), np.array([begin]), np.zeros(sources, dtype=np.int64)
+    )

@@ -1,0 +1,221 @@
+"""Prediction in the closed loop: sample by sample the vehicle, from event to event the covariance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from truenorth.core import earth
+from truenorth.core.compiled import compiled
+from truenorth.core.linalg import multiply, propagate_covariance
+from truenorth.errors.dynamics import ALONE, couple_pairs, noise_of_pairs
+from truenorth.errors.group import columns_at
+from truenorth.errors.ins import couple_sensors, error_dynamics, transition
+from truenorth.estimate.memory import BACK, Memory, Model, Samples, Sums
+from truenorth.state.now import (
+    NOW_BEHIND,
+    NOW_C,
+    NOW_EARTH,
+    NOW_FORCE,
+    NOW_FORCE_W,
+    NOW_GYRO_NOISE,
+    NOW_MEAN_RATE,
+    NOW_NORTH,
+    NOW_PUSH,
+    NOW_RATE,
+    NOW_SINCE,
+    NOW_SPIN,
+    NOW_TURN,
+)
+from truenorth.strapdown.wander import acceleration, advance, azimuth, earth_axis
+
+_PHI, _BG, _BA = 0, 9, 12
+
+
+@compiled
+def set_matrix(s: Any, C: Any) -> None:
+    """``C_wb`` of the state's quaternion."""
+    w, x, y, z = s[0], s[1], s[2], s[3]
+    C[0, 0], C[0, 1], C[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    C[1, 0], C[1, 1], C[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+    C[2, 0], C[2, 1], C[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+@compiled
+def take_sample(
+    s: Any, samples: Samples, i: int, done: float, part: float, ends: bool, model: Model, aux: Any, sums: Sums
+) -> None:
+    """Advance through a part of sample i, sensor errors taken off, and add it to the sums."""
+    T = samples.step[i]
+    w = (samples.dtheta[i, 0], samples.dtheta[i, 1], samples.dtheta[i, 2])
+    f = (samples.dvel[i, 0], samples.dvel[i, 1], samples.dvel[i, 2])
+    w = (w[0] - T * aux[9], w[1] - T * aux[10], w[2] - T * aux[11])
+    f = (f[0] - T * aux[12], f[1] - T * aux[13], f[2] - T * aux[14])
+    a, b, c, d = model.sensors[0], model.sensors[1], model.sensors[2], model.sensors[3]
+    if a >= 0:
+        w = (w[0] - T * aux[a], w[1] - T * aux[a + 1], w[2] - T * aux[a + 2])
+    if b >= 0:
+        f = (f[0] - T * aux[b], f[1] - T * aux[b + 1], f[2] - T * aux[b + 2])
+    if c >= 0:
+        w = (w[0] * (1.0 - aux[c]), w[1] * (1.0 - aux[c + 1]), w[2] * (1.0 - aux[c + 2]))
+    if d >= 0:
+        f = (f[0] * (1.0 - aux[d]), f[1] * (1.0 - aux[d + 1]), f[2] * (1.0 - aux[d + 2]))
+    half = 0.5 * part * T
+    for j in range(3):
+        sums.vectors[1, j] += half * s[4 + j]
+        for k in range(3):
+            sums.C[j, k] += half * sums.C_now[j, k]
+    advance(s, T, part, w, f, ends, model.fixed_altitude)
+    set_matrix(s, sums.C_now)
+    for j in range(3):
+        sums.vectors[0, j] += s[21 + j]
+        sums.vectors[1, j] += half * s[4 + j]
+        sums.vectors[2, j] += part * w[j]
+        sums.vectors[3, j] += part * f[j]
+        for k in range(3):
+            sums.C[j, k] += half * sums.C_now[j, k]
+    sums.T[0] += part * T
+
+
+@compiled
+def describe(m: Memory, model: Model, now: Any) -> None:
+    """Fill in what rows and columns are told of this epoch, but for what is needed of it sample by sample."""
+    s, C = m.s, m.sums.C_now
+    for j in range(24):
+        now[j] = s[j]
+    axis = earth_axis(s)
+    force = (m.means.vectors[0, 0], m.means.vectors[0, 1], m.means.vectors[0, 2])
+    push = acceleration(s, force, model.fixed_altitude)
+    for j in range(3):
+        for k in range(3):
+            now[NOW_C + 3 * j + k] = C[j, k]
+        now[NOW_EARTH + j] = earth.EARTH_RATE * axis[j]
+        now[NOW_MEAN_RATE + j] = m.means.vectors[2, j]
+        now[NOW_PUSH + j] = push[j]
+        now[NOW_FORCE_W + j] = force[j]
+    for j in range(3):
+        now[NOW_TURN + j] = m.means.vectors[2, j] - (
+            C[0, j] * now[NOW_EARTH] + C[1, j] * now[NOW_EARTH + 1] + C[2, j] * now[NOW_EARTH + 2]
+        )
+    now[NOW_SINCE] = m.means.T[0]
+    now[NOW_GYRO_NOISE] = model.dynamics.noise[_PHI]
+    now[NOW_BEHIND] = 0.0
+    now[NOW_NORTH], now[NOW_NORTH + 1] = azimuth(s)
+
+
+@compiled
+def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: Any, now: Any) -> None:
+    """Rate, its derivative and specific force at a part `done` of sample i: a line through the samples next to it."""
+    middle = i
+    if done > 0.5:
+        middle = i + 1
+    first, last = max(0, middle - BACK), min(len(samples.step), middle + BACK)
+    middle = max(first + 1, min(middle, last - 1))
+    at = samples.end[middle - 1]
+    t = samples.end[i - 1] if i > 0 else samples.end[0] - samples.step[0]
+    if i < len(samples.step):
+        t += done * samples.step[i]
+    slow_gyro, slow_accel = model.sensors[0], model.sensors[1]
+    for j in range(3):
+        before, after, force = 0.0, 0.0, 0.0
+        T_before, T_after = 0.0, 0.0
+        for k in range(first, last):
+            force += samples.dvel[k, j]
+            if k < middle:
+                before += samples.dtheta[k, j]
+                T_before += samples.step[k]
+            else:
+                after += samples.dtheta[k, j]
+                T_after += samples.step[k]
+        T = T_before + T_after
+        spin = (after / T_after - before / T_before) / (0.5 * T)
+        rate, force = (before + after) / T - aux[_BG + j], force / T - aux[_BA + j]
+        if slow_gyro >= 0:
+            rate -= aux[slow_gyro + j]
+        if slow_accel >= 0:
+            force -= aux[slow_accel + j]
+        now[NOW_RATE + j] = rate + spin * (t - at - 0.5 * (T_after - T_before))
+        now[NOW_SPIN + j] = spin
+        now[NOW_FORCE + j] = force
+
+
+@compiled
+def predict_to_event(
+    size: Any, m: Memory, model: Model, F: Any, rate: Any, now: Any, w: Any, Q: Any, link: Any
+) -> None:
+    """Carry ``P`` over the samples summed up, and the nominal values of what decays; clear the sums.
+
+    `Q` and `link` gather the noise and the transition since the last event for the smoother; of length 0 they do not.
+    """
+    sums, means, aux, d = m.sums, m.means, m.aux, model.dynamics
+    T = sums.T[0]
+    for j in range(3):
+        for k in range(3):
+            means.C[j, k] = sums.C[j, k] / T
+            sums.C[j, k] = 0.0
+        for k in range(4):
+            means.vectors[k, j] = sums.vectors[k, j] / T
+            sums.vectors[k, j] = 0.0
+    means.T[0], sums.T[0] = T, 0.0
+    axis = earth_axis(m.s)
+    error_dynamics(means.C, means.vectors[0], means.vectors[1], axis, m.s[11], False, model.fixed_altitude, F)
+    couple_sensors(means.C, means.vectors[2], means.vectors[3], model.sensors, model.fixed_altitude, F)
+    if len(d.acts) > 0:
+        act(m, model, F, now, w.x)
+    n = len(d.decay)
+    speed = (means.vectors[1, 0] ** 2 + means.vectors[1, 1] ** 2 + means.vectors[1, 2] ** 2) ** 0.5
+    for i in range(n):
+        rate[i] = d.decay[i] + speed * d.along[i]
+    transition(size, F, rate, T, w.Phi, w.Phi_t)
+    couple_pairs(d, F, T, w.Phi, w.Phi_t)
+    for i in range(n):
+        w.Q[i, i] = 0.5 * T * (d.noise[i] + speed * d.wander[i])
+    for i in range(9, n):
+        j = d.pair[i]
+        if j >= 0:
+            w.Q[i, j] = w.Q[j, i] = 0.0
+            x, y = aux[i], aux[j]
+            aux[i], aux[j] = w.Phi[i, i] * x + w.Phi[i, j] * y, w.Phi[j, i] * x + w.Phi[j, j] * y
+        elif j == ALONE:
+            aux[i] *= w.Phi[i, i]
+    # Scale factors act along the axis that turns, misalignments across it.
+    x, y, z = means.vectors[2, 0] ** 2, means.vectors[2, 1] ** 2, means.vectors[2, 2] ** 2
+    k, c = 0.5 * T * model.turn_scale, 0.5 * T * model.turn_cross
+    turning = (k * x + c * (y + z), k * y + c * (z + x), k * z + c * (x + y))
+    for i in range(3):
+        for j in range(3):
+            total = d.noise[_PHI] * 0.5 * T * (i == j)
+            for q in range(3):
+                total += means.C[i, q] * turning[q] * means.C[j, q]
+            w.Q[_PHI + i, _PHI + j] = total
+            w.P[_PHI + i, _PHI + j] += total
+    for i in range(3, n):
+        w.P[i, i] += w.Q[i, i]
+    if len(link) > 0:
+        multiply(size, w.Phi, link, w.temporary)
+        for a in range(len(size)):
+            for b in range(len(size)):
+                link[a, b] = w.temporary[a, b]
+                Q[a, b] += w.Q[a, b]
+    noise_of_pairs(d, w.Phi, w.Q)
+    if len(link) > 0:
+        propagate_covariance(size, w.Phi, w.Phi_t, w.Q, Q, w.temporary)
+    propagate_covariance(size, w.Phi, w.Phi_t, w.Q, w.P, w.temporary)
+
+
+@compiled
+def act(m: Memory, model: Model, F: Any, now: Any, x: Any) -> None:
+    """Columns of the groups that act on the INS; what is assumed of them is taken off it."""
+    d = model.dynamics
+    describe(m, model, now)
+    T = m.means.T[0]
+    for g in range(len(d.acts)):
+        first = d.first[g]
+        for i in range(9):
+            for j in range(first, first + d.width[g]):
+                F[i, j] = 0.0
+        columns_at(d.acts[g])(now, d.figures[g], first, m.aux, F)
+        for i in range(9):
+            for j in range(first, first + d.width[g]):
+                if model.fixed_altitude and (i == 5 or i == 8):
+                    F[i, j] = 0.0
+                x[i] += T * F[i, j] * m.aux[j]
