@@ -9,6 +9,7 @@ sources thus share kernels across checkouts, and an edit compiles its dependents
 from __future__ import annotations
 
 import hashlib
+import inspect
 import sys
 from collections.abc import Callable
 from enum import Enum
@@ -25,6 +26,7 @@ from numba.core.extending import _Intrinsic
 
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STEPS = "compiled_steps"  # attribute of a class: functions by name that a kernel takes for arguments of this class
+STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
 CONFIG: Any = numba.config
 TOOLS = repr((
     *(sys.implementation.name, sys.version_info[:2], numba.__version__, llvmlite.__version__, np.__version__),
@@ -95,7 +97,7 @@ class _Sources:
         skip = 1 if code.co_consts and isinstance(doc, str) and code.co_consts[0] == doc else 0
         constants = [self.of(value, names) for value in code.co_consts[skip:]]
         variables = (code.co_varnames, code.co_freevars, code.co_cellvars, code.co_names)
-        counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
+        counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags & STARS)
         return repr((code.co_code, constants, variables, counts, code.co_exceptiontable))
 
     def of(self, value: Any, names: set[str]) -> str:
