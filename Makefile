@@ -2,17 +2,21 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+WARM := .venv/.warm
 WORKERS ?= auto
 
-.PHONY: demo test test-all check format bench docs messages release lock clean
+.DEFAULT_GOAL := demo
+.PHONY: install demo test test-all check format bench docs messages release lock clean
 
-demo: $(READY)
+install: $(WARM)
+
+demo: $(WARM)
 	$(BIN)/python examples/demo.py
 
-test: $(READY)
+test: $(WARM)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow"
 
-test-all: $(READY)
+test-all: $(WARM)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope
 
 check: $(READY)
@@ -24,7 +28,7 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(READY)
+bench: $(WARM)
 	$(BIN)/python -m benchmarks
 
 docs: $(READY)
@@ -44,8 +48,14 @@ lock: $(READY)
 $(READY): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install -q uv
-	$(BIN)/uv pip sync -q --python $(BIN)/python --require-hashes requirements.lock
+	$(BIN)/uv pip sync -q --compile-bytecode --python $(BIN)/python --require-hashes requirements.lock
 	$(BIN)/uv pip install -q --python $(BIN)/python --no-deps --no-build-isolation -e .
+	$(BIN)/python -m compileall -q truenorth
+	touch $@
+
+# Compiled code is kept in the user's cache; a second call finds it there.
+$(WARM): $(READY)
+	$(BIN)/truenorth warm
 	touch $@
 
 clean:

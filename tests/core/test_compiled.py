@@ -10,9 +10,9 @@ import sys
 import time
 
 import pytest
-from numba.core.dispatcher import Dispatcher
 
 import truenorth
+from truenorth.core.compiled import Kernel
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
 from truenorth.core.kernel_store import prune
 
@@ -67,10 +67,11 @@ SHOW = """
 import sys
 sys.path.insert(0, {folder!r})
 from numba import float64, typeof
+from truenorth.core.compiled import Kernel
 from truenorth.core.fingerprint import fingerprint
 import plugin_inner, plugin_outer
 for k in (plugin_inner.inner, plugin_outer.outer, plugin_outer.by_module, plugin_outer.alone):
-    print(fingerprint(k.py_func, k.targetoptions, (float64,)))
+    print(fingerprint(k.py_func, k.options, (float64,)))
 pair = (typeof(plugin_outer.Pair(1.0, 2.0)),)
 print(fingerprint(plugin_outer.of_pair.py_func, {{}}, pair))
 """
@@ -142,8 +143,8 @@ def test_every_kernel_of_the_library_is_covered():
     for info in pkgutil.walk_packages(truenorth.__path__, "truenorth."):
         if not info.name.endswith("__main__"):
             for value in vars(importlib.import_module(info.name)).values():
-                if isinstance(value, Dispatcher):
-                    assert len(fingerprint(value.py_func, value.targetoptions, ())) == 64
+                if isinstance(value, Kernel):
+                    assert len(fingerprint(value.py_func, value.options, ())) == 64
                     count += 1
     assert count > 100
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
 from truenorth.alignment.task import level_of
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
@@ -127,6 +126,8 @@ def path_to_the_end(track: Track) -> Array:
     lat, lon, alt = track.position[-1]
     R_M, R_N = radii(lat)
     metres = np.array([(R_N + alt) * math.cos(lat), R_M + alt, 1.0])
+    from scipy.integrate import cumulative_trapezoid  # .1 s of import
+
     moved = cumulative_trapezoid(track.v_n / metres, track.time, axis=0, initial=0.0)[:, [1, 0, 2]]
     return np.asarray(np.array([lat, lon, alt]) + moved - moved[-1])
 

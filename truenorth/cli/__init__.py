@@ -23,6 +23,7 @@ from truenorth.cli.navigate import navigate
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
+from truenorth.cli.warm import warm
 from truenorth.cli.wording import in_options
 from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
@@ -48,6 +49,7 @@ app.command("simulate")(simulate)
 app.command("campaign")(campaign)
 app.command("faults")(faults)
 app.command("tune")(tune)
+app.command("warm")(warm)
 app.command("reproduce")(reproduce)
 
 

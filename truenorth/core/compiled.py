@@ -3,21 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property, update_wrapper
 from typing import Any, TypeVar
-
-import numba
-from numba.core.ccallback import CFunc
-from numba.core.sigutils import normalize_signature
-
-from truenorth.core.kernel_store import KernelStore
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"nopython": True, "error_model": "numpy", "fastmath": False, "nogil": True}
+STEPS = "compiled_steps"  # attribute of a class: functions by name that a kernel takes for arguments of this class
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+class Kernel:
+    """A compiled function; Numba itself is loaded when it is first called.
+
+    Other kernels call the function without the code that unpacks Python's arguments, a third of the time that
+    compilation takes; that code is made only for what Python calls.
+
+    Parameters
+    ----------
+    function : callable
+        The Python function, of what Numba understands; it may call other kernels.
+    options : dict
+        For :func:`numba.jit`.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self.options = options
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the compiled function."""
+        return self.dispatcher(*arguments)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Numba's own, for calls from Python."""
+        return self._dispatcher({})
+
+    @cached_property
+    def inner(self) -> Any:
+        """Numba's own, for calls from other kernels."""
+        return self._dispatcher(INNER)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba takes a kernel for that another one names."""
+        return self.inner._numba_type_
+
+    def _dispatcher(self, more: dict[str, Any]) -> Any:
+        import numba
+
+        from truenorth.core.kernel_store import KernelStore
+
+        options = self.options | more
+        dispatcher: Any = numba.jit(**options)(self.py_func)
+        dispatcher._cache = KernelStore(self.py_func, options)
+        return dispatcher
+
+    @property
+    def stats(self) -> Any:
+        """Numba's count of what was compiled and what was found on the disk."""
+        return self.dispatcher.stats
+
+    @property
+    def signatures(self) -> Any:
+        """The types of arguments that it was called with."""
+        return self.dispatcher.signatures
 
 
 def compiled(function: F | None = None, **options: Any) -> Any:
-    """Compile a function with Numba: IEEE arithmetic, NumPy division rules, cached on disk.
+    """Compile a function with Numba where it is first called: IEEE arithmetic, NumPy division rules, cached on disk.
 
     A kernel on the disk is named by all that its code depends on (:mod:`~truenorth.core.fingerprint`), where Numba's
     own cache watches only the file that a kernel stands in, not those that it calls into. Where no folder can be
@@ -32,13 +88,11 @@ def compiled(function: F | None = None, **options: Any) -> Any:
 
     Returns
     -------
-    numba dispatcher, or a decorator when `function` is left out.
+    Kernel, or a decorator when `function` is left out.
     """
     if function is None:
         return lambda f: compiled(f, **options)
-    dispatcher = numba.jit(**(OPTIONS | options))(function)
-    dispatcher._cache = KernelStore(dispatcher.py_func, dispatcher.targetoptions)
-    return dispatcher
+    return Kernel(function, OPTIONS | options)
 
 
 def compiled_callback(signature: str) -> Callable[[F], Any]:
@@ -59,6 +113,11 @@ def compiled_callback(signature: str) -> Callable[[F], Any]:
     """
 
     def decorate(function: F) -> Any:
+        from numba.core.ccallback import CFunc
+        from numba.core.sigutils import normalize_signature
+
+        from truenorth.core.kernel_store import KernelStore
+
         options = {"nopython": True, "error_model": "numpy"}
         callback: Any = CFunc(function, normalize_signature(signature), locals={}, options=options)
         callback._cache = KernelStore(function, options | {"callback": True})

@@ -24,8 +24,9 @@ from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 
+from truenorth.core.compiled import STEPS, Kernel
+
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
-STEPS = "compiled_steps"  # attribute of a class: functions by name that a kernel takes for arguments of this class
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
 CONFIG: Any = numba.config
 TOOLS = repr((
@@ -113,8 +114,10 @@ class _Sources:
         if isinstance(value, (np.ndarray, np.generic)):
             array = np.asarray(value)
             return f"array({array.dtype!r}, {array.shape}, {array.flags.c_contiguous}, {array.tobytes()!r})"
-        if isinstance(value, Dispatcher):
-            return f"compiled({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
+        if isinstance(value, Kernel):
+            return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
+        if isinstance(value, Dispatcher):  # a user's own, by numba.jit
+            return f"jit({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
         if isinstance(value, CFunc):
             return f"callback({self.see(value.__wrapped__)})"
         if isinstance(value, _Intrinsic):

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from truenorth.estimate.batch import Filtered
 from truenorth.filters import Estimates, LinearSystem, kalman
@@ -45,6 +44,8 @@ def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, 
     if colour and blocks >= COLOUR_RUNS:
         e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
         low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
+        from scipy.special import chdtri  # .1 s of import
+
         chance = chdtri(blocks, COLOUR_ALARM) / blocks  # what white noise itself may give
         # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
         coloured = low > chance * ratio

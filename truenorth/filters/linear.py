@@ -8,12 +8,10 @@ both. The type is known when the kernel is compiled, so that the choice costs no
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Unpack
 
-from numba.extending import overload
-
-from truenorth.core.compiled import OPTIONS, compiled
-from truenorth.core.fingerprint import STEPS
+from truenorth.core.compiled import OPTIONS, STEPS, compiled
 from truenorth.core.linalg import Array, Size
 from truenorth.filters import recursion
 from truenorth.filters.drive import Running, drive
@@ -73,18 +71,17 @@ def variant(options: type, **steps: Callable[..., Any]) -> None:
     setattr(options, STEPS, steps)
 
 
-def _by_type(step: Callable[..., Any]) -> None:
-    """Let kernels call `step` as the type of its third argument, the options, has it; else as it stands."""
+@cache
+def _choose_by_type() -> None:
+    """Let kernels call each step as the type of the options, its third argument, has it; else as it stands here."""
+    from numba.extending import overload
 
-    def chosen(*arguments: Any) -> Any:
-        return getattr(arguments[2].instance_class, STEPS).get(step.__name__, step)
+    def chosen_of(step: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *arguments: getattr(arguments[2].instance_class, STEPS).get(step.__name__, step)
 
     inlined: Any = OPTIONS | {"forceinline": True}
-    overload(step, jit_options=inlined, strict=False)(chosen)
-
-
-for _step in (room, predict, adapt, condition, report):
-    _by_type(_step)
+    for step in (room, predict, adapt, condition, report):
+        overload(step, jit_options=inlined, strict=False)(chosen_of(step))
 
 
 @compiled
@@ -120,6 +117,7 @@ def run_linear(
     **running: Unpack[Running],
 ) -> Estimates:
     """Run the linear filter that has options of this type; parameters as in :func:`truenorth.filters.drive.drive`."""
+    _choose_by_type()
 
     def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
         linear_runs(size, runs, epochs, options, out)

@@ -1,0 +1,135 @@
+"""`truenorth warm`: compile what the other commands need, once, so that the first of them does not wait."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truenorth.cli.console import make_console
+
+PACKAGE = Path(__file__).parents[1]
+EXAMPLES = """
+\b
+Examples:
+  truenorth warm
+  truenorth warm --workers 1
+
+Exit codes: 0 done; 2 wrong usage.
+"""
+
+# Each task simulates a scenario that ships with us and runs the commands on its logs: what they compile is what a
+# user's own commands will ask for. The longest first.
+TASKS: dict[str, tuple[str, ...]] = {
+    "quay": (
+        "align imu.parquet --lat 53.54 --lon 9.97 --imu navigation --to 600 -o start",
+        "navigate imu.parquet --start start",
+    ),
+    "odometer_ring": (
+        "align imu.parquet --odometer odometer.parquet --lat 39.9 --lon 116.3 --alt 50 --imu navigation --to 300 -o start",
+        "navigate imu.parquet --start start --odometer odometer.parquet",
+    ),
+    "transfer_flat_turn": ("align imu.parquet --master master.parquet --lat 34 --alt 5000 --imu tactical",),
+    "van": (
+        "align imu.parquet --gnss gnss.parquet --imu industrial --to 300 -o start",
+        "navigate imu.parquet --start start --gnss gnss.parquet",
+    ),
+    "static_kalman": (
+        "align imu.parquet --lat 45 --imu navigation",
+        "align imu.parquet --lat 45",
+        "inspect imu.parquet",
+    ),
+    "rotary_ship": ("align imu.parquet --indexer encoder.parquet --lat 40 --lon 118 --imu navigation",),
+    "table": ("align imu.parquet --positions auto --lat 40 --lon 116 --imu tactical",),
+}
+
+
+def warm(
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes at once; one a core without it.", show_default=False)
+    ] = None,
+) -> None:
+    """Compile what the other commands need and keep it for all that follow; a second call finds it done."""
+    from multiprocessing import get_context
+
+    from truenorth.core.kernel_store import write_folder
+
+    folder = write_folder()
+    if folder is None:
+        print("truenorth: no cache folder can be written to; each command compiles for itself", file=sys.stderr)
+        return
+    stamp = folder / f"warm-{_digest()}"
+    if stamp.exists():
+        print(f"warm already: {folder}")
+        return
+    begun = time.monotonic()
+    count = min(workers or os.cpu_count() or 1, len(TASKS))
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        _show(pool, list(TASKS))
+    stamp.touch()
+    number = sum(1 for _ in folder.glob("*.kernel"))
+    print(f"{number} kernels in {folder} after {time.monotonic() - begun:.0f} s")
+
+
+def _digest() -> str:
+    """Of all sources and of Numba: what was compiled for these is there."""
+    import hashlib
+    from importlib.metadata import version
+
+    text = hashlib.sha256(version("numba").encode())
+    for file in sorted(PACKAGE.rglob("*.py")):
+        text.update(file.read_bytes())
+    return text.hexdigest()[:32]
+
+
+def _show(pool: ProcessPoolExecutor, tasks: list[str]) -> None:
+    """Run the tasks with a bar on standard error."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("compiling"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=make_console(stderr=True), disable=not sys.stderr.isatty()) as bar:
+        shown = bar.add_task("compiling", total=len(tasks))
+        for done in as_completed([pool.submit(run_task, task) for task in tasks]):
+            done.result()
+            bar.advance(shown)
+
+
+def run_task(name: str) -> None:
+    """Simulate a scenario into a folder of its own and run its commands there; what they print is dropped.
+
+    Parameters
+    ----------
+    name : str
+        A key of `TASKS`.
+
+    Raises
+    ------
+    TruenorthError
+        A command failed; that the data cannot be aligned is no failure here.
+    """
+    from truenorth.cli import app
+
+    before = Path.cwd()
+    silent = io.StringIO()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.redirect_stdout(silent),
+        contextlib.redirect_stderr(silent),
+    ):
+        os.chdir(folder)
+        try:
+            for command in (f"simulate {name} -o . --no-plot", *TASKS[name]):
+                app(command.split(), standalone_mode=False)
+        finally:
+            os.chdir(before)
+
+
+warm.__doc__ = f"{warm.__doc__}\n{EXAMPLES}"
