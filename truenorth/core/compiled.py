@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cached_property
 from typing import Any, TypeVar
+
+from truenorth.core.kernel_source import KernelSource
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"nopython": True, "error_model": "numpy", "fastmath": False, "nogil": True}
-STEPS = "compiled_steps"  # attribute of a class: functions by name that a kernel takes for arguments of this class
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-class Kernel:
+class Kernel(KernelSource):
     """A compiled function; Numba itself is loaded when it is first called.
 
     Other kernels call the function without the code that unpacks Python's arguments, a third of the time that
     compilation takes; that code is made only for what Python calls.
-
-    Parameters
-    ----------
-    function : callable
-        The Python function, of what Numba understands; it may call other kernels.
-    options : dict
-        For :func:`numba.jit`.
     """
-
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        update_wrapper(self, function)
-        self.py_func = function
-        self.options = options
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""

@@ -24,7 +24,7 @@ from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 
-from truenorth.core.compiled import STEPS, Kernel
+from truenorth.core.kernel_source import STEPS, KernelSource
 
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
@@ -114,7 +114,7 @@ class _Sources:
         if isinstance(value, (np.ndarray, np.generic)):
             array = np.asarray(value)
             return f"array({array.dtype!r}, {array.shape}, {array.flags.c_contiguous}, {array.tobytes()!r})"
-        if isinstance(value, Kernel):
+        if isinstance(value, KernelSource):
             return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
         if isinstance(value, Dispatcher):  # a user's own, by numba.jit
             return f"jit({self.see(value.py_func)}, {_of_options(value.targetoptions)})"

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Unpack
 
-from truenorth.core.compiled import OPTIONS, STEPS, compiled
+from truenorth.core.compiled import OPTIONS, compiled
+from truenorth.core.kernel_source import STEPS
 from truenorth.core.linalg import Array, Size
 from truenorth.filters import recursion
 from truenorth.filters.drive import Running, drive
