@@ -8,8 +8,8 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from truenorth import Odometer, align
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.alignment.procedure import align
 from truenorth.alignment.published import FADING, STATIONARY
 from truenorth.cli import app
 from truenorth.core.attitude import dcm_from_euler, misalignment
@@ -91,7 +91,7 @@ def test_ten_and_eight_states_refuse_a_base_that_sways(method):
 def test_another_epoch(method):
     """On a still base any epoch has the same attitude, to what the biases found turn it by."""
     record, spec, _ = next(logs(STILL, 1))
-    early, late = (align(record, PLACE, spec, method, at=at) for at in (record.time[3000], record.time[-1]))
+    early, late = (align(record, PLACE, spec, method=method, at=at) for at in (record.time[3000], record.time[-1]))
     assert early.time == record.time[3000]
     np.testing.assert_allclose(early.C_nb, late.C_nb, atol=np.radians(0.2 / 60))
 
@@ -130,7 +130,7 @@ def test_filters_of_the_odometer_paper(drives, method):
     record, odometer, place, spec, motion = drives[0]
     C_mb = dcm_from_euler(np.radians(-90.0), 0.0, 0.0)
     turned = replace(record, gyro=record.gyro @ C_mb, accel=record.accel @ C_mb)
-    usual = align_in_motion(record, spec, odometer=odometer, position=place, method=method)
+    usual = align(record, place, spec, aid=Odometer(odometer), method=method)
     answer = align_in_motion(
         turned, spec, odometer=odometer, position=place, method=method, wheel=Mounting(C_mb=C_mb, scale_sigma=0.03)
     )

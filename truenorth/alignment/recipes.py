@@ -245,7 +245,9 @@ def align(
         ``auto``, or one of the recipe. On a base: ``analytic`` (TRIAD on mean rate and specific force, still base only),
         ``inertial`` (dual vector in the inertial frame), ``oba`` (optimisation-based alignment), ``kalman`` (coarse, then a Kalman
         filter on velocity, re-linearised), ``swaying`` (the same with the base's motion and the lever arm as states). On the move:
-        ``gyrocompass`` or ``motion``. A plug-in's name, or a callable of one's own ``method(request) -> Alignment``.
+        ``gyrocompass`` or ``motion``. Published filters (docs/published.md): ``kf``, ``sakf``, ``makf``, ``imakf``, ``states10``,
+        ``states8``; on the move with an odometer ``ekf``, ``ukf``, ``ckf``, ``gh3``, ``gh5``, ``gh7``, ``sgkf``. A plug-in's
+        name, or a callable of one's own ``method(request) -> Alignment``.
     at : float, s, optional
         Epoch of the answer on the record's clock; the last sample when left out. Base and indexer only.
     calibration : Calibration, optional
