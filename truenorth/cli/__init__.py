@@ -14,6 +14,7 @@ import typer
 from truenorth.cli.advise import advise
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
+from truenorth.cli.example import example
 from truenorth.cli.faults import faults
 from truenorth.cli.files import FORCE, check_output, inputs
 from truenorth.cli.imu import imu
@@ -42,6 +43,7 @@ app = typer.Typer(
 app.command("align")(align)
 app.command("advise")(advise)
 app.command("imu")(imu)
+app.command("example")(example)
 app.command("inspect")(inspect)
 app.command("live")(live)
 app.command("navigate")(navigate)

@@ -26,7 +26,8 @@ from truenorth.formats.guesses import UnsureError, write_layout
 from truenorth.formats.layout import layout_for
 from truenorth.formats.opening import columns_of
 from truenorth.formats.table import record_of
-from truenorth.records import ImuRecord, Record
+from truenorth.formats.writing import write_imu, write_record
+from truenorth.records import ImuRecord
 
 __all__ = [
     "FORMATS",
@@ -50,7 +51,6 @@ READERS = {
     "kf-gins": ("kf_gins", "read_text"),
     "kf-gins-binary": ("kf_gins", "read_binary"),
 }
-WRITERS = {".csv": "text", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
 
 
 def read_imu(
@@ -136,37 +136,3 @@ def _plugged(path: Path, format: str | None) -> Callable[..., ImuRecord] | None:
     if name in FORMATS or f".{name}" in SUFFIXES or not name:
         return None
     return plugin("truenorth.formats", name) if name in plugins("truenorth.formats") else None
-
-
-def write_imu(record: ImuRecord, path: str | PathLike[str]) -> None:
-    """Write a record as CSV, Parquet or npz, by the suffix; whole or not at all.
-
-    `read_imu` gives the same bits back, whatever the format.
-
-    Raises
-    ------
-    UsageError
-        Another suffix, or a folder that cannot be written to.
-    """
-    write_record(record, path)
-
-
-def write_record(record: Record, path: str | PathLike[str]) -> None:
-    """Write a record of any kind as CSV, Parquet or npz, by the suffix; whole or not at all.
-
-    The columns are the documented ones of :meth:`truenorth.records.Record.to_frame`; the reader of the kind gives the same
-    record back: to the bit, but for angles, which stand in degrees and come back to rounding.
-
-    Raises
-    ------
-    UsageError
-        Another suffix, or a folder that cannot be written to.
-    """
-    from truenorth.core.atomic import atomic_path
-
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in WRITERS:
-        raise UsageError(f"{path}: cannot write {suffix or 'a file without a suffix'}; use .csv, .parquet or .npz")
-    with atomic_path(path) as temporary:
-        import_module(f"truenorth.formats.{WRITERS[suffix]}").write(record, temporary)
