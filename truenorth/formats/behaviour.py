@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.turning import AGREES, Turning, fit_turning
 from truenorth.core.earth import EARTH_RATE
+from truenorth.core.turning import AGREES, Turning, fit_turning
 from truenorth.core.units import STANDARD_GRAVITY as G
 from truenorth.core.units import parse_quantity, parse_unit
 from truenorth.records.imu import Kind

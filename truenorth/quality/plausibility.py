@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.turning import AGREES, Turning, fit_turning
 from truenorth.core.earth import EARTH_RATE
+from truenorth.core.turning import AGREES, Turning, fit_turning
 from truenorth.core.units import STANDARD_GRAVITY as G
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding
