@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from truenorth.alignment.result import NOT_ESTIMATED, Alignment
-from truenorth.alignment.verdict import judged
+from truenorth.alignment.verdict import claimed, judged
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.track import Track
@@ -15,7 +15,7 @@ def judge_moving(answer: Alignment, track: Track, limit: float, more: list[Evide
     needs: tuple[str, ...] = ()
     if by_motion:
         needs = ("manoeuvre_gnss" if any("GNSS" in r.name for r in track.residuals) else "north",)
-    evidence = [*_wheel(answer), *innovation_evidence(track.residuals), *more]
+    evidence = [*_wheel(answer), *innovation_evidence(track.residuals, claimed(answer)), *more]
     return judged(answer, evidence, limit, waiting=not by_motion, remedies=needs)
 
 

@@ -17,7 +17,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
-from truenorth.navigation.result import Altitude, Navigation, judged_navigation
+from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import second_look, slow_errors
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
@@ -150,7 +150,7 @@ def navigate(
     _check_axes(plan, given)
     tell("navigating")
     track = plan.run(aiding, smooth=smooth)
-    evidence = innovation_evidence(track.residuals) + sampling_evidence(record, turns=True) + why
+    evidence = innovation_evidence(track.residuals, last_sigma(track)) + sampling_evidence(record, turns=True) + why
     receiver = _record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
     if found:

@@ -284,16 +284,20 @@ class Navigation(Shown):
         return export(self, Path(path))
 
 
+def last_sigma(track: Track) -> Effect:
+    """One sigma of each output at the last epoch."""
+    sigma = track.sigma[-1]
+    heading = float(euler_sigma(track.C_nb[-1], track.P[-1, PHI, PHI])[0])
+    return Effect(heading, float(sigma[PHI][:2].max()), float(sigma[DV].max()), float(sigma[DP].max()))
+
+
 def judged_navigation(result: Navigation, evidence: Sequence[Evidence]) -> Navigation:
     """The verdict on a navigation by its last epoch; what the evidence adds to sigma is in its covariance, as a share of it."""
-    P = result.track.P[-1]
-    sigma = np.sqrt(np.maximum(np.diag(P), 0.0))
-    heading = float(result.euler_sigma[-1, 0])
-    claim = Effect(heading, float(sigma[PHI][:2].max()), float(sigma[DV].max()), float(sigma[DP].max()))
+    claim = last_sigma(result.track)
     verdict = judge(Claim(claim), evidence)
     if verdict.added != NO_EFFECT:
         grows = {name: s / own for (name, s), (_, own) in zip(verdict.sigma.items(), claim.items(), strict=True)}
-        factor = np.ones(P.shape[0])
+        factor = np.ones(result.track.P.shape[-1])
         factor[PHI] = grows["level"], grows["level"], grows["heading"]
         factor[DV], factor[DP] = grows["velocity"], grows["position"]
         result = replace(result, track=replace(result.track, P=factor[:, None] * result.track.P * factor))

@@ -1,16 +1,33 @@
-"""Innovations of any filter as evidence: how many were rejected, whether their size is that which sigma says."""
+"""Innovations of any filter as evidence: how many were rejected, whether they are as large as sigma says, and white.
+
+Where the model is right, innovations are white and as large as their sigma. Where they are ``f`` times as large, so are the
+errors. Where they hang together over many rows, of correlations ``r_1, r_2, ...``, so many rows carry the information of fewer,
+and a mean of them errs by ``g = sqrt(1 + 2 sum r_k)`` times as much as it says. Both together are by how much sigma must grow.
+
+Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970); the
+sum ends at the first correlation that chance explains, as in C. Geyer, "Practical Markov chain Monte Carlo" (1992).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truenorth.state.evidence import Evidence, contradiction, note
+from truenorth.state.evidence import OUTPUTS, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals
 
+Array = NDArray[np.float64]
+
+FEWEST = 60  # components, from which size and colour are judged
+LAGS, MOST_LAGS = 5, 60
+LEAST_CORRELATION = 0.05  # mean over the first lags
+# Sources of places: their errors last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
+PLACES = {"GNSS position": ("position",), "barometer": ("position",)}
 UNITS = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}
 
 
@@ -21,12 +38,56 @@ def mean_nis(source: Residuals) -> float | None:
     return float(np.sum(source.nis[source.used]) / np.sum(source.rows[source.used]))
 
 
-def innovation_evidence(sources: Iterable[Residuals]) -> list[Evidence]:
+class Whiteness(NamedTuple):
+    """Size and colour of normalised innovations.
+
+    Attributes
+    ----------
+    size : float
+        RMS; 1 where sigma is right.
+    colour : float
+        ``sqrt(1 + 2 sum r_k)``; 1 where they are white.
+    sure : bool
+        Whether chance does not explain it.
+    """
+
+    size: float
+    colour: float
+    sure: bool
+
+    @property
+    def growth(self) -> float:
+        """By how much sigma must grow."""
+        return max(1.0, self.size * self.colour) if self.sure else 1.0
+
+
+def whiteness(normalised: Array) -> Whiteness:
+    """Size and colour of innovations (M, m), each divided by its sigma, in the order of time."""
+    e = normalised
+    count = e.size
+    if count < FEWEST or len(e) < 4 * LAGS:
+        return Whiteness(1.0, 1.0, False)
+    total = float(np.sum(e**2))
+    most = min(len(e) // 4, MOST_LAGS)
+    r = np.array([np.sum(e[k:] * e[:-k]) for k in range(1, most + 1)]) / max(total, 1e-300)
+    chance = r < 2.0 / math.sqrt(count)
+    last = int(np.argmax(chance)) if chance.any() else most
+    colour = math.sqrt(1.0 + 2.0 * float(r[:last].sum()))
+    size = math.sqrt(total / count)
+    spread = math.sqrt(2.0 * (1.0 + 2.0 * float(np.sum(r[:last] ** 2))) / count)
+    mean = float(r[:LAGS].mean())
+    coloured = mean > max(LEAST_CORRELATION, limit("chance") / math.sqrt(LAGS * count))
+    return Whiteness(size, colour, coloured or size**2 - 1.0 > limit("chance") * spread)
+
+
+def innovation_evidence(sources: Iterable[Residuals], sigma: Effect) -> list[Evidence]:
     """What the innovations of each source say of the model.
 
     Parameters
     ----------
     sources : iterable of Residuals
+    sigma : Effect
+        Of the answer, one sigma of each output: what grows.
     """
     found: list[Evidence] = []
     for source in sources:
@@ -53,6 +114,27 @@ def innovation_evidence(sources: Iterable[Residuals]) -> list[Evidence]:
         nis = mean_nis(source)
         if nis is not None and nis > limit("nis"):
             found.append(contradiction("innovations.size", name=source.name, factor=math.sqrt(nis)))
+        else:
+            found += _growth(source, sigma)
         if source.outside:
             found.append(note("innovations.outside", name=source.name, outside=source.outside))
     return found
+
+
+def _growth(source: Residuals, sigma: Effect) -> list[Evidence]:
+    """By how much the innovations of a source say that sigma is too small."""
+    used = source.used & (source.rows > 0)
+    e = source.innovation[used] / source.sigma[used]
+    found = whiteness(e[:, np.isfinite(e).all(axis=0)])
+    if found.growth <= 1.0:
+        return []
+    more = math.sqrt(found.growth**2 - 1.0)
+    touched = PLACES.get(source.name, OUTPUTS)
+    effect = Effect(**{name: more * size for name, size in sigma.items() if name in touched and math.isfinite(size)})
+    figures: dict[str, Figure] = {
+        "name": source.name,
+        "size": found.size,
+        "colour": found.colour,
+        "growth": found.growth,
+    }
+    return [Evidence("innovations.coloured", figures, "known", effect)]

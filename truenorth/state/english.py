@@ -151,6 +151,10 @@ SENTENCES = {
     "innovations.size": (
         "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted"
     ),
+    "innovations.coloured": (
+        "{name}: innovations are {size:.2f} times as large as their sigma says and follow each other ({colour:.1f} times the error "
+        "of white ones): sigma grows {growth:.1f} times"
+    ),
     "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
     "innovations.wander": (
         "errors of the {name}s hang together from fix to fix (correlation {correlation:.2f}), they wander by {wander:.2g} m or "
