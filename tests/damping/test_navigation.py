@@ -230,7 +230,7 @@ def test_a_log_in_body_axes_mounted_askew(ship):
     assert np.abs(one.v_n - two.v_n)[late].max() < 0.05  # the INS's heading error of .1 deg turns 12.8 m/s by .02
     with pytest.raises(UsageError, match="no lever arm"):
         navigate(ship.record, ship.start, aid=VelocityLog(body, Mounting(lever_arm=np.array([0, 1.0, 0]))), **options)
-    with pytest.raises(UsageError, match="see --every"):
+    with pytest.raises(UsageError, match="expected 10 s at most"):
         navigate(ship.record, ship.start, aid=VelocityLog(body), **options | {"output": 40.0})
 
 
@@ -253,7 +253,7 @@ def test_what_is_refused(ship):
         Damper("external", ramp=-1.0)
     with pytest.raises(UsageError, match="it needs a reference"):
         Damper("internal", azimuth=0.5)
-    with pytest.raises(UsageError, match="--velocity"):
+    with pytest.raises(UsageError, match="velocity=record"):
         ship.navigate(Damper("double"))
     with pytest.raises(UsageError, match="height is held at sea"):
         navigate(ship.record, ship.start, altitude="free", imu=SPEC, damping=Damper("none"))

@@ -20,6 +20,8 @@ from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over,
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.quality.gnss import master_evidence
+from truenorth.quality.record_evidence import sampling_evidence
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
@@ -165,8 +167,9 @@ def align_transfer(
     matched = Matching(*noise, gate=GATE)
     track = transfer_filter(part, master, model, start, matched, linear=linear)
     parted = parted_clocks(slave, master, C_mb)
+    of_master = [*([] if parted is None else [parted]), *master_evidence(master), *sampling_evidence(slave, turns=True)]
     answer = assemble_transfer(
-        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, parted
+        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, of_master
     )
     if position is not None and master.lat is None:
         answer = replace(

@@ -78,9 +78,9 @@ def assemble_transfer(
     what: str,
     notes: tuple[str, ...],
     heading_limit: float,
-    parted: Evidence | None,
+    of_master: list[Evidence],
 ) -> Alignment:
-    """The answer at the last row of the master, judged; `parted` says what is wrong with the clocks, if anything."""
+    """The answer at the last row of the master, judged; `of_master` is what was found of the master before, its clock included."""
     P = track.last_P
     phi_covariance, floor = misalignment_covariance(P)
     gyro_prior, accel_prior = bias_sigmas(spec)
@@ -111,7 +111,7 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(answer, transfer, track, start, heading_limit, parted)
+    return judge_transfer(answer, transfer, track, start, heading_limit, of_master)
 
 
 def _transfer(

@@ -28,10 +28,10 @@ def judge_transfer(
     track: TransferTrack,
     start: SlaveStart,
     heading_limit: float,
-    parted: Evidence | None,
+    of_master: list[Evidence],
 ) -> Alignment:
-    """The answer with its verdict; `parted` is what is wrong with the clocks, if anything."""
-    evidence = [] if parted is None else [parted]
+    """The answer with its verdict; `of_master` is what was found of the master before, its clock included."""
+    evidence = list(of_master)
     evidence += _rejected(transfer)
     evidence += _misses(transfer, track, start)
     lopsided = _lopsided(track)

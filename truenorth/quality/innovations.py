@@ -2,7 +2,9 @@
 
 Where the model is right, innovations are white and as large as their sigma. Where they are ``f`` times as large, so are the
 errors. Where they hang together over many rows, of correlations ``r_1, r_2, ...``, so many rows carry the information of fewer,
-and a mean of them errs by ``g = sqrt(1 + 2 sum r_k)`` times as much as it says. Both together are by how much sigma must grow.
+and a mean of them errs by ``g = sqrt(1 + 2 sum r_k)`` times as much as it says. Both together are by how much sigma must grow:
+that of velocity and position. Attitude shows in changes of velocity over a manoeuvre, of a period ``T``, and what is slower
+cancels: there ``g = sqrt(1 + 2 sum r_k cos(2 pi t_k / T))``, the density of the innovations at that period.
 
 Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970); the
 sum ends at the first correlation that chance explains, as in C. Geyer, "Practical Markov chain Monte Carlo" (1992).
@@ -25,6 +27,7 @@ Array = NDArray[np.float64]
 
 FEWEST = 60  # components, from which size and colour are judged
 LAGS, MOST_LAGS = 5, 60
+MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 LEAST_CORRELATION = 0.05  # mean over the first lags
 # Sources of places: their errors last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
 PLACES = {"GNSS position": ("position",), "barometer": ("position",)}
@@ -47,37 +50,47 @@ class Whiteness(NamedTuple):
         RMS; 1 where sigma is right.
     colour : float
         ``sqrt(1 + 2 sum r_k)``; 1 where they are white.
+    turning : float
+        The same at the period of manoeuvres.
     sure : bool
         Whether chance does not explain it.
     """
 
     size: float
     colour: float
+    turning: float
     sure: bool
 
     @property
     def growth(self) -> float:
-        """By how much sigma must grow."""
+        """By how much the sigma of velocity and position must grow."""
         return max(1.0, self.size * self.colour) if self.sure else 1.0
 
+    @property
+    def of_attitude(self) -> float:
+        """By how much the sigma of heading and level must grow."""
+        return max(1.0, self.size * self.turning) if self.sure else 1.0
 
-def whiteness(normalised: Array) -> Whiteness:
-    """Size and colour of innovations (M, m), each divided by its sigma, in the order of time."""
+
+def whiteness(normalised: Array, interval: float = 1.0) -> Whiteness:
+    """Size and colour of innovations (M, m), each divided by its sigma, so many seconds apart."""
     e = normalised
     count = e.size
     if count < FEWEST or len(e) < 4 * LAGS:
-        return Whiteness(1.0, 1.0, False)
+        return Whiteness(1.0, 1.0, 1.0, False)
     total = float(np.sum(e**2))
     most = min(len(e) // 4, MOST_LAGS)
     r = np.array([np.sum(e[k:] * e[:-k]) for k in range(1, most + 1)]) / max(total, 1e-300)
     chance = r < 2.0 / math.sqrt(count)
     last = int(np.argmax(chance)) if chance.any() else most
     colour = math.sqrt(1.0 + 2.0 * float(r[:last].sum()))
+    turns = np.cos(2.0 * np.pi * interval * np.arange(1, last + 1) / MANOEUVRE)
+    turning = math.sqrt(max(1.0 + 2.0 * float(r[:last] @ turns), 0.0))
     size = math.sqrt(total / count)
     spread = math.sqrt(2.0 * (1.0 + 2.0 * float(np.sum(r[:last] ** 2))) / count)
     mean = float(r[:LAGS].mean())
     coloured = mean > max(LEAST_CORRELATION, limit("chance") / math.sqrt(LAGS * count))
-    return Whiteness(size, colour, coloured or size**2 - 1.0 > limit("chance") * spread)
+    return Whiteness(size, colour, turning, coloured or size**2 - 1.0 > limit("chance") * spread)
 
 
 def innovation_evidence(sources: Iterable[Residuals], sigma: Effect) -> list[Evidence]:
@@ -125,12 +138,17 @@ def _growth(source: Residuals, sigma: Effect) -> list[Evidence]:
     """By how much the innovations of a source say that sigma is too small."""
     used = source.used & (source.rows > 0)
     e = source.innovation[used] / source.sigma[used]
-    found = whiteness(e[:, np.isfinite(e).all(axis=0)])
+    times = source.time[used]
+    interval = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    found = whiteness(e[:, np.isfinite(e).all(axis=0)], interval)
     if found.growth <= 1.0:
         return []
-    more = math.sqrt(found.growth**2 - 1.0)
+    more = dict.fromkeys(("velocity", "position"), math.sqrt(found.growth**2 - 1.0))
+    more |= dict.fromkeys(("heading", "level"), math.sqrt(found.of_attitude**2 - 1.0))
     touched = PLACES.get(source.name, OUTPUTS)
-    effect = Effect(**{name: more * size for name, size in sigma.items() if name in touched and math.isfinite(size)})
+    effect = Effect(
+        **{name: more[name] * size for name, size in sigma.items() if name in touched and math.isfinite(size)}
+    )
     figures: dict[str, Figure] = {
         "name": source.name,
         "size": found.size,

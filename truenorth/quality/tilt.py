@@ -35,8 +35,8 @@ PLAIN = (
 )
 CLEARER = 3.0  # times smaller squares that another reading must leave
 EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may leave at most
-SURE = 6.0  # sigmas of a small delay
-LEAST_DELAY = 0.01  # s: a shorter one is that of sensors' own filters
+SURE = 10.0  # sigmas of a small delay: of few pieces, in each of which the base's own motion is alike
+LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
 IDENTITY = "+x +y +z"
 
 
@@ -189,7 +189,7 @@ class _Bench:
         x = inverse @ (A.T @ flat[:, 0])
         scores = np.einsum("pnk,pn->pk", A.reshape(len(theta), -1, 4), (flat[:, 0] - A @ x).reshape(len(theta), -1))
         covariance = inverse @ (scores.T @ scores) @ inverse * len(scores) / max(1, len(scores) - 2)
-        return float(x[0] / scale[0]), float(math.sqrt(max(covariance[0, 0], 0.0)) / scale[0])
+        return -float(x[0] / scale[0]), float(math.sqrt(max(covariance[0, 0], 0.0)) / scale[0])
 
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""

@@ -17,6 +17,7 @@ TITLES = {
     "tilt": "The gyros contradict the accelerometers",
     "bias": "The biases are not what the specification allows",
     "encoder": "The indexer's angles contradict the gyros",
+    "master": "The master contradicts itself",
     "gnss": "GNSS positions and velocities contradict each other",
     "table": "The table was touched",
     "innovations": "The measurements contradict the track",
@@ -104,14 +105,8 @@ SENTENCES = {
         "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
         "gyro columns x y z read as {axes}"
     ),
-    "tilt.gyros_late": (
-        "the gyros are {delay:.3f} s late against the accelerometers: the turns of gravity fit {best:.2g} m/s^2 then, "
-        "{given:.2g} m/s^2 as given"
-    ),
-    "tilt.gyros_early": (
-        "the gyros are {delay:.3f} s early against the accelerometers: the turns of gravity fit {best:.2g} m/s^2 then, "
-        "{given:.2g} m/s^2 as given"
-    ),
+    "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
+    "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
     "bias.gyro": (
         "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu}) allows {allowed:deg/h|} deg/h"
     ),
@@ -142,6 +137,11 @@ SENTENCES = {
     "gnss.turned": (
         "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
     ),
+    "gnss.velocity": "the GNSS velocities are not the changes of its positions, whatever way they are turned",
+    "master.turned": (
+        "the master's velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"
+    ),
+    "master.velocity": "the master's velocities are not the changes of its positions, whatever way they are turned",
     # ---- measurements against the prediction
     "innovations.rejected": (
         "{name}: {rejected} of {count} measurements rejected: they contradict the track (half of them by more than "

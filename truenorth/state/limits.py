@@ -19,7 +19,7 @@ LIMITS: dict[str, Limit] = {
     "negligible": Limit(0.3, "sigma", "adds 4 % to sigma: less than the figures of sigma are worth"),
     "bound": Limit(1.0, "sigma", "a suspicion of up to one sigma leaves the answer within three of them: it is added"),
     "growth": Limit(
-        3.0, "sigma", "an error three times as large as all others together is not a correction of the model"
+        5.0, "sigma", "an error five times as large as all others together is not a correction of the model"
     ),
     # ---- what an answer must reach
     "level": Limit(
