@@ -19,7 +19,7 @@ SEED = 11
 ONCE_SILENT = {
     "swaying": ("gyro axes exchanged", "gyro sign", "late gyros"),
     "rotary": ("gyro axes exchanged", "gyro sign", "encoder axes exchanged", "encoder sign", "held rows", "clock rate"),
-    "gnss": ("grid north", "gyro sign", "clock rate"),
+    "gnss": ("grid north", "clock rate"),
     "transfer": ("accel axes exchanged", "master's V_E and V_N exchanged", "turned master", "clock rate"),
     "navigate": ("grid north", "damaged start", "late GNSS"),
     "still": ("accel bias step or ramp", "dead sensor"),

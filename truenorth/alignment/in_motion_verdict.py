@@ -15,7 +15,7 @@ def judge_moving(answer: Alignment, track: Track, limit: float, more: list[Evide
     needs: tuple[str, ...] = ()
     if by_motion:
         needs = ("manoeuvre_gnss" if any("GNSS" in r.name for r in track.residuals) else "north",)
-    evidence = [*_wheel(answer), *innovation_evidence(track.residuals, claimed(answer)), *more]
+    evidence = [*_wheel(answer), *innovation_evidence(track.residuals, claimed(answer), by_motion=by_motion), *more]
     return judged(answer, evidence, limit, waiting=not by_motion, remedies=needs)
 
 

@@ -31,6 +31,7 @@ MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 LEAST_CORRELATION = 0.05  # mean over the first lags
 # Sources of places: their errors last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
 PLACES = {"GNSS position": ("position",), "barometer": ("position",)}
+BODY = ("odometer", "velocity log", "zero velocity", "zero rotation")
 UNITS = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}
 
 
@@ -93,7 +94,7 @@ def whiteness(normalised: Array, interval: float = 1.0) -> Whiteness:
     return Whiteness(size, colour, turning, coloured or size**2 - 1.0 > limit("chance") * spread)
 
 
-def innovation_evidence(sources: Iterable[Residuals], sigma: Effect) -> list[Evidence]:
+def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motion: bool = False) -> list[Evidence]:
     """What the innovations of each source say of the model.
 
     Parameters
@@ -101,6 +102,8 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect) -> list[Evi
     sources : iterable of Residuals
     sigma : Effect
         Of the answer, one sigma of each output: what grows.
+    by_motion : bool
+        Whether heading comes from motion alone: velocities in body axes then have no part in it.
     """
     found: list[Evidence] = []
     for source in sources:
@@ -128,13 +131,13 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect) -> list[Evi
         if nis is not None and nis > limit("nis"):
             found.append(contradiction("innovations.size", name=source.name, factor=math.sqrt(nis)))
         else:
-            found += _growth(source, sigma)
+            found += _growth(source, sigma, by_motion)
         if source.outside:
             found.append(note("innovations.outside", name=source.name, outside=source.outside))
     return found
 
 
-def _growth(source: Residuals, sigma: Effect) -> list[Evidence]:
+def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]:
     """By how much the innovations of a source say that sigma is too small."""
     used = source.used & (source.rows > 0)
     e = source.innovation[used] / source.sigma[used]
@@ -145,7 +148,9 @@ def _growth(source: Residuals, sigma: Effect) -> list[Evidence]:
         return []
     more = dict.fromkeys(("velocity", "position"), math.sqrt(found.growth**2 - 1.0))
     more |= dict.fromkeys(("heading", "level"), math.sqrt(found.of_attitude**2 - 1.0))
-    touched = PLACES.get(source.name, OUTPUTS)
+    touched: tuple[str, ...] = PLACES.get(source.name, OUTPUTS)
+    if by_motion and source.name in BODY:
+        touched = ("level", "velocity", "position")
     effect = Effect(
         **{name: more[name] * size for name, size in sigma.items() if name in touched and math.isfinite(size)}
     )
