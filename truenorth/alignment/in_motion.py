@@ -77,6 +77,7 @@ class _Task:
     wheel: Mounting
     antenna: Mounting
     stops: Sequence[Aiding]  # and gaps of the log
+    more: Sequence[Aiding]
 
     def aiding(self, *, gated: bool) -> list[Aiding]:
         """Of all sensors; without gates as long as the filter may be wrong itself."""
@@ -86,7 +87,7 @@ class _Task:
             found += from_odometer(self.odometer, wheel)
         if self.gnss is not None:
             found += from_gnss(self.gnss, antenna)
-        return found
+        return found + [source if gated else replace(source, gate=0.0) for source in self.more]
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""
@@ -117,6 +118,7 @@ def align_in_motion(
     position: Position | None = None,
     wheel: Mounting | None = None,
     antenna: Mounting | None = None,
+    sources: Sequence[Aiding] = (),
     zupt: bool = True,
     method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
@@ -144,6 +146,8 @@ def align_in_motion(
         earth turn, and said among the reasons.
     wheel, antenna : Mounting, optional
         How they sit. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m) of the wheel are estimated.
+    sources : sequence of Aiding
+        Further measurements, such as rows of one's own.
     zupt : bool
         Use stops: seconds in which the wheel, or GNSS, says that nothing moves.
     method : {"auto", "gyrocompass", "motion", ...}
@@ -175,7 +179,7 @@ def align_in_motion(
         Too short a log.
     """
     tell = progress or (lambda stage: None)
-    task = _task(record, imu, odometer, gnss, position, wheel, antenna, zupt, calibration, offset)
+    task = _task(record, imu, odometer, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
         raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")
     if not heading_limit > 0.0 or passes < 1:
@@ -251,6 +255,7 @@ def _task(
     position: Position | None,
     wheel: Mounting | None,
     antenna: Mounting | None,
+    more: Sequence[Aiding],
     zupt: bool,
     calibration: Calibration | None,
     offset: float,
@@ -287,6 +292,7 @@ def _task(
         WHEEL if wheel is None else wheel,
         usual_antenna(gnss) if antenna is None else antenna,
         stops,
+        more,
     )
 
 

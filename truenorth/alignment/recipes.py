@@ -89,6 +89,8 @@ class Recipe:
         Whether a method can be asked for; the recipe checks its name.
     at : bool
         Whether another epoch than the last sample can be asked for.
+    own : bool
+        Whether aids of a user's own module, with a method `sources`, may be given besides these.
     """
 
     name: str
@@ -96,9 +98,11 @@ class Recipe:
     aids: tuple[type, ...] = ()
     methods: bool = False
     at: bool = False
+    own: bool = False
 
     def fits(self, kinds: set[type]) -> bool:
         """Whether it takes aids of these types."""
+        kinds = {kind for kind in kinds if not (self.own and _of_a_user(kind))}
         return kinds <= set(self.aids) if kinds else not self.aids
 
     def __call__(self, request: Request) -> Alignment:
@@ -108,6 +112,10 @@ class Recipe:
             run: Run = getattr(import_module(module), name)
             return run(request)
         return self.run(request)
+
+
+def _of_a_user(kind: type) -> bool:
+    return hasattr(kind, "sources") and not kind.__module__.startswith("truenorth.")
 
 
 def on_base(r: Request) -> Alignment:
@@ -136,6 +144,7 @@ def in_motion(r: Request) -> Alignment:
         position=r.place,
         wheel=None if odometer is None else odometer.mounting,
         antenna=None if gnss is None else gnss.mounting,
+        sources=[source for kind, a in r.aids.items() if _of_a_user(kind) for source in a.sources("free")],
         method=r.method,
         calibration=r.calibration,
         **r.common,
@@ -199,7 +208,7 @@ def on_table(r: Request) -> Alignment:
 
 RECIPES = [
     Recipe("a base that stays", on_base, methods=True, at=True),
-    Recipe("a vehicle on the move", in_motion, (Odometer, Gnss), methods=True),
+    Recipe("a vehicle on the move", in_motion, (Odometer, Gnss), methods=True, own=True),
     Recipe("a master INS", by_master, (Master,)),
     Recipe("an IMU on an indexer", on_indexer, (Indexer,), at=True),
     Recipe("a turntable", on_table, (Positions,)),
@@ -240,7 +249,8 @@ def align(
         Specification, a preset's name, or a YAML file. On a base that stays the scale of the errors is inferred from the log when
         it is left out.
     aid : aid or sequence of aids
-        :class:`Odometer`, :class:`Gnss`, :class:`Master`, :class:`Indexer`, :class:`Positions`.
+        :class:`Odometer`, :class:`Gnss`, :class:`Master`, :class:`Indexer`, :class:`Positions`; on the move also one of
+        your own, as navigation takes it.
     method : str or callable
         ``auto``, or one of the recipe. On a base: ``analytic`` (TRIAD on mean rate and specific force, still base only),
         ``inertial`` (dual vector in the inertial frame), ``oba`` (optimisation-based alignment), ``kalman`` (coarse, then a Kalman

@@ -140,7 +140,10 @@ def _read(path: Path) -> Any:
     with suppress(OSError):  # gone since, or of another user
         if time.time() - path.stat().st_mtime > DAY:
             os.utime(path)  # used today: the last to be pruned
-    return pickle.loads(content[SUM:])
+    try:
+        return pickle.loads(content[SUM:])
+    except ImportError:  # of a module that was run from a file without a name to import it by
+        return None
 
 
 def _write(path: Path, content: bytes) -> None:
