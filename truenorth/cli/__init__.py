@@ -21,6 +21,7 @@ from truenorth.cli.imu import imu
 from truenorth.cli.inspect import inspect
 from truenorth.cli.live import live
 from truenorth.cli.navigate import navigate
+from truenorth.cli.noise import noise
 from truenorth.cli.reproduce import reproduce
 from truenorth.cli.simulate import simulate
 from truenorth.cli.tune import tune
@@ -47,6 +48,7 @@ app.command("example")(example)
 app.command("inspect")(inspect)
 app.command("live")(live)
 app.command("navigate")(navigate)
+app.command("noise")(noise)
 app.command("simulate")(simulate)
 app.command("campaign")(campaign)
 app.command("faults")(faults)

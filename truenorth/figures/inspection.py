@@ -58,8 +58,8 @@ def plot_inspection(inspection: Inspection) -> Figure:
         for ax in (rate, force):
             ax.tick_params(labelbottom=False)
         wander.set_xlabel("time, s")
-        _allan(figure.add_subplot(right[0]), inspection.gyro_noise, "Gyro Allan deviation", "deg/h")
-        _allan(figure.add_subplot(right[1]), inspection.accel_noise, "Accelerometer Allan deviation", "ug")
+        draw_allan(figure.add_subplot(right[0]), inspection.gyro_noise, "Gyro Allan deviation", "deg/h")
+        draw_allan(figure.add_subplot(right[1]), inspection.accel_noise, "Accelerometer Allan deviation", "ug")
         figure.suptitle(_title(inspection), ha="left", x=0.01, fontsize=11)
         figure.legend(handles=_legend(inspection), loc="outside lower left", ncols=9, fontsize=9, handlelength=1.4)
     return figure
@@ -148,7 +148,7 @@ def _legend(inspection: Inspection) -> list[Patch]:
     return handles
 
 
-def _allan(ax: Axes, noise: NoiseCoefficients | None, title: str, unit: str) -> None:
+def draw_allan(ax: Axes, noise: NoiseCoefficients | None, title: str, unit: str) -> None:
     """Measured points with their one-sigma, and the fitted model through them."""
     ax.set_title(title)
     if noise is None:

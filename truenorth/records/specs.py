@@ -356,6 +356,54 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
     return _from_mapping(read_mapping(path), str(path), path.stem)
 
 
+# Kalibr's imu.yaml: continuous-time densities in SI, as bare numbers.
+KALIBR = {
+    "gyroscope_noise_density": "gyro_random_walk",
+    "gyroscope_random_walk": "gyro_rate_random_walk",
+    "accelerometer_noise_density": "accel_random_walk",
+    "accelerometer_random_walk": "accel_rate_random_walk",
+}
+
+
+def _from_kalibr(content: Mapping[Any, Any], where: str, name: str) -> ImuSpec:
+    """The specification of a Kalibr file; its other keys (topic, rate, model) are none of the sensor's errors."""
+    values: dict[str, Any] = {"name": name}
+    for theirs, ours in KALIBR.items():
+        value = content[theirs]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+            raise DataError(f"{where}: {theirs}: {value!r}; expected a number in SI, zero or more")
+        values[ours] = float(value)
+    return ImuSpec(**values)
+
+
+def write_kalibr(spec: ImuSpec, rate: float, path: str | PathLike[str]) -> None:
+    """Write the four densities that Kalibr takes, for samples at a rate (Hz).
+
+    A bias that wanders as a Gauss-Markov process (sigma b, correlation time T) drives its random walk by ``b sqrt(2 / T)``.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be written.
+    """
+    import yaml
+
+    from truenorth.core.atomic import atomic_path
+
+    whole = spec.with_random_walks(1.0 / rate)
+    drive = math.sqrt(2.0 / spec.correlation_time)
+    content: dict[str, Any] = {}
+    for theirs, ours in KALIBR.items():
+        value = getattr(whole, ours)
+        if ours.endswith("rate_random_walk"):
+            sensor = ours.partition("_")[0]
+            value = math.hypot(value, getattr(spec, f"{sensor}_bias_instability") * drive)
+        content[theirs] = float(value)
+    content |= {"rostopic": "/imu", "update_rate": float(rate)}
+    with atomic_path(path) as temporary:
+        temporary.write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")
+
+
 def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
     if not isinstance(content, Mapping):
         raise DataError(f"{where}: expected the groups gyro and accel, found {type(content).__name__}")
@@ -363,6 +411,8 @@ def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
         raise DataError(
             f"{where}: names no error of the IMU; expected the groups gyro and accel (a perfect IMU is ImuSpec())"
         )
+    if set(KALIBR) <= set(content):
+        return _from_kalibr(content, where, name)
     values: dict[str, Any] = {"name": str(content.get("name", name))}
     for group, entries in content.items():
         if group == "name":
