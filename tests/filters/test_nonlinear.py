@@ -102,6 +102,28 @@ def test_strong_tracking_with_few_nodes_is_that_with_all():
         assert_allclose(getattr(few, field), getattr(all_, field), rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.parametrize("by", ["epoch", "row"])
+def test_a_gate_judges_before_the_factor_acts(by):
+    """What it rejects is as if it had not been measured: it makes no factor, now or later."""
+    system = conditionally_linear(15, np.random.default_rng(5))
+    z = system.z.copy()
+    z[7] += 1e3
+    options = {
+        "order": 3,
+        "nonlinear": [TURNING],
+        "tracking": StrongTracking(),
+        "history": "full",
+        "gate": Gate(1 - 1e-9, by),
+    }
+    hit = gauss_hermite(replace(system, z=z), **options)
+    z[7] = np.nan
+    absent = gauss_hermite(replace(system, z=z), **options)
+    assert np.all(hit.adaptation[7, 1:] == 0.0)
+    for field in ("x", "P", "log_likelihood"):
+        assert_allclose(getattr(hit, field), getattr(absent, field), rtol=1e-12, atol=1e-12)
+    assert_array_equal(hit.adaptation[:, 0], absent.adaptation[:, 0])
+
+
 def test_iteration_finds_the_largest_posterior_density():
     # One epoch of precise bearings of a badly known target: the maximum of the posterior, by SciPy.
     from scipy.optimize import minimize

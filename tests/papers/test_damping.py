@@ -111,7 +111,9 @@ def test_the_study(tmp_path):
     study.save(tmp_path)
     table = pd.read_csv(tmp_path / "figures.csv")
     assert set(table["unit"]) <= set(UNITS)
-    assert {f"c-0.{i}" for i in range(1, 6)} | {"c0", "random_signs", "drawn"} == set(table["case"])
+    logs = {f"c-0.{i}" for i in range(1, 6)}
+    expected = logs | {f"{c}_best_signs" for c in logs} | {"c0", "random_signs", "drawn", "all"}
+    assert set(table["case"]) == expected
 
     def value(case, method, quantity, statistic, hours=None):
         rows = table[(table["case"] == case) & (table["method"] == method) & (table["quantity"] == quantity)]

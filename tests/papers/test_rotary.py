@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from truenorth.cli import app
 from truenorth.papers import reproduce
 from truenorth.papers.rotary.coarse import dual_vector_as_printed
-from truenorth.papers.rotary.runs import FILTERS, TIMES, all_runs, work
+from truenorth.papers.rotary.runs import FILTERS, SWEEPS, TIMES, all_runs, work
 from truenorth.papers.rotary.truth import CASES, scenario_of, simulate_run
 
 ARCMIN = math.radians(1 / 60)
@@ -108,7 +108,7 @@ def test_the_command(tmp_path):
     assert names == {"figures.csv", "claims.md", "report.html"} | drawings
     table = pd.read_csv(tmp_path / "figures.csv")
     expected = {"A", "A_max_start", "B", "C", "jonswap", "unrotated", "rotation_off", "lever_arm_at_t1_kept"}
-    assert set(table["case"]) == expected
+    assert set(table["case"]) == expected | {sweep.case_of(value) for sweep in SWEEPS for value in sweep.values}
     methods = {"dual_vector", "triad", "q_method", *FILTERS, "kf_two_pass", "windowed_ls", "coloured_noise_kf"}
     assert set(table["method"]) == methods
 
