@@ -22,6 +22,7 @@ Studies:
   static    Kalman filters for static alignment, with ten and with eight states
   odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
   networks  Internal damping networks by design, and a fuzzy damping ratio (related work)
+  gyro_free Angular rate from twelve accelerometers (related work)
   all       All of them, and index.html: which claims hold, in part, or not
 \b
 Examples:

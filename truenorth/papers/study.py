@@ -26,6 +26,7 @@ STUDIES = {
     "damping": "truenorth.papers.damping.study",
     "odometer": "truenorth.papers.odometer.study",
     "networks": "truenorth.papers.related.networks",
+    "gyro_free": "truenorth.papers.related.gyro_free",
 }
 Progress = Callable[[str], None]
 
