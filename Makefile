@@ -6,7 +6,7 @@ WARM := .venv/.warm
 WORKERS ?= auto
 
 .DEFAULT_GOAL := demo
-.PHONY: install demo test test-all check format bench docs messages release lock clean
+.PHONY: install demo test test-all check format bench docs notebooks messages release lock clean
 
 install: $(WARM)
 
@@ -33,6 +33,9 @@ bench: $(WARM)
 
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build -q
+
+notebooks: $(READY)
+	$(BIN)/python docs/notebooks/build.py
 
 messages: $(READY)
 	$(BIN)/python -m tests.report.catalogue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import subprocess
@@ -90,3 +91,21 @@ def test_the_film_is_small_and_moves():
     film = ROOT / "docs/assets/heading.svg"
     assert film.stat().st_size < 1e6
     assert film.read_text(encoding="utf-8").count("<animate ") > 30
+
+
+NOTEBOOKS = sorted((ROOT / "docs/notebooks").glob("[0-9]_*.py"))
+
+
+@pytest.mark.parametrize("script", NOTEBOOKS, ids=lambda p: p.stem)
+def test_a_notebook_is_its_script_executed(script):
+    """The .ipynb holds the cells of the script, every one with a number, none with an error, and some with pictures."""
+    cells = json.loads(script.with_suffix(".ipynb").read_text(encoding="utf-8"))["cells"]
+    parts = re.split(r"^# %%.*\n", script.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    assert len(parts) == len(cells), "run make notebooks"
+    for part, cell in zip(parts, cells, strict=True):
+        if cell["cell_type"] == "code":
+            assert "".join(cell["source"]).strip() == part.strip(), "run make notebooks"
+            assert cell["execution_count"]
+            assert all(output["output_type"] != "error" for output in cell["outputs"])
+    shown = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
+    assert any("image/png" in json.dumps(output) for output in shown)

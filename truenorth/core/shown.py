@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -93,7 +94,21 @@ def plot(result: Any, **options: Any) -> Figure:
         A type that nothing draws.
     """
     drawn: Figure = _view(result, "plot")(result, **options)
+    _shown_in_notebooks()
     return drawn
+
+
+def _shown_in_notebooks() -> None:
+    """Let a notebook show a figure that ends a cell, without a magic line and without pyplot."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if shell is not None:
+        shell.display_formatter.formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", _png)
+
+
+def _png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=PICTURE_DPI)
+    return buffer.getvalue()
 
 
 def save(result: Any, folder: str | PathLike[str]) -> list[Path]:
@@ -221,9 +236,7 @@ class Shown:
             return None
         if not hasattr(figure, "savefig"):
             return None
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=PICTURE_DPI)
-        return buffer.getvalue()
+        return _png(figure)
 
     def _repr_png_(self) -> bytes | None:
         return self._picture
