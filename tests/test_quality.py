@@ -457,3 +457,19 @@ def test_waves_do_not_carry_a_moored_ship_away():
         assert ship.overall == "disturbed"
     van = motion_summary(read_scenario("van").simulate().record)
     assert van.fraction("moving") > 0.2
+
+
+@pytest.mark.parametrize("rate", [2.0, 20.0])
+def test_gyros_that_turn_while_gravity_does_not_have_a_bias(rate):
+    """At rest, gyro offsets of MEMS, however large, are no turn; the same rate with gravity turning in step is one."""
+    rng = np.random.default_rng(2)
+    time = 0.02 * np.arange(1, 6001)
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    gyro = np.radians(rate) * axis + np.radians(0.05) * rng.standard_normal((6000, 3))
+    force = np.array([0.3, -0.2, 9.8]) + 0.02 * rng.standard_normal((6000, 3))
+    resting = ImuRecord(time, gyro, force, "rates")
+    summary = motion_summary(resting)
+    assert summary.overall == "still"
+    np.testing.assert_allclose(summary.rate_bias, np.radians(rate) * axis, atol=np.radians(0.01))
+    turned = Rotation.from_rotvec(-np.radians(rate) * axis * time[:, None]).apply(force)
+    assert motion_summary(ImuRecord(time, gyro, turned, "rates")).overall == "rotating"

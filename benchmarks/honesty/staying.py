@@ -125,6 +125,13 @@ def low_cost(rng: np.random.Generator) -> Mapping[str, Any]:
     }
 
 
+def offset(rng: np.random.Generator) -> Mapping[str, Any]:
+    """A consumer IMU at rest whose gyros are off by .5 to 20 deg/s."""
+    bias = 0.5 * 40.0 ** rng.random() * _direction(rng)
+    gyro = {"bias": [f"{v:.4f} deg/s" for v in bias]}
+    return low_cost(rng) | {"imu": "consumer", "errors": {"gyro": gyro}}
+
+
 def _direction(rng: np.random.Generator) -> np.ndarray:
     v = rng.standard_normal(3)
     return v / np.linalg.norm(v)
@@ -154,6 +161,7 @@ CASES = (
     Case("still, no specification, gyro bias .05 deg/h", still("0.05 deg/h"), _with(None), ("aligned", "level_only")),
     Case("still, specification given, gyro bias .01 deg/h", still("0.01 deg/h"), _with(_imu("0.01 deg/h"))),
     Case("low cost at rest, no specification", low_cost, _with(None), ("aligned", "level_only")),
+    Case("gyros off by .5 to 20 deg/s at rest", offset, _with("consumer"), ("level_only",)),
 )
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from truenorth.strapdown.inertial import earth_rotation
 
 Array = NDArray[np.float64]
 
+FARTHEST = 100.0  # lengths of the log: a power law is not carried further
 EXCURSION = 0.3  # m, one sigma: how far the place about which a base sways may have moved over a log
 
 
@@ -118,7 +119,8 @@ def pays_until(history: History, answer: Alignment, fine: FineAlignment) -> floa
     slope = math.log(random[-1] / random[half]) / math.log(elapsed[-1] / elapsed[half])
     if slope > -0.2:
         return None
-    return float(elapsed[-1] * (0.5 * floor / random[-1]) ** (1.0 / slope))
+    wanted = float(elapsed[-1] * (0.5 * floor / random[-1]) ** (1.0 / slope))
+    return wanted if wanted < FARTHEST * elapsed[-1] else None
 
 
 def without_heading(covariance: Array) -> Array:

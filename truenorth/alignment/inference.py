@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 GYRO_WIDTH = math.log(7.0)  # one sigma of the logarithm of a bias about what is usual with such a random walk
 ACCEL_WIDTH = math.log(2.0)  # narrower: an accelerometer's offset goes with its noise, a gyro's with its maker's care
 CORRELATION_TIME = 300.0  # s: of a bias that wanders, where nobody names one
+LEAST = 0.3  # of the navigation preset's biases: beginning of the search
 WORST_GYRO = np.radians(10.0)  # rad/s: end of the search for a bias scale
 WORST_ACCEL = 10.0  # m/s^2
 
@@ -88,12 +89,14 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     typical_gyro = usual_bias("gyro", noise.gyro_random_walk)
     typical_accel = usual_bias("accel", noise.accel_random_walk)
     force, force_noise = np.array([check.force_residual]), np.array([check.force_noise])
+    gyro_bias = predictive_sigma(
+        check.rate_residual, check.rate_noise, typical_gyro, GYRO_WIDTH, LEAST * best.gyro_bias, WORST_GYRO
+    )
+    accel_bias = predictive_sigma(force, force_noise, typical_accel, ACCEL_WIDTH, LEAST * best.accel_bias, WORST_ACCEL)
     return ImuSpec(
         name="inferred",
-        gyro_bias=predictive_sigma(
-            check.rate_residual, check.rate_noise, typical_gyro, GYRO_WIDTH, best.gyro_bias, WORST_GYRO
-        ),
-        accel_bias=predictive_sigma(force, force_noise, typical_accel, ACCEL_WIDTH, best.accel_bias, WORST_ACCEL),
+        gyro_bias=max(gyro_bias, best.gyro_bias),
+        accel_bias=max(accel_bias, best.accel_bias),
         gyro_random_walk=noise.gyro_random_walk,
         accel_random_walk=noise.accel_random_walk,
         gyro_bias_instability=noise.gyro_rate_walk * math.sqrt(0.5 * CORRELATION_TIME),

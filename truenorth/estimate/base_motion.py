@@ -72,9 +72,9 @@ class VelocityNoise:
     def __init__(self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int) -> None:
         self.R, self.parts, self.most = R, parts, most
 
-    def __call__(self, system: LinearSystem) -> Filtered:
+    def __call__(self, quiet: LinearSystem) -> Filtered:
         """Filter a system that holds the variance of the quietest base so far."""
-        system = replace(system, R=system.R + (self.R - QUIETEST_BASE**2)[:, None] * np.eye(3))
+        system = self._with_motion(quiet)
         estimates = kalman(system, history="full")
         for colour in (False, True):
             for _ in range(self.most):
@@ -91,7 +91,10 @@ class VelocityNoise:
                     same &= bool(np.all(np.abs(R[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
                 if same:
                     break
-                system = replace(system, R=system.R + (R - self.R)[:, None] * np.eye(3))
                 self.R = R
+                system = self._with_motion(quiet)
                 estimates = kalman(system, history="full")
         return Filtered(system, estimates)
+
+    def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
+        return replace(quiet, R=quiet.R + (self.R - QUIETEST_BASE**2)[:, None] * np.eye(3))

@@ -24,6 +24,7 @@ from truenorth.quality.signals import (
     acceleration,
     angle_wander,
     attitude_from,
+    bias_by_gravity,
     box_mean,
     even_rates,
     offset,
@@ -197,6 +198,8 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     angle_noise, force_noise = np.split(white_noise(record), 2)
     wander = angle_wander(rates[:3], interval, per_second)  # (3, windows), of each window of up to 10 s
     bias = rate_bias(rates[:3], wander, per_second, angle_noise)
+    still_gravity = bias_by_gravity(second_means(rates[:3], per_second), second_means(rates[3:], per_second))
+    bias = bias if still_gravity is None else still_gravity
     gyro = rates[:3] - bias[:, None]
     rate = second_means(gyro, per_second)
     force = second_means(rates[3:], per_second)

@@ -19,6 +19,9 @@ WINDOW = 10  # s, over which the angle's wander and the gain of speed are judged
 LEVEL_WINDOW = 31  # s, odd; the direction of gravity is the median over it
 # Three arcseconds are what spoils north by a degree in 15 s of static averaging.
 STILL_ANGLE = 3.0 * ARCSEC
+SEEN_TURN = np.radians(2.0)  # of gravity in body axes within WINDOW: accelerometers that shake still see it
+QUARTER_TURN = np.radians(90.0)
+UNTURNED = 0.1  # part of the turn that gyros show, below which gravity has not turned at all
 LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, whatever the sensor
 
 
@@ -114,6 +117,28 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
         if np.linalg.norm(bias) < limit:
             return bias
     return np.zeros(3)
+
+
+def bias_by_gravity(rate: Array, force: Array) -> Array | None:
+    """(3,) mean rate of gyros that turn while gravity does not: a bias, however large; None where gravity may have turned.
+
+    A body that turned by the part of that rate across gravity would see gravity's direction turn. (A turn about the vertical
+    leaves gravity where it is: that part is a bias only in company of the other.)
+
+    Parameters
+    ----------
+    rate, force : (3, m) arrays
+        Means of seconds.
+    """
+    mean = rate.mean(axis=1)
+    up = force / np.maximum(np.linalg.norm(force, axis=0), 1e-9)
+    vertical = up.mean(axis=1)
+    across = float(np.linalg.norm(mean - vertical * (mean @ vertical) / (vertical @ vertical)))
+    lag = min(WINDOW, max(1, int(QUARTER_TURN / max(across, 1e-9))))
+    if across * lag < SEEN_TURN or rate.shape[1] < 2 * lag:
+        return None
+    turned = np.linalg.norm(up[:, lag:] - up[:, :-lag], axis=0)
+    return mean if float(np.quantile(turned, 0.9)) < UNTURNED * across * lag else None
 
 
 def attitude_from(angles: Array) -> Array:
