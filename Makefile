@@ -19,6 +19,9 @@ test: $(WARM)
 test-all: $(WARM)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope
 
+fuzz: $(READY)
+	FUZZ=$(or $(FUZZ),5000) $(BIN)/python -m pytest -q -n $(WORKERS) tests/fuzz
+
 check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

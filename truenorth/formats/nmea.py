@@ -120,9 +120,9 @@ def _sentences(path: Path) -> Iterator[tuple[int, str, list[str]]]:
                     "sentence is damaged, remove the line"
                 )
         cells = body.decode("ascii", "replace").split(",")
-        kind = cells[0][2:]
+        kind = line[start + 3 : start + 6].decode()
         wanted = {"GGA": 12, "RMC": 9, "VTG": 6}[kind]
-        if len(cells) >= wanted:
+        if len(cells) >= wanted and cells[0][2:] == kind:
             yield number, kind, cells
         elif not end:
             raise DataError(
@@ -140,7 +140,7 @@ def _number(text: str, where: str, what: str) -> float:
 def _clock(text: str, where: str) -> float:
     """Seconds of the day of ``hhmmss.ss``."""
     value = _number(text, where, "time")
-    hours, minutes, seconds = value // 10000, value // 100 % 100, float(text[4:] or "nan")
+    hours, minutes, seconds = value // 10000, value // 100 % 100, _number(text[4:], where, "seconds")
     if not (0 <= hours < 24 and minutes < 60 and seconds < 61):
         raise DataError(f"{where}: time {text!r}; expected hhmmss.ss")
     return 3600.0 * hours + 60.0 * minutes + seconds

@@ -1,0 +1,90 @@
+"""Damaged logs of every format: a record, or one error of ours; no traceback, no crash, no NaN.
+
+`make test` tries a few dozen of each; ``FUZZ=5000 pytest tests/fuzz`` (`make fuzz`) as many as asked.
+"""
+
+import os
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from tests.formats.corpus.dialects import DEG, SI, G, table
+from tests.formats.corpus.truth import truth
+from tests.formats.test_devices import dataflash_bytes, ulog_bytes
+from truenorth.core.errors import TruenorthError
+from truenorth.core.yaml_file import read_mapping
+from truenorth.formats import read_gnss, read_imu, read_odometer, write_imu
+from truenorth.records import ImuRecord
+
+EXAMPLES = int(os.environ.get("FUZZ", "25"))
+SPICE = [
+    b"\n", b",", b"-", b"e9", b"1e200", b"nan", b"\0", b'"', b";", b"$", b"\xff", "١".encode(), "٫".encode(), b"9" * 400,
+    b"\r", b"#", b"[", b"{{", b"*", b":", b"&a", b"inf", b"  ", b"\t", b"T", b"Z", struct.pack("<d", 1e200),
+]  # fmt: skip
+
+
+def logs(folder) -> dict[str, bytes]:
+    short = truth("swaying", "tactical", 50.0, 4.0)
+    record = ImuRecord(short.time, short.gyro, short.accel)
+    for suffix in ("npz", "parquet"):
+        write_imu(record, folder / f"whole.{suffix}")
+    savemat(folder / "whole.mat", {"time": short.time, "gyro": short.gyro, "accel": short.accel})
+    rows = [f"$GPGGA,{100000 + k:06d}.00,4806.0,N,01130.0,E,1,08,1.0,500.0,M,45.0,M,," for k in range(20)]
+    return {
+        "log.csv": table(short, SI).encode(),
+        "odd.csv": table(short, "t;wx;wy;wz;ax;ay;az", sep=";", decimal=",", gyro=DEG, accel=G).encode(),
+        "bare.txt": table(short, "", sep=" ").encode(),
+        "log.imu": table(short.increments, "", sep=" ", order="gat").encode(),
+        "log.bin": np.column_stack([short.time, short.increments.gyro, short.increments.accel]).tobytes(),
+        "log.npz": (folder / "whole.npz").read_bytes(),
+        "log.parquet": (folder / "whole.parquet").read_bytes(),
+        "log.mat": (folder / "whole.mat").read_bytes(),
+        "log.ulg": ulog_bytes()[:20_000],
+        "dataflash.bin": dataflash_bytes()[:20_000],
+        "log.nmea": ("\r\n".join(rows) + "\r\n").encode(),
+        "odo.csv": b"time,speed [km/h]\n" + b"".join(b"%d,%d\n" % (k, 30 + k) for k in range(30)),
+        "spec.yaml": b"gyro: {bias: 1 deg/h, random_walk: 0.1 deg/sqrt(h)}\naccel: &a {bias: 1 mg}\n",
+    }
+
+
+READ = {"log.nmea": read_gnss, "odo.csv": read_odometer, "spec.yaml": read_mapping}
+NAMES = ["log.csv", "odd.csv", "bare.txt", "log.imu", "log.bin", "log.npz", "log.parquet", "log.mat", "log.ulg",
+         "dataflash.bin", "log.nmea", "odo.csv", "spec.yaml"]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> dict[str, bytes]:
+    return logs(tmp_path_factory.mktemp("whole"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_damaged_is_a_record_or_an_error_of_ours(name, whole, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fuzz")
+    # Reading .mat starts a process each time.
+    examples = max(3, EXAMPLES // 8) if name == "log.mat" else EXAMPLES
+
+    @settings(max_examples=examples, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+    @given(data=st.data())
+    def attempt(data):
+        content = bytearray(whole[name])
+        for _ in range(data.draw(st.integers(1, 4))):
+            place, gone = data.draw(st.integers(0, len(content))), data.draw(st.integers(0, 40))
+            content[place : place + gone] = data.draw(st.binary(max_size=12) | st.sampled_from(SPICE))
+        if data.draw(st.integers(0, 9)) == 0:
+            content = content[: data.draw(st.integers(0, len(content)))]
+        path = folder / name
+        path.write_bytes(content)
+        try:
+            record = READ.get(name, read_imu)(path)
+        except TruenorthError:
+            return
+        if isinstance(record, ImuRecord):
+            assert np.isfinite(record.gyro).all()
+            assert np.isfinite(record.accel).all()
+            assert np.all(np.diff(record.time) > 0.0)
+
+    attempt()
