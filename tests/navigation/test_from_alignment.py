@@ -52,7 +52,7 @@ def test_free_inertial_after_an_alignment_is_as_good_as_its_sigma():
     errors, sigmas = [], []
     for run in range(100):
         record = simulate(log, imu=spec, seed=21, run=run).record
-        start = align(record.between(None, 300.0), PLACE, spec, "kalman")
+        start = align(record.between(None, 300.0), PLACE, spec, method="kalman")
         result = navigate(record, start, interval=1.0, output=60.0)
         errors.append(np.hstack([result.displacement[-1], result.v_n[-1, :2]]))
         sigmas.append(np.hstack([result.position_sigma[-1, :2], result.v_sigma[-1, :2]]))

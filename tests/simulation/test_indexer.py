@@ -8,10 +8,10 @@ import pytest
 from tests.simulation.test_simulation import SHIP
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import (
     Axis,
-    C_bs_from_angles,
     EncoderSpec,
     Indexed,
     Indexer,

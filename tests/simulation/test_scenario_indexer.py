@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from truenorth.core.errors import DataError
-from truenorth.simulation import C_bs_from_angles
+from truenorth.core.indexing import C_bs_from_angles
 from truenorth.simulation.folder import save_run
 from truenorth.simulation.scenario import read_scenario
 
@@ -28,7 +28,7 @@ def test_system_1_turns_and_its_folder_tells_how(tmp_path):
     save_run(scenario, simulation, tmp_path, seed=0, run=3, plot=False)
     angles = pd.read_parquet(tmp_path / "encoder.parquet").to_numpy()[-1, -2:]
     t = simulation.record.time[-1]
-    np.testing.assert_allclose(angles, [18 * t, 3 * t], atol=0.5001 / 3600)  # steps of 1 arcsec
+    np.testing.assert_allclose(angles, [6 * t, 18 * t], atol=0.5001 / 3600)  # steps of 1 arcsec
     body = simulation.motion.motion.states(t)
     C_ns = body.C_nb @ C_bs_from_angles("zx", np.radians(angles))
     np.testing.assert_allclose(simulation.truth.C_nb[-1], C_ns, atol=5e-6)

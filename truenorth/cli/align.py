@@ -118,17 +118,17 @@ def align(
         raise UsageError(
             "the latitude is missing; expected --lat DEGREES, or --gnss FILE or --master FILE with positions"
         )
-    if imu is None and moving.given and master.master is None:
-        raise UsageError(
-            "on the move the errors of the IMU cannot be found from the log; expected --imu navigation, tactical, industrial, "
-            "consumer or a YAML file"
-        )
     if output is not None:
         writable_folder(output)  # before the work, not after it
     paths: list[Path] = []
     with stages(quiet=as_json) as tell:
         tell(f"reading {log.name}")
         record = reading.read(log)
+        if imu is None and moving.given and master.master is None:
+            raise UsageError(
+                "on the move the errors of the IMU cannot be found from the log; expected --imu navigation, tactical, industrial, "
+                "consumer or a YAML file"
+            )
         aids: list[Any] = [
             *master.aids(indexer.arm, moving.mounting, moving.mounting_sigma),
             *(moving.aids() if master.master is None else []),
