@@ -29,10 +29,7 @@ LONGEST = 120
 LONG = {  # known ones; each goes when its file is rebuilt
     "truenorth.alignment.transfer:align_transfer",
     "truenorth.alignment.transfer_loop:run",
-    "truenorth.cli.align:align",
-    "truenorth.cli.navigate:navigate",
     "truenorth.estimate.loop:run",
-    "truenorth.navigation.procedure:navigate",
 }
 
 FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}

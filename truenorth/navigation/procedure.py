@@ -150,18 +150,10 @@ def navigate(
     _check_axes(plan, given)
     tell("navigating")
     track = plan.run(aiding, smooth=smooth)
-    evidence = innovation_evidence(track.residuals, last_sigma(track)) + sampling_evidence(record, turns=True) + why
-    receiver = _record_of(given, Gnss)
-    evidence += [] if receiver is None else gnss_evidence(receiver)
-    if found:
-        evidence.append(note("odometer.taken_over"))
-    if "baro" in given and height != "baro":
-        evidence.append(note("height.barometer_unused", "use_barometer", altitude=height))
-    mountings = _looked_at(given)
-    evidence += [*slow_errors(track, mountings["gnss"]), *said]
+    evidence = [*_seen(plan, track, given, found), *why, *said]
     if check_clocks and aiding:
         tell("checking clocks and mountings")
-        evidence += second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, mountings)
+        evidence += second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, _looked_at(given))
     result = Navigation(
         status="navigated",
         evidence=(),
@@ -204,6 +196,18 @@ class _Plan:
         used = [*sensors, *self.always]
         model = with_states(self.model, used)
         return navigate_track(self.record, self.start, model, used, interval=self.interval, every=self.every, **options)
+
+
+def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
+    """What the measurements and the log show; `found`: the odometer sits as an alignment on the move has found."""
+    evidence = innovation_evidence(track.residuals, last_sigma(track)) + sampling_evidence(plan.record, turns=True)
+    receiver = _record_of(given, Gnss)
+    evidence += [] if receiver is None else gnss_evidence(receiver)
+    if found:
+        evidence.append(note("odometer.taken_over"))
+    if "baro" in given and plan.altitude != "baro":
+        evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
+    return [*evidence, *slow_errors(track, _looked_at(given)["gnss"])]
 
 
 def _by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
