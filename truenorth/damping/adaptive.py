@@ -1,7 +1,7 @@
 """Damping whose strength follows the ship: fuzzy rules on how much of a manoeuvre gets into an internal network.
 
 An internal network takes every velocity that changes for an error: what it lets into the loop is ``(1 - H) v``. While the ship
-keeps its speed that is the INS's own oscillation, some tenths of a m/s; in a manoeuvre it is as large as the manoeuvre. Two fuzzy
+keeps its speed that is the INS's own oscillation, up to some m/s; in a manoeuvre it is larger than the manoeuvre. Two fuzzy
 sets, *calm* and *manoeuvre*, overlap between the two sizes, and the loop is damped by
 
     mu = m_calm/(m_calm + m_manoeuvre)        (Sugeno's rule: calm -> 1, manoeuvre -> 0)
@@ -36,13 +36,14 @@ class FuzzyDamping:
     Attributes
     ----------
     calm : float, m/s
-        Up to this size of ``(1 - H) v`` it is wholly calm.
+        Up to this size of ``(1 - H) v`` it is wholly calm; above what the INS's own undamped oscillation makes of it, or the
+        damping never sets in.
     manoeuvre : float, m/s
         From this size on it is wholly a manoeuvre.
     """
 
-    calm: float = 0.3
-    manoeuvre: float = 1.5
+    calm: float = 3.5
+    manoeuvre: float = 6.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.calm < self.manoeuvre:
