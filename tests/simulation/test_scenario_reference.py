@@ -127,7 +127,7 @@ def test_a_table_has_the_keys_of_the_schema_and_their_defaults(heading):
 def test_the_table_of_the_imu_has_every_term():
     terms = {f"{group}.{key}" for group, key in ENTRIES if group}
     page = PAGE.read_text(encoding="utf-8")
-    table = page[page.index("## The IMU") : page.index("## Sensors beside the IMU")]
+    table = page[page.index("## The IMU") : page.index("## Sensors besides the IMU")]
     groups = {
         f"{group}.{key}"
         for line in table.splitlines()
