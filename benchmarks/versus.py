@@ -1,0 +1,120 @@
+"""This checkout and an older one in one run, in turn: ``python -m benchmarks.versus OLD_CHECKOUT``.
+
+Processor time of whole processes, children included, the least of the repetitions: what else the machine does counts
+little. Each checkout runs with the interpreter of its own ``.venv``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import truenorth
+
+NEW = Path(__file__).parents[1]
+WHERE = ["--lat", "40", "--lon", "118", "--imu", "navigation"]
+EDITED = "core/attitude.py"  # holds compiled functions, and most others call one of them
+PROGRAM = "from truenorth.cli import main; main()"
+STEPS = """
+import json, time
+import numpy as np
+from truenorth.filters import LinearSystem, kalman
+n, K = 15, 20000
+rng = np.random.default_rng(0)
+A = rng.standard_normal((n, n))
+Phi = np.eye(n) + 0.01 * (A - A.T)
+H = rng.standard_normal((1, 3, n))
+system = LinearSystem(Phi[None], 1e-4 * np.eye(n)[None], H, np.eye(3)[None], rng.standard_normal((K, 3)), np.zeros(n), np.eye(n))
+took = []
+for _ in range(9):
+    begun = time.process_time()
+    kalman(system, history="full")
+    took.append(time.process_time() - begun)
+print(json.dumps(min(took[1:]) / K * 1e6))
+"""
+
+
+def spent(checkout: Path, arguments: list[str], cache: Path | None = None, package: Path | None = None) -> float:
+    """Processor time of one process, s; with the kernels of a cache of its own, where one is given."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    environment |= {"PYTHONPATH": str(package or checkout)} | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
+    before = os.times()
+    command = [str(checkout / ".venv/bin/python"), "-c", PROGRAM, *arguments]
+    subprocess.run(command, env=environment, cwd=package or checkout, check=True, capture_output=True)
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
+
+
+def main() -> None:
+    """Print the table, one row for each thing that is measured."""
+    old, repeats = Path(sys.argv[1]).resolve(), int(sys.argv[2]) if len(sys.argv) > 2 else 3
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        log = folder / "ship.csv"
+        ship = truenorth.simulation.Sway(
+            truenorth.Position.from_degrees(40.0, 118.0),
+            roll_tones=(truenorth.simulation.Tone(np.radians(10.0), 6.0, 0.45),),
+        )
+        simulated = truenorth.simulation.simulate(
+            ship, rate=100.0, duration=600.0, imu=truenorth.imu_spec("navigation"), seed=1
+        )
+        truenorth.write_imu(simulated.record, log)
+        caches = {checkout: folder / f"cache {i}" for i, checkout in enumerate((old, NEW))}
+
+        def both(measure: Callable[[Path], float], times: int) -> list[float]:
+            rounds = [[measure(checkout) for checkout in (old, NEW)] for _ in range(times)]
+            return list(np.min(rounds, axis=0))
+
+        def align(checkout: Path) -> float:
+            return spent(checkout, ["align", str(log), *WHERE])
+
+        def first(checkout: Path) -> float:
+            return spent(checkout, ["align", str(log), *WHERE], caches[checkout])
+
+        def with_report(checkout: Path) -> float:
+            return spent(checkout, ["align", str(log), *WHERE, "-o", str(out(checkout))])
+
+        def out(checkout: Path) -> Path:
+            return folder / f"result {'new' if checkout is NEW else 'old'}"
+
+        def after_an_edit(checkout: Path) -> float:
+            copy = folder / f"copy {'new' if checkout is NEW else 'old'}"
+            shutil.copytree(checkout / "truenorth", copy / "truenorth", ignore=shutil.ignore_patterns("__pycache__"))
+            spent(checkout, ["align", str(log), *WHERE], caches[checkout], copy)  # bytecode, and this copy's kernels
+            with (copy / "truenorth" / EDITED).open("a") as file:
+                file.write("\n# An edit.\n")
+            return spent(checkout, ["align", str(log), *WHERE], caches[checkout], copy)
+
+        def step(checkout: Path) -> float:
+            python = str(checkout / ".venv/bin/python")
+            done = subprocess.run([python, "-c", STEPS], cwd=checkout, check=True, capture_output=True, text=True)
+            return json.loads(done.stdout)
+
+        def sizes() -> list[float]:
+            return [(out(checkout) / "report.html").stat().st_size / 1e6 for checkout in (old, NEW)]
+
+        both(with_report, 1)  # what is not compiled yet
+        rows: list[tuple[str, Callable[[], list[float]]]] = [
+            ("`align` of 600 s, compiled, s", lambda: both(align, repeats)),
+            ("the same with report, s", lambda: both(with_report, repeats)),
+            ("size of the report, MB", sizes),
+            ("15-state step, covariance at every sample, us", lambda: both(step, repeats)),
+            ("first `align`, nothing compiled, s", lambda: both(first, 1)),
+            (f"`align` after a comment was added to {EDITED}, s", lambda: both(after_an_edit, 1)),
+        ]
+        print("| what | before | now | ratio |\n| --- | ---: | ---: | ---: |", flush=True)
+        for what, measured in rows:
+            before, now = measured()
+            print(f"| {what} | {before:.2f} | {now:.2f} | {before / now:.1f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
