@@ -364,3 +364,17 @@ def test_ideal_spec_of_the_slave_is_possible(flight, ideal):
     slave = simulate(ideal).record
     master = simulate_master(flight, MASTER, duration=SPAN).record
     assert align_transfer(slave, master, ImuSpec()).status == "aligned"
+
+
+def test_errors_of_the_master_count_in_sigma_and_not_in_the_sigma_against_it(real, found):
+    """The mean of 2 arcmin of heading cannot be seen by a slave: absolute sigma is no less; the answer hardly moves."""
+    slave, master = real
+    result = align_transfer(slave, master, master_errors="navigation")
+    heading = np.sqrt(result.phi_covariance[2, 2])
+    assert heading > 0.9 * 2.0 * ARCMIN
+    assert result.transfer.relative_sigma[0] < 0.8 * heading
+    np.testing.assert_allclose(found.transfer.relative_sigma[0], np.sqrt(found.phi_covariance[2, 2]), rtol=1e-2)
+    off = rotation_vector_from_dcm(result.C_nb @ found.C_nb.T)
+    assert np.all(np.abs(off) < 3 * np.sqrt(np.diag(result.phi_covariance)))
+    with pytest.raises(UsageError, match="expected one of navigation"):
+        align_transfer(slave, master, master_errors="perfect")

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
+from truenorth.errors.master import MasterErrors
 from truenorth.records import EncoderRecord, GnssRecord, HeightRecord, MasterRecord, OdometerRecord, VelocityRecord
 from truenorth.records.flexure import FlexureSpec
 from truenorth.state.mounting import Mounting
@@ -147,6 +148,8 @@ class Master(_Mounted):
     matching : {"auto", "velocity", "attitude", "both"}
     flexure : FlexureSpec, optional
         The IMU's seat bends.
+    errors : MasterErrors or {"navigation", "tactical"}, optional
+        The master's own slow errors; left out, it is taken for the truth, and sigma is relative to it.
     velocity_noise, attitude_noise : float, optional, m/s and rad
         White noise of the master's rows; fitted when left out.
     heading : float, rad, optional
@@ -157,6 +160,7 @@ class Master(_Mounted):
     mounting: Mounting | None = None
     matching: Literal["auto", "velocity", "attitude", "both"] = "auto"
     flexure: FlexureSpec | None = None
+    errors: MasterErrors | str | None = None
     velocity_noise: float | None = None
     attitude_noise: float | None = None
     heading: float | None = None

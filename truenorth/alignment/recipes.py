@@ -170,6 +170,7 @@ def by_master(r: Request) -> Alignment:
         mounting=tuple(float(x) for x in euler_from_dcm(m.C_mb)),
         mounting_sigma=m.angle_sigma,
         flexure=master.flexure,
+        master_errors=master.errors,
         velocity_noise=master.velocity_noise,
         attitude_noise=master.attitude_noise,
         position=r.place,

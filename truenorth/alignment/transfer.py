@@ -20,6 +20,8 @@ from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over,
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.master import MasterErrors
+from truenorth.errors.master import master_errors as errors_of
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import sampling_evidence
 from truenorth.records import ImuRecord, MasterRecord
@@ -52,6 +54,7 @@ def align_transfer(
     mounting: Sequence[float] = (0.0, 0.0, 0.0),
     mounting_sigma: float = MOUNTING_SIGMA,
     flexure: FlexureSpec | None = None,
+    master_errors: MasterErrors | str | None = None,
     velocity_noise: float | None = None,
     attitude_noise: float | None = None,
     position: Position | None = None,
@@ -87,6 +90,9 @@ def align_transfer(
         About each axis; 0: known.
     flexure : FlexureSpec, optional
         The slave's seat bends: second-order Gauss-Markov states, with attitude matching.
+    master_errors : MasterErrors or {"navigation", "tactical"}, optional
+        The master's own slow errors: sigma then is absolute, and `relative_sigma` that against the master. Left out, the master is
+        taken for the truth.
     velocity_noise, attitude_noise : float, optional, m/s and rad
         White noise of the master's rows; fitted to the innovations when left out.
     position : Position, optional
@@ -146,7 +152,9 @@ def align_transfer(
     if flexure is not None:
         turn, pitch, roll = flexure.sigma
         bend = np.array([pitch, roll, turn]), flexure.beta
-    model = model_from_spec(spec, assumed, what != "velocity", bend, DELAY_WALK)
+    model = model_from_spec(
+        spec, assumed, what != "velocity", bend, DELAY_WALK, _matched(errors_of(master_errors), what)
+    )
 
     noise = _noise(velocity_noise, attitude_noise, what)
     fitted = [velocity_noise is None and what != "attitude", attitude_noise is None and what != "velocity"]
@@ -167,7 +175,12 @@ def align_transfer(
     matched = Matching(*noise, gate=GATE)
     track = transfer_filter(part, master, model, start, matched, linear=linear)
     parted = parted_clocks(slave, master, C_mb)
-    of_master = [*([] if parted is None else [parted]), *master_evidence(master), *sampling_evidence(slave, turns=True)]
+    slow = math.hypot(model.master.velocity, model.master.velocity_drift)
+    of_master = [
+        *([] if parted is None else [parted]),
+        *master_evidence(master, slow),
+        *sampling_evidence(slave, turns=True),
+    ]
     answer = assemble_transfer(
         part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, of_master
     )
@@ -179,6 +192,13 @@ def align_transfer(
             ),
         )
     return answer
+
+
+def _matched(errors: MasterErrors, what: str) -> MasterErrors:
+    """Of what is not matched, no states."""
+    if what == "velocity":
+        return replace(errors, attitude_drift=0.0, level=0.0, heading=0.0)
+    return replace(errors, velocity=0.0, velocity_drift=0.0) if what == "attitude" else errors
 
 
 def _matching(asked: What, master: MasterRecord) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +19,19 @@ from truenorth.core.attitude import (
     dcm_from_quaternion,
     dcm_from_rotation_vector,
     euler_from_dcm,
+    euler_sigma,
     rotation_vector_from_dcm,
 )
 from truenorth.core.earth import earth_rate_n, transport_rate_n
 from truenorth.core.position import Position
-from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
+from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, MasterErrors, TransferModel
 from truenorth.estimate.loop import SAME_TIME
 from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import BA, BG, DP, STATES
+from truenorth.state.layout import BA, BG, DP, PHI, STATES
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -150,10 +152,21 @@ def _transfer(
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
         P=_fifteen(track.last_P, Position(0.0)),
+        relative_sigma=_relative(track, model),
         jumps=_jumps(track),
         open=_open(slave, model, assumed, start, track, noise),
         notes=(*notes, *silences),
     )
+
+
+def _relative(track: TransferTrack, model: TransferModel) -> Array:
+    """(3,) sigmas of heading, pitch and roll against the master's own solution: ``phi - m``."""
+    P, at = track.last_P, model.slice_of(ATTITUDE_ERROR)
+    J = np.zeros((3, model.states))
+    J[:, PHI] = np.eye(3)
+    if at is not None:
+        J[:, at] = -np.eye(3)
+    return euler_sigma(track.C_nb[-1], J @ P @ J.T)
 
 
 def _fifteen(P: Array, place: Position) -> Array:
@@ -190,6 +203,7 @@ def _open(
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:
         return ()
+    model = replace(model, master=MasterErrors())  # its groups stand behind all others
     middle, at, T = _states(slave, track, k)
     speed = float(np.max(np.linalg.norm(track.v_n, axis=1)))
     P0 = model.prior(

@@ -122,6 +122,8 @@ class TransferTrack:
     nis : (K, 2) array
     verdict : (K, 2) int array
         `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`.
+    slow : (6,) array
+        Variance of what in the innovations is an error of the master's own, which does not change from row to row.
     """
 
     time: Array
@@ -138,6 +140,7 @@ class TransferTrack:
     innovation_sigma: Array
     nis: Array
     verdict: Integers
+    slow: Array
 
     @property
     def last_P(self) -> Array:
@@ -334,4 +337,15 @@ def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStar
         innovation_sigma=sigma,
         nis=nis,
         verdict=verdict,
+        slow=_slow(track, model),
     )
+
+
+def _slow(track: Track, model: TransferModel) -> Array:
+    """(6,) variance of the master's own errors of velocity and attitude at the end."""
+    found = np.zeros(6)
+    for first, name in ((0, VELOCITY_ERROR), (3, ATTITUDE_ERROR)):
+        at = model.slice_of(name)
+        if at is not None:
+            found[first : first + 3] = np.diag(track.P[-1])[at]
+    return found

@@ -35,6 +35,8 @@ class Transfer:
         Of the slave at the alignment's epoch.
     P : (15, 15) array
         Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.errors.ins`): what navigation begins with.
+    relative_sigma : (3,) array, rad
+        Of heading, pitch and roll against the master's solution, where its own errors are considered; else as the absolute ones.
     jumps : tuple of str
         Where the master jumped, in words.
     open : tuple of str
@@ -59,6 +61,7 @@ class Transfer:
     rejected: int
     v_n: Array
     P: Array
+    relative_sigma: Array
     jumps: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -98,6 +101,7 @@ class Transfer:
             "mounting_estimated": self.mounting_estimated.tolist(),
             "master_velocity_noise_m_s": known(self.velocity_noise),
             "master_attitude_noise_deg": known(float(np.degrees(self.attitude_noise))),
+            "relative_sigma_deg": np.degrees(self.relative_sigma).tolist(),
             "master_rows_used": self.used,
             "master_rows_rejected": self.rejected,
             "master_jumps": list(self.jumps),

@@ -15,7 +15,7 @@ from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import TransferModel, turn_noise
+from truenorth.errors.master import ATTITUDE_ERROR, MasterErrors, TransferModel, turn_noise
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
@@ -106,7 +106,12 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Eviden
 
 
 def model_from_spec(
-    spec: ImuSpec, assumed: Assumed, attitude: bool, flexure: tuple[Array, float] | None, delay_walk: float
+    spec: ImuSpec,
+    assumed: Assumed,
+    attitude: bool,
+    flexure: tuple[Array, float] | None,
+    delay_walk: float,
+    master: MasterErrors | None = None,
 ) -> TransferModel:
     """The error model of a specification; instabilities become random walks of the biases."""
     sigma, beta = ((0.0, 0.0, 0.0), 1.0) if flexure is None else (tuple(float(x) for x in flexure[0]), flexure[1])
@@ -123,6 +128,7 @@ def model_from_spec(
         delay_walk=delay_walk if assumed.delay_sigma > 0.0 else 0.0,
         flexure_sigma=sigma,  # type: ignore[arg-type]  # three of them
         flexure_beta=beta,
+        master=master or MasterErrors(),
     )
 
 
@@ -186,6 +192,8 @@ def hand_over(
         phi = np.hypot(phi, float(np.linalg.norm(w)) * assumed.delay_sigma)
         if not model.mounting:
             phi = np.hypot(phi, assumed.mounting_sigma)
+        if ATTITUDE_ERROR not in model.groups:  # not matched, and handed over once
+            phi = np.hypot(phi, [model.master.level, model.master.level, model.master.heading])
     else:
         C = _from_course(master, assumed, f)
         phi = np.array([LEVEL_SIGMA, LEVEL_SIGMA, COURSE_SIGMA])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,7 +80,9 @@ def _lopsided(track: TransferTrack) -> str:
         if len(rows) < FEWEST:
             continue
         follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)
-        mean = np.abs(rows.mean(axis=0)) * math.sqrt(len(rows))
+        columns = slice(3 * kind, 3 * kind + 3)
+        slow = np.nanmean(track.slow[columns] / track.innovation_sigma[later, columns] ** 2, axis=0)
+        mean = np.abs(rows.mean(axis=0)) / np.sqrt(1.0 / len(rows) + slow)
         if np.any((mean > LOPSIDED) & (follows > STEADY)):
             return name
     return ""

@@ -6,7 +6,7 @@
 | `ARM` | lever arm from the master to the slave, slave axes: true minus assumed | m |
 | `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
-| `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: first-order Gauss-Markov | m/s, rad |
+| `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: constants that wander | m/s, rad |
 
 (The mounting stands in the *master's* axes, in which it does not turn with what is estimated: in the slave's axes the filter would
 take its own corrections of tilt for knowledge of heading.) Flexure is ``theta'' = -2 beta theta' - beta^2 theta + white noise``.
@@ -53,27 +53,60 @@ _OF_INS = (
 
 @dataclass(frozen=True)
 class MasterErrors:
-    """Slow errors of the master's own solution: first-order Gauss-Markov, one-sigma.
+    """Slow errors of the master's own solution, one-sigma: constants, and what they drift by.
 
     Attributes
     ----------
     level, heading : float, rad
     velocity : float, m/s
+        Constant, of each axis.
+    attitude_drift, velocity_drift : float, rad and m/s
+        Of each axis, in the correlation time; taken as a random walk of that rate, which does not turn back.
     correlation_time : float, s
     """
 
     level: float = 0.0
     heading: float = 0.0
     velocity: float = 0.0
-    correlation_time: float = math.inf
+    attitude_drift: float = 0.0
+    velocity_drift: float = 0.0
+    correlation_time: float = 300.0
 
     def __post_init__(self) -> None:
-        if not all(0.0 <= x < math.inf for x in (self.level, self.heading, self.velocity)):
+        sigmas = (self.level, self.heading, self.velocity, self.attitude_drift, self.velocity_drift)
+        if not all(0.0 <= x < math.inf for x in sigmas):
             raise UsageError(f"{self}: expected sigmas of zero or more")
         if not self.correlation_time > 0.0:
             raise UsageError(
                 f"correlation time of the master's errors {self.correlation_time:g} s; expected above zero"
             )
+
+
+MASTERS = {
+    "navigation": MasterErrors(
+        math.radians(0.3 / 60), math.radians(2.0 / 60), 0.05, math.radians(0.3 / 60), 0.05, correlation_time=300.0
+    ),
+    "tactical": MasterErrors(
+        math.radians(3.0 / 60), math.radians(20.0 / 60), 0.2, math.radians(3.0 / 60), 0.2, correlation_time=300.0
+    ),
+}  # by grade: an aided INS of a ship or an aircraft
+
+
+def master_errors(given: MasterErrors | str | None) -> MasterErrors:
+    """Of a grade's name, or as given; None: the master is taken for the truth.
+
+    Raises
+    ------
+    UsageError
+        An unknown grade.
+    """
+    if given is None:
+        return MasterErrors()
+    if isinstance(given, MasterErrors):
+        return given
+    if given not in MASTERS:
+        raise UsageError(f"errors of the master {given!r}; expected one of {', '.join(MASTERS)}, or MasterErrors(...)")
+    return MASTERS[given]
 
 
 @dataclass(frozen=True)
@@ -132,13 +165,14 @@ class TransferModel:
             found.append(Group(MOUNTING, np.zeros(3), rotation=True, unit="rad"))
         if any(self.flexure_sigma):
             found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
-        time = of.correlation_time
-        if of.velocity > 0.0:
-            sigma = np.full(3, of.velocity)
-            found.append(Group(VELOCITY_ERROR, sigma, correlation_time=time, considered=True, unit="m/s"))
-        if of.level > 0.0 or of.heading > 0.0:
-            sigma = np.array([of.level, of.level, of.heading])
-            found.append(Group(ATTITUDE_ERROR, sigma, correlation_time=time, considered=True, unit="rad"))
+        rate = math.sqrt(2.0 / of.correlation_time)
+        if of.velocity > 0.0 or of.velocity_drift > 0.0:
+            sigma, walk = np.full(3, math.hypot(of.velocity, of.velocity_drift)), rate * of.velocity_drift
+            found.append(Group(VELOCITY_ERROR, sigma, walk=walk, considered=True, unit="m/s"))
+        if of.level > 0.0 or of.heading > 0.0 or of.attitude_drift > 0.0:
+            sigma = np.hypot([of.level, of.level, of.heading], of.attitude_drift)
+            walk = rate * of.attitude_drift
+            found.append(Group(ATTITUDE_ERROR, sigma, walk=walk, considered=True, unit="rad"))
         return {group.name: group for group in found}
 
     @property

@@ -29,17 +29,21 @@ def gnss_evidence(gnss: GnssRecord) -> list[Evidence]:
     return turn_evidence("gnss", gnss.time[rows], gnss.lat[rows], gnss.lon[rows], gnss.v_n[rows])
 
 
-def master_evidence(master: MasterRecord) -> list[Evidence]:
-    """What the positions of a master say against its velocities."""
+def master_evidence(master: MasterRecord, velocity_error: float = 0.0) -> list[Evidence]:
+    """What the positions of a master say against its velocities, whose slow error has this one-sigma (m/s)."""
     if master.v_n is None or master.lat is None or master.lon is None:
         return []
     rows = np.flatnonzero(
         np.isfinite(master.v_n[:, :2]).all(axis=1) & np.isfinite(master.lat) & np.isfinite(master.lon)
     )
-    return turn_evidence("master", master.time[rows], master.lat[rows], master.lon[rows], master.v_n[rows])
+    return turn_evidence(
+        "master", master.time[rows], master.lat[rows], master.lon[rows], master.v_n[rows], velocity_error
+    )
 
 
-def turn_evidence(source: str, time: Array, lat: Array, lon: Array, v_n: Array) -> list[Evidence]:
+def turn_evidence(
+    source: str, time: Array, lat: Array, lon: Array, v_n: Array, velocity_error: float = 0.0
+) -> list[Evidence]:
     """By how much velocities are turned, where positions contradict them; heading would be as wrong.
 
     Displacements ``p`` and integrals ``s`` of velocity of pieces, as complex numbers (east + i north): the turn is the phase
@@ -52,6 +56,8 @@ def turn_evidence(source: str, time: Array, lat: Array, lon: Array, v_n: Array) 
     time : (N,) array, s
     lat, lon : (N,) arrays, rad
     v_n : (N, 3) array, m/s
+    velocity_error : float, m/s
+        One-sigma of an error that stays: across the way it looks like a turn.
     """
     if len(time) < 2 * FEWEST:
         return []
@@ -73,6 +79,8 @@ def turn_evidence(source: str, time: Array, lat: Array, lon: Array, v_n: Array) 
     angle = -float(np.angle(k))  # of the velocities against the positions, counter-clockwise
     left = np.imag((p - k * s) * np.conj(k * s)) / np.abs(k)
     sigma = math.sqrt(float(np.sum(left**2)) * len(p) / (len(p) - 1)) / energy
+    across = velocity_error * abs(np.sum(s * np.diff(time[edges])[good])) / energy
+    sigma = math.hypot(sigma, across)
     if abs(angle) < max(CLEAR * sigma, LEAST):
         return []
     figures: dict[str, Figure] = {"angle": angle, "sigma": sigma}
