@@ -70,7 +70,12 @@ def write_layout(record: ImuRecord, path: str | PathLike[str]) -> Path:
 
 
 def take(
-    what: str, readings: Sequence[Reading], options: Sequence[Mapping[str, Any]], source: str, guesses: list[Guess]
+    what: str,
+    readings: Sequence[Reading],
+    options: Sequence[Mapping[str, Any]],
+    source: str,
+    guesses: list[Guess],
+    sure: float = SURE,
 ) -> Reading:
     """The most likely reading, noted among the guesses.
 
@@ -80,7 +85,7 @@ def take(
         It is not sure.
     """
     best = readings[0]
-    if best.probability < SURE:
+    if best.probability < sure:
         why = "; ".join(f"{r.unit} ({100 * r.probability:.0f} %): {r.why}" for r in readings[:2])
         raise UnsureError(f"{source}: the {what} is not sure: {why}", options[:2], guesses)
     guesses.append(Guess(what, best.unit, best.why, best.probability, options[0]))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.behaviour import (
+    SURE_GYRO,
     accel_readings,
     clock_readings,
     gravity_level,
@@ -257,7 +258,7 @@ def _units(
         facts = gyro_facts(time, gyro, accel, kind)
         readings = gyro_readings(facts, kind, said["accel"])
         said["gyro"] = take(
-            "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses
+            "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
     return kind, said
 
