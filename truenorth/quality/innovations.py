@@ -118,6 +118,7 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
                 contradiction(
                     "innovations.rejected",
                     "source",
+                    "specification",
                     name=source.name,
                     rejected=rejected,
                     count=count,
@@ -129,7 +130,7 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
             found.append(note("innovations.outliers", name=source.name, rejected=rejected, count=count))
         nis = mean_nis(source)
         if nis is not None and nis > limit("nis"):
-            found.append(contradiction("innovations.size", name=source.name, factor=math.sqrt(nis)))
+            found.append(contradiction("innovations.size", "specification", name=source.name, factor=math.sqrt(nis)))
         else:
             found += _growth(source, sigma, by_motion)
         if source.outside:
