@@ -32,7 +32,7 @@ SENTENCES = {
     "heading.known": (
         "heading is known to {sigma:angle} (one sigma); {floor:angle} of it is sensor bias, which waiting does not improve"
     ),
-    "heading.known_from": "heading is known to {sigma:angle} (one sigma), from {source:term}",
+    "heading.known_from": "heading is known to {sigma:angle} (one sigma), from {source}",
     "heading.known_with_level": "heading is known to {sigma:angle}, level to {level:angle} (one sigma)",
     "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
     "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
@@ -267,7 +267,6 @@ REMEDIES = {
 }
 
 TERMS = {
-    "the earth's rate": "the earth's rate",
     "exchanged": "their axes exchanged",
     "first_reversed": "the other sign of the first angle",
     "last_reversed": "the other sign of the last angle",
