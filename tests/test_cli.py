@@ -316,13 +316,16 @@ def test_an_unexpected_error_is_one_line_and_its_traceback_is_in_a_file(log, tmp
 
 @pytest.mark.parametrize("moment", [0.0, 0.03, 0.1, 0.3, 0.6])
 def test_an_interrupt_at_the_start_is_one_line_too(log, moment):
+    code = "from truenorth.__main__ import main; print('Python has started', flush=True); main()"
     process = subprocess.Popen(
-        [sys.executable, "-m", "truenorth", "align", str(log), *WHERE],
+        [sys.executable, "-c", code, "align", str(log), *WHERE],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(0.15 + moment)  # by then Python itself has started
+    assert process.stdout is not None
+    assert process.stdout.readline()
+    time.sleep(0.01 + moment)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert "Traceback" not in err

@@ -21,7 +21,7 @@ BASE = {
     "position": {"lat": "45 deg", "lon": "10 deg"},
     "motion": {"kind": "rest"},
 }
-PAPERS = {"rotary_ship", "transfer_flat_turn", "marine_damping", "static_kalman", "odometer_ring"}
+PAPERS = {"rotary_ship", "transfer_flat_turn", "marine_damping", "marine_manoeuvres", "static_kalman", "odometer_ring"}
 EVERYDAY = {"van", "quay", "take_off", "auv", "table"}
 
 
@@ -29,7 +29,7 @@ def run(*arguments: str):
     return CliRunner().invoke(app, ["simulate", *arguments])
 
 
-def test_five_papers_and_five_everyday_scenarios_ship():
+def test_the_papers_and_the_everyday_scenarios_ship():
     assert set(shipped()) == PAPERS | EVERYDAY
     assert all(shipped().values())
 
@@ -48,7 +48,7 @@ def test_a_shipped_scenario_runs_and_reads_back_from_its_resolved_file(name):
     )
     np.testing.assert_array_equal(first.record.gyro, second.record.gyro)
     np.testing.assert_array_equal(first.record.accel, second.record.accel)
-    nothing_drawn = name == "marine_damping"  # all its errors are given
+    nothing_drawn = name in ("marine_damping", "marine_manoeuvres")  # all their errors are given
     assert np.array_equal(first.record.gyro, other.record.gyro) == nothing_drawn
     assert scenario.is_drawn == (repr(short.build_motion(run=0)) != repr(short.build_motion(run=1)))
 

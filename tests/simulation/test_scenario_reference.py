@@ -45,6 +45,7 @@ MODELS |= {
         "points": "Point",
         "driving": "DrivingStyle",
         "motion: turntable": "TurntableMotion",
+        "motion: plug-in": "PlugInMotion",
         "positions": "TablePosition",
         "disturbance: sway": "SwayDisturbance",
         "disturbance: sea": "SeaDisturbance",
