@@ -473,3 +473,13 @@ def test_gyros_that_turn_while_gravity_does_not_have_a_bias(rate):
     np.testing.assert_allclose(summary.rate_bias, np.radians(rate) * axis, atol=np.radians(0.01))
     turned = Rotation.from_rotvec(-np.radians(rate) * axis * time[:, None]).apply(force)
     assert motion_summary(ImuRecord(time, gyro, turned, "rates")).overall == "rotating"
+
+
+def test_a_log_without_any_noise_is_a_simulation_and_no_dead_sensor():
+    """One constant axis among noisy ones is dead; three constant ones are not, but for zeros."""
+    record = base(duration=60.0)
+    still = np.tile(np.median(record.accel, axis=0), (len(record), 1))
+    assert "constant_channel" not in codes(inspect(ImuRecord(record.time, record.gyro, still)))
+    assert "no_noise" in codes(inspect(ImuRecord(record.time, record.gyro, still)), "note")
+    dead = np.zeros_like(record.gyro)
+    assert "constant_channel" in codes(inspect(ImuRecord(record.time, dead, record.accel)), "error")

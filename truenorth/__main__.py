@@ -9,6 +9,7 @@ INTERRUPTED, INTERNAL = 130, 70
 
 def main() -> None:
     """Run the program; an interrupt ends it with exit code 130 and an error that nobody foresaw with 70, each in one line."""
+    sys.unraisablehook = _again
     try:
         from truenorth.cli import main as run
 
@@ -19,6 +20,16 @@ def main() -> None:
     except Exception as error:
         print(f"truenorth: internal error: {_in_one_line(error)}; {_details()}", file=sys.stderr)
         sys.exit(INTERNAL)
+
+
+def _again(lost: sys.UnraisableHookArgs) -> None:
+    """An interrupt that came where Python cannot raise it, such as in a callback of the compiler, comes again."""
+    if lost.exc_type is KeyboardInterrupt:
+        import _thread
+
+        _thread.interrupt_main()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _in_one_line(error: Exception) -> str:

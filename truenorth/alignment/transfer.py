@@ -20,7 +20,7 @@ from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over,
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import MasterErrors
+from truenorth.errors.master import MasterErrors, TransferModel
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import sampling_evidence
@@ -28,6 +28,7 @@ from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence
 
 Array = NDArray[np.float64]
 What = Literal["auto", "velocity", "attitude", "both"]
@@ -122,17 +123,7 @@ def align_transfer(
     what = _matching(matching, master)
     arm = _three(lever_arm, "lever_arm", "metres: right, forward, up of the slave, from the master")
     angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
-    for name, value, shown in (
-        ("lever_arm_sigma", lever_arm_sigma, f"{lever_arm_sigma:g} m"),
-        ("delay_sigma", delay_sigma, f"{delay_sigma:g} s"),
-        ("mounting_sigma", mounting_sigma, f"{math.degrees(mounting_sigma):g} deg"),
-    ):
-        if not 0.0 <= value < math.inf:
-            raise UsageError(f"{name} is {shown}; expected zero (known) or a positive one-sigma")
-    if not math.isfinite(delay):
-        raise UsageError(f"delay is {delay}; expected seconds")
-    if not heading_limit > 0.0:
-        raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
+    _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and what == "velocity":
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
     spec = imu_spec("industrial" if imu is None else imu).with_random_walks(slave.interval)
@@ -148,23 +139,14 @@ def align_transfer(
     assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     assumed, notes = common_clock(slave, master, assumed)
     notes = (*notes, *master.notes)
-    bend = None
-    if flexure is not None:
-        turn, pitch, roll = flexure.sigma
-        bend = np.array([pitch, roll, turn]), flexure.beta
+    bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
     model = model_from_spec(
         spec, assumed, what != "velocity", bend, DELAY_WALK, _matched(errors_of(master_errors), what)
     )
 
     noise = _noise(velocity_noise, attitude_noise, what)
     fitted = [velocity_noise is None and what != "attitude", attitude_noise is None and what != "velocity"]
-    linear: Linear | None = None
-    for number in range(PASSES):
-        tell(f"pass {number + 1}")
-        part, start = hand_over(slave, master, model, spec, assumed, noise, position)
-        track = transfer_filter(part, master, model, start, Matching(*noise), linear=linear)
-        noise = _refitted(track, noise, fitted)
-        linear = _linear(part, master, track)
+    noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, position, tell)
     tell("aligning")
     part, start = hand_over(slave, master, model, spec, assumed, noise, position)
     if part.duration < SHORTEST:
@@ -174,24 +156,17 @@ def align_transfer(
         )
     matched = Matching(*noise, gate=GATE)
     track = transfer_filter(part, master, model, start, matched, linear=linear)
-    parted = parted_clocks(slave, master, C_mb)
-    slow = math.hypot(model.master.velocity, model.master.velocity_drift)
-    of_master = [
-        *([] if parted is None else [parted]),
-        *master_evidence(master, slow),
-        *sampling_evidence(slave, turns=True),
-    ]
+    seen = _seen(slave, master, model, C_mb)
     answer = assemble_transfer(
-        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, of_master
+        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, seen
     )
-    if position is not None and master.lat is None:
-        answer = replace(
-            answer,
-            position=replace(
-                answer.position, horizontal_sigma=position.horizontal_sigma, vertical_sigma=position.vertical_sigma
-            ),
-        )
-    return answer
+    return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+
+
+def _known_as_well_as(position: Position, answer: Alignment) -> Alignment:
+    """The answer with the uncertainty of a place that the caller gave."""
+    sigmas = {"horizontal_sigma": position.horizontal_sigma, "vertical_sigma": position.vertical_sigma}
+    return replace(answer, position=replace(answer.position, **sigmas))
 
 
 def _matched(errors: MasterErrors, what: str) -> MasterErrors:
@@ -199,6 +174,55 @@ def _matched(errors: MasterErrors, what: str) -> MasterErrors:
     if what == "velocity":
         return replace(errors, attitude_drift=0.0, level=0.0, heading=0.0)
     return replace(errors, velocity=0.0, velocity_drift=0.0) if what == "attitude" else errors
+
+
+def _passes(
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    spec: ImuSpec,
+    assumed: Assumed,
+    noise: tuple[float, float],
+    fitted: Sequence[bool],
+    position: Position | None,
+    tell: Callable[[str], None],
+) -> tuple[tuple[float, float], Linear | None]:
+    """Passes that fit the noise of the master's rows, and the attitudes to linearise with."""
+    linear: Linear | None = None
+    for number in range(PASSES):
+        tell(f"pass {number + 1}")
+        part, start = hand_over(slave, master, model, spec, assumed, noise, position)
+        track = transfer_filter(part, master, model, start, Matching(*noise), linear=linear)
+        noise = _refitted(track, noise, fitted)
+        linear = _linear(part, master, track)
+    return noise, linear
+
+
+def _seen(slave: ImuRecord, master: MasterRecord, model: TransferModel, C_mb: Array) -> list[Evidence]:
+    """What clocks, positions and samples show."""
+    parted = parted_clocks(slave, master, C_mb)
+    slow = math.hypot(model.master.velocity, model.master.velocity_drift)
+    return [
+        *([] if parted is None else [parted]),
+        *master_evidence(master, slow),
+        *sampling_evidence(slave, turns=True),
+    ]
+
+
+def _check_sigmas(
+    lever_arm_sigma: float, delay: float, delay_sigma: float, mounting_sigma: float, heading_limit: float
+) -> None:
+    for name, value, shown in (
+        ("lever_arm_sigma", lever_arm_sigma, f"{lever_arm_sigma:g} m"),
+        ("delay_sigma", delay_sigma, f"{delay_sigma:g} s"),
+        ("mounting_sigma", mounting_sigma, f"{math.degrees(mounting_sigma):g} deg"),
+    ):
+        if not 0.0 <= value < math.inf:
+            raise UsageError(f"{name} is {shown}; expected zero (known) or a positive one-sigma")
+    if not math.isfinite(delay):
+        raise UsageError(f"delay is {delay}; expected seconds")
+    if not heading_limit > 0.0:
+        raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
 
 
 def _matching(asked: What, master: MasterRecord) -> str:

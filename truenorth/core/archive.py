@@ -80,7 +80,10 @@ def _packed(value: Any, arrays: dict[str, NDArray[Any]], where: str) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.generic):
-        return value.item()
+        value = value.item()
+        return _packed(value, arrays, where) if isinstance(value, complex) else value
+    if isinstance(value, complex):
+        return {"complex": [value.real, value.imag]}
     if isinstance(value, np.ndarray):
         return _packed_array(value, arrays, where)
     if isinstance(value, slice):
@@ -135,6 +138,8 @@ def _unpacked(tree: Any, arrays: Mapping[str, NDArray[Any]], more: Collection[st
     def down(item: Any) -> Any:
         return _unpacked(item, arrays, more)
 
+    if "complex" in tree:
+        return complex(*tree["complex"])
     if "type" in tree:
         return _type(tree["type"], more)(**{name: down(item) for name, item in tree["fields"].items()})
     (kind, content), *rest = tree.items()

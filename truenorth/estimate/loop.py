@@ -138,6 +138,52 @@ def keep(m: Memory, w: Any, time: float, j: int, kept: Kept) -> None:
 
 
 @compiled
+def keep_link(kept: Kept, link: int, n: int, Phi: Any, Q: Any) -> None:
+    """Put out transition and noise since the last event, for the smoother, and begin them anew."""
+    for a in range(n):
+        for b in range(n):
+            kept.Phi[link, a, b] = Phi[a, b]
+            kept.Q[link, a, b] = Q[a, b]
+    for a in range(len(Phi)):
+        for b in range(len(Phi)):
+            Phi[a, b] = 1.0 * (a == b)
+            Q[a, b] = 0.0
+
+
+@compiled
+def disturb(of: Events, e: int, P: Any) -> None:
+    """Add what the base may have done in a gap to the variances of attitude and velocity."""
+    for a in range(3):
+        P[_PHI + a, _PHI + a] += of.variance[e, a]
+        P[_DV + a, _DV + a] += of.measured[e, a]
+
+
+@compiled
+def time_of(samples: Samples, i: int, done: float) -> float:
+    """Where the loop stands, a part `done` of sample i taken."""
+    if i < len(samples.step):
+        return samples.end[i] - (1.0 - done) * samples.step[i]
+    if i == 0:
+        return samples.end[0] - samples.step[0]
+    return samples.end[i - 1]
+
+
+@compiled
+def next_event(events: Events, late: Events, sources: Sources, aux: Any, k: int, r: int, took: bool) -> Any:
+    """The next re-timed event's time, whether it shares its stamp with one just taken, whether it is the next, and when."""
+    target = np.inf
+    if r < len(late.time):
+        target = late.time[r]
+        at_lag = sources.states[late.source[r], AT_LAG]
+        if at_lag >= 0:
+            target -= aux[at_lag]
+    # What has one stamp belongs to one epoch, even where the first of it has moved the delay.
+    together = took and r < len(late.time) and late.time[r] == late.time[r - 1]
+    retimed = together or k >= len(events.time) or target <= events.time[k]
+    return target, together, retimed, target if retimed else events.time[k]
+
+
+@compiled
 def run(
     size: Any,
     samples: Samples,
@@ -183,27 +229,19 @@ def run(
     n, N = len(m.aux), len(size)
     w = workspace(size, 3)
     load(size, m.P, w.P)
-    for a in range(n):
-        w.largest[a] = m.largest[a]
+    w.largest[:n] = m.largest
     F, rate, S, R, now = np.zeros((N, N)), np.zeros(n), np.zeros((3, 4)), np.zeros(3), np.zeros(NOW_LENGTH)
     smoothing = kept.Phi.shape[0] > 0
     Phi, Q = np.zeros((N * smoothing, N * smoothing)), np.zeros((N * smoothing, N * smoothing))
     for a in range(len(Phi)):
         Phi[a, a] = 1.0
     set_matrix(m.s, m.sums.C_now)
+    # Taken out of their tuples once: a tuple handed to a function counts references to all that it holds, at each sample.
+    s, aux, sums, sensors, fixed_altitude = m.s, m.aux, m.sums, model.sensors, model.fixed_altitude
     i, k, r, j, link = start, 0, 0, 0, 0
     failure, number, took = SOUND, 0, False
     while k < len(events.time) or r < len(late.time):
-        at_lag, target = -1, np.inf
-        if r < len(late.time):
-            target = late.time[r]
-            at_lag = sources.states[late.source[r], AT_LAG]
-            if at_lag >= 0:
-                target -= m.aux[at_lag]
-        # What has one stamp belongs to one epoch, even where the first of it has moved the delay.
-        together = took and r < len(late.time) and late.time[r] == late.time[r - 1]
-        retimed = together or k >= len(events.time) or target <= events.time[k]
-        time = target if retimed else events.time[k]
+        target, together, retimed, time = next_event(events, late, sources, aux, k, r, took)
         reached = True
         while not together:
             if i >= horizon:
@@ -216,11 +254,11 @@ def run(
             if ahead < SAME_TIME:
                 break
             if ahead > (1.0 - m.done[0]) * T - SAME_TIME:
-                take_sample(m.s, samples, i, m.done[0], 1.0 - m.done[0], True, model, m.aux, m.sums)
+                take_sample(s, samples, i, 1.0 - m.done[0], True, sensors, fixed_altitude, aux, sums)
                 i += 1
                 m.done[0] = 0.0
             else:
-                take_sample(m.s, samples, i, m.done[0], ahead / T, False, model, m.aux, m.sums)
+                take_sample(s, samples, i, ahead / T, False, sensors, fixed_altitude, aux, sums)
                 m.done[0] += ahead / T
         if not reached:
             break
@@ -234,17 +272,11 @@ def run(
         number = len(events.time) + r if retimed else k
         source = of.source[e]
         if source >= 0 and sources.action[source] == DISTURB:
-            for a in range(3):
-                w.P[_PHI + a, _PHI + a] += of.variance[e, a]
-                w.P[_DV + a, _DV + a] += of.measured[e, a]
-                if smoothing:
-                    Q[_PHI + a, _PHI + a] += of.variance[e, a]
-                    Q[_DV + a, _DV + a] += of.measured[e, a]
+            disturb(of, e, w.P)
+            if smoothing:
+                disturb(of, e, Q)
         elif source >= 0:
-            begin = samples.end[0] - samples.step[0]
-            here = begin if i == 0 else samples.end[i - 1]
-            if i < len(samples.step):
-                here = samples.end[i] - (1.0 - m.done[0]) * samples.step[i]
+            here = time_of(samples, i, m.done[0])
             behind = here - target if retimed else 0.0
             # Earlier than it can be reached, by a delay that has just grown, or where the start was taken from: nothing new.
             if retimed:
@@ -261,14 +293,7 @@ def run(
                 if failure != SOUND:
                     break
         if smoothing and (source >= 0 or of.output[e]):
-            for a in range(n):
-                for b in range(n):
-                    kept.Phi[link, a, b] = Phi[a, b]
-                    kept.Q[link, a, b] = Q[a, b]
-            for a in range(N):
-                for b in range(N):
-                    Phi[a, b] = 1.0 * (a == b)
-                    Q[a, b] = 0.0
+            keep_link(kept, link, n, Phi, Q)
             link += 1
         if of.output[e] and not (retimed and kept.verdict[number] == ABSENT):
             keep(m, w, kept.when[number] if retimed else time, j, kept)
@@ -277,8 +302,6 @@ def run(
             r += 1
         else:
             k += 1
-    for a in range(n):
-        m.largest[a] = w.largest[a]
-        for b in range(n):
-            m.P[a, b] = w.P[a, b]
+    m.largest[:] = w.largest[:n]
+    m.P[:] = w.P[:n, :n]
     return failure, i, number if failure != SOUND else k, r, j

@@ -42,7 +42,15 @@ def set_matrix(s: Any, C: Any) -> None:
 
 @compiled
 def take_sample(
-    s: Any, samples: Samples, i: int, done: float, part: float, ends: bool, model: Model, aux: Any, sums: Sums
+    s: Any,
+    samples: Samples,
+    i: int,
+    part: float,
+    ends: bool,
+    sensors: Any,
+    fixed_altitude: bool,
+    aux: Any,
+    sums: Sums,
 ) -> None:
     """Advance through a part of sample i, sensor errors taken off, and add it to the sums."""
     T = samples.step[i]
@@ -50,7 +58,7 @@ def take_sample(
     f = (samples.dvel[i, 0], samples.dvel[i, 1], samples.dvel[i, 2])
     w = (w[0] - T * aux[9], w[1] - T * aux[10], w[2] - T * aux[11])
     f = (f[0] - T * aux[12], f[1] - T * aux[13], f[2] - T * aux[14])
-    a, b, c, d = model.sensors[0], model.sensors[1], model.sensors[2], model.sensors[3]
+    a, b, c, d = sensors[0], sensors[1], sensors[2], sensors[3]
     if a >= 0:
         w = (w[0] - T * aux[a], w[1] - T * aux[a + 1], w[2] - T * aux[a + 2])
     if b >= 0:
@@ -64,7 +72,7 @@ def take_sample(
         sums.vectors[1, j] += half * s[4 + j]
         for k in range(3):
             sums.C[j, k] += half * sums.C_now[j, k]
-    advance(s, T, part, w, f, ends, model.fixed_altitude)
+    advance(s, T, part, w, f, ends, fixed_altitude)
     set_matrix(s, sums.C_now)
     for j in range(3):
         sums.vectors[0, j] += s[21 + j]

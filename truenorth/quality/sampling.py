@@ -16,6 +16,7 @@ Severity = Literal["error", "warning", "note"]
 JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
 REPEATED_SHARE = 0.002  # of the rows, beyond chance
 HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
+ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
 FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
@@ -159,12 +160,13 @@ def _frozen(record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: l
         first = int(changes[longest])
         limit = max(10.0, FROZEN_TIME / record.interval, FROZEN_FACTOR * by_chance[channel])
         if runs[channel] == len(record):
+            dead = _is_dead(data, channel)
             findings.append(
                 Finding(
-                    "error",
-                    "constant_channel",
+                    "error" if dead else "note",
+                    "constant_channel" if dead else "no_noise",
                     f"{name} is {data[channel, 0]:g} in all {len(record)} rows; expected a sensor's noise: the "
-                    "channel is dead or not connected",
+                    + ("channel is dead or not connected" if dead else "log is simulated without noise, or coarse"),
                 )
             )
         elif runs[channel] > limit:
@@ -178,6 +180,16 @@ def _frozen(record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: l
                 )
             )
     return runs
+
+
+def _is_dead(data: Array, channel: int) -> bool:
+    """Whether a constant channel is dead: its sensor's other channels have noise, or all three are zero.
+
+    Where none of the three has noise beyond rounding, the log comes from a simulation without noise.
+    """
+    sensor = data[:3] if channel < 3 else data[3:]
+    size = float(np.abs(sensor).max())
+    return size == 0.0 or bool(np.ptp(sensor, axis=1).max() > ROUNDING * size)
 
 
 def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArray[np.intp]:
