@@ -17,7 +17,7 @@ PIECE = 20.0  # s, of a displacement
 LEAST_WAY = 20.0  # m of a piece: shorter ones do not show a direction
 FEWEST = 4
 UNEXPLAINED = 0.3  # of the squares of displacements, that velocities turned as one may leave at most
-CLEAR = 5.0  # sigmas
+CLEAR = 4.0  # sigmas: six pieces of a sound log come so far in one of a hundred, twelve in one of five hundred
 LEAST = math.radians(0.15)  # rad: a smaller turn is the drift of a receiver's positions
 
 
