@@ -152,6 +152,6 @@ def _correlations(a: Array, b: Array) -> tuple[Array, Array, Array]:
     floor = 1e-12 * math.sqrt(float(np.sum(a**2) * np.sum(b**2)))
     return (
         shifts.astype(np.float64),
-        np.where(scale > floor, product.sum(axis=1) / np.maximum(scale, floor), 0.0),
+        np.divide(product.sum(axis=1), scale, out=np.zeros_like(scale), where=scale > floor),
         common,
     )
