@@ -255,8 +255,7 @@ def run(
                 break
             if ahead > (1.0 - m.done[0]) * T - SAME_TIME:
                 take_sample(s, samples, i, 1.0 - m.done[0], True, sensors, fixed_altitude, aux, sums)
-                i += 1
-                m.done[0] = 0.0
+                i, m.done[0] = i + 1, 0.0
             else:
                 take_sample(s, samples, i, ahead / T, False, sensors, fixed_altitude, aux, sums)
                 m.done[0] += ahead / T
