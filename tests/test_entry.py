@@ -13,7 +13,7 @@ from truenorth.aiding.source import Aiding
 from truenorth.alignment import Request
 from truenorth.alignment.transfer import align_transfer
 from truenorth.core.attitude import dcm_from_euler
-from truenorth.simulation import MasterSpec, ideal_log, rest, simulate, simulate_master
+from truenorth.simulation import MasterSpec, ideal_log, rest, simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
 
@@ -84,7 +84,7 @@ def slave():
     ideal = ideal_log(motion, rate=50.0, duration=35.0)
     record = simulate(ideal, imu="tactical", seed=2).record
     spec = MasterSpec(rate=10.0, latency=0.04, lever_arm=(-0.6, -1.1, 0.2))
-    return record, simulate_master(motion, spec, duration=35.0, seed=2).record
+    return record, simulate_sensor(motion, spec, duration=35.0, seed=2).record
 
 
 def test_a_master_is_the_transfer_recipe_with_the_arm_from_the_imu_to_the_master(slave):

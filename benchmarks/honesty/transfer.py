@@ -19,7 +19,7 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors
 from truenorth.records.specs import imu_spec
-from truenorth.simulation import MasterSpec, ideal_log, simulate, simulate_master
+from truenorth.simulation import MasterSpec, ideal_log, simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.simulation.sway import Disturbed
@@ -69,7 +69,7 @@ def run_case(name: str, motion: Any, errors: MasterErrors | None, seed: int, run
             **sigma,
         )
         slave = simulate(ideal, imu=spec, seed=seed, run=run).record
-        master = simulate_master(motion, of_master, duration=SECONDS, seed=seed, run=run).record
+        master = simulate_sensor(motion, of_master, duration=SECONDS, seed=seed, run=run).record
         answer = align_transfer(slave, master, spec, master_errors=errors)
         t = answer.transfer
         phi = -rotation_vector_from_dcm(answer.C_nb @ motion.states(np.array(answer.time)).C_nb.T)

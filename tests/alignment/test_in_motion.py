@@ -14,7 +14,7 @@ from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.navigation import Mounting
-from truenorth.simulation import OdometerSpec, simulate, simulate_odometer
+from truenorth.simulation import OdometerSpec, simulate, simulate_sensor
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.layout import BG, DP
 
@@ -194,7 +194,7 @@ def test_driving_backwards():
     motion = replace(forwards, heading_offset=math.pi)
     sim = simulate(motion, duration=300.0, imu=RING.imu_spec, seed=7)
     spec = OdometerSpec(output="pulses", scale_sigma=0.003)
-    odometer = simulate_odometer(motion, spec, duration=300.0, seed=7).record
+    odometer = simulate_sensor(motion, spec, duration=300.0, seed=7).record
     assert odometer.values.min() < -20
     answer = align_in_motion(sim.record, RING.imu_spec, odometer=odometer, position=PLACE)
     assert answer.status == "aligned"

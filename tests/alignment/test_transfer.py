@@ -21,7 +21,7 @@ from truenorth.errors.master import ARM, DELAY, TransferModel
 from truenorth.filters import kalman
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_master
+from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
 
@@ -63,7 +63,7 @@ def _start(flight, model, C_mb_true):
 def test_without_noise_it_finds_the_truth(flight, ideal):
     """Delay to .02 ms, lever arm to 5 mm, mounting and attitude to .02 arcmin: R stays, the data are exact."""
     spec = replace(MASTER, velocity_noise=0.0, attitude_noise=0.0)
-    slave, master = simulate(ideal).record, simulate_master(flight, spec, duration=SPAN).record
+    slave, master = simulate(ideal).record, simulate_sensor(flight, spec, duration=SPAN).record
     C_mb = dcm_from_euler(*MOUNT_TRUE)
     model = TransferModel(1e-7, 1e-6, mounting=True)
     track = transfer_filter(slave, master, model, _start(flight, model, C_mb), Matching(1e-3, 1e-5))
@@ -84,7 +84,7 @@ def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
     the sigma that it should have.
     """
     spec, C_mb = replace(MASTER, lever_arm=(0.0, 0.0, 0.0)), dcm_from_euler(*MOUNT_TRUE)
-    slave, master = simulate(ideal).record, simulate_master(flight, spec, duration=SPAN).record
+    slave, master = simulate(ideal).record, simulate_sensor(flight, spec, duration=SPAN).record
     model = TransferModel(TACTICAL.gyro_random_walk, TACTICAL.accel_random_walk, mounting=True)
     start = replace(_start(flight, model, C_mb), delay=TAU_TRUE)
     C_nb = flight.states(master.time - TAU_TRUE).C_nb
@@ -110,7 +110,7 @@ def test_sigmas_are_honest(flight, ideal):
         arm, tau, mount = rng.standard_normal(3), 0.05 * rng.standard_normal(), 3 * DEG * rng.standard_normal(3)
         heading, pitch, roll = mount[2], mount[0], mount[1]
         spec = replace(MASTER, latency=0.0, clock_offset=tau, lever_arm=tuple(arm), mounting=(-heading, pitch, roll))
-        master = simulate_master(flight, spec, duration=SPAN, seed=5, run=run).record
+        master = simulate_sensor(flight, spec, duration=SPAN, seed=5, run=run).record
         result = align_transfer(simulation.record, master, TACTICAL, velocity_noise=0.05, attitude_noise=2 * ARCMIN)
         t = result.transfer
         phi = _phi(result, flight)
@@ -290,7 +290,7 @@ def test_flexure_states_take_up_a_seat_that_bends(flight):
     bend = FlexureSpec(sigma=(6 * ARCMIN, 3 * ARCMIN, 3 * ARCMIN), correlation_time=5.0)
     moving = Flexed(flight, bend, duration=SPAN, seed=3)
     slave = simulate(ideal_log(moving, rate=100.0, duration=SPAN), imu=TACTICAL, seed=3).record
-    master = simulate_master(flight, replace(MASTER, attitude_noise=0.2 * ARCMIN), duration=SPAN, seed=3).record
+    master = simulate_sensor(flight, replace(MASTER, attitude_noise=0.2 * ARCMIN), duration=SPAN, seed=3).record
     noise = {"velocity_noise": 0.05, "attitude_noise": 0.2 * ARCMIN}
     with_states, without = (align_transfer(slave, master, TACTICAL, flexure=f, **noise) for f in (bend, None))
 
@@ -362,7 +362,7 @@ def test_only_what_is_unknown_is_estimated(real):
 def test_ideal_spec_of_the_slave_is_possible(flight, ideal):
     """A specification of zeros: the covariance must not break down."""
     slave = simulate(ideal).record
-    master = simulate_master(flight, MASTER, duration=SPAN).record
+    master = simulate_sensor(flight, MASTER, duration=SPAN).record
     assert align_transfer(slave, master, ImuSpec()).status == "aligned"
 
 

@@ -22,7 +22,7 @@ from truenorth.errors.master import (
 from truenorth.estimate.linear import rows_along
 from truenorth.records import MasterRecord
 from truenorth.records.motion import MotionStates
-from truenorth.simulation import MasterSpec, simulate_master
+from truenorth.simulation import MasterSpec, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
 from truenorth.state.layout import BG, DV, PHI
@@ -49,7 +49,7 @@ def measured(motion, dx, C_mb):
     tau = float(part[DELAY][0])
     angles = (float(heading), float(pitch), float(roll))
     spec = MasterSpec(rate=10.0, latency=max(tau, 0.0), lever_arm=tuple(ARM_AS_ASSUMED + part[ARM]), mounting=angles)
-    true = simulate_master(motion, spec, duration=1.0, start=T - tau).record
+    true = simulate_sensor(motion, spec, duration=1.0, start=T - tau).record
     C_nm = dcm_from_rotation_vector(-part[ATTITUDE_ERROR]) @ true.C_nb[:1]
     master = MasterRecord(np.array([0.0, 1.0]), C_nb=C_nm[[0, 0]], v_n=(true.v_n[:1] + part[VELOCITY_ERROR])[[0, 0]])
     slave = MotionStates(

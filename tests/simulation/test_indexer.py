@@ -22,8 +22,8 @@ from truenorth.simulation import (
     ideal_log,
     scheme,
     simulate,
-    simulate_encoder,
     simulate_runs,
+    simulate_sensor,
     steps,
 )
 from truenorth.simulation.axis_angles import SCHEMES
@@ -188,7 +188,7 @@ def test_mechanisms_that_make_no_sense(call, said):
 
 
 def encoder(spec=None, indexer=DUAL, **options):
-    return simulate_encoder(indexer, spec, duration=50.0, **options)
+    return simulate_sensor(indexer, spec or EncoderSpec(), duration=50.0, **options)
 
 
 def test_a_perfect_encoder_tells_the_angles():

@@ -59,7 +59,7 @@ MODELS |= {
     "axis: spin": scenario_sensors.SpinAxis,
     "axis: swing": scenario_sensors.SwingAxis,
 }
-SPECS: dict[str, type[UnitSpec]] = {key: spec for key, (spec, _) in AIDING.items()}
+SPECS: dict[str, type[UnitSpec]] = dict(AIDING)
 SPECS |= {"encoder": EncoderSpec, "flexure": FlexureSpec}
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,8 +71,8 @@ STREAMS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class AidingSpec(UnitSpec):
-    """What every aiding sensor has.
+class AidingSpec(UnitSpec, Generic[R]):
+    """What every aiding sensor has: a name for its random streams, and :meth:`sense`, which makes its record.
 
     Attributes
     ----------
@@ -81,12 +81,17 @@ class AidingSpec(UnitSpec):
         From sampling to the time that a row carries; may be negative, of a clock that is early.
     """
 
+    sensor: ClassVar[str]
     rate: float = value("frequency", "Hz", 1.0, sign="positive")
     latency: float = value("time", "s", sign="any")
 
+    def sense(self, body: Any, times: Array, draws: Draws) -> Aided[R]:
+        """The sensor on a body (of an encoder: an indexer), sampled at some times (N,)."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True, kw_only=True)
-class DroppingSpec(AidingSpec):
+class DroppingSpec(AidingSpec[R]):
     """What sensors have that drop out.
 
     Attributes
@@ -109,7 +114,7 @@ class DroppingSpec(AidingSpec):
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutlyingSpec(DroppingSpec):
+class OutlyingSpec(DroppingSpec[R]):
     """What sensors have that drop out and give outliers.
 
     Attributes
@@ -156,7 +161,46 @@ class Draws:
         return stream(*self.key, STREAMS[name])
 
 
-def sample_times(spec: AidingSpec, start: float, duration: float) -> Array:
+def simulate_sensor(
+    body: Any,
+    spec: AidingSpec[R],
+    *,
+    duration: float,
+    start: float = 0.0,
+    seed: int = 0,
+    run: int = 0,
+    scenario: int = 0,
+    **given: Any,
+) -> Aided[R]:
+    """Simulate an aiding sensor, or the encoder of an indexer.
+
+    Parameters
+    ----------
+    body : Motion, Indexed or Indexer
+        The motion of the IMU that the sensor stands by; of an encoder its indexer.
+    spec : AidingSpec
+        :class:`GnssSpec`, :class:`HeightSpec`, :class:`OdometerSpec`, :class:`VelocityLogSpec`, :class:`MasterSpec` or
+        :class:`EncoderSpec`: each is an ideal sensor until it is given errors.
+    duration, start : float, s
+    seed, run, scenario : int
+        The same three give the same bits.
+    **given
+        Errors in place of drawn ones, where the sensor's `sense` takes them.
+
+    Returns
+    -------
+    Aided
+        The record, when its rows were sampled, and the errors that were drawn: their names are those of the sensor's `sense`.
+
+    Raises
+    ------
+    UsageError
+        Less than two rows in the time, by rate, latency or outages.
+    """
+    return spec.sense(body, sample_times(spec, start, duration), Draws(spec.sensor, seed, run, scenario), **given)
+
+
+def sample_times(spec: AidingSpec[Any], start: float, duration: float) -> Array:
     """When a sensor is sampled: from the start on, as long as its rows arrive before the end.
 
     Raises
@@ -173,7 +217,7 @@ def sample_times(spec: AidingSpec, start: float, duration: float) -> Array:
     return start + np.arange(count) / spec.rate
 
 
-def kept(spec: DroppingSpec, times: Array, draws: Draws) -> NDArray[np.bool_]:
+def kept(spec: DroppingSpec[Any], times: Array, draws: Draws) -> NDArray[np.bool_]:
     """(N,) which rows are sampled in no outage.
 
     Raises
@@ -201,7 +245,7 @@ def random_windows(rate: float, length: float, times: Array, rng: np.random.Gene
     return [(float(start), float(start) + length) for start in starts]
 
 
-def outliers(spec: OutlyingSpec, sigma: Any, shape: tuple[int, ...], draws: Draws) -> Array:
+def outliers(spec: OutlyingSpec[Any], sigma: Any, shape: tuple[int, ...], draws: Draws) -> Array:
     """Errors of a standard deviation in the rows that are outliers, zero in the others."""
     rng = draws("outliers")
     hit = rng.random(shape[0]) < spec.outlier_rate

@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.errors import UsageError
 from truenorth.records.encoder import EncoderRecord
 from truenorth.records.unit_spec import value
-from truenorth.simulation.aiding import Aided, AidingSpec, Draws, sample_times
+from truenorth.simulation.aiding import Aided, AidingSpec, Draws
 from truenorth.simulation.indexer import Indexer
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class EncoderSpec(AidingSpec):
+class EncoderSpec(AidingSpec[EncoderRecord]):
     """An encoder and its errors, one-sigma for each axis.
 
     Measured is ``angle + offset + c cos(angle) + s sin(angle) + noise``, in whole steps.
@@ -35,66 +35,47 @@ class EncoderSpec(AidingSpec):
         Of c and of s each: the disc turns about a point that is not its centre.
     """
 
+    sensor = "encoder"
     rate: float = value("frequency", "Hz", 100.0, sign="positive")
     resolution: float = value("angle", "arcsec")
     noise: float = value("angle", "arcsec")
     offset: float = value("angle", "arcsec")
     eccentricity: float = value("angle", "arcsec")
 
+    def sense(
+        self, body: Indexer, times: Array, draws: Draws, errors: Mapping[str, ArrayLike] | None = None
+    ) -> Aided[EncoderRecord]:
+        """The encoder of an indexer: angles (N, A), or (N,) of a single axis; errors ``offset, eccentricity``.
 
-def simulate_encoder(
-    indexer: Indexer,
-    spec: EncoderSpec | None = None,
-    *,
-    duration: float,
-    start: float = 0.0,
-    seed: int = 0,
-    run: int = 0,
-    scenario: int = 0,
-    errors: Mapping[str, ArrayLike] | None = None,
-) -> Aided[EncoderRecord]:
-    """Simulate the encoder of an indexer.
+        Parameters
+        ----------
+        body : Indexer
+        times : (N,) array, s
+        draws : Draws
+        errors : mapping, optional
+            ``offset`` (A,) and ``eccentricity`` (A, 2; of cosine and sine), rad, given in place of their draws.
 
-    Parameters
-    ----------
-    indexer : Indexer
-    spec : EncoderSpec, optional
-        A perfect one of 100 Hz when left out.
-    duration, start : float, s
-    seed, run, scenario : int
-        The same three give the same bits.
-    errors : mapping, optional
-        ``offset`` (A,) and ``eccentricity`` (A, 2; of cosine and sine), rad, given in place of their draws.
-
-    Returns
-    -------
-    Aided
-        Angles of the record (N, A), or (N,) of a single axis; errors ``offset, eccentricity``.
-
-    Raises
-    ------
-    UsageError
-        A given error that is not known, or of another shape.
-    """
-    spec = EncoderSpec() if spec is None else spec
-    draws = Draws("encoder", seed, run, scenario)
-    count = len(indexer.axes)
-    shapes: dict[str, tuple[int, ...]] = {"offset": (count,), "eccentricity": (count, 2)}
-    given = {name: np.asarray(x, dtype=np.float64) for name, x in (errors or {}).items()}
-    for name, x in given.items():
-        if shapes.get(name) != x.shape:
-            known = ", ".join(f"{key} of shape {shape}" for key, shape in shapes.items())
-            raise UsageError(f"errors of the encoder: {name} of shape {x.shape}; expected {known}")
-    drawn = {
-        name: given.get(name, getattr(spec, name) * draws(name).standard_normal(shape))
-        for name, shape in shapes.items()
-    }
-    times = sample_times(spec, start, duration)
-    true = indexer.angles(times)
-    c, s = drawn["eccentricity"].T
-    angles = true + drawn["offset"] + c * np.cos(true) + s * np.sin(true)
-    angles += spec.noise * draws("noise").standard_normal(true.shape)
-    if spec.resolution > 0.0:
-        angles = np.round(angles / spec.resolution) * spec.resolution
-    record = EncoderRecord(times + spec.latency, angles[:, 0] if count == 1 else angles, "simulation")
-    return Aided(record, times, drawn)
+        Raises
+        ------
+        UsageError
+            A given error that is not known, or of another shape.
+        """
+        count = len(body.axes)
+        shapes: dict[str, tuple[int, ...]] = {"offset": (count,), "eccentricity": (count, 2)}
+        given = {name: np.asarray(x, dtype=np.float64) for name, x in (errors or {}).items()}
+        for name, x in given.items():
+            if shapes.get(name) != x.shape:
+                known = ", ".join(f"{key} of shape {shape}" for key, shape in shapes.items())
+                raise UsageError(f"errors of the encoder: {name} of shape {x.shape}; expected {known}")
+        drawn = {
+            name: given.get(name, getattr(self, name) * draws(name).standard_normal(shape))
+            for name, shape in shapes.items()
+        }
+        true = body.angles(times)
+        c, s = drawn["eccentricity"].T
+        angles = true + drawn["offset"] + c * np.cos(true) + s * np.sin(true)
+        angles += self.noise * draws("noise").standard_normal(true.shape)
+        if self.resolution > 0.0:
+            angles = np.round(angles / self.resolution) * self.resolution
+        record = EncoderRecord(times + self.latency, angles[:, 0] if count == 1 else angles, "simulation")
+        return Aided(record, times, drawn)

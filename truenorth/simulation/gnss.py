@@ -13,7 +13,7 @@ from truenorth.core.earth import earth_rate_n, radii, transport_rate_n
 from truenorth.records import GnssRecord, HeightRecord
 from truenorth.records.motion import MotionStates, Moving
 from truenorth.records.unit_spec import value
-from truenorth.simulation.aiding import Aided, Draws, OutlyingSpec, kept, outliers, sample_times
+from truenorth.simulation.aiding import Aided, Draws, OutlyingSpec, kept, outliers
 from truenorth.simulation.motion import displaced
 from truenorth.simulation.processes import gauss_markov
 from truenorth.simulation.sensing import NODES, WEIGHTS
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class GnssSpec(OutlyingSpec):
+class GnssSpec(OutlyingSpec[GnssRecord]):
     """A GNSS receiver and its errors; each value is of east and north, and `vertical` times as large upwards.
 
     Attributes
@@ -41,6 +41,7 @@ class GnssSpec(OutlyingSpec):
         From the IMU to the antenna, IMU axes.
     """
 
+    sensor = "gnss"
     position_noise: float = value("length", "m")
     position_drift: float = value("length", "m")
     velocity_noise: float = value("speed", "m/s")
@@ -50,9 +51,39 @@ class GnssSpec(OutlyingSpec):
     outlier_size: float = value("length", "m", 30.0)
     lever_arm: tuple[float, float, float] = value("length length length", "m m m", (0.0, 0.0, 0.0), sign="any")
 
+    def sense(self, body: Moving, times: Array, draws: Draws) -> Aided[GnssRecord]:
+        """A GNSS receiver: the record's sigmas are those of drift and noise together, None where both are zero.
+
+        Errors row by row: ``position_drift, position_noise, outliers`` (N, 3) m, ``velocity_drift, velocity_noise`` (N, 3) m/s.
+        """
+        shape, ratio = (len(times), 3), np.array([1.0, 1.0, self.vertical])
+        errors: dict[str, Array] = {}
+        for what in ("position", "velocity"):
+            drift, noise = getattr(self, f"{what}_drift") * ratio, getattr(self, f"{what}_noise") * ratio
+            generator = draws(f"{what}_drift")
+            errors[f"{what}_drift"] = gauss_markov(drift, self.correlation_time, 1.0 / self.rate, len(times), generator)
+            errors[f"{what}_noise"] = noise * draws(f"{what}_noise").standard_normal(shape)
+        errors["outliers"] = outliers(self, self.outlier_size * ratio, shape, draws)
+        there = kept(self, times, draws)
+        times, errors = times[there], {name: error[there] for name, error in errors.items()}
+
+        lat, lon, alt, v_n = place_of(body.states(times), self.lever_arm)
+        lat, lon, alt = moved(lat, lon, alt, errors["position_drift"] + errors["position_noise"] + errors["outliers"])
+        record = GnssRecord(
+            times + self.latency,
+            lat,
+            lon,
+            alt,
+            v_n + errors["velocity_drift"] + errors["velocity_noise"],
+            _sigma(math.hypot(self.position_drift, self.position_noise), ratio, len(times)),
+            _sigma(math.hypot(self.velocity_drift, self.velocity_noise), ratio, len(times)),
+            source="simulation",
+        )
+        return Aided(record, times, errors)
+
 
 @dataclass(frozen=True, kw_only=True)
-class HeightSpec(OutlyingSpec):
+class HeightSpec(OutlyingSpec[HeightRecord]):
     """A barometer and its errors.
 
     Attributes
@@ -68,6 +99,7 @@ class HeightSpec(OutlyingSpec):
     outlier_size : float, m
     """
 
+    sensor = "height"
     bias: float = value("length", "m", sign="any")
     bias_sigma: float = value("length", "m")
     drift: float = value("length", "m")
@@ -76,111 +108,29 @@ class HeightSpec(OutlyingSpec):
     lag: float = value("time", "s")
     outlier_size: float = value("length", "m", 30.0)
 
+    def sense(self, body: Moving, times: Array, draws: Draws) -> Aided[HeightRecord]:
+        """A barometer, its reading settled at the start where it lags.
 
-def simulate_gnss(
-    motion: Moving,
-    spec: GnssSpec | None = None,
-    *,
-    duration: float,
-    start: float = 0.0,
-    seed: int = 0,
-    run: int = 0,
-    scenario: int = 0,
-) -> Aided[GnssRecord]:
-    """Simulate a GNSS receiver.
-
-    Parameters
-    ----------
-    motion : Motion or Indexed
-        Of the IMU.
-    spec : GnssSpec, optional
-        An ideal receiver of 1 Hz when left out.
-    duration, start : float, s
-    seed, run, scenario : int
-        The same three give the same bits.
-
-    Returns
-    -------
-    Aided
-        The record's sigmas are those of drift and noise together, None where both are zero; errors row by row:
-        ``position_drift, position_noise, outliers`` (N, 3) m, ``velocity_drift, velocity_noise`` (N, 3) m/s.
-    """
-    spec = GnssSpec() if spec is None else spec
-    draws = Draws("gnss", seed, run, scenario)
-    times = sample_times(spec, start, duration)
-    shape, ratio = (len(times), 3), np.array([1.0, 1.0, spec.vertical])
-    errors: dict[str, Array] = {}
-    for what in ("position", "velocity"):
-        drift, noise = getattr(spec, f"{what}_drift") * ratio, getattr(spec, f"{what}_noise") * ratio
-        generator = draws(f"{what}_drift")
-        errors[f"{what}_drift"] = gauss_markov(drift, spec.correlation_time, 1.0 / spec.rate, len(times), generator)
-        errors[f"{what}_noise"] = noise * draws(f"{what}_noise").standard_normal(shape)
-    errors["outliers"] = outliers(spec, spec.outlier_size * ratio, shape, draws)
-    there = kept(spec, times, draws)
-    times, errors = times[there], {name: error[there] for name, error in errors.items()}
-
-    lat, lon, alt, v_n = place_of(motion.states(times), spec.lever_arm)
-    lat, lon, alt = moved(lat, lon, alt, errors["position_drift"] + errors["position_noise"] + errors["outliers"])
-    record = GnssRecord(
-        times + spec.latency,
-        lat,
-        lon,
-        alt,
-        v_n + errors["velocity_drift"] + errors["velocity_noise"],
-        _sigma(math.hypot(spec.position_drift, spec.position_noise), ratio, len(times)),
-        _sigma(math.hypot(spec.velocity_drift, spec.velocity_noise), ratio, len(times)),
-        source="simulation",
-    )
-    return Aided(record, times, errors)
-
-
-def simulate_height(
-    motion: Moving,
-    spec: HeightSpec | None = None,
-    *,
-    duration: float,
-    start: float = 0.0,
-    seed: int = 0,
-    run: int = 0,
-    scenario: int = 0,
-) -> Aided[HeightRecord]:
-    """Simulate a barometer.
-
-    Parameters
-    ----------
-    motion : Motion or Indexed
-        Of the IMU.
-    spec : HeightSpec, optional
-        An ideal one of 1 Hz when left out.
-    duration, start : float, s
-        With a lag, its reading has settled when it starts.
-    seed, run, scenario : int
-        The same three give the same bits.
-
-    Returns
-    -------
-    Aided
         Errors ``bias``, and row by row ``drift, noise, outliers, lag`` (N,) m, the last being what the lag leaves.
-    """
-    spec = HeightSpec() if spec is None else spec
-    draws = Draws("height", seed, run, scenario)
-    times = sample_times(spec, start, duration)
-    bias = spec.bias + spec.bias_sigma * draws("bias").standard_normal()
-    drift = gauss_markov(spec.drift, spec.correlation_time, 1.0 / spec.rate, len(times), draws("drift"), axes=1)[:, 0]
-    noise = spec.noise * draws("noise").standard_normal(len(times))
-    wild = outliers(spec, spec.outlier_size, times.shape, draws)
-    there = kept(spec, times, draws)
-    true = motion.states(times).alt
-    lag = _lagging(motion, times, spec.lag) - true if spec.lag > 0 else np.zeros_like(true)
-    sigma = math.hypot(spec.drift, spec.noise)
-    record = HeightRecord(
-        times[there] + spec.latency,
-        (true + lag + bias + drift + noise + wild)[there],
-        np.full(np.count_nonzero(there), sigma) if sigma > 0 else None,
-        "simulation",
-    )
-    errors: dict[str, Any] = {"drift": drift, "noise": noise, "outliers": wild, "lag": lag}
-    return Aided(record, times[there], {name: error[there] for name, error in errors.items()} | {"bias": bias})
+        """
+        bias = self.bias + self.bias_sigma * draws("bias").standard_normal()
+        drift = gauss_markov(self.drift, self.correlation_time, 1.0 / self.rate, len(times), draws("drift"), axes=1)[
+            :, 0
+        ]
+        noise = self.noise * draws("noise").standard_normal(len(times))
+        wild = outliers(self, self.outlier_size, times.shape, draws)
+        there = kept(self, times, draws)
+        true = body.states(times).alt
+        lag = _lagging(body, times, self.lag) - true if self.lag > 0 else np.zeros_like(true)
+        sigma = math.hypot(self.drift, self.noise)
+        record = HeightRecord(
+            times[there] + self.latency,
+            (true + lag + bias + drift + noise + wild)[there],
+            np.full(np.count_nonzero(there), sigma) if sigma > 0 else None,
+            "simulation",
+        )
+        errors: dict[str, Any] = {"drift": drift, "noise": noise, "outliers": wild, "lag": lag}
+        return Aided(record, times[there], {name: error[there] for name, error in errors.items()} | {"bias": bias})
 
 
 def place_of(at: MotionStates, arm: Any) -> tuple[Array, Array, Array, Array]:

@@ -20,7 +20,7 @@ from truenorth.core.errors import UsageError
 from truenorth.records import MasterRecord
 from truenorth.records.motion import MotionStates, Moving
 from truenorth.records.unit_spec import value
-from truenorth.simulation.aiding import Aided, Draws, DroppingSpec, kept, sample_times
+from truenorth.simulation.aiding import Aided, Draws, DroppingSpec, kept
 from truenorth.simulation.gnss import moved, place_of
 from truenorth.simulation.processes import gauss_markov
 from truenorth.simulation.sensing import acceleration_gain
@@ -30,7 +30,7 @@ THREE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MasterSpec(DroppingSpec):
+class MasterSpec(DroppingSpec[MasterRecord]):
     """A master INS, where it sits, and its errors (computed minus true; ``C_hat = exp(-[phi x]) C``).
 
     Attributes
@@ -62,6 +62,7 @@ class MasterSpec(DroppingSpec):
         What the record holds; the sensors' rates and forces, in the master's axes and place, are without error.
     """
 
+    sensor = "master"
     rate: float = value("frequency", "Hz", 10.0, sign="positive")
     clock_offset: float = value("time", "s", sign="any")
     clock_drift: float = value("ratio", "ppm", sign="any")
@@ -92,60 +93,35 @@ class MasterSpec(DroppingSpec):
         if not (self.with_attitude or self.with_velocity):
             raise UsageError("a master without attitude and velocity; expected with_attitude or with_velocity")
 
+    def sense(self, body: Moving, times: Array, draws: Draws) -> Aided[MasterRecord]:
+        """A master INS by a slave's IMU on the rigid body.
 
-def simulate_master(
-    motion: Moving,
-    spec: MasterSpec | None = None,
-    *,
-    duration: float,
-    start: float = 0.0,
-    seed: int = 0,
-    run: int = 0,
-    scenario: int = 0,
-) -> Aided[MasterRecord]:
-    """Simulate a master INS.
-
-    Parameters
-    ----------
-    motion : Motion or Indexed
-        Of the slave's IMU on the rigid body.
-    spec : MasterSpec, optional
-        An ideal master of 10 Hz in the slave's place and axes when left out.
-    duration, start : float, s
-    seed, run, scenario : int
-        The same three give the same bits.
-
-    Returns
-    -------
-    Aided
         Errors row by row: ``attitude`` (phi), ``velocity``, ``position`` (N, 3), in rad, m/s and m east, north, up; ``jumps``
         (time, east, north) that were made.
-    """
-    spec = MasterSpec() if spec is None else spec
-    draws = Draws("master", seed, run, scenario)
-    times = sample_times(spec, start, duration)
-    phi, dv, dp, jumps = _errors(spec, motion.states(times[0]), times, draws)
-    there = kept(spec, times, draws)
-    times, phi, dv, dp = times[there], phi[there], dv[there], dp[there]
+        """
+        start = times[0]
+        phi, dv, dp, jumps = _errors(self, body.states(times[0]), times, draws)
+        there = kept(self, times, draws)
+        times, phi, dv, dp = times[there], phi[there], dv[there], dp[there]
 
-    at = motion.states(times)
-    arm = -np.asarray(spec.lever_arm)
-    C_sm = dcm_from_euler(*spec.mounting).T
-    lat, lon, alt, v_n = place_of(at, arm)
-    values: dict[str, Any] = {}
-    if spec.with_attitude:
-        C_nm = at.C_nb @ C_sm if any(spec.mounting) else at.C_nb
-        values["C_nb"] = dcm_from_rotation_vector(-phi) @ C_nm if phi.any() else C_nm
-    if spec.with_velocity:
-        values["v_n"] = v_n + dv
-    if spec.with_position:
-        values["lat"], values["lon"], values["alt"] = moved(lat, lon, alt, dp)
-    if spec.with_sensors:
-        values["w_ib_b"] = at.w_ib_b @ C_sm
-        values["f_b"] = (at.f_b + acceleration_gain(at) @ arm) @ C_sm
-    stamps = times + spec.latency + spec.clock_offset + spec.clock_drift * (times - start)
-    record = MasterRecord(stamps, source="simulation", **values)
-    return Aided(record, times, {"attitude": phi, "velocity": dv, "position": dp, "jumps": jumps})
+        at = body.states(times)
+        arm = -np.asarray(self.lever_arm)
+        C_sm = dcm_from_euler(*self.mounting).T
+        lat, lon, alt, v_n = place_of(at, arm)
+        values: dict[str, Any] = {}
+        if self.with_attitude:
+            C_nm = at.C_nb @ C_sm if any(self.mounting) else at.C_nb
+            values["C_nb"] = dcm_from_rotation_vector(-phi) @ C_nm if phi.any() else C_nm
+        if self.with_velocity:
+            values["v_n"] = v_n + dv
+        if self.with_position:
+            values["lat"], values["lon"], values["alt"] = moved(lat, lon, alt, dp)
+        if self.with_sensors:
+            values["w_ib_b"] = at.w_ib_b @ C_sm
+            values["f_b"] = (at.f_b + acceleration_gain(at) @ arm) @ C_sm
+        stamps = times + self.latency + self.clock_offset + self.clock_drift * (times - start)
+        record = MasterRecord(stamps, source="simulation", **values)
+        return Aided(record, times, {"attitude": phi, "velocity": dv, "position": dp, "jumps": jumps})
 
 
 def _errors(spec: MasterSpec, at: MotionStates, times: Array, draws: Draws) -> tuple[Array, Array, Array, Any]:

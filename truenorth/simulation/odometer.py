@@ -26,7 +26,6 @@ from truenorth.simulation.aiding import (
     check_windows,
     kept,
     random_windows,
-    sample_times,
     velocity_b,
 )
 from truenorth.simulation.sensing import integrals
@@ -35,7 +34,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class OdometerSpec(DroppingSpec):
+class OdometerSpec(DroppingSpec[OdometerRecord]):
     """An odometer and its errors.
 
     Attributes
@@ -61,6 +60,7 @@ class OdometerSpec(DroppingSpec):
         Whether reverse driving counts negative; where not, each sample is the magnitude of its interval's.
     """
 
+    sensor = "odometer"
     rate: float = value("frequency", "Hz", 10.0, sign="positive")
     output: Literal["distance", "pulses", "speed"] = "distance"
     scale: float = value("ratio", "%", sign="any")
@@ -87,75 +87,51 @@ class OdometerSpec(DroppingSpec):
         if self.lost > 0.0 and self.output != "pulses":
             raise UsageError(f"lost pulses, but the output is {self.output}; expected output pulses")
 
+    def sense(self, body: Moving, times: Array, draws: Draws) -> Aided[OdometerRecord]:
+        """An odometer that counts from the first time on.
 
-def simulate_odometer(
-    motion: Moving,
-    spec: OdometerSpec | None = None,
-    *,
-    duration: float,
-    start: float = 0.0,
-    seed: int = 0,
-    run: int = 0,
-    scenario: int = 0,
-) -> Aided[OdometerRecord]:
-    """Simulate an odometer.
-
-    Parameters
-    ----------
-    motion : Motion or Indexed
-        Of the IMU.
-    spec : OdometerSpec, optional
-        An ideal odometer of 10 Hz when left out.
-    duration, start : float, s
-    seed, run, scenario : int
-        The same three give the same bits.
-
-    Returns
-    -------
-    Aided
         Errors ``scale, mounting (2,), phase`` (of the first pulse), ``slips`` (start, stop, size), ``lost`` (pulses a row),
         ``noise`` (m/s a row).
-    """
-    spec = OdometerSpec() if spec is None else spec
-    draws = Draws("odometer", seed, run, scenario)
-    edges = sample_times(spec, start, duration)
-    scale = spec.scale + spec.scale_sigma * draws("scale").standard_normal()
-    mounting = np.asarray(spec.mounting) + spec.mounting_sigma * draws("mounting").standard_normal(2)
-    drawn = random_windows(spec.slip_rate, spec.slip_duration, edges, draws("slips"))
-    slips = (*spec.slips, *((*window, spec.slip_size) for window in drawn))
-    forward = dcm_from_euler(mounting[0], mounting[1], 0.0)[:, 1]
+        """
+        scale = self.scale + self.scale_sigma * draws("scale").standard_normal()
+        mounting = np.asarray(self.mounting) + self.mounting_sigma * draws("mounting").standard_normal(2)
+        drawn = random_windows(self.slip_rate, self.slip_duration, times, draws("slips"))
+        slips = (*self.slips, *((*window, self.slip_size) for window in drawn))
+        forward = dcm_from_euler(mounting[0], mounting[1], 0.0)[:, 1]
 
-    def speed(at: MotionStates) -> Array:
-        return velocity_b(at, spec.lever_arm) @ forward
+        def speed(at: MotionStates) -> Array:
+            return velocity_b(at, self.lever_arm) @ forward
 
-    noise = spec.noise * draws("noise").standard_normal(len(edges) - 1)
-    there = kept(spec, edges[1:], draws)
-    sampled = edges[1:][there]
-    stamps = sampled + spec.latency
-    errors = {"scale": scale, "mounting": mounting, "slips": slips, "noise": noise[there]}
-    if spec.output == "speed":
-        values = speed(motion.states(edges[1:])) * (1.0 + scale) * _slipping(edges[1:], slips) + noise
-        values = values if spec.signed else np.abs(values)
-        return Aided(OdometerRecord(stamps, values[there], "speed", None, spec.signed, "simulation"), sampled, errors)
+        noise = self.noise * draws("noise").standard_normal(len(times) - 1)
+        there = kept(self, times[1:], draws)
+        sampled = times[1:][there]
+        stamps = sampled + self.latency
+        errors = {"scale": scale, "mounting": mounting, "slips": slips, "noise": noise[there]}
+        if self.output == "speed":
+            values = speed(body.states(times[1:])) * (1.0 + scale) * _slipping(times[1:], slips) + noise
+            values = values if self.signed else np.abs(values)
+            return Aided(
+                OdometerRecord(stamps, values[there], "speed", None, self.signed, "simulation"), sampled, errors
+            )
 
-    bounds = np.array([bound for slip in slips for bound in slip[:2] if edges[0] < bound < edges[-1]])
-    finer = np.union1d(edges, bounds)
-    parts = integrals(motion, finer, lambda at: speed(at)[..., None], 1)[:, 0] * _slipping(
-        0.5 * (finer[1:] + finer[:-1]), slips
-    )
-    distance = (1.0 + scale) * np.add.reduceat(parts, np.searchsorted(finer, edges[:-1])) + noise * np.diff(edges)
-    distance = distance if spec.signed else np.abs(distance)
-    if spec.output == "distance":
-        return Aided(
-            OdometerRecord(stamps, distance[there], "distance", None, spec.signed, "simulation"), sampled, errors
+        bounds = np.array([bound for slip in slips for bound in slip[:2] if times[0] < bound < times[-1]])
+        finer = np.union1d(times, bounds)
+        parts = integrals(body, finer, lambda at: speed(at)[..., None], 1)[:, 0] * _slipping(
+            0.5 * (finer[1:] + finer[:-1]), slips
         )
+        distance = (1.0 + scale) * np.add.reduceat(parts, np.searchsorted(finer, times[:-1])) + noise * np.diff(times)
+        distance = distance if self.signed else np.abs(distance)
+        if self.output == "distance":
+            return Aided(
+                OdometerRecord(stamps, distance[there], "distance", None, self.signed, "simulation"), sampled, errors
+            )
 
-    phase = draws("phase").random()
-    pulses = np.diff(np.floor(np.cumsum(distance) / spec.pulse_size + phase), prepend=0.0)
-    lost = draws("lost").binomial(np.abs(pulses).astype(np.int64), spec.lost)
-    pulses -= np.sign(pulses) * lost
-    record = OdometerRecord(stamps, pulses[there], "pulses", spec.pulse_size, spec.signed, "simulation")
-    return Aided(record, sampled, errors | {"phase": phase, "lost": lost[there]})
+        phase = draws("phase").random()
+        pulses = np.diff(np.floor(np.cumsum(distance) / self.pulse_size + phase), prepend=0.0)
+        lost = draws("lost").binomial(np.abs(pulses).astype(np.int64), self.lost)
+        pulses -= np.sign(pulses) * lost
+        record = OdometerRecord(stamps, pulses[there], "pulses", self.pulse_size, self.signed, "simulation")
+        return Aided(record, sampled, errors | {"phase": phase, "lost": lost[there]})
 
 
 def _slipping(times: Array, slips: tuple[tuple[float, float, float], ...]) -> Array:

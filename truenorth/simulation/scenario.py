@@ -29,10 +29,9 @@ from truenorth.core.yaml_file import read_mapping
 from truenorth.records.flexure import FlexureSpec
 from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.records.unit_spec import UnitSpec
 from truenorth.simulation import IdealLog, Simulation, given_errors, ideal_log, simulate
-from truenorth.simulation.aiding import Aided
-from truenorth.simulation.encoder import EncoderSpec, simulate_encoder
+from truenorth.simulation.aiding import Aided, AidingSpec, simulate_sensor
+from truenorth.simulation.encoder import EncoderSpec
 from truenorth.simulation.flexure import Flexed
 from truenorth.simulation.indexer import Indexed
 from truenorth.simulation.motion import Motion
@@ -220,31 +219,34 @@ class Scenario(Strict):
             A specification with a mistake, or a sensor that has nothing to say in the time; the message names the key.
         """
         seed = self.seed if seed is None else seed
-        draw: dict[str, Any] = {"seed": seed, "run": run, "scenario": number}
+        draw: dict[str, Any] = {
+            "seed": seed,
+            "run": run,
+            "scenario": number,
+            "duration": self.duration,
+            "start": self.start,
+        }
         body = self.build_motion(seed, run, number)
         logs: dict[str, Aided[Any]] = {}
-        for key, (_, make) in AIDING.items():
-            if key in self.aiding_specs:
-                try:
-                    logs[key] = make(body, self.aiding_specs[key], duration=self.duration, start=self.start, **draw)
-                except UsageError as error:
-                    raise DataError(f"{self._source}: {key}: {error}") from None
+        for key, spec in self.aiding_specs.items():
+            try:
+                logs[key] = simulate_sensor(body, spec, **draw)
+            except UsageError as error:
+                raise DataError(f"{self._source}: {key}: {error}") from None
         if self.indexer is not None:
             indexer = self.indexer.build(self.start + self.duration)
-            logs["encoder"] = simulate_encoder(
-                indexer, self._encoder(self.indexer), duration=self.duration, start=self.start, **draw
-            )
+            logs["encoder"] = simulate_sensor(indexer, self._encoder(self.indexer), **draw)
         return logs
 
     def _encoder(self, indexer: IndexerModel) -> EncoderSpec:
         return indexer.encoder_spec(self.rate, f"{self._source}: indexer.encoder")
 
     @cached_property
-    def aiding_specs(self) -> dict[str, UnitSpec]:
+    def aiding_specs(self) -> dict[str, AidingSpec[Any]]:
         """Specifications of the aiding sensors that the scenario has."""
         given = {key: getattr(self, key) for key in AIDING}
         return {
-            key: AIDING[key][0].from_mapping(content, f"{self._source}: {key}")
+            key: AIDING[key].from_mapping(content, f"{self._source}: {key}")
             for key, content in given.items()
             if content is not None
         }

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from truenorth.core.errors import UsageError
 from truenorth.core.schema import Angle, AngularRate, Strict, Time
-from truenorth.records.unit_spec import UnitSpec
+from truenorth.simulation.aiding import AidingSpec
 from truenorth.simulation.axis_angles import SCHEMES, Spin, Swing, Turning, scheme
 from truenorth.simulation.encoder import EncoderSpec
-from truenorth.simulation.gnss import GnssSpec, HeightSpec, simulate_gnss, simulate_height
+from truenorth.simulation.gnss import GnssSpec, HeightSpec
 from truenorth.simulation.indexer import Axis, Indexer
-from truenorth.simulation.master import MasterSpec, simulate_master
-from truenorth.simulation.odometer import OdometerSpec, simulate_odometer
+from truenorth.simulation.master import MasterSpec
+from truenorth.simulation.odometer import OdometerSpec
 from truenorth.simulation.tones import Tone
-from truenorth.simulation.velocity_log import VelocityLogSpec, simulate_velocity
+from truenorth.simulation.velocity_log import VelocityLogSpec
 
-# Key in a scenario: the specification that its mapping is, and what makes the log.
-AIDING: dict[str, tuple[type[UnitSpec], Callable[..., Any]]] = {
-    "odometer": (OdometerSpec, simulate_odometer),
-    "velocity_log": (VelocityLogSpec, simulate_velocity),
-    "gnss": (GnssSpec, simulate_gnss),
-    "height": (HeightSpec, simulate_height),
-    "master": (MasterSpec, simulate_master),
+# Key in a scenario: the specification that its mapping is.
+AIDING: dict[str, type[AidingSpec[Any]]] = {
+    "odometer": OdometerSpec,
+    "velocity_log": VelocityLogSpec,
+    "gnss": GnssSpec,
+    "height": HeightSpec,
+    "master": MasterSpec,
 }
 Direction = Literal["x", "y", "z"]
 

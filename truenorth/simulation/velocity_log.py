@@ -19,7 +19,6 @@ from truenorth.simulation.aiding import (
     kept,
     outliers,
     rotation,
-    sample_times,
     velocity_b,
 )
 from truenorth.simulation.processes import gauss_markov
@@ -29,7 +28,7 @@ MEASURED = {"forward": [False, True, False], "level": [True, True, False], "all"
 
 
 @dataclass(frozen=True, kw_only=True)
-class VelocityLogSpec(OutlyingSpec):
+class VelocityLogSpec(OutlyingSpec[VelocityRecord]):
     """A velocity log and its errors; measured is ``(1 + scale) C v + bias + drift + noise``.
 
     Attributes
@@ -53,6 +52,7 @@ class VelocityLogSpec(OutlyingSpec):
         Sigma of an outlier.
     """
 
+    sensor = "velocity"
     frame: Literal["body", "navigation"] = "body"
     axes: Literal["forward", "level", "all"] = "all"
     bias: tuple[float, float, float] = value("speed speed speed", "m/s m/s m/s", (0.0, 0.0, 0.0), sign="any")
@@ -76,61 +76,34 @@ class VelocityLogSpec(OutlyingSpec):
         if self.axes == "forward" and self.frame != "body":
             raise UsageError("a log of forward speed alone measures in body axes; expected frame body, or axes level")
 
+    def sense(self, body: Moving, times: Array, draws: Draws) -> Aided[VelocityRecord]:
+        """A velocity log: the record's ``sigma`` is that of drift and noise together.
 
-def simulate_velocity(
-    motion: Moving,
-    spec: VelocityLogSpec | None = None,
-    *,
-    duration: float,
-    start: float = 0.0,
-    seed: int = 0,
-    run: int = 0,
-    scenario: int = 0,
-) -> Aided[VelocityRecord]:
-    """Simulate a velocity log.
+        Errors ``bias (3,), scale, misalignment (3,)``, and row by row ``drift, noise, outliers`` (N, 3).
+        """
+        shape = (len(times), 3)
+        bias = np.asarray(self.bias) + self.bias_sigma * draws("bias").standard_normal(3)
+        scale = self.scale + self.scale_sigma * draws("scale").standard_normal()
+        turn = np.asarray(self.misalignment) + self.misalignment_sigma * draws("misalignment").standard_normal(3)
+        drift = gauss_markov(self.drift, self.correlation_time, 1.0 / self.rate, len(times), draws("drift"))
+        noise = self.noise * draws("noise").standard_normal(shape)
+        wild = outliers(self, self.outlier_size, shape, draws)
 
-    Parameters
-    ----------
-    motion : Motion or Indexed
-        Of the IMU.
-    spec : VelocityLogSpec, optional
-        An ideal log of 1 Hz in body axes when left out.
-    duration, start : float, s
-    seed, run, scenario : int
-        The same three give the same bits.
-
-    Returns
-    -------
-    Aided
-        The record's ``sigma`` is that of drift and noise together; errors ``bias (3,), scale, misalignment (3,)``, and row by
-        row ``drift, noise, outliers`` (N, 3).
-    """
-    spec = VelocityLogSpec() if spec is None else spec
-    draws = Draws("velocity", seed, run, scenario)
-    times = sample_times(spec, start, duration)
-    shape = (len(times), 3)
-    bias = np.asarray(spec.bias) + spec.bias_sigma * draws("bias").standard_normal(3)
-    scale = spec.scale + spec.scale_sigma * draws("scale").standard_normal()
-    turn = np.asarray(spec.misalignment) + spec.misalignment_sigma * draws("misalignment").standard_normal(3)
-    drift = gauss_markov(spec.drift, spec.correlation_time, 1.0 / spec.rate, len(times), draws("drift"))
-    noise = spec.noise * draws("noise").standard_normal(shape)
-    wild = outliers(spec, spec.outlier_size, shape, draws)
-
-    at = motion.states(times)
-    true = velocity_b(at, spec.lever_arm)
-    if spec.frame == "navigation":
-        true = np.einsum("kij,kj->ki", at.C_nb, true) if np.any(spec.lever_arm) else at.v_n
-    turned = true @ rotation(turn) if turn.any() else true
-    measured = (1.0 + scale) * turned + bias + drift + noise + wild
-    there, axes = kept(spec, times, draws), np.array(MEASURED[spec.axes])
-    measured[:, ~axes] = np.nan
-    sigma = float(np.hypot(spec.drift, spec.noise))
-    record = VelocityRecord(
-        times[there] + spec.latency,
-        measured[there],
-        spec.frame,
-        np.where(axes, np.full(shape, sigma)[there], np.nan) if sigma > 0 else None,
-        "simulation",
-    )
-    errors = {"drift": drift[there], "noise": noise[there], "outliers": wild[there]}
-    return Aided(record, times[there], errors | {"bias": bias, "scale": scale, "misalignment": turn})
+        at = body.states(times)
+        true = velocity_b(at, self.lever_arm)
+        if self.frame == "navigation":
+            true = np.einsum("kij,kj->ki", at.C_nb, true) if np.any(self.lever_arm) else at.v_n
+        turned = true @ rotation(turn) if turn.any() else true
+        measured = (1.0 + scale) * turned + bias + drift + noise + wild
+        there, axes = kept(self, times, draws), np.array(MEASURED[self.axes])
+        measured[:, ~axes] = np.nan
+        sigma = float(np.hypot(self.drift, self.noise))
+        record = VelocityRecord(
+            times[there] + self.latency,
+            measured[there],
+            self.frame,
+            np.where(axes, np.full(shape, sigma)[there], np.nan) if sigma > 0 else None,
+            "simulation",
+        )
+        errors = {"drift": drift[there], "noise": noise[there], "outliers": wild[there]}
+        return Aided(record, times[there], errors | {"bias": bias, "scale": scale, "misalignment": turn})

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import Moving
-from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_master
+from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_sensor
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
 
@@ -185,7 +185,7 @@ class Flights:
             mounting=(heading, pitch, roll),
             attitude_noise=ATTITUDE_NOISE,
         )
-        record = simulate_master(
+        record = simulate_sensor(
             self.body, spec, duration=self.scenario.duration + MORE, seed=self.seed, run=run, scenario=self.case.number
         ).record
         if self.case.drop is not None:
