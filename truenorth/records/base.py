@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -60,23 +60,31 @@ class Guess(NamedTuple):
     option: Mapping[str, Any] = {}  # never written to
 
 
-class Record:
+@dataclass(frozen=True)
+class _Ordered:
+    """What a reader did to the order of the rows: a field of all records, and by name alone."""
+
+    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
+
+
+class Record(_Ordered):
     """Measurements over time: a frozen dataclass with ``time`` (N,), ``source``, and arrays of N rows.
 
-    Kinds of record say what the columns of each array are called in :meth:`groups`, which arrays may be left out
-    (`OPTIONAL`) and which may hold NaN for what is absent in a row (`PARTIAL`).
+    Kinds of record say what the columns of each array are called (`GROUPS`, or :meth:`groups` where it depends on the record),
+    which arrays may be left out (`OPTIONAL`) and which may hold NaN for what is absent in a row (`PARTIAL`). Every record takes
+    ``late``, the rows that a reader put in order.
     """
 
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]]
     OPTIONAL: ClassVar[frozenset[str]] = frozenset()
     PARTIAL: ClassVar[frozenset[str]] = frozenset()
 
     time: Array
     source: str
-    late: Late = IN_ORDER
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """Arrays of the record, each with the names of its columns: one means (N,), three (N, 3), nine (N, 3, 3)."""
-        raise NotImplementedError
+        return self.GROUPS
 
     def __post_init__(self) -> None:
         groups = {name: columns for name, columns in self.groups().items() if self._holds(name)}
@@ -148,7 +156,7 @@ class Record:
         return self._with(time=self.time + offset)
 
     def _with(self, **changes: Any) -> Self:
-        return replace(self, **changes)  # type: ignore[type-var]
+        return replace(self, **changes)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.records.base import IN_ORDER, Late, Record
+from truenorth.records.base import Record
 
 Array = NDArray[np.float64]
 
@@ -24,8 +24,6 @@ class EncoderRecord(Record):
     angles : (N, A) array, rad
         Of A axes, (N,) of a single one; turns are counted, so that an angle can be interpolated.
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -36,7 +34,6 @@ class EncoderRecord(Record):
     time: Array
     angles: Array
     source: str = field(default="encoder record", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """One angle an axis."""

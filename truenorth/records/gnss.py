@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import IN_ORDER, Late, Record, check_positive, check_range
+from truenorth.records.base import Record, check_positive, check_range
 
 Array = NDArray[np.float64]
+PLACE = {"lat": ("lat",), "lon": ("lon",), "alt": ("alt",)}
 HEIGHTS = (-12_000.0, 1_000_000.0)  # m
 
 
@@ -36,8 +37,6 @@ class GnssRecord(Record):
     quality : (N,) array or None
         Indicator of NMEA 0183: 0 no fix, 1 single, 2 differential, 4 RTK fixed, 5 RTK float, 6 dead reckoning.
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -45,6 +44,13 @@ class GnssRecord(Record):
         As for :class:`ImuRecord`; degrees for radians, a sigma that is not positive, not one fix in the record.
     """
 
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = PLACE | {
+        "v_n": ("VE", "VN", "VU"),
+        "position_sigma": ("sigma_E", "sigma_N", "sigma_U"),
+        "velocity_sigma": ("sigma_VE", "sigma_VN", "sigma_VU"),
+        "dop": ("hdop", "vdop"),
+        "quality": ("quality",),
+    }
     OPTIONAL: ClassVar[frozenset[str]] = frozenset({"v_n", "position_sigma", "velocity_sigma", "dop", "quality"})
     PARTIAL: ClassVar[frozenset[str]] = OPTIONAL | {"lat", "lon", "alt"}
 
@@ -58,20 +64,6 @@ class GnssRecord(Record):
     dop: Array | None = None
     quality: Array | None = None
     source: str = field(default="GNSS record", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
-
-    def groups(self) -> Mapping[str, Sequence[str]]:
-        """Columns by array."""
-        return {
-            "lat": ("lat",),
-            "lon": ("lon",),
-            "alt": ("alt",),
-            "v_n": ("VE", "VN", "VU"),
-            "position_sigma": ("sigma_E", "sigma_N", "sigma_U"),
-            "velocity_sigma": ("sigma_VE", "sigma_VN", "sigma_VU"),
-            "dop": ("hdop", "vdop"),
-            "quality": ("quality",),
-        }
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -108,8 +100,6 @@ class HeightRecord(Record):
     sigma : (N,) array or None, m
         One-sigma errors, NaN where not known.
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -117,6 +107,7 @@ class HeightRecord(Record):
         As for :class:`ImuRecord`; a height no vehicle reaches, or a sigma that is not positive.
     """
 
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {"alt": ("alt",), "sigma": ("sigma_U",)}
     OPTIONAL: ClassVar[frozenset[str]] = frozenset({"sigma"})
     PARTIAL: ClassVar[frozenset[str]] = OPTIONAL
 
@@ -124,11 +115,6 @@ class HeightRecord(Record):
     alt: Array
     sigma: Array | None = None
     source: str = field(default="height record", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
-
-    def groups(self) -> Mapping[str, Sequence[str]]:
-        """Columns by array."""
-        return {"alt": ("alt",), "sigma": ("sigma_U",)}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import IN_ORDER, Late, Record
+from truenorth.records.base import Record
 
 Array = NDArray[np.float64]
 KINDS = ("distance", "pulses", "speed")
@@ -33,8 +33,6 @@ class OdometerRecord(Record):
     signed : bool
         Whether reverse driving is negative; where not, all values are magnitudes.
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -48,7 +46,6 @@ class OdometerRecord(Record):
     pulse_size: float | None = None
     signed: bool = True
     source: str = field(default="odometer record", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """``values`` under the name of the kind; without a sign for reverse, under one that says so."""

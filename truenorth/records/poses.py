@@ -10,24 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import GAP_FACTOR, IN_ORDER, Late, Record, check_together
-from truenorth.records.gnss import check_place, in_degrees
+from truenorth.records.base import GAP_FACTOR, Record, check_together
+from truenorth.records.gnss import PLACE, check_place, in_degrees
 from truenorth.records.interpolation import interpolated
 
 Array = NDArray[np.float64]
 ORTHONORMAL = 1e-6  # farthest that C C' may be from the unit matrix
 NINE = tuple(f"C_nb[{i},{j}]" for i in range(3) for j in range(3))
-GROUPS: dict[str, Sequence[str]] = {
-    "lat": ("lat",),
-    "lon": ("lon",),
-    "alt": ("alt",),
-    "v_n": ("VE", "VN", "VU"),
-    "C_nb": NINE,
-}
 
 
 class Poses(Record):
     """What a trajectory and a master share."""
+
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = PLACE | {"v_n": ("VE", "VN", "VU"), "C_nb": NINE}
 
     C_nb: Array | None
     v_n: Array | None
@@ -125,8 +120,6 @@ class Trajectory(Poses):
         East, north, up.
     lat, lon, alt : (N,) arrays, rad and m
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -141,11 +134,6 @@ class Trajectory(Poses):
     lon: Array
     alt: Array
     source: str = field(default="trajectory", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
-
-    def groups(self) -> Mapping[str, Sequence[str]]:
-        """Columns by array."""
-        return GROUPS
 
 
 @dataclass(frozen=True)
@@ -166,8 +154,6 @@ class MasterRecord(Poses):
     f_b : (N, 3) array or None, m/s^2
         Specific force of the master's own accelerometers, in its axes.
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -175,6 +161,11 @@ class MasterRecord(Poses):
         As for :class:`Trajectory`; neither attitude nor velocity, or a part of a position.
     """
 
+    GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
+        **Poses.GROUPS,
+        "w_ib_b": ("gyro_x", "gyro_y", "gyro_z"),
+        "f_b": ("accel_x", "accel_y", "accel_z"),
+    }
     OPTIONAL: ClassVar[frozenset[str]] = frozenset({"C_nb", "v_n", "lat", "lon", "alt", "w_ib_b", "f_b"})
 
     time: Array
@@ -186,12 +177,6 @@ class MasterRecord(Poses):
     w_ib_b: Array | None = None
     f_b: Array | None = None
     source: str = field(default="master record", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
-
-    def groups(self) -> Mapping[str, Sequence[str]]:
-        """Columns by array."""
-        sensors = {"w_ib_b": ("gyro_x", "gyro_y", "gyro_z"), "f_b": ("accel_x", "accel_y", "accel_z")}
-        return GROUPS | sensors
 
     def __post_init__(self) -> None:
         if self.C_nb is None and self.v_n is None:

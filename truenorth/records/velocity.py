@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import IN_ORDER, Late, Record, check_positive
+from truenorth.records.base import Record, check_positive
 
 Array = NDArray[np.float64]
 
@@ -31,8 +31,6 @@ class VelocityRecord(Record):
     sigma : (N, 3) array or None, m/s
         One-sigma errors, NaN where not known.
     source : str
-    late : Late
-        Rows that a reader put in order.
 
     Raises
     ------
@@ -48,7 +46,6 @@ class VelocityRecord(Record):
     frame: Literal["body", "navigation"] = "body"
     sigma: Array | None = None
     source: str = field(default="velocity record", compare=False)
-    late: Late = field(default=IN_ORDER, compare=False, kw_only=True)
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """``velocity`` and ``sigma`` with the columns of the frame."""
