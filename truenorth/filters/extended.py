@@ -67,20 +67,18 @@ def iterated(
 
     The updates are Gauss and Newton's steps towards the largest posterior density.
 
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
     system : NonlinearSystem
         With both Jacobians; without retraction.
-    state : FilterState, optional
-        From an earlier call with the same options, to go on from.
     iterations : int
         At most, of each epoch; 1 is the extended Kalman filter.
     tolerance : float
         Stop where no state moves by more than this part of its sigma.
     gate : Gate, optional
         Leave out measurements whose innovation is not to be believed; they are judged before the iteration.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

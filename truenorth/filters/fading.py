@@ -165,20 +165,18 @@ def fading(
 ) -> Estimates:
     """Fading Kalman filter; the kinds are those of the table above.
 
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
     system : LinearSystem
         For "multiple" and "improved", each row of H has one element that is not zero, and no two rows the same.
-    state : FilterState, optional
-        From an earlier call with the same kind, to go on from.
     kind : "single", "noise", "multiple" or "improved"
         Known as SAKF on P, SAKF on R, MAKF and IMAKF.
     rho : float
         Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
     cap : float
         Largest factor.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

@@ -86,18 +86,15 @@ def h_infinity(
 ) -> Estimates:
     """H-infinity filter.
 
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
-    system : LinearSystem
-    state : FilterState, optional
-        From an earlier call, to go on from.
     bound : float
         g: bound on the estimation error's energy against the normalised disturbance's, in the unit of ``L x``. With a
         growing bound the filter becomes the Kalman filter.
     L : (p, n) array, optional
         What of the state is to be estimated; all of it as a rule.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

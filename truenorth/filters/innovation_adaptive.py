@@ -108,19 +108,17 @@ def innovation_adaptive(
 ) -> Estimates:
     """Kalman filter that takes the measurement noise from a window of innovations or residuals.
 
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
     system : LinearSystem
         With a diagonal R, which is what each row begins with, and without S.
-    state : FilterState, optional
-        From an earlier call, to go on from.
     kind : "innovation" or "residual"
     window : int
         Measurements of a row that count; the variance scatters by ``sqrt(2 / window)`` and more.
     smallest, largest : float
         Limits of the estimated variance, in units of the given one.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

@@ -21,7 +21,7 @@ U. D. Hanebeck, Gaussian filtering using state decomposition methods, 2009 (cond
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -250,21 +250,37 @@ def predict_tangent(size: Size, functions: Functions, w: Workspace, s: Points) -
 
 
 @compiled
+def images(
+    rule: QuadratureRule,
+    order: NDArray[np.int64],
+    function: Any,
+    jacobian: Any,
+    s: Points,
+    image: Array,
+    values: Array,
+    slopes: Array,
+) -> None:
+    """Values of a function of the model at all nodes, and its Jacobians there in the linear states, if there are any."""
+    d = rule.nodes.shape[1]
+    for i in range(len(rule.nodes)):
+        node(rule, i, s)
+        function(s.x, s.p, image)
+        for j in range(len(image)):
+            values[i, j] = image[j]
+        if d < len(s.X):
+            slopes[i][:] = 0.0
+            jacobian(s.x, s.p, slopes[i])
+            clear(order, d, slopes[i])
+
+
+@compiled
 def predict_nodes(
     size: Size, functions: Functions, rule: QuadratureRule, order: NDArray[np.int64], w: Workspace, s: Points
 ) -> bool:
     """``X = E f(x)``, ``P = cov f(x)`` by the rule; P is to be decomposed. False where a number is not finite."""
     N, n = len(size), len(s.X)
     M, d = rule.nodes.shape
-    for i in range(M):
-        node(rule, i, s)
-        functions.transition(s.x, s.p, s.y)
-        for j in range(n):
-            s.Y[i, j] = s.y[j]
-        if d < n:
-            s.J[i][:] = 0.0
-            functions.transition_jacobian(s.x, s.p, s.J[i])
-            clear(order, d, s.J[i])
+    images(rule, order, functions.transition, functions.transition_jacobian, s, s.y, s.Y, s.J)
     regress(rule, s.Y, n, s.X, s.A)
     for i in range(N):
         for j in range(N):
@@ -310,15 +326,7 @@ def measure_nodes(
     """``z - E h(x)`` in place of z, H by regression, ``R + Omega`` in place of R; P is to be decomposed."""
     n, rows = len(s.X), len(s.h)
     M, d = rule.nodes.shape
-    for i in range(M):
-        node(rule, i, s)
-        functions.measurement(s.x, s.p, s.h)
-        for r in range(rows):
-            s.Z[i, r] = s.h[r]
-        if d < n:
-            s.G[i][:] = 0.0
-            functions.measurement_jacobian(s.x, s.p, s.G[i])
-            clear(order, d, s.G[i])
+    images(rule, order, functions.measurement, functions.measurement_jacobian, s, s.h, s.Z, s.G)
     regress(rule, s.Z, rows, s.z_mean, s.C)
     for i in range(M):
         for r in range(rows):

@@ -222,19 +222,12 @@ def gated(
 ) -> Estimates:
     """Kalman filter with a chi-square gate.
 
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
-    system : LinearSystem
-    state : FilterState, optional
-        From an earlier call, to go on from.
-    probability : float
-        With which a good row (or epoch) passes.
-    by : "row" or "epoch"
-        Judge each row, given those before it, or all rows of an epoch together.
-    patience : int, optional
-        After so many rejections in a row the next one is believed: a filter that is wrong itself finds back.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
+    probability, by, patience
+        Of a :class:`Gate`.
 
     Returns
     -------
@@ -264,18 +257,15 @@ def robust(
 ) -> Estimates:
     """Kalman filter with robust weights.
 
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
-    system : LinearSystem
-    state : FilterState, optional
-        From an earlier call, to go on from.
     weighting : "huber" or "igg3"
     k0 : float, optional
         Innovation in sigma up to which a row has full weight; 1.345 (Huber), 1.5 (IGG III) as a rule.
     k1 : float
         Innovation in sigma from which a row has none (IGG III).
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

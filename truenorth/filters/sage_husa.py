@@ -76,18 +76,16 @@ def sage_husa(
 ) -> Estimates:
     """Kalman filter that estimates the measurement noise (Sage and Husa).
 
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
     system : LinearSystem
         With a diagonal R, which is what each row begins with, and without S.
-    state : FilterState, optional
-        From an earlier call, to go on from.
     b : float
         Forgetting factor; the memory is ``1 / (1 - b)`` measurements.
     smallest, largest : float
         Limits of the estimated variance, in units of the given one.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

@@ -30,29 +30,12 @@ def unscented(
     nonlinear: Sequence[int] | None = None,
     **running: Unpack[Guarded],
 ) -> Estimates:
-    """Unscented Kalman filter.
+    """Unscented Kalman filter; the rest of its call is that of :func:`gauss_hermite`.
 
     Parameters
     ----------
-    system : NonlinearSystem
-        Without retraction.
-    state : FilterState, optional
-        From an earlier call with the same options, to go on from.
     alpha, beta, kappa : float
         As in :func:`truenorth.filters.quadrature.unscented_rule`, in as many dimensions as there are nonlinear states.
-    nonlinear
-        As in :func:`gauss_hermite`.
-    **running
-        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
-
-    Returns
-    -------
-    Estimates
-
-    Raises
-    ------
-    UsageError, DataError
-        As :func:`gauss_hermite`.
     """
     order = cholesky_order(system, nonlinear)
     rule = unscented_rule(len(order), alpha=alpha, beta=beta, kappa=kappa)
@@ -66,28 +49,7 @@ def cubature(
     nonlinear: Sequence[int] | None = None,
     **running: Unpack[Guarded],
 ) -> Estimates:
-    """Cubature Kalman filter, of third degree.
-
-    Parameters
-    ----------
-    system : NonlinearSystem
-        Without retraction.
-    state : FilterState, optional
-        From an earlier call with the same options, to go on from.
-    nonlinear
-        As in :func:`gauss_hermite`.
-    **running
-        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
-
-    Returns
-    -------
-    Estimates
-
-    Raises
-    ------
-    UsageError, DataError
-        As :func:`gauss_hermite`.
-    """
+    """Cubature Kalman filter, of third degree; the rest of its call is that of :func:`gauss_hermite`."""
     order = cholesky_order(system, nonlinear)
     rule = cubature_rule(len(order))
     return _by_nodes(system, state, rule, order, **running)
@@ -103,23 +65,17 @@ def gauss_hermite(
 ) -> Estimates:
     """Gauss-Hermite filter.
 
+    `state` and ``**running`` are as of :func:`truenorth.filters.extended`.
+
     Parameters
     ----------
     system : NonlinearSystem
         Without retraction; with both Jacobians where `nonlinear` is given.
-    state : FilterState, optional
-        From an earlier call with the same options, to go on from.
     order : int
         Nodes in each dimension (3, 5, 7 ...); in d dimensions there are ``order**d``.
     nonlinear : sequence of int, optional
         The states in which transition and measurement are not linear; all of them, if not given. The model must be
         linear in the other states once these are given (:func:`truenorth.filters.check_jacobians` tests that).
-    **running
-        ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
-
-    Returns
-    -------
-    Estimates
 
     Raises
     ------

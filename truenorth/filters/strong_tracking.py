@@ -52,11 +52,10 @@ def strong_tracking(
 ) -> Estimates:
     """Strong tracking filter.
 
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
-    system : LinearSystem
-    state : FilterState, optional
-        From an earlier call, to go on from.
     softening : float
         beta, at least 1: how much larger than expected the measurement noise may look before the factor fires; at 1
         the filter is the fading filter of kind "single".
@@ -64,8 +63,6 @@ def strong_tracking(
         Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
     cap : float
         Largest factor.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------

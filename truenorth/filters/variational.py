@@ -121,20 +121,18 @@ def variational(
 ) -> Estimates:
     """Kalman filter that estimates the measurement noise by variational Bayes.
 
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+
     Parameters
     ----------
     system : LinearSystem
         With a diagonal R, the prior guess of the variances, and without S.
-    state : FilterState, optional
-        From an earlier call, to go on from.
     rho : float
         Forgetting factor; the memory is ``1 / (1 - rho)`` epochs.
     worth : float
         How many measurements the given R is worth.
     iterations : int
         Turns an epoch.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Returns
     -------
