@@ -34,43 +34,23 @@ DEFECT = 4.0
 
 @dataclass(frozen=True)
 class Log:
-    """A simulated log and its truth.
-
-    Attributes
-    ----------
-    record : ImuRecord
-    encoder : EncoderRecord or None
-    position : Position
-        Where the IMU is in the mean.
-    C_nb : callable
-        True attitude of the body at a time, s, against the level at that place.
-    """
+    """A simulated log and its truth."""
 
     record: ImuRecord
     encoder: EncoderRecord | None
-    position: Position
-    C_nb: Callable[[float], Array]
+    position: Position  # where the IMU is in the mean
+    C_nb: Callable[[float], Array]  # true attitude of the body at a time, s, against the level at that place
 
 
 @dataclass(frozen=True)
 class Case:
-    """A row of the table.
-
-    Attributes
-    ----------
-    name : str
-    scenario : callable
-        ``scenario(rng)``: the mapping of a scenario, its numbers drawn.
-    align : callable
-        ``align(log)``: the procedure.
-    good : sequence of str
-        Statuses that are no refusal.
-    """
+    """A row of the table."""
 
     name: str
+    # ``scenario(rng)``: the mapping of a scenario, its numbers drawn
     scenario: Callable[[np.random.Generator], Mapping[str, Any]]
-    align: Callable[[Log], Alignment]
-    good: Sequence[str] = ("aligned",)
+    align: Callable[[Log], Alignment]  # ``align(log)``: the procedure
+    good: Sequence[str] = ("aligned",)  # statuses that are no refusal
 
 
 def simulated(scenario: Mapping[str, Any], seed: int, run: int) -> Log:

@@ -52,25 +52,13 @@ DISTURBANCE = 1e-4  # m/s: RMS velocity of a quiet base, over one second
 
 @dataclass(frozen=True)
 class SchemeAdvice:
-    """What one scheme of positions reaches.
-
-    Attributes
-    ----------
-    name : str
-    time : (N,) array, s
-        Lengths of data, turns included.
-    sigma : (N,) array, rad
-        One-sigma of heading after each.
-    reached : float or None, s
-        Length after which the wanted sigma is reached; None if not within the longest.
-    share : mapping of str to float
-        Part of each error source in the variance of heading, at `reached` or else at `least`; greatest first.
-    """
+    """What one scheme of positions reaches."""
 
     name: str
-    time: Array
-    sigma: Array
-    reached: float | None
+    time: Array  # (N,) s: lengths of data, turns included
+    sigma: Array  # (N,) rad: one-sigma of heading after each
+    reached: float | None  # s; length after which the wanted sigma is reached; None if not within the longest
+    # part of each error source in the variance of heading, at `reached` or else at `least`; greatest first
     share: Mapping[str, float]
 
     @property

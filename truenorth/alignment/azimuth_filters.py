@@ -85,12 +85,7 @@ METHODS = {
 
 @dataclass(frozen=True)
 class Belief:
-    """What a filter of the study believes, as factors on its covariances.
-
-    Attributes
-    ----------
-    P0, Q, R : float
-    """
+    """What a filter of the study believes, as factors on its covariances."""
 
     P0: float = 1.0
     Q: float = 1.0
@@ -101,23 +96,13 @@ NOMINAL = Belief()
 
 
 class Logs(NamedTuple):
-    """Logs of R runs on one time axis.
+    """Logs of R runs on one time axis."""
 
-    Attributes
-    ----------
-    steps : (N,) array, s
-    dtheta, dvel : (R, N, 3) arrays, rad and m/s
-    wheel : (R, N) array, m
-        Distance in each sample.
-    rows : (K+1,) array of int
-        Samples before each epoch.
-    """
-
-    steps: Array
-    dtheta: Array
-    dvel: Array
-    wheel: Array
-    rows: NDArray[np.int64]
+    steps: Array  # (N,) s
+    dtheta: Array  # (R, N, 3) rad
+    dvel: Array  # (R, N, 3) m/s
+    wheel: Array  # (R, N) m: distance in each sample
+    rows: NDArray[np.int64]  # (K+1,): samples before each epoch
 
 
 class Begin(NamedTuple):
@@ -145,40 +130,20 @@ class Begin(NamedTuple):
 
 @dataclass(frozen=True)
 class Solution:
-    """What a filter found for B runs at K epochs after the beginning.
+    """What a filter found for B runs at K epochs after the beginning."""
 
-    Attributes
-    ----------
-    C_nb : (B, K, 3, 3) array
-    v_n : (B, K, 3) array, m/s
-    position : (B, K, 3) array
-    errors : (B, K, 7) array
-        Gyro and accelerometer bias, relative scale of the odometer.
-    sigma : (B, K, 16) array
-    P : (B, K, 16, 16) array
-        K = 0 where it was not asked for.
-    innovation, innovation_sigma : (B, K, 3) arrays, m
-    nis : (B, K) array
-    used : (B, K) array of bool
-        Not rejected by the gate.
-    lost : (B,) array of bool
-        Given up: a tilt beyond half a radian, where the model has no meaning.
-    acted : (B,) array
-        Share of the epochs in which a factor of strong tracking was above 1.
-    """
-
-    C_nb: Array
-    v_n: Array
-    position: Array
-    errors: Array
-    sigma: Array
-    P: Array
-    innovation: Array
-    innovation_sigma: Array
-    nis: Array
-    used: NDArray[np.bool_]
-    lost: NDArray[np.bool_]
-    acted: Array
+    C_nb: Array  # (B, K, 3, 3)
+    v_n: Array  # (B, K, 3) m/s
+    position: Array  # (B, K, 3)
+    errors: Array  # (B, K, 7): gyro and accelerometer bias, relative scale of the odometer
+    sigma: Array  # (B, K, 16)
+    P: Array  # (B, K, 16, 16): K = 0 where it was not asked for
+    innovation: Array  # (B, K, 3) m
+    innovation_sigma: Array  # (B, K, 3) m
+    nis: Array  # (B, K)
+    used: NDArray[np.bool_]  # (B, K): not rejected by the gate
+    lost: NDArray[np.bool_]  # (B,): given up: a tilt beyond half a radian, where the model has no meaning
+    acted: Array  # (B,): share of the epochs in which a factor of strong tracking was above 1
 
 
 def run_loop(

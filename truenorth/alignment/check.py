@@ -34,20 +34,12 @@ HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
 
 @dataclass(frozen=True)
 class LogCheck:
-    """Components of rate and specific force that the log lets us check, measured minus expected, with their noise.
+    """Components of rate and specific force that the log lets us check, measured minus expected, with their noise."""
 
-    Attributes
-    ----------
-    rate_residual, rate_noise : (2,) arrays, rad/s
-        Along north and up.
-    force_residual, force_noise : float, m/s^2
-        Along up.
-    """
-
-    rate_residual: Array
-    rate_noise: Array
-    force_residual: float
-    force_noise: float
+    rate_residual: Array  # (2,) rad/s: along north and up
+    rate_noise: Array  # (2,) rad/s
+    force_residual: float  # m/s^2; along up
+    force_noise: float  # m/s^2
 
 
 def check_means(m: Means, lat: float, g: float) -> LogCheck:

@@ -31,29 +31,17 @@ ONSETS = (0.25, 0.5, 0.75)
 
 @dataclass(frozen=True)
 class Drift:
-    """The best matching drift.
+    """The best matching drift."""
 
-    Attributes
-    ----------
-    ratio : float
-        Twice the logarithm of the likelihood ratio; chi-square with one degree of freedom where there is no drift.
-    kind, axis : str
-        ``step`` or ``ramp`` of velocity; ``east`` or ``north``.
-    onset : float, s
-        Since the beginning of the log.
-    velocity : float, m/s
-        At the end of the log.
-    heading, level : float, rad
-        Errors that the drift leaves in the answer: the largest of all signatures that match beyond chance.
-    """
-
+    # twice the logarithm of the likelihood ratio; chi-square with one degree of freedom where there is no drift
     ratio: float
-    kind: str
+    kind: str  # ``step`` or ``ramp`` of velocity; ``east`` or ``north``
     axis: str
-    onset: float
-    velocity: float
+    onset: float  # s; since the beginning of the log
+    velocity: float  # m/s; at the end of the log
+    # rad; errors that the drift leaves in the answer: the largest of all signatures that match beyond chance
     heading: float
-    level: float
+    level: float  # rad
 
     @property
     def found(self) -> bool:

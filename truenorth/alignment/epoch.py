@@ -17,24 +17,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Epoch:
-    """A time, the last row before it, and the turn from there on.
+    """A time, the last row before it, and the turn from there on."""
 
-    Attributes
-    ----------
-    time : float, s
-        On the record's clock.
-    elapsed : float, s
-        Since the beginning of the first row's interval.
-    row : int
-        The last row at or before `time`.
-    turn : (3,) array, rad
-        Rotation vector from that row to `time`.
-    """
-
-    time: float
-    elapsed: float
-    row: int
-    turn: Array
+    time: float  # s; on the record's clock
+    elapsed: float  # s; since the beginning of the first row's interval
+    row: int  # the last row at or before `time`
+    turn: Array  # (3,) rad: rotation vector from that row to `time`
 
     def attitude(self, C_ib: Array) -> Array:
         """Attitude at the epoch, of the attitude after its row."""

@@ -34,41 +34,20 @@ SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at
 
 @dataclass(frozen=True)
 class FineAlignment:
-    """What the last pass of the filter left.
-
-    Attributes
-    ----------
-    integrals : InertialIntegrals
-    C_n0_i : (3, 3) array
-        Nominal attitude of the last pass; states are errors of it.
-    nominal_bias : (6,) array
-        Gyro and accelerometer biases taken off before the last pass.
-    system : LinearSystem
-    estimates : Estimates
-        With the whole history of x and P.
-    gains : Gains
-        That the filter used.
-    floor : (K, n, n) array
-        The part of the covariance that the biases alone make, ``P = floor + random``: what waiting does not improve.
-    disturbance : (3,) array, m/s
-        RMS mean velocity of the base (E, N, U) as the filter took it.
-    passes : int
-    settled : bool
-        Whether the last pass moved nothing by more than a small part of its sigma.
-    form : {"velocity", "force"}
-        What the innovations and the disturbance are of: the base's mean velocity, or the velocity it gains in an interval.
-    """
+    """What the last pass of the filter left."""
 
     integrals: InertialIntegrals
-    C_n0_i: Array
-    nominal_bias: Array
+    C_n0_i: Array  # (3, 3): nominal attitude of the last pass; states are errors of it
+    nominal_bias: Array  # (6,): gyro and accelerometer biases taken off before the last pass
     system: LinearSystem
-    estimates: Estimates
-    gains: Gains
+    estimates: Estimates  # with the whole history of x and P
+    gains: Gains  # that the filter used
+    # (K, n, n): the part of the covariance that the biases alone make, ``P = floor + random``: what waiting does not improve
     floor: Array
-    disturbance: Array
+    disturbance: Array  # (3,) m/s: RMS mean velocity of the base (E, N, U) as the filter took it
     passes: int
-    settled: bool
+    settled: bool  # whether the last pass moved nothing by more than a small part of its sigma
+    # what the innovations and the disturbance are of: the base's mean velocity, or the velocity it gains in an interval
     form: Form
 
     @classmethod

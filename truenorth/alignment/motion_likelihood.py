@@ -30,17 +30,10 @@ LOWEST_BIN = 3  # slower than this is the trend's
 
 @dataclass(frozen=True)
 class Walks:
-    """Random walks that reach the velocity beside the base's motion: of the accelerometers, and of the gyros through gravity.
+    """Random walks that reach the velocity beside the base's motion: of the accelerometers, and of the gyros through gravity."""
 
-    Attributes
-    ----------
-    velocity : float, m/s/sqrt(s)
-    tilt : float, m/s^2/sqrt(s)
-        Random walk of angle times gravity.
-    """
-
-    velocity: float
-    tilt: float
+    velocity: float  # m/s/sqrt(s)
+    tilt: float  # m/s^2/sqrt(s); random walk of angle times gravity
 
     def blocks(self, interval: float) -> tuple[Array, Array]:
         """Transition and noise of velocity and acceleration."""

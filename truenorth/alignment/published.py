@@ -114,24 +114,13 @@ def _allowing(faded: Estimates, plain: Estimates) -> Estimates:
 
 
 class Stationary(NamedTuple):
-    """What a filter of ten or eight states found.
+    """What a filter of ten or eight states found."""
 
-    Attributes
-    ----------
-    C_n0_b : (3, 3) array
-        At the epoch.
-    covariance, floor : (3, 3) arrays, rad^2
-        Of phi in ``n0``, and the part of it that the biases make.
-    bias, bias_sigma : (6,) arrays
-        Gyros, accelerometers; that of the vertical accelerometer is no state and stays NaN.
-    settled : bool
-    """
-
-    C_n0_b: Array
-    covariance: Array
-    floor: Array
-    bias: Array
-    bias_sigma: Array
+    C_n0_b: Array  # (3, 3): at the epoch
+    covariance: Array  # (3, 3) rad^2: of phi in ``n0``, and the part of it that the biases make
+    floor: Array  # (3, 3) rad^2
+    bias: Array  # (6,): gyros, accelerometers; that of the vertical accelerometer is no state and stays NaN
+    bias_sigma: Array  # (6,)
     settled: bool
 
 

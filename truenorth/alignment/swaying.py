@@ -41,20 +41,12 @@ FILTER_PASSES = 8
 
 @dataclass(frozen=True)
 class Mount:
-    """How the IMU sits on the base.
+    """How the IMU sits on the base."""
 
-    Attributes
-    ----------
-    arm : (3,) array, m
-        From the base's centre of rotation to the IMU, base axes.
-    arm_sigma : float, m
-        One sigma along each axis; zero where it is known.
-    C_sb : (K+1, 3, 3) array or None
-        Attitude of the base in the IMU at the ends of the filter intervals (an indexer's); None where the two are one.
-    """
-
-    arm: Array
-    arm_sigma: float = 0.0
+    arm: Array  # (3,) m: from the base's centre of rotation to the IMU, base axes
+    arm_sigma: float = 0.0  # m; one sigma along each axis; zero where it is known
+    # (K+1, 3, 3): attitude of the base in the IMU at the ends of the filter intervals (an indexer's); None where the two are
+    # one
     C_sb: Array | None = None
 
 
@@ -63,18 +55,11 @@ UNKNOWN_ARM = Mount(np.zeros(3), ARM_PRIOR)
 
 @dataclass(frozen=True)
 class SwayAlignment(FineAlignment):
-    """What the last pass of the filter left; see :class:`FineAlignment`.
+    """What the last pass of the filter left; see :class:`FineAlignment`."""
 
-    Attributes
-    ----------
-    motion : tuple of three AxisMotion
-        Along E, N, U.
-    arm, arm_sigma : (3,) arrays, m
-    """
-
-    motion: tuple[AxisMotion, ...]
-    arm: Array
-    arm_sigma: Array
+    motion: tuple[AxisMotion, ...]  # along E, N, U
+    arm: Array  # (3,) m
+    arm_sigma: Array  # (3,) m
 
 
 @dataclass(frozen=True)

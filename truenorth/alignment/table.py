@@ -18,22 +18,12 @@ PPM = 1e-6
 
 @dataclass(frozen=True)
 class TablePosition:
-    """One position.
+    """One position."""
 
-    Attributes
-    ----------
-    start, stop : float, s
-        On the record's clock.
-    C_nb : (3, 3) array
-        Attitude in its middle.
-    turn : (3,) array, rad
-        Rotation vector from the position before, body axes; zero of the first.
-    """
-
-    start: float
-    stop: float
-    C_nb: Array
-    turn: Array
+    start: float  # s; on the record's clock
+    stop: float  # s
+    C_nb: Array  # (3, 3): attitude in its middle
+    turn: Array  # (3,) rad: rotation vector from the position before, body axes; zero of the first
 
     def summary(self) -> dict[str, Any]:
         """Times and angles in datasheet units."""
@@ -50,28 +40,16 @@ class TablePosition:
 
 @dataclass(frozen=True)
 class TurntableErrors:
-    """Positions, and the sensors' errors that turns bring to light.
-
-    Attributes
-    ----------
-    positions : tuple of TablePosition
-    touch : Touch or None
-        A step of the specific force that no turn explains.
-    gyro_matrix, gyro_matrix_sigma : (3, 3) arrays
-        ``w_hat = (I + M) w + bias``: scale factors on the diagonal, misalignments beside it.
-    accel_matrix, accel_matrix_sigma : (3, 3) arrays
-    arm, arm_sigma : (3,) arrays, m
-        Place of the IMU from where the table's axes meet.
-    """
+    """Positions, and the sensors' errors that turns bring to light."""
 
     positions: tuple[TablePosition, ...]
-    touch: Touch | None
-    gyro_matrix: Array
-    gyro_matrix_sigma: Array
-    accel_matrix: Array
-    accel_matrix_sigma: Array
-    arm: Array
-    arm_sigma: Array
+    touch: Touch | None  # a step of the specific force that no turn explains
+    gyro_matrix: Array  # (3: ``w_hat = (I + M) w + bias``: scale factors on the diagonal, misalignments beside it
+    gyro_matrix_sigma: Array  # 3)
+    accel_matrix: Array  # (3
+    accel_matrix_sigma: Array  # 3)
+    arm: Array  # (3,) m: place of the IMU from where the table's axes meet
+    arm_sigma: Array  # (3,) m
 
     def summary(self, heading_known: bool) -> dict[str, Any]:
         """For the flat summary of the alignment."""

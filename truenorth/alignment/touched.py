@@ -28,21 +28,11 @@ FACTOR = 10.0  # of the usual scatter of such differences: a false alarm in less
 
 @dataclass(frozen=True)
 class Touch:
-    """A step of the specific force.
+    """A step of the specific force."""
 
-    Attributes
-    ----------
-    time : float, s
-        On the record's clock, about.
-    step : (2,) array, m/s^2
-        Along east and north, of the answer's heading.
-    usual : float, m/s^2
-        Scatter of such differences elsewhere in the position.
-    """
-
-    time: float
-    step: Array
-    usual: float
+    time: float  # s; on the record's clock, about
+    step: Array  # (2,) m/s^2: along east and north, of the answer's heading
+    usual: float  # m/s^2; scatter of such differences elsewhere in the position
 
     @property
     def size(self) -> float:

@@ -30,24 +30,12 @@ CHANCE = 5.0  # sigmas by which a correlation must exceed that of unrelated sign
 
 
 class Found(NamedTuple):
-    """A delay that the motion itself tells.
+    """A delay that the motion itself tells."""
 
-    Attributes
-    ----------
-    delay : float, s
-        Of the master's stamps behind the slave's clock.
-    correlation : float
-        Of the signals at that shift.
-    rival : float
-        The highest correlation elsewhere.
-    sure : bool
-        The correlation is high, no chance, and the only one.
-    """
-
-    delay: float
-    correlation: float
-    rival: float
-    sure: bool
+    delay: float  # s; of the master's stamps behind the slave's clock
+    correlation: float  # of the signals at that shift
+    rival: float  # the highest correlation elsewhere
+    sure: bool  # the correlation is high, no chance, and the only one
 
 
 def find_delay(

@@ -39,55 +39,29 @@ KINDS = ("master velocity", "master attitude")
 
 @dataclass(frozen=True)
 class SlaveStart:
-    """Where the slave is said to be at the beginning, and what is assumed.
+    """Where the slave is said to be at the beginning, and what is assumed."""
 
-    Attributes
-    ----------
-    C_nb : (3, 3) array
-    v_n : (3,) array, m/s
-    lat, lon, alt : float, rad, rad, m
-    P : (n, n) array
-        Of the states of a :class:`truenorth.errors.master.TransferModel`.
-    C_mb : (3, 3) array
-        Slave to master axes.
-    arm : (3,) array, m
-        Master to slave, slave axes.
-    delay : float, s
-        Of the master.
-    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
-    """
-
-    C_nb: Array
-    v_n: Array
-    lat: float
-    lon: float
-    alt: float
-    P: Array
-    C_mb: Array = field(default_factory=lambda: np.eye(3))
-    arm: Array = field(default_factory=lambda: np.zeros(3))
-    delay: float = 0.0
-    gyro_bias: Array = field(default_factory=lambda: np.zeros(3))
-    accel_bias: Array = field(default_factory=lambda: np.zeros(3))
+    C_nb: Array  # (3, 3)
+    v_n: Array  # (3,) m/s
+    lat: float  # rad
+    lon: float  # rad
+    alt: float  # m
+    P: Array  # (n, n): of the states of a :class:`truenorth.errors.master.TransferModel`
+    C_mb: Array = field(default_factory=lambda: np.eye(3))  # (3, 3): slave to master axes
+    arm: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m: master to slave, slave axes
+    delay: float = 0.0  # s; of the master
+    gyro_bias: Array = field(default_factory=lambda: np.zeros(3))  # (3,) rad/s
+    accel_bias: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m/s^2
 
 
 @dataclass(frozen=True)
 class Matching:
-    """What of the master is matched, and how much it is believed.
+    """What of the master is matched, and how much it is believed."""
 
-    Attributes
-    ----------
-    velocity_sigma, attitude_sigma : float, m/s and rad
-        White noise of each row and axis; infinite: not matched.
-    gate : float
-        Probability of rejecting a sound row; 0: none is rejected.
-    patience : float, s
-        Rejections for so long are a jump: the state that takes it up is opened again.
-    """
-
-    velocity_sigma: float
-    attitude_sigma: float = float("inf")
-    gate: float = 0.0
-    patience: float = 1.0
+    velocity_sigma: float  # m/s; white noise of each row and axis; infinite: not matched
+    attitude_sigma: float = float("inf")  # rad
+    gate: float = 0.0  # probability of rejecting a sound row; 0: none is rejected
+    patience: float = 1.0  # s; rejections for so long are a jump: the state that takes it up is opened again
 
 
 @dataclass(frozen=True)
@@ -100,46 +74,24 @@ class Linear:
 
 @dataclass(frozen=True)
 class TransferTrack:
-    """The slave at each row of the master, as known then.
+    """The slave at each row of the master, as known then."""
 
-    Attributes
-    ----------
-    time : (K,) array, s
-        At which the row holds by the delay as known then, on the slave's clock.
-    delay : float, s
-        The known one.
-    row : (K,) int array
-        The master's.
-    C_nb : (K, 3, 3) array
-    v_n, position : (K, 3) arrays
-    aux : (K, n) array
-        What is assumed in the places of the states: biases, delay and lever arm beside the known ones, flexure.
-    C_mb : (K, 3, 3) array
-    sigma : (K, n) array
-    P : (K, n, n) array
-    innovation, innovation_sigma : (K, 6) arrays
-        Velocity (m/s) and attitude (rad); NaN where absent.
-    nis : (K, 2) array
-    verdict : (K, 2) int array
-        `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`.
-    slow : (6,) array
-        Variance of what in the innovations is an error of the master's own, which does not change from row to row.
-    """
-
-    time: Array
-    delay: float
-    row: Integers
-    C_nb: Array
-    v_n: Array
-    position: Array
+    time: Array  # (K,) s: at which the row holds by the delay as known then, on the slave's clock
+    delay: float  # s; the known one
+    row: Integers  # (K,): the master's
+    C_nb: Array  # (K, 3, 3)
+    v_n: Array  # (K
+    position: Array  # 3)
+    # (K, n): what is assumed in the places of the states: biases, delay and lever arm beside the known ones, flexure
     aux: Array
-    C_mb: Array
-    sigma: Array
-    P: Array
-    innovation: Array
-    innovation_sigma: Array
-    nis: Array
-    verdict: Integers
+    C_mb: Array  # (K, 3, 3)
+    sigma: Array  # (K, n)
+    P: Array  # (K, n, n)
+    innovation: Array  # (K: velocity (m/s) and attitude (rad); NaN where absent
+    innovation_sigma: Array  # 6)
+    nis: Array  # (K, 2)
+    verdict: Integers  # (K, 2): `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`
+    # (6,): variance of what in the innovations is an error of the master's own, which does not change from row to row
     slow: Array
 
     @property

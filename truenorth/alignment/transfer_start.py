@@ -33,28 +33,15 @@ FIRST = 1.0  # s over which those are taken
 
 @dataclass(frozen=True)
 class Assumed:
-    """What is assumed of the master, one-sigma beside it; a sigma of 0: known, no state.
+    """What is assumed of the master, one-sigma beside it; a sigma of 0: known, no state."""
 
-    Attributes
-    ----------
-    lever_arm : (3,) array, m
-        Master to slave, slave axes.
-    lever_arm_sigma : float, m
-    delay, delay_sigma : float, s
-    C_mb : (3, 3) array
-        Slave to master axes.
-    mounting_sigma : float, rad
-    heading : float or None, rad
-        Of the slave at the start, where no master tells attitude; else its course.
-    """
-
-    lever_arm: Array
-    lever_arm_sigma: float
-    delay: float
-    delay_sigma: float
-    C_mb: Array
-    mounting_sigma: float
-    heading: float | None = None
+    lever_arm: Array  # (3,) m: master to slave, slave axes
+    lever_arm_sigma: float  # m
+    delay: float  # s
+    delay_sigma: float  # s
+    C_mb: Array  # (3, 3): slave to master axes
+    mounting_sigma: float  # rad
+    heading: float | None = None  # rad; of the slave at the start, where no master tells attitude; else its course
 
 
 def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:

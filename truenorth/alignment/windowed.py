@@ -25,24 +25,12 @@ BASE_VELOCITY = 1e-3  # m/s: what the window leaves of the motion; only weighs t
 
 
 class WindowedFit(NamedTuple):
-    """Least-squares states.
+    """Least-squares states."""
 
-    Attributes
-    ----------
-    x0 : (n,) array
-        Before the first epoch.
-    x : (n,) array
-        At the last epoch.
-    residual : (K, m) array
-        What the fit leaves of z.
-    response : (K, m, n) array
-        ``z_k`` for a unit of each state before the first epoch.
-    """
-
-    x0: Array
-    x: Array
-    residual: Array
-    response: Array
+    x0: Array  # (n,): before the first epoch
+    x: Array  # (n,): at the last epoch
+    residual: Array  # (K, m): what the fit leaves of z
+    response: Array  # (K, m, n): ``z_k`` for a unit of each state before the first epoch
 
 
 def hann(count: int) -> Array:

@@ -25,21 +25,11 @@ DIGITS = 3  # of a coefficient
 
 @dataclass(frozen=True)
 class Combination:
-    """A weighted sum of states.
+    """A weighted sum of states."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of its states; the first has the coefficient 1.
-    coefficients : tuple of float
-        SI.
-    units : tuple of str
-        Of the coefficients; empty for a pure number.
-    """
-
-    names: tuple[str, ...]
-    coefficients: tuple[float, ...]
-    units: tuple[str, ...]
+    names: tuple[str, ...]  # of its states; the first has the coefficient 1
+    coefficients: tuple[float, ...]  # SI
+    units: tuple[str, ...]  # of the coefficients; empty for a pure number
 
     def __str__(self) -> str:
         text = self.names[0]

@@ -45,29 +45,14 @@ class Consistency:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Autocorrelation of innovations, and the portmanteau test that they are white.
+    """Autocorrelation of innovations, and the portmanteau test that they are white."""
 
-    Parameters
-    ----------
-    autocorrelation : (L, m) array
-        Of each row at lags 1 to L epochs; not centred, so that a bias shows too.
-    band : (L, m) array
-        Half-width of the band of each.
-    statistic : float
-        Ljung and Box's sum over lags and rows, chi-square with `dof` degrees of freedom.
-    dof : int
-    p_value : float
-        Probability of so much colour, or more, from white innovations.
-    white : bool
-        Whether ``p_value > 1 - level``.
-    """
-
-    autocorrelation: Array
-    band: Array
-    statistic: float
+    autocorrelation: Array  # (L, m): of each row at lags 1 to L epochs; not centred, so that a bias shows too
+    band: Array  # (L, m): half-width of the band of each
+    statistic: float  # Ljung and Box's sum over lags and rows, chi-square with `dof` degrees of freedom
     dof: int
-    p_value: float
-    white: bool
+    p_value: float  # probability of so much colour, or more, from white innovations
+    white: bool  # whether ``p_value > 1 - level``
 
 
 def chi_square_quantile(probability: ArrayLike, dof: ArrayLike) -> Array:

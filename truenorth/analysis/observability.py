@@ -30,21 +30,11 @@ HARDLY = 0.1  # coefficients that do not matter where a direction is only hardly
 
 
 class Segment(NamedTuple):
-    """A span in which the system does not change.
+    """A span in which the system does not change."""
 
-    Attributes
-    ----------
-    F : (n, n) array, 1/s
-        ``x' = F x``.
-    H : (m, n) array
-        ``z = H x``.
-    duration : float, s
-        Until the next segment.
-    """
-
-    F: Array
-    H: Array
-    duration: float = 1.0
+    F: Array  # (n, n) 1/s: ``x' = F x``
+    H: Array  # (m, n): ``z = H x``
+    duration: float = 1.0  # s; until the next segment
 
 
 @dataclass(frozen=True)

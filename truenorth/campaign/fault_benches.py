@@ -42,20 +42,11 @@ RECEIVER = {"rate": "1 Hz", "position_noise": "1 m", "velocity_noise": "0.05 m/s
 
 @dataclass(frozen=True)
 class Bench:
-    """One procedure.
-
-    Attributes
-    ----------
-    name : str
-    scenario : callable
-        Draws one.
-    align : callable
-        Inputs to an alignment or a navigation.
-    """
+    """One procedure."""
 
     name: str
-    scenario: Callable[[np.random.Generator], Mapping[str, Any]]
-    align: Callable[[Inputs], Alignment | Navigation]
+    scenario: Callable[[np.random.Generator], Mapping[str, Any]]  # draws one
+    align: Callable[[Inputs], Alignment | Navigation]  # inputs to an alignment or a navigation
 
     def draw(self, seed: int, run: int) -> tuple[Inputs, Truth]:
         """A sound log of its own motion and errors, and its truth."""

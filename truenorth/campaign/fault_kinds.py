@@ -21,19 +21,11 @@ Inputs = dict[str, Any]  # of a procedure: its records, its place, its specifica
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that goes wrong.
-
-    Attributes
-    ----------
-    name : str
-    needs : str
-        The input that it spoils; procedures without it are not asked.
-    apply : callable
-        Inputs and a generator to the spoilt inputs and the drawn size in words.
-    """
+    """One thing that goes wrong."""
 
     name: str
-    needs: str
+    needs: str  # the input that it spoils; procedures without it are not asked
+    # inputs and a generator to the spoilt inputs and the drawn size in words
     apply: Callable[[Inputs, np.random.Generator], tuple[Inputs, str]]
 
 

@@ -21,28 +21,16 @@ GOOD = ("aligned", "level_only", "navigated")
 
 
 class Trial(NamedTuple):
-    """One run of one fault on one procedure.
-
-    Attributes
-    ----------
-    procedure, fault : str
-    run : int
-    size : str
-        What was drawn.
-    outcome : str
-        ``refused``: an error with a message; ``flagged``: no good status, or a warning; ``harmless``: within three sigmas;
-        ``silent``: a good status, and wrong; ``crash``: anything else.
-    worst : float
-        The largest error in its sigma, of any output.
-    reason : str
-    """
+    """One run of one fault on one procedure."""
 
     procedure: str
     fault: str
     run: int
-    size: str
+    size: str  # what was drawn
+    # ``refused``: an error with a message; ``flagged``: no good status, or a warning; ``harmless``: within three sigmas;
+    # ``silent``: a good status, and wrong; ``crash``: anything else
     outcome: Outcome
-    worst: float
+    worst: float  # the largest error in its sigma, of any output
     reason: str
 
 

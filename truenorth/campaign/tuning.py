@@ -70,23 +70,13 @@ class Search(Strict):
 
 @dataclass(frozen=True, repr=False)
 class Tuned(Shown):
-    """The outcome of a search.
-
-    Attributes
-    ----------
-    search : Search
-    spec : ImuSpec
-        The best found.
-    trials : DataFrame
-        Terms (SI), rms, nees and whether it is in its band, one row a trial.
-    judged : DataFrame
-        The best and the simulated IMU's own specification on runs of another seed, which the search never saw: rms with its
-        interval, rms_over_sigma, nees with its band.
-    """
+    """The outcome of a search."""
 
     search: Search
-    spec: ImuSpec
-    trials: pd.DataFrame
+    spec: ImuSpec  # the best found
+    trials: pd.DataFrame  # terms (SI), rms, nees and whether it is in its band, one row a trial
+    # the best and the simulated IMU's own specification on runs of another seed, which the search never saw: rms with its
+    # interval, rms_over_sigma, nees with its band
     judged: pd.DataFrame
 
     def in_brief(self) -> dict[str, str]:

@@ -52,24 +52,12 @@ FIRST = 0.25  # of the time elapsed, that GNSS's noise at a single epoch shall n
 
 @dataclass(frozen=True)
 class MovingAttitude:
-    """What coarse alignment on the move found.
+    """What coarse alignment on the move found."""
 
-    Attributes
-    ----------
-    time : (K+1,) array, s
-        Ends of the intervals, since the beginning of the first sample.
-    C_n0_i : (3, 3) array
-        Body to ENU at the beginning of the first sample.
-    history : (K, 3, 3) array
-        The same as known at each epoch but the first.
-    position : (K+1, 3) array
-        Latitude, longitude (rad) and height (m) along the way.
-    """
-
-    time: Array
-    C_n0_i: Array
-    history: Array
-    position: Array
+    time: Array  # (K+1,) s: ends of the intervals, since the beginning of the first sample
+    C_n0_i: Array  # (3, 3): body to ENU at the beginning of the first sample
+    history: Array  # (K, 3, 3): the same as known at each epoch but the first
+    position: Array  # (K+1, 3): latitude, longitude (rad) and height (m) along the way
 
 
 def odometer_alignment(

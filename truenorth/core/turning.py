@@ -23,27 +23,14 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Turning:
-    """How the gyros explain the turning of gravity in body axes.
+    """How the gyros explain the turning of gravity in body axes."""
 
-    Parameters
-    ----------
-    scale : float
-        Measured rate over the rate that gravity's direction shows, axes as given; NaN where nothing turned.
-    agreement : float
-        Share of gravity's turning explained with the axes as given and that scale, at most 1.
-    best_axes : str
-        Signed axes, such as ``+y +x -z``, of the reading that agrees best: what the gyro columns x, y, z hold.
-    best_agreement : float
-        Its agreement.
-    best_scale : float
-        Measured rate over the rate that gravity's direction shows, in that reading.
-    """
-
-    scale: float
-    agreement: float
+    scale: float  # measured rate over the rate that gravity's direction shows, axes as given; NaN where nothing turned
+    agreement: float  # share of gravity's turning explained with the axes as given and that scale, at most 1
+    # signed axes, such as ``+y +x -z``, of the reading that agrees best: what the gyro columns x, y, z hold
     best_axes: str
-    best_agreement: float
-    best_scale: float
+    best_agreement: float  # its agreement
+    best_scale: float  # measured rate over the rate that gravity's direction shows, in that reading
 
 
 def fit_turning(interval: float, rates: Array) -> Turning:

@@ -35,23 +35,12 @@ OTHERS = (0.6, 1.0, 1.6, 2.5, 4.0)
 
 @dataclass(frozen=True)
 class Design:
-    """A network and what it does to a level channel.
-
-    Attributes
-    ----------
-    network : Network
-    overshoot : float
-        Of the step response, as a part of its final value.
-    settling : float, s
-        After which it stays within 5 % of it.
-    leak : float
-        Largest ``|1 - H|``: the part of a manoeuvre's velocity that gets into the loop.
-    """
+    """A network and what it does to a level channel."""
 
     network: Network
-    overshoot: float
-    settling: float
-    leak: float
+    overshoot: float  # of the step response, as a part of its final value
+    settling: float  # s; after which it stays within 5 % of it
+    leak: float  # largest ``|1 - H|``: the part of a manoeuvre's velocity that gets into the loop
 
 
 def step_response(network: Network, time: Array) -> Array:

@@ -111,40 +111,22 @@ def master_errors(given: MasterErrors | str | None) -> MasterErrors:
 
 @dataclass(frozen=True)
 class TransferModel:
-    """Noise of the slave, and which groups there are; one-sigma, SI.
+    """Noise of the slave, and which groups there are; one-sigma, SI."""
 
-    Attributes
-    ----------
-    gyro_random_walk : float, rad/sqrt(s)
-    accel_random_walk : float, m/s/sqrt(s)
-    gyro_rate_walk, accel_rate_walk : float
-        Random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s).
-    turn_noise : float, s
-        What scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.errors.model.InsModel`.
-    delay, lever_arm, mounting : bool
-        Groups for them.
-    delay_walk : float, s/sqrt(s)
-        How the delay wanders, for a master whose clock runs at another rate.
-    flexure_sigma : (3,) tuple, rad
-        Of the seat's angles about right, forward, up; zeros: it does not bend, and there are no such states.
-    flexure_beta : float, rad/s
-        Natural frequency of its critically damped processes.
-    master : MasterErrors
-        Of the master itself; zeros: it is taken for the truth.
-    """
-
-    gyro_random_walk: float
-    accel_random_walk: float
-    gyro_rate_walk: float = 0.0
+    gyro_random_walk: float  # rad/sqrt(s)
+    accel_random_walk: float  # m/s/sqrt(s)
+    gyro_rate_walk: float = 0.0  # random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s)
     accel_rate_walk: float = 0.0
+    # s; what scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.errors.model.InsModel`
     turn_noise: float = 0.0
-    delay: bool = True
+    delay: bool = True  # groups for them
     lever_arm: bool = True
     mounting: bool = False
-    delay_walk: float = 0.0
+    delay_walk: float = 0.0  # s/sqrt(s); how the delay wanders, for a master whose clock runs at another rate
+    # (3,) rad: of the seat's angles about right, forward, up; zeros: it does not bend, and there are no such states
     flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    flexure_beta: float = 1.0
-    master: MasterErrors = MasterErrors()
+    flexure_beta: float = 1.0  # rad/s; natural frequency of its critically damped processes
+    master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
 
     def __post_init__(self) -> None:
         walks = (self.gyro_random_walk, self.accel_random_walk, self.gyro_rate_walk, self.accel_rate_walk)

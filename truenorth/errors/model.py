@@ -24,29 +24,16 @@ GYRO_SCALE, ACCEL_SCALE = "gyro scale factor", "accelerometer scale factor"
 
 @dataclass(frozen=True)
 class InsModel:
-    """Noise of an INS, and its states; everything one-sigma, SI.
+    """Noise of an INS, and its states; everything one-sigma, SI."""
 
-    Attributes
-    ----------
-    gyro_random_walk : float, rad/sqrt(s)
-    accel_random_walk : float, m/s/sqrt(s)
-    gyro_rate_walk, accel_rate_walk : float
-        Random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s).
-    turn_noise : (2,) tuple, s
-        What scale factors and misalignments of the gyros do in turns, as noise: their variances times `TURN_TIME`.
-    groups : tuple of Group
-        Further states, in order.
-    fixed_altitude : bool
-        Height held: its error and that of vertical velocity stay as they are.
-    """
-
-    gyro_random_walk: float
-    accel_random_walk: float
-    gyro_rate_walk: float = 0.0
+    gyro_random_walk: float  # rad/sqrt(s)
+    accel_random_walk: float  # m/s/sqrt(s)
+    gyro_rate_walk: float = 0.0  # random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s)
     accel_rate_walk: float = 0.0
+    # (2,) s: what scale factors and misalignments of the gyros do in turns, as noise: their variances times `TURN_TIME`
     turn_noise: tuple[float, float] = (0.0, 0.0)
-    groups: tuple[Group, ...] = ()
-    fixed_altitude: bool = False
+    groups: tuple[Group, ...] = ()  # further states, in order
+    fixed_altitude: bool = False  # height held: its error and that of vertical velocity stay as they are
 
     @classmethod
     def from_spec(

@@ -45,18 +45,10 @@ class HasState(Protocol):
 
 @dataclass(frozen=True)
 class Filtered:
-    """A system and what a filter made of it.
+    """A system and what a filter made of it."""
 
-    Attributes
-    ----------
-    system : LinearSystem
-        As filtered: its noise may have been fitted on the way.
-    estimates : Estimates
-        With the history that the next step needs.
-    """
-
-    system: LinearSystem
-    estimates: Estimates
+    system: LinearSystem  # as filtered: its noise may have been fitted on the way
+    estimates: Estimates  # with the history that the next step needs
 
     @property
     def end(self) -> Array:
@@ -74,20 +66,11 @@ E = TypeVar("E", bound=HasState)
 
 @dataclass(frozen=True)
 class Settled(Generic[E]):
-    """The last pass.
+    """The last pass."""
 
-    Attributes
-    ----------
-    found : E
-        What the estimator gave.
-    passes : int
-    moved : float
-        How much this pass would still move the nominal solution, in the unit of `moved` of :func:`settle`.
-    """
-
-    found: E
+    found: E  # what the estimator gave
     passes: int
-    moved: float
+    moved: float  # how much this pass would still move the nominal solution, in the unit of `moved` of :func:`settle`
 
 
 def in_sigmas(states: slice) -> Callable[[Filtered], float]:

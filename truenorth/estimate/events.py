@@ -22,33 +22,17 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Setting:
-    """What a closed loop keeps to as long as it runs.
+    """What a closed loop keeps to as long as it runs."""
 
-    Attributes
-    ----------
-    model : InsModel
-        With the groups that the sources ask for (see :func:`with_states`).
-    sources : tuple of Aiding
-        The sensors; of the rows they hold, :func:`begin` takes note, more come with :func:`go_on`.
-    stride : int
-        Samples from one prediction of the filter to the next.
-    every : int
-        Output at every so many of these, at the beginning and at the end; 0: only after measurements that ask for it.
-    covariance : bool
-        Carry the covariance; needed for any aiding.
-    smooth : bool
-        Keep what the smoother needs: of a log in one chunk.
-    invariant : bool
-        Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`).
-    """
-
-    model: InsModel
+    model: InsModel  # with the groups that the sources ask for (see :func:`with_states`)
+    # the sensors; of the rows they hold, :func:`begin` takes note, more come with :func:`go_on`
     sources: tuple[Aiding, ...] = ()
-    stride: int = 1
+    stride: int = 1  # samples from one prediction of the filter to the next
+    # output at every so many of these, at the beginning and at the end; 0: only after measurements that ask for it
     every: int = 1
-    covariance: bool = True
-    smooth: bool = False
-    invariant: bool = False
+    covariance: bool = True  # carry the covariance; needed for any aiding
+    smooth: bool = False  # keep what the smoother needs: of a log in one chunk
+    invariant: bool = False  # corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`)
 
 
 class Rows(NamedTuple):
@@ -67,46 +51,20 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class LoopState:
-    """Where a closed loop is: with it, it goes on as if it had never stopped.
+    """Where a closed loop is: with it, it goes on as if it had never stopped."""
 
-    Attributes
-    ----------
-    memory : Memory
-        Of the kernel.
-    samples : Samples
-        The last that it took, and those that wait.
-    taken : int
-        How many of these it took.
-    count : int
-        Samples before these.
-    waiting, late : Rows
-        Measurements that wait, and re-timed ones.
-    rows : ImuRows or None
-        The last two rows of the record, or one that waits for a second.
-    interval : float, s
-        Nominal, of the samples.
-    begin : float, s
-        Of the first sample.
-    outside : tuple of int
-        Measurements of each source that came for a time already passed.
-    fresh : bool
-        It has taken nothing yet.
-    finished : bool
-        The last sample was said to be the last.
-    """
-
-    memory: Memory
-    samples: Samples
-    taken: int
-    count: int
-    waiting: Rows
+    memory: Memory  # of the kernel
+    samples: Samples  # the last that it took, and those that wait
+    taken: int  # how many of these it took
+    count: int  # samples before these
+    waiting: Rows  # measurements that wait, and re-timed ones
     late: Rows
-    rows: ImuRows | None
-    interval: float
-    begin: float
-    outside: tuple[int, ...]
-    fresh: bool = True
-    finished: bool = False
+    rows: ImuRows | None  # the last two rows of the record, or one that waits for a second
+    interval: float  # s; nominal, of the samples
+    begin: float  # s; of the first sample
+    outside: tuple[int, ...]  # measurements of each source that came for a time already passed
+    fresh: bool = True  # it has taken nothing yet
+    finished: bool = False  # the last sample was said to be the last
 
 
 def received(setting: Setting, state: LoopState, aiding: Sequence[Aiding]) -> LoopState:

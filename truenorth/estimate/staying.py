@@ -33,20 +33,11 @@ BIASES = slice(6, 12)
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of attitude, velocity and sensors before the log.
+    """What is known of attitude, velocity and sensors before the log."""
 
-    Attributes
-    ----------
-    mean : (n,) array
-        Expected errors of the sensors and the arm; zero of misalignment and velocity.
-    P : (n, n) array
-    groups : mapping of str to slice
-        Where the states behind the first twelve stand.
-    """
-
-    mean: Array
-    P: Array
-    groups: Mapping[str, slice]
+    mean: Array  # (n,): expected errors of the sensors and the arm; zero of misalignment and velocity
+    P: Array  # (n, n)
+    groups: Mapping[str, slice]  # where the states behind the first twelve stand
 
     @property
     def sensors(self) -> slice:

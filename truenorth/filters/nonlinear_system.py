@@ -36,18 +36,11 @@ MATRIX = "void(float64[::1], float64[::1], float64[:, ::1])"
 
 @dataclass(frozen=True)
 class ModelFunction:
-    """A function of a model, ``f(x, p, out)``; made by :func:`vector_function` and :func:`matrix_function`.
+    """A function of a model, ``f(x, p, out)``; made by :func:`vector_function` and :func:`matrix_function`."""
 
-    Parameters
-    ----------
-    function : callable
-        The Python function, of what Numba understands; it may call compiled functions.
-    signature : str
-        Its declared signature.
-    """
-
+    # the Python function, of what Numba understands; it may call compiled functions
     function: Callable[[Array, Array, Array], None]
-    signature: str
+    signature: str  # its declared signature
 
     def __call__(self, x: Array, p: Array, out: Array) -> None:
         """Call the Python function."""

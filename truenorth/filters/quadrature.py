@@ -21,20 +21,11 @@ MOST_NODES = 100_000
 
 
 class QuadratureRule(NamedTuple):
-    """Nodes and weights; the first node is the one nearest to the mean.
+    """Nodes and weights; the first node is the one nearest to the mean."""
 
-    Parameters
-    ----------
-    nodes : (M, d) array
-    mean : (M,) array
-        Weights of expectations.
-    covariance : (M,) array
-        Weights of second moments about the mean; differ from `mean` in the unscented rule only.
-    """
-
-    nodes: Array
-    mean: Array
-    covariance: Array
+    nodes: Array  # (M, d)
+    mean: Array  # (M,): weights of expectations
+    covariance: Array  # (M,): weights of second moments about the mean; differ from `mean` in the unscented rule only
 
 
 def gauss_hermite_rule(dimensions: int, order: int) -> QuadratureRule:

@@ -31,28 +31,13 @@ MOST_COLUMNS = 200  # that are looked at where no name tells
 
 @dataclass
 class Choice:
-    """The columns of an IMU in a log.
+    """The columns of an IMU in a log."""
 
-    Attributes
-    ----------
-    kind : {"rates", "increments"} or None
-        None: the names do not tell.
-    time : tuple of str
-        One column, or two of seconds and their fraction; none where the log has no clock.
-    sensors : list of (str, float)
-        Six columns, each with its sign.
-    units : dict
-        That the headings name, of ``gyro``, ``accel`` and ``time``.
-    documented : bool
-        The columns have our own names, which mean SI.
-    guesses : list of Guess
-    """
-
-    kind: Kind | None
-    time: tuple[str, ...]
-    sensors: list[tuple[str, float]]
-    units: dict[str, str] = field(default_factory=dict)
-    documented: bool = False
+    kind: Kind | None  # None: the names do not tell
+    time: tuple[str, ...]  # one column, or two of seconds and their fraction; none where the log has no clock
+    sensors: list[tuple[str, float]]  # list of (str, float); six columns, each with its sign
+    units: dict[str, str] = field(default_factory=dict)  # that the headings name, of ``gyro``, ``accel`` and ``time``
+    documented: bool = False  # the columns have our own names, which mean SI
     guesses: list[Guess] = field(default_factory=list)
 
     @property

@@ -20,33 +20,19 @@ KNOWN_COLUMNS = ("time", *COLUMNS["rates"], *COLUMNS["increments"], *ARRAY_ONLY)
 
 @dataclass(frozen=True)
 class Layout:
-    """How a log is to be read.
+    """How a log is to be read."""
 
-    Attributes
-    ----------
-    columns : mapping
-        Our column names to the log's; a minus before the latter turns the sign. For ``.npz`` and ``.mat`` also ``gyro,
-        accel`` (``dtheta, dvel``) to arrays of three columns, ``scale`` to what the sensor values are multiplied with, and
-        ``interval`` to the sampling interval.
-    units : mapping
-        Of ``gyro``, ``accel`` and ``time``; SI where left out. A number before the unit (``0.05 deg/s``) is the size of
-        one count.
-    axes : str or None
-        Where x, y and z point, such as ``"FRD"``; None leaves it to the format.
-    rate : float or None, Hz
-        For a log without time.
-    kind : {"rates", "increments"} or None
-        Told by the names of the columns when left out.
-    topic : str or None
-        Of a ROS bag with several IMUs.
-    """
-
+    # our column names to the log's; a minus before the latter turns the sign. For ``.npz`` and ``.mat`` also ``gyro, accel``
+    # (``dtheta, dvel``) to arrays of three columns, ``scale`` to what the sensor values are multiplied with, and ``interval``
+    # to the sampling interval.
     columns: Mapping[str, str] = field(default_factory=dict)
+    # of ``gyro``, ``accel`` and ``time``; SI where left out. A number before the unit (``0.05 deg/s``) is the size of one
+    # count.
     units: Mapping[str, str] = field(default_factory=dict)
-    axes: str | None = None
-    rate: float | None = None
-    kind: Kind | None = None
-    topic: str | None = None
+    axes: str | None = None  # where x, y and z point, such as ``"FRD"``; None leaves it to the format
+    rate: float | None = None  # Hz; for a log without time
+    kind: Kind | None = None  # told by the names of the columns when left out
+    topic: str | None = None  # of a ROS bag with several IMUs
 
 
 def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:

@@ -29,30 +29,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column that a reader understands.
+    """A column that a reader understands."""
 
-    Attributes
-    ----------
-    name : str
-        Ours.
-    dimension : str
-        A key of :data:`truenorth.core.units.DIMENSIONS`.
-    unit : str
-        Where neither the file nor the caller names one.
-    aliases : tuple of str
-        Other usual names.
-    opposite : tuple of str
-        Names of the same quantity counted the other way, such as ``VD`` of ``VU``.
-    group : str
-        By which `units` may name it along with others, such as ``velocity``.
-    """
-
-    name: str
-    dimension: str = "ratio"
-    unit: str = "1"
-    aliases: tuple[str, ...] = ()
-    opposite: tuple[str, ...] = ()
-    group: str = ""
+    name: str  # ours
+    dimension: str = "ratio"  # a key of :data:`truenorth.core.units.DIMENSIONS`
+    unit: str = "1"  # where neither the file nor the caller names one
+    aliases: tuple[str, ...] = ()  # other usual names
+    opposite: tuple[str, ...] = ()  # names of the same quantity counted the other way, such as ``VD`` of ``VU``
+    group: str = ""  # by which `units` may name it along with others, such as ``velocity``
 
 
 TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc"))
@@ -60,51 +44,26 @@ TIME = Quantity("time", "time", "s", ("t", "timestamp", "tow", "gps_time", "utc"
 
 @dataclass(frozen=True)
 class Options:
-    """How an aiding log is to be read.
+    """How an aiding log is to be read."""
 
-    Attributes
-    ----------
-    columns : mapping
-        Our names to the log's; a minus before the latter turns the sign.
-    units : mapping
-        Of columns or their groups; they win over those in the header.
-    others : mapping
-        What only one kind of log has.
-    """
-
+    # our names to the log's; a minus before the latter turns the sign
     columns: Mapping[str, str] = field(default_factory=dict)
+    # of columns or their groups; they win over those in the header
     units: Mapping[str, str] = field(default_factory=dict)
-    others: Mapping[str, Any] = field(default_factory=dict)
+    others: Mapping[str, Any] = field(default_factory=dict)  # what only one kind of log has
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a log has of the columns that a reader understands.
-
-    Attributes
-    ----------
-    source : str
-    labels : mapping
-        Our names to the log's.
-    values : mapping
-        Our names to (N,) arrays in SI; NaN where a cell is empty.
-    factors : mapping
-        Our names to what the log's numbers were multiplied with.
-    place : callable
-        Where a row stands in the file, in words.
-    asked : set of str
-        Our names of those that the caller named.
-    late : Late
-        Rows that were put in order.
-    """
+    """What a log has of the columns that a reader understands."""
 
     source: str
-    labels: Mapping[str, str]
-    values: Mapping[str, Array]
-    factors: Mapping[str, float]
-    place: Callable[[int], str]
-    asked: frozenset[str]
-    late: Late = IN_ORDER
+    labels: Mapping[str, str]  # our names to the log's
+    values: Mapping[str, Array]  # our names to (N,) arrays in SI; NaN where a cell is empty
+    factors: Mapping[str, float]  # our names to what the log's numbers were multiplied with
+    place: Callable[[int], str]  # where a row stands in the file, in words
+    asked: frozenset[str]  # our names of those that the caller named
+    late: Late = IN_ORDER  # rows that were put in order
 
     def has(self, *names: str) -> bool:
         """Whether all of these columns are there."""

@@ -78,37 +78,17 @@ class Dialect:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Where the numbers of a text stand.
-
-    Attributes
-    ----------
-    path : Path
-    text : bytes
-        The whole log.
-    names : list of str
-        Of the columns; ``1, 2, ...`` where the log has no header.
-    named : bool
-        Whether the log has a header.
-    header : str
-        The line of the names; empty without one.
-    dialect : Dialect
-    skip : int
-        Lines above the numbers.
-    above : tuple of str
-        Those lines that are not the header.
-    notes : tuple of str
-        What was left out or mended.
-    """
+    """Where the numbers of a text stand."""
 
     path: Path
-    text: bytes
-    names: list[str]
-    named: bool
+    text: bytes  # the whole log
+    names: list[str]  # of the columns; ``1, 2, ...`` where the log has no header
+    named: bool  # whether the log has a header
     dialect: Dialect
-    skip: int
-    header: str = ""
-    above: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    skip: int  # lines above the numbers
+    header: str = ""  # the line of the names; empty without one
+    above: tuple[str, ...] = ()  # those lines that are not the header
+    notes: tuple[str, ...] = ()  # what was left out or mended
 
     def read(self, wanted: Sequence[str], gaps: bool = False) -> Array:
         """The columns of these names, (N, len(wanted)); what stands in others does not matter.

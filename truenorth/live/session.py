@@ -28,42 +28,19 @@ Listener = Callable[[Aligner, Answer | None, str], None]
 
 @dataclass
 class Session:
-    """A live run.
+    """A live run."""
 
-    Parameters
-    ----------
-    source : str
-        See :func:`truenorth.live.sources.open_source`.
-    place : Position
-    imu : ImuSpec, str, path or mapping, optional
-    layout : Layout
-        Columns, units and axes of the rows.
-    method : str
-    share : float
-        Of one core, for solutions.
-    every : float, s
-        Between two calls of the listeners, by the wall clock.
-    until : float or None, rad
-        One-sigma of heading with which to stop; None: only at the end of the source.
-    folder : Path or None
-        Where the rows are kept.
-    resume : bool
-        Go on with the rows in `folder`.
-    opened : callable
-        Called with the source's text when rows can come.
-    """
-
-    source: str
+    source: str  # see :func:`truenorth.live.sources.open_source`
     place: Position
     imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None
-    layout: Layout = field(default_factory=Layout)
+    layout: Layout = field(default_factory=Layout)  # columns, units and axes of the rows
     method: str = "auto"
-    share: float = SHARE
-    every: float = 1.0
-    until: float | None = None
-    folder: Path | None = None
-    resume: bool = False
-    opened: Callable[[str], None] = lambda source: None
+    share: float = SHARE  # of one core, for solutions
+    every: float = 1.0  # s; between two calls of the listeners, by the wall clock
+    until: float | None = None  # rad; one-sigma of heading with which to stop; None: only at the end of the source
+    folder: Path | None = None  # where the rows are kept
+    resume: bool = False  # go on with the rows in `folder`
+    opened: Callable[[str], None] = lambda source: None  # called with the source's text when rows can come
 
     def run(self, listeners: Sequence[Listener] = ()) -> Alignment:
         """Align until the source ends, the heading is good enough, or an interrupt.

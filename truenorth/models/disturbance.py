@@ -31,22 +31,12 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half
 
 @dataclass(frozen=True)
 class Oscillator:
-    """One oscillator.
-
-    Attributes
-    ----------
-    order : {1, 2}
-    sigma : float, m/s
-        Of the velocity that it puts out.
-    frequency : float, rad/s
-    damping : float
-        Fraction of the critical, above 0 and below 1.
-    """
+    """One oscillator."""
 
     order: int
-    sigma: float
-    frequency: float
-    damping: float
+    sigma: float  # m/s; of the velocity that it puts out
+    frequency: float  # rad/s
+    damping: float  # fraction of the critical, above 0 and below 1
 
     @property
     def states(self) -> int:
@@ -56,16 +46,9 @@ class Oscillator:
 
 @dataclass(frozen=True)
 class AxisMotion:
-    """Motion of the base along one axis.
+    """Motion of the base along one axis."""
 
-    Attributes
-    ----------
-    white : float, m/s
-        One sigma of what is white in the mean velocity of an interval.
-    oscillators : tuple of Oscillator
-    """
-
-    white: float
+    white: float  # m/s; one sigma of what is white in the mean velocity of an interval
     oscillators: tuple[Oscillator, ...] = ()
 
     @property

@@ -55,33 +55,17 @@ OF_INS = np.array([3, 4, 6, 7, 0, 1, 2, 12, 13, 14, 9, 10, 11])
 
 @dataclass(frozen=True)
 class MarineModel:
-    """Noise and memory of the error model; one-sigma, SI.
+    """Noise and memory of the error model; one-sigma, SI."""
 
-    Attributes
-    ----------
-    accel_random_walk : float, m/s/sqrt(s)
-    gyro_random_walk : float, rad/sqrt(s)
-    accel_rate_walk, gyro_rate_walk : float, m/s^2/sqrt(s) and rad/s/sqrt(s)
-        White noise that drives the biases.
-    accel_time, gyro_time : float, s
-        Correlation times of the biases; infinite: constants, or random walks.
-    reference_walk : float, m/s/sqrt(s)
-        White noise that drives the reference's error.
-    reference_time : float, s
-        Its correlation time.
-    with_reference : bool
-        Fifteen states rather than thirteen.
-    """
-
-    accel_random_walk: float
-    gyro_random_walk: float
-    accel_rate_walk: float = 0.0
-    gyro_rate_walk: float = 0.0
-    accel_time: float = math.inf
-    gyro_time: float = math.inf
-    reference_walk: float = 0.0
-    reference_time: float = math.inf
-    with_reference: bool = False
+    accel_random_walk: float  # m/s/sqrt(s)
+    gyro_random_walk: float  # rad/sqrt(s)
+    accel_rate_walk: float = 0.0  # m/s^2/sqrt(s); white noise that drives the biases
+    gyro_rate_walk: float = 0.0  # rad/s/sqrt(s)
+    accel_time: float = math.inf  # s; correlation times of the biases; infinite: constants, or random walks
+    gyro_time: float = math.inf  # s
+    reference_walk: float = 0.0  # m/s/sqrt(s); white noise that drives the reference's error
+    reference_time: float = math.inf  # s; its correlation time
+    with_reference: bool = False  # fifteen states rather than thirteen
 
     def __post_init__(self) -> None:
         for name in ("accel_random_walk", "gyro_random_walk", "accel_rate_walk", "gyro_rate_walk", "reference_walk"):

@@ -31,18 +31,10 @@ DV, PHI, BG, BA = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 
 @dataclass(frozen=True)
 class RotaryModel:
-    """The model's noise.
+    """The model's noise."""
 
-    Attributes
-    ----------
-    walks : StaticModel
-        Of the sensors.
-    base_velocity : float, m/s
-        One sigma of the base's velocity, which the model takes for white.
-    """
-
-    walks: StaticModel
-    base_velocity: float
+    walks: StaticModel  # of the sensors
+    base_velocity: float  # m/s; one sigma of the base's velocity, which the model takes for white
 
     def linearise(
         self,

@@ -42,22 +42,12 @@ QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without nois
 
 @dataclass(frozen=True)
 class StaticModel:
-    """Noise of the model; everything one-sigma, SI.
+    """Noise of the model; everything one-sigma, SI."""
 
-    Attributes
-    ----------
-    gyro_random_walk : float, rad/sqrt(s)
-    accel_random_walk : float, m/s/sqrt(s)
-    gyro_rate_walk : float, rad/s/sqrt(s)
-        Slow change of the gyro bias as a random walk.
-    accel_rate_walk : float, m/s^2/sqrt(s)
-        Slow change of the accelerometer bias.
-    """
-
-    gyro_random_walk: float
-    accel_random_walk: float
-    gyro_rate_walk: float = 0.0
-    accel_rate_walk: float = 0.0
+    gyro_random_walk: float  # rad/sqrt(s)
+    accel_random_walk: float  # m/s/sqrt(s)
+    gyro_rate_walk: float = 0.0  # rad/s/sqrt(s); slow change of the gyro bias as a random walk
+    accel_rate_walk: float = 0.0  # m/s^2/sqrt(s); slow change of the accelerometer bias
 
     def linearise(
         self,

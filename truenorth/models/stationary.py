@@ -33,22 +33,13 @@ SERIES = 8  # terms of the exponential; the paper takes 6 to 10
 
 @dataclass(frozen=True)
 class StationaryModel:
-    """The error model at a place.
+    """The error model at a place."""
 
-    Attributes
-    ----------
-    lat, alt : float, rad and m
-    gyro_random_walk : float, rad/sqrt(s)
-    accel_random_walk : float, m/s/sqrt(s)
-    complete : bool
-        With the two terms that the paper's own model leaves out.
-    """
-
-    lat: float
-    alt: float = 0.0
-    gyro_random_walk: float = 0.0
-    accel_random_walk: float = 0.0
-    complete: bool = True
+    lat: float  # rad
+    alt: float = 0.0  # m
+    gyro_random_walk: float = 0.0  # rad/sqrt(s)
+    accel_random_walk: float = 0.0  # m/s/sqrt(s)
+    complete: bool = True  # with the two terms that the paper's own model leaves out
 
     @property
     def gravity(self) -> float:

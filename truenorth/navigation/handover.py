@@ -16,21 +16,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Handover:
-    """The joint estimate of an alignment that estimated biases.
+    """The joint estimate of an alignment that estimated biases."""
 
-    Attributes
-    ----------
-    C_nb : (3, 3) array
-        Attitude of the IMU itself, also where it turns on the body.
-    accel_bias : (3,) array, m/s^2
-        What acts as accelerometer bias: scale factor, misalignment and gravity's error as well.
-    P : (9, 9) array
-        Covariance of phi (E, N, U), gyro bias and `accel_bias` (IMU axes), the deflection of the vertical included.
-    prior : (6,) array
-        Variance a priori of what acts as gyro and accelerometer bias.
-    """
-
-    C_nb: Array
+    C_nb: Array  # (3, 3): attitude of the IMU itself, also where it turns on the body
+    # (3,) m/s^2: what acts as accelerometer bias: scale factor, misalignment and gravity's error as well
     accel_bias: Array
+    # (9, 9): covariance of phi (E, N, U), gyro bias and `accel_bias` (IMU axes), the deflection of the vertical included
     P: Array
-    prior: Array
+    prior: Array  # (6,): variance a priori of what acts as gyro and accelerometer bias

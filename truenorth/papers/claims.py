@@ -40,28 +40,14 @@ RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class Condition:
-    """One condition of a rule: ``one < factor * other``, ``>`` likewise, or ``=``.
+    """One condition of a rule: ``one < factor * other``, ``>`` likewise, or ``=``."""
 
-    Attributes
-    ----------
-    one : str
-        A reference to the table; see :class:`truenorth.papers.table.Reference`.
-    relation : {"<", ">", "="}
-    other : str or float
-        Another reference, or a number in the unit of `one`.
-    test : {"exact", "interval", "paired"}
-    factor : float
-        Of `other`.
-    runs : int
-        That the test needs; 0 for its own least number.
-    """
-
-    one: str
+    one: str  # a reference to the table; see :class:`truenorth.papers.table.Reference`
     relation: Literal["<", ">", "="]
-    other: str | float
+    other: str | float  # another reference, or a number in the unit of `one`
     test: Test
-    factor: float = 1.0
-    runs: int = 0
+    factor: float = 1.0  # of `other`
+    runs: int = 0  # that the test needs; 0 for its own least number
 
     @property
     def needed(self) -> int:
@@ -102,55 +88,26 @@ def paired(text: str, runs: int = 0) -> Condition:
 
 @dataclass(frozen=True)
 class Rule:
-    """A claim and how it is decided.
+    """A claim and how it is decided."""
 
-    Attributes
-    ----------
-    claim : str
-        As the paper means it.
-    conditions : tuple of Condition
-    words : str
-        What else is to be said; numbers of the table as ``{case method quantity@time statistic:format}``.
-    by : {"paper", "related work", "ours"}
-        Who claims it.
-    """
-
-    claim: str
+    claim: str  # as the paper means it
     conditions: tuple[Condition, ...]
-    words: str = ""
-    by: Literal["paper", "related work", "ours"] = "paper"
+    words: str = ""  # what else is to be said; numbers of the table as ``{case method quantity@time statistic:format}``
+    by: Literal["paper", "related work", "ours"] = "paper"  # who claims it
 
 
 @dataclass(frozen=True)
 class Check:
-    """A condition, tested.
+    """A condition, tested."""
 
-    Attributes
-    ----------
-    met : bool or None
-        None where there are too few runs.
-    runs : int
-    text : str
-        With its figures.
-    """
-
-    met: bool | None
+    met: bool | None  # None where there are too few runs
     runs: int
-    text: str
+    text: str  # with its figures
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim, settled.
-
-    Attributes
-    ----------
-    text : str
-    verdict : str
-    checks : tuple of Check
-    evidence : str
-    by : str
-    """
+    """A claim, settled."""
 
     text: str
     verdict: Verdict

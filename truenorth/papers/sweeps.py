@@ -17,29 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sweep:
-    """One choice.
+    """One choice."""
 
-    Attributes
-    ----------
-    case : str
-        In which our choice is made.
-    name : str
-        Of the choice; its cases in the table are `case`_`name`_`value`.
-    label : str
-        With the unit.
-    chosen : float
-        Ours.
-    values : tuple of float
-    logarithmic : bool
-        The axis.
-    """
-
-    case: str
-    name: str
-    label: str
-    chosen: float
+    case: str  # in which our choice is made
+    name: str  # of the choice; its cases in the table are `case`_`name`_`value`
+    label: str  # with the unit
+    chosen: float  # ours
     values: tuple[float, ...]
-    logarithmic: bool = True
+    logarithmic: bool = True  # the axis
 
     def case_of(self, value: float) -> str:
         """Name of the case with a value."""

@@ -43,28 +43,12 @@ OF_RUNS: dict[str, Callable[[Array], float]] = {
 
 
 class Figure(NamedTuple):
-    """A figure of a study; NaN or empty where a column is not meant.
-
-    Attributes
-    ----------
-    case, method : str
-    noise : {"per_sample", "random_walk", ""}
-        Which reading of the paper's noise.
-    window_start_s : float
-        For figures over a window that ends at `time_s`.
-    time_s : float
-    quantity, statistic : str
-    value, ci_low, ci_high : float
-    unit : str
-    paper : float
-        The paper's figure in the same unit.
-    runs : int
-    """
+    """A figure of a study; NaN or empty where a column is not meant."""
 
     case: str
     method: str
-    noise: str
-    window_start_s: float
+    noise: str  # which reading of the paper's noise
+    window_start_s: float  # for figures over a window that ends at `time_s`
     time_s: float
     quantity: str
     statistic: str
@@ -72,7 +56,7 @@ class Figure(NamedTuple):
     ci_low: float
     ci_high: float
     unit: str
-    paper: float
+    paper: float  # the paper's figure in the same unit
     runs: int
 
 

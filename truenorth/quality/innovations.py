@@ -43,24 +43,12 @@ def mean_nis(source: Residuals) -> float | None:
 
 
 class Whiteness(NamedTuple):
-    """Size and colour of normalised innovations.
+    """Size and colour of normalised innovations."""
 
-    Attributes
-    ----------
-    size : float
-        RMS; 1 where sigma is right.
-    colour : float
-        ``sqrt(1 + 2 sum r_k)``; 1 where they are white.
-    turning : float
-        The same at the period of manoeuvres.
-    sure : bool
-        Whether chance does not explain it.
-    """
-
-    size: float
-    colour: float
-    turning: float
-    sure: bool
+    size: float  # RMS; 1 where sigma is right
+    colour: float  # ``sqrt(1 + 2 sum r_k)``; 1 where they are white
+    turning: float  # the same at the period of manoeuvres
+    sure: bool  # whether chance does not explain it
 
     @property
     def growth(self) -> float:

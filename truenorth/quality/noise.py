@@ -41,28 +41,17 @@ LONGEST = 4.0  # of the record's length
 
 @dataclass(frozen=True)
 class LogNoise:
-    """Noise of an IMU as its log shows it.
+    """Noise of an IMU as its log shows it."""
 
-    Attributes
-    ----------
-    spec : ImuSpec
-        With the worst axis of each term.
-    random_walk, quantisation, bias_instability : (2, 3) arrays
-        Of gyros and accelerometers, SI, axis by axis; the step of the quantisation, the sigma of the Gauss-Markov bias.
-    random_walk_sigma, quantisation_sigma, bias_instability_sigma : (2, 3) arrays
-        One-sigma of each; NaN where the log does not show the term.
-    gyro, accel : AllanDeviation
-        What they were fitted to.
-    """
-
-    spec: ImuSpec
+    spec: ImuSpec  # with the worst axis of each term
+    # (2, 3): of gyros and accelerometers, SI, axis by axis; the step of the quantisation, the sigma of the Gauss-Markov bias
     random_walk: Array
-    quantisation: Array
-    bias_instability: Array
-    random_walk_sigma: Array
-    quantisation_sigma: Array
-    bias_instability_sigma: Array
-    gyro: AllanDeviation
+    quantisation: Array  # (2, 3)
+    bias_instability: Array  # (2, 3)
+    random_walk_sigma: Array  # (2, 3): one-sigma of each; NaN where the log does not show the term
+    quantisation_sigma: Array  # (2, 3)
+    bias_instability_sigma: Array  # (2, 3)
+    gyro: AllanDeviation  # what they were fitted to
     accel: AllanDeviation
 
 

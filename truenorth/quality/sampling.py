@@ -44,29 +44,15 @@ class Finding:
 
 @dataclass(frozen=True)
 class Sampling:
-    """Clock and values of a record, as figures.
+    """Clock and values of a record, as figures."""
 
-    Parameters
-    ----------
-    jitter_rms, jitter_max : float, s
-        Deviation of the steps from the nominal interval, gaps left out.
-    gap_times, gap_lengths : (g,) arrays, s
-        Time after each gap and the length of the step that bridges it.
-    repeated_rows : int
-        Rows equal to the row before in all six channels.
-    longest_runs : (6,) array of int
-        Longest run of one value in each channel, rows.
-    saturated_rows : (6,) array of int
-        Rows at a clipped extreme of each channel; 0 where nothing is clipped.
-    """
-
-    jitter_rms: float
-    jitter_max: float
-    gap_times: Array
-    gap_lengths: Array
-    repeated_rows: int
-    longest_runs: NDArray[np.intp]
-    saturated_rows: NDArray[np.intp]
+    jitter_rms: float  # s; deviation of the steps from the nominal interval, gaps left out
+    jitter_max: float  # s
+    gap_times: Array  # (g,) s: time after each gap and the length of the step that bridges it
+    gap_lengths: Array  # (g,) s
+    repeated_rows: int  # rows equal to the row before in all six channels
+    longest_runs: NDArray[np.intp]  # (6,): longest run of one value in each channel, rows
+    saturated_rows: NDArray[np.intp]  # (6,): rows at a clipped extreme of each channel; 0 where nothing is clipped
 
 
 def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:

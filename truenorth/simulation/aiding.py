@@ -92,21 +92,12 @@ class AidingSpec(UnitSpec, Generic[R]):
 
 @dataclass(frozen=True, kw_only=True)
 class DroppingSpec(AidingSpec[R]):
-    """What sensors have that drop out.
+    """What sensors have that drop out."""
 
-    Attributes
-    ----------
-    outages : tuple of (start, stop), s
-        In which no row is sampled.
-    outage_rate : float, 1/s
-        Mean number of more outages a second, at random times.
-    outage_duration : float, s
-        Of each of these.
-    """
-
+    # tuple of (start, stop), s; in which no row is sampled
     outages: tuple[tuple[float, float], ...] = value("time time", "s s", (), sign="any", many=True)
-    outage_rate: float = value("frequency", "Hz")
-    outage_duration: float = value("time", "s", 10.0)
+    outage_rate: float = value("frequency", "Hz")  # 1/s; mean number of more outages a second, at random times
+    outage_duration: float = value("time", "s", 10.0)  # s; of each of these
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -115,15 +106,9 @@ class DroppingSpec(AidingSpec[R]):
 
 @dataclass(frozen=True, kw_only=True)
 class OutlyingSpec(DroppingSpec[R]):
-    """What sensors have that drop out and give outliers.
+    """What sensors have that drop out and give outliers."""
 
-    Attributes
-    ----------
-    outlier_rate : float, 1
-        Part of the rows that are outliers.
-    """
-
-    outlier_rate: float = value("ratio", "%")
+    outlier_rate: float = value("ratio", "%")  # 1; part of the rows that are outliers
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -156,29 +156,15 @@ class Course(Motion):
 
 @dataclass(frozen=True)
 class Leg:
-    """A part of a course in time.
+    """A part of a course in time."""
 
-    Attributes
-    ----------
-    duration : float, s
-    speed : float or None, m/s
-        At its end; None: unchanged.
-    turn : float, rad
-        Change of track, clockwise.
-    slope : float or None, rad
-        At its end; None: unchanged.
-    bank : float or {"flat", "coordinated"}
-        Held through the leg, rad; coordinated: ``atan(V psi'/g)``.
-    onset : float, s
-        In which a turn, an acceleration or a bank comes and goes.
-    """
-
-    duration: float
-    speed: float | None = None
-    turn: float = 0.0
-    slope: float | None = None
+    duration: float  # s
+    speed: float | None = None  # m/s; at its end; None: unchanged
+    turn: float = 0.0  # rad; change of track, clockwise
+    slope: float | None = None  # rad; at its end; None: unchanged
+    # float or {"flat", "coordinated"}; held through the leg, rad; coordinated: ``atan(V psi'/g)``
     bank: float | Literal["flat", "coordinated"] = "flat"
-    onset: float = 2.0
+    onset: float = 2.0  # s; in which a turn, an acceleration or a bank comes and goes
 
 
 def course(

@@ -21,26 +21,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Motion of the body and of its centre, as a kind of motion gives it.
+    """Motion of the body and of its centre, as a kind of motion gives it."""
 
-    Attributes
-    ----------
-    angles, rates, accelerations : (3, ...) arrays, rad, rad/s, rad/s^2
-        Heading, pitch, roll and their derivatives.
-    lat, lon, alt : (...) arrays
-        Of the centre.
-    v, a : (..., 3) arrays, m/s and m/s^2
-        Its velocity in n, and the derivative of those components.
-    """
-
-    angles: Array
-    rates: Array
-    accelerations: Array
-    lat: Array
-    lon: Array
-    alt: Array
-    v: Array
-    a: Array
+    angles: Array  # (3, ...) rad: heading, pitch, roll and their derivatives
+    rates: Array  # (3, ...) rad/s
+    accelerations: Array  # (3, ...) rad/s^2
+    lat: Array  # (...): of the centre
+    lon: Array  # (...)
+    alt: Array  # (...)
+    v: Array  # (..., 3) m/s: its velocity in n, and the derivative of those components
+    a: Array  # (..., 3) m/s^2
 
 
 class Motion(ABC):

@@ -19,18 +19,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A piecewise polynomial; its first and last piece go on beyond its ends.
+    """A piecewise polynomial; its first and last piece go on beyond its ends."""
 
-    Attributes
-    ----------
-    breaks : (K+1,) array
-        Of time (s) or distance (m), increasing.
-    coefficients : (D, K) array
-        Of each piece in powers of the distance from its left end, the highest first.
-    """
-
-    breaks: Array
-    coefficients: Array
+    breaks: Array  # (K+1,): of time (s) or distance (m), increasing
+    coefficients: Array  # (D, K): of each piece in powers of the distance from its left end, the highest first
 
     def __call__(self, x: ArrayLike) -> tuple[Array, Array, Array]:
         """Value, first and second derivative at `x`, of any shape."""

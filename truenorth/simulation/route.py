@@ -29,23 +29,13 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 @dataclass(frozen=True)
 class WayPoint:
-    """A point of a route.
+    """A point of a route."""
 
-    Attributes
-    ----------
-    lat, lon : float, rad
-    alt : float, m
-    speed : float or None, m/s
-        From here on; None: as before.
-    stop : float, s
-        For which the vehicle stands here.
-    """
-
-    lat: float
-    lon: float
-    alt: float = 0.0
-    speed: float | None = None
-    stop: float = 0.0
+    lat: float  # rad
+    lon: float  # rad
+    alt: float = 0.0  # m
+    speed: float | None = None  # m/s; from here on; None: as before
+    stop: float = 0.0  # s; for which the vehicle stands here
 
 
 @dataclass(frozen=True)

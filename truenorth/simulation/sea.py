@@ -34,24 +34,15 @@ STILL = 0.02  # rad/s: slower encounters of a following sea are left out, they w
 class WaveSpectrum:
     """JONSWAP spectrum of the sea's elevation; with a peakedness of 1, Pierson and Moskowitz's.
 
-    Attributes
-    ----------
-    height : float, m
-        Significant wave height, four standard deviations of the elevation.
-    period : float, s
-        At the peak of the spectrum.
-    peakedness : float
-        Gamma; 3.3 in the mean of a growing sea, 1 in a fully developed one.
-
     Raises
     ------
     UsageError
         A height or period that is not positive, or a peakedness below 1.
     """
 
-    height: float
-    period: float
-    peakedness: float = 3.3
+    height: float  # m; significant wave height, four standard deviations of the elevation
+    period: float  # s; at the peak of the spectrum
+    peakedness: float = 3.3  # gamma; 3.3 in the mean of a growing sea, 1 in a fully developed one
 
     def __post_init__(self) -> None:
         if not (0 < self.height < math.inf and 0 < self.period < math.inf and 1 <= self.peakedness < math.inf):
@@ -92,31 +83,21 @@ class WaveSpectrum:
 class Hull:
     """How a hull answers the waves: three damped oscillators behind the mean of the slope over its length and beam.
 
-    Attributes
-    ----------
-    length, beam : float, m
-    roll_period, pitch_period, heave_period : float, s
-        Natural ones.
-    roll_damping, pitch_damping, heave_damping : float
-        Fraction of the critical.
-    yaw_gain : float
-        Yaw over the wave's slope times sin(2 beta)/2.
-
     Raises
     ------
     UsageError
         A value that is not positive.
     """
 
-    length: float = 100.0
-    beam: float = 16.0
-    roll_period: float = 10.0
-    pitch_period: float = 6.0
-    heave_period: float = 6.5
-    roll_damping: float = 0.08
+    length: float = 100.0  # m
+    beam: float = 16.0  # m
+    roll_period: float = 10.0  # s; natural ones
+    pitch_period: float = 6.0  # s
+    heave_period: float = 6.5  # s
+    roll_damping: float = 0.08  # fraction of the critical
     pitch_damping: float = 0.35
     heave_damping: float = 0.35
-    yaw_gain: float = 0.3
+    yaw_gain: float = 0.3  # yaw over the wave's slope times sin(2 beta)/2
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

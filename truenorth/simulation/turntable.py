@@ -19,39 +19,23 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hold:
-    """A position of the table.
+    """A position of the table."""
 
-    Attributes
-    ----------
-    duration : float, s
-    heading, pitch, roll : float, rad
-        Not wrapped: from 0 to 720 deg the table turns twice.
-    """
-
-    duration: float
-    heading: float = 0.0
-    pitch: float = 0.0
-    roll: float = 0.0
+    duration: float  # s
+    heading: float = 0.0  # rad; not wrapped: from 0 to 720 deg the table turns twice
+    pitch: float = 0.0  # rad
+    roll: float = 0.0  # rad
 
 
 @dataclass(frozen=True, eq=False)
 class Turntable(Motion):
-    """A base that turns at a fixed place.
-
-    Attributes
-    ----------
-    position : Position
-    heading, pitch, roll : Profile
-        Of time, rad.
-    lever_arm : (3,) floats, m
-        From the axes' common point to the IMU.
-    """
+    """A base that turns at a fixed place."""
 
     position: Position
-    heading: Profile
+    heading: Profile  # of time, rad
     pitch: Profile
     roll: Profile
-    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) m: from the axes' common point to the IMU
 
     @property
     def breaks(self) -> Array:

@@ -14,20 +14,12 @@ OUTPUTS = ("heading", "level", "velocity", "position")
 
 @dataclass(frozen=True)
 class Effect:
-    """One figure for each output of an alignment or a navigation: an error, or a sigma.
+    """One figure for each output of an alignment or a navigation: an error, or a sigma."""
 
-    Attributes
-    ----------
-    heading, level : float, rad
-    velocity : float, m/s
-    position : float, m
-        Zero: no effect; infinite: of unknown size.
-    """
-
-    heading: float = 0.0
-    level: float = 0.0
-    velocity: float = 0.0
-    position: float = 0.0
+    heading: float = 0.0  # rad
+    level: float = 0.0  # rad
+    velocity: float = 0.0  # m/s
+    position: float = 0.0  # m; zero: no effect; infinite: of unknown size
 
     def items(self) -> list[tuple[str, float]]:
         """Name and size of each output's figure."""
@@ -44,32 +36,18 @@ ANY_EFFECT = Effect(math.inf, math.inf, math.inf, math.inf)
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one check saw.
+    """What one check saw."""
 
-    Attributes
-    ----------
-    key : str
-        What was seen, such as ``drift.step``; the text that belongs to it stands in :mod:`truenorth.state.english`.
-    figures : mapping of str to number or str
-        What the text needs, SI.
-    kind : {"note", "known", "bounded", "unknown"}
-        ``note``: worth knowing, no effect. ``known``: an error whose one-sigma size is known. ``bounded``: a suspicion
-        that, if it is true, has an effect of at most this size. ``unknown``: the model does not hold, and nobody knows
-        what that does.
-    effect : Effect
-        One sigma, or the bound, of the error in each output; an output whose effect is zero is not touched.
-    remedies : tuple of str
-        What to do, as keys; a program that knows its options names them.
-    urgent : bool
-        Of a note: worth a warning to a person who reads nothing else.
-    """
-
+    # what was seen, such as ``drift.step``; the text that belongs to it stands in :mod:`truenorth.state.english`
     key: str
-    figures: Mapping[str, Figure] = field(default_factory=dict)
+    figures: Mapping[str, Figure] = field(default_factory=dict)  # what the text needs, SI
+    # ``note``: worth knowing, no effect. ``known``: an error whose one-sigma size is known. ``bounded``: a suspicion that, if
+    # it is true, has an effect of at most this size. ``unknown``: the model does not hold, and nobody knows what that does.
     kind: Kind = "note"
+    # one sigma, or the bound, of the error in each output; an output whose effect is zero is not touched
     effect: Effect = NO_EFFECT
-    remedies: tuple[str, ...] = ()
-    urgent: bool = False
+    remedies: tuple[str, ...] = ()  # what to do, as keys; a program that knows its options names them
+    urgent: bool = False  # of a note: worth a warning to a person who reads nothing else
 
     def to_dict(self) -> dict[str, Any]:
         """Ready for JSON: an infinite effect is the word ``unknown``."""

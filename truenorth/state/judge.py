@@ -15,31 +15,17 @@ Finding = Literal["good", "level_only", "not_converged", "not_observable", "inco
 
 @dataclass(frozen=True)
 class Claim:
-    """What a result says of itself.
+    """What a result says of itself."""
 
-    Attributes
-    ----------
-    sigma : Effect
-        One sigma of each output; infinite for one that it does not give. A heading beyond its limit counts as not given,
-        unless the sensors are `able` to give it.
-    heading_limit : float, rad
-        Largest one-sigma heading error of use; infinite: heading is not what the result is for.
-    floor : float, rad
-        The part of heading's sigma that waiting does not improve.
-    waiting : bool
-        Whether more of the same data improves heading at all.
-    hidden : bool
-        Whether the place, not the sensor, is what hides north.
-    able : bool
-        Whether the sensors, as specified, can give heading: one that they then do not give is missed.
-    """
-
+    # one sigma of each output; infinite for one that it does not give. A heading beyond its limit counts as not given, unless
+    # the sensors are `able` to give it.
     sigma: Effect
+    # rad; largest one-sigma heading error of use; infinite: heading is not what the result is for
     heading_limit: float = math.inf
-    floor: float = 0.0
-    waiting: bool = True
-    hidden: bool = False
-    able: bool = False
+    floor: float = 0.0  # rad; the part of heading's sigma that waiting does not improve
+    waiting: bool = True  # whether more of the same data improves heading at all
+    hidden: bool = False  # whether the place, not the sensor, is what hides north
+    able: bool = False  # whether the sensors, as specified, can give heading: one that they then do not give is missed
 
 
 @dataclass(frozen=True)

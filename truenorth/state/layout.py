@@ -16,18 +16,10 @@ SLOW_GYRO, SLOW_ACCEL = "slow gyro bias", "slow accelerometer bias"
 
 @dataclass(frozen=True)
 class Layout:
-    """Groups of error states behind the fifteen of the INS, in order.
+    """Groups of error states behind the fifteen of the INS, in order."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the groups.
-    priors : tuple of tuples of float
-        One-sigma of each of their states at the start.
-    """
-
-    names: tuple[str, ...] = ()
-    priors: tuple[tuple[float, ...], ...] = ()
+    names: tuple[str, ...] = ()  # of the groups
+    priors: tuple[tuple[float, ...], ...] = ()  # one-sigma of each of their states at the start
 
     @property
     def states(self) -> int:

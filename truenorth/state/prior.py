@@ -12,15 +12,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WholeBiases:
-    """How to take apart the biases of a start into their constant and their slow part.
+    """How to take apart the biases of a start into their constant and their slow part."""
 
-    Attributes
-    ----------
-    constant : (6,) array
-        Variance a priori of what is constant of the gyro and accelerometer biases, (rad/s)^2 and (m/s^2)^2.
-    averaged : float, s
-        They are means over the time before the start; 0: they hold at the start.
-    """
-
+    # (6,): variance a priori of what is constant of the gyro and accelerometer biases, (rad/s)^2 and (m/s^2)^2
     constant: Array
-    averaged: float = 0.0
+    averaged: float = 0.0  # s; they are means over the time before the start; 0: they hold at the start

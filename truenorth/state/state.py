@@ -15,25 +15,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class State:
-    """Attitude, velocity and place at one epoch, ENU, and the biases assumed.
+    """Attitude, velocity and place at one epoch, ENU, and the biases assumed."""
 
-    Attributes
-    ----------
-    time : float, s
-    C_nb : (3, 3) array
-    v_n : (3,) array, m/s
-    lat, lon, alt : float, rad, rad, m
-    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
-    """
-
-    time: float
-    C_nb: Array
-    v_n: Array
-    lat: float
-    lon: float
-    alt: float
-    gyro_bias: Array
-    accel_bias: Array
+    time: float  # s
+    C_nb: Array  # (3, 3)
+    v_n: Array  # (3,) m/s
+    lat: float  # rad
+    lon: float  # rad
+    alt: float  # m
+    gyro_bias: Array  # (3,) rad/s
+    accel_bias: Array  # (3,) m/s^2
 
 
 @dataclass(frozen=True)

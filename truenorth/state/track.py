@@ -57,31 +57,15 @@ class Residuals:
 
 @dataclass(frozen=True)
 class Track:
-    """The state along the track, ENU; one row an output epoch.
+    """The state along the track, ENU; one row an output epoch."""
 
-    Attributes
-    ----------
-    time : (K,) array, s
-    C_nb : (K, 3, 3) array
-    v_n : (K, 3) array, m/s
-    position : (K, 3) array
-        Latitude, longitude (rad), height (m).
-    sensors : (K, n) array
-        What is assumed of the sensors, in the places of the states: biases, scale factors, ...
-    P : (K, n, n) array
-        Covariance of the errors; K = 0 where none was asked for.
-    layout : Layout
-        Of the states.
-    residuals : tuple of Residuals
-    """
-
-    time: Array
-    C_nb: Array
-    v_n: Array
-    position: Array
-    sensors: Array
-    P: Array
-    layout: Layout
+    time: Array  # (K,) s
+    C_nb: Array  # (K, 3, 3)
+    v_n: Array  # (K, 3) m/s
+    position: Array  # (K, 3): latitude, longitude (rad), height (m)
+    sensors: Array  # (K, n): what is assumed of the sensors, in the places of the states: biases, scale factors, ..
+    P: Array  # (K, n, n): covariance of the errors; K = 0 where none was asked for
+    layout: Layout  # of the states
     residuals: tuple[Residuals, ...]
 
     def bias(self, group: slice, slow: str) -> Array:

@@ -32,21 +32,11 @@ RATE, DRIFT, OFFSET = slice(0, 3), slice(3, 6), slice(6, 12)
 
 
 class Field(NamedTuple):
-    """What four triads tell of a rigid body.
+    """What four triads tell of a rigid body."""
 
-    Attributes
-    ----------
-    force : (..., 3) array, m/s^2
-        Specific force at the origin.
-    acceleration : (..., 3) array, rad/s^2
-        Angular.
-    square : (..., 6) array, (rad/s)^2
-        xx, yy, zz, xy, xz, yz of ``w w'``.
-    """
-
-    force: Array
-    acceleration: Array
-    square: Array
+    force: Array  # (..., 3) m/s^2: specific force at the origin
+    acceleration: Array  # (..., 3) rad/s^2: angular
+    square: Array  # (..., 6) (rad/s)^2: xx, yy, zz, xy, xz, yz of ``w w'``
 
 
 def _inverse(places: Array) -> Array:

@@ -57,35 +57,16 @@ def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
 
 @dataclass(frozen=True)
 class InertialIntegrals:
-    """Attitude and integrated specific force of one log in frame ``i``, at the K + 1 ends of K filter intervals.
+    """Attitude and integrated specific force of one log in frame ``i``, at the K + 1 ends of K filter intervals."""
 
-    Attributes
-    ----------
-    start : float, s
-        Time, on the record's clock, at which ``i`` is frozen: the beginning of the first row's interval.
-    time : (K+1,) array, s
-        Since `start`; the first is 0.
-    C_ib : (K+1, 3, 3) array
-    velocity : (K+1, 3) array, m/s
-        ``int C_ib f_b dt``.
-    position : (K+1, 3) array, m
-        Its integral.
-    C_mean : (K, 3, 3) array
-        Mean of ``C_ib`` over each interval.
-    C_late : (K, 3, 3) array
-        Mean of ``C_ib`` weighted by the elapsed part of the interval, ``(1/T^2) int s C_ib ds``.
-    C_ib_at : (M, 3, 3) array
-        ``C_ib`` after the rows that were asked for besides.
-    """
-
-    start: float
-    time: Array
-    C_ib: Array
-    velocity: Array
-    position: Array
-    C_mean: Array
-    C_late: Array
-    C_ib_at: Array
+    start: float  # s; time, on the record's clock, at which ``i`` is frozen: the beginning of the first row's interval
+    time: Array  # (K+1,) s: since `start`; the first is 0
+    C_ib: Array  # (K+1, 3, 3)
+    velocity: Array  # (K+1, 3) m/s: ``int C_ib f_b dt``
+    position: Array  # (K+1, 3) m: its integral
+    C_mean: Array  # (K, 3, 3): mean of ``C_ib`` over each interval
+    C_late: Array  # (K, 3, 3): mean of ``C_ib`` weighted by the elapsed part of the interval, ``(1/T^2) int s C_ib ds``
+    C_ib_at: Array  # (M, 3, 3): ``C_ib`` after the rows that were asked for besides
 
     @property
     def intervals(self) -> Array:

@@ -51,28 +51,16 @@ _radii_at = compiled(earth.radii_at, inline="always")
 
 @dataclass(frozen=True)
 class Memory:
-    """What the algorithm remembers of the samples it has seen, beside the motion itself.
+    """What the algorithm remembers of the samples it has seen, beside the motion itself."""
 
-    Attributes
-    ----------
-    acceleration : (3,) array, m/s^2
-        Mean of ``dv_n/dt`` over the last update: extrapolates velocity to the middle of the next.
-    dtheta, dvel : (3,) arrays, rad and m/s
-        Last sample of the last update.
-    rest : (M, 7) array
-        Samples (interval, dtheta, dvel) that do not fill an update yet.
-    before : ImuRecord or None
-        The last rows of the record.
-    updates : int
-        Since the last output.
-    """
-
+    # (3,) m/s^2: mean of ``dv_n/dt`` over the last update: extrapolates velocity to the middle of the next
     acceleration: Array = field(default_factory=lambda: np.zeros(3))
-    dtheta: Array = field(default_factory=lambda: np.zeros(3))
-    dvel: Array = field(default_factory=lambda: np.zeros(3))
+    dtheta: Array = field(default_factory=lambda: np.zeros(3))  # (3,) rad: last sample of the last update
+    dvel: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m/s
+    # (M, 7): samples (interval, dtheta, dvel) that do not fill an update yet
     rest: Array = field(default_factory=lambda: np.zeros((0, 7)))
-    before: ImuRecord | None = None
-    updates: int = 0
+    before: ImuRecord | None = None  # the last rows of the record
+    updates: int = 0  # since the last output
 
 
 @dataclass(frozen=True)
@@ -80,25 +68,15 @@ class NavigationState:
     """Where a mechanisation stands, and all it needs to go on.
 
     Correct the motion between chunks with :func:`dataclasses.replace`; the memory stays.
-
-    Attributes
-    ----------
-    q_nb : (4,) array
-        Attitude quaternion, scalar first.
-    v_n : (3,) array, m/s
-        East, north, up.
-    lat, lon, alt : float, rad, rad, m
-    interval : float or None, s
-        Nominal sampling interval; None: that of the first record. Given, chunks have the bits of one batch however
-        their time stamps were rounded.
-    memory : Memory
     """
 
-    q_nb: Array
-    v_n: Array
-    lat: float
-    lon: float
-    alt: float
+    q_nb: Array  # (4,): attitude quaternion, scalar first
+    v_n: Array  # (3,) m/s: East, north, up
+    lat: float  # rad
+    lon: float  # rad
+    alt: float  # m
+    # s; nominal sampling interval; None: that of the first record. Given, chunks have the bits of one batch however their
+    # time stamps were rounded.
     interval: float | None = None
     memory: Memory = field(default_factory=Memory, repr=False)
 
@@ -123,26 +101,13 @@ class NavigationState:
 
 @dataclass(frozen=True)
 class Mechanisation:
-    """Computed motion at the output epochs.
+    """Computed motion at the output epochs."""
 
-    Attributes
-    ----------
-    time : (K,) array, s
-    q_nb : (K, 4) array
-        Attitude quaternion, scalar first.
-    v_n : (K, 3) array, m/s
-        East, north, up.
-    position : (K, 3) array
-        Latitude, longitude (rad), height (m).
-    state : NavigationState
-        To go on from: after the last whole update, whether it was put out or not.
-    """
-
-    time: Array
-    q_nb: Array
-    v_n: Array
-    position: Array
-    state: NavigationState
+    time: Array  # (K,) s
+    q_nb: Array  # (K, 4): attitude quaternion, scalar first
+    v_n: Array  # (K, 3) m/s: East, north, up
+    position: Array  # (K, 3): latitude, longitude (rad), height (m)
+    state: NavigationState  # to go on from: after the last whole update, whether it was put out or not
 
     @property
     def C_nb(self) -> Array:

@@ -22,30 +22,15 @@ EPOCH = 1_700_000_000.0
 
 @dataclass(frozen=True)
 class Log:
-    """A log of the corpus.
+    """A log of the corpus."""
 
-    Attributes
-    ----------
-    name : str
-        Of the file; unique.
-    write : callable
-        Makes the file.
-    truth : Truth
-        What is to be read.
-    answer : dict
-        Options that answer the reader's question; empty where it needs none.
-    refused : str
-        What the reader has to say instead; empty where it reads.
-    shift : float, s
-        Of the log's clock against the truth's.
-    """
-
-    name: str
-    write: Callable[[Path], None]
-    truth: Truth
+    name: str  # of the file; unique
+    write: Callable[[Path], None]  # makes the file
+    truth: Truth  # what is to be read
+    # options that answer the reader's question; empty where it needs none
     answer: dict[str, Any] = field(default_factory=dict)
-    refused: str = ""
-    shift: float = 0.0
+    refused: str = ""  # what the reader has to say instead; empty where it reads
+    shift: float = 0.0  # s; of the log's clock against the truth's
 
 
 def table(

@@ -43,28 +43,16 @@ LONG = MarineModel(
 
 @dataclass(frozen=True)
 class Case:
-    """What every method left on one course.
+    """What every method left on one course."""
 
-    Attributes
-    ----------
-    course : Course
-        Of the free INS.
-    time : (K+1,) array, s
-    errors : dict of (K+1, 7) arrays
-        By method: v_e, v_n (m/s), lat, lon (rad), phi_e, phi_n, phi_u (rad), computed minus true after its correction.
-    estimates : dict of Estimate
-        Of the filters.
-    filters : dict of Filter
-    runtime : float, s
-        Of all methods together, CPU time of all threads.
-    """
-
-    course: Course
-    time: Array
+    course: Course  # of the free INS
+    time: Array  # (K+1,) s
+    # dict of (K+1, 7) arrays; by method: v_e, v_n (m/s), lat, lon (rad), phi_e, phi_n, phi_u (rad), computed minus true after
+    # its correction
     errors: dict[str, Array]
-    estimates: dict[str, Estimate]
+    estimates: dict[str, Estimate]  # of the filters
     filters: dict[str, Filter]
-    runtime: float
+    runtime: float  # s; of all methods together, CPU time of all threads
 
 
 def filters_of(voyage: Voyage, course: Course, *, raw: bool = True) -> dict[str, Filter]:

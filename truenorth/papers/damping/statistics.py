@@ -26,22 +26,12 @@ COMPARED = ("filter1", "filter2", "fused", "fused_tuned", "augmented", "augmente
 
 @dataclass(frozen=True)
 class Signs:
-    """Errors over runs of the paper's sizes with random signs.
-
-    Attributes
-    ----------
-    errors : dict of (N, K+1, 7) arrays
-        By method.
-    correlation : (K+1-start, 7) array
-        Of the errors of filters 1 and 2 over the runs.
-    fused_ratio : (7,) array
-        RMS of the fused error over its claimed sigma, 18-24 h.
-    """
+    """Errors over runs of the paper's sizes with random signs."""
 
     time: Array
-    errors: dict[str, Array]
-    correlation: Array
-    fused_ratio: Array
+    errors: dict[str, Array]  # dict of (N, K+1, 7) arrays; by method
+    correlation: Array  # (K+1-start, 7): of the errors of filters 1 and 2 over the runs
+    fused_ratio: Array  # (7,): RMS of the fused error over its claimed sigma, 18-24 h
 
 
 def with_log(voyage: Voyage, seed: int, run: int) -> Voyage:

@@ -28,19 +28,11 @@ LOG_NOISE = 0.05  # m/s, of each row at 1 Hz
 
 @dataclass(frozen=True)
 class Voyage:
-    """The ideal log of the ship's IMU, and where it truly was.
-
-    Attributes
-    ----------
-    ideal : IdealLog
-    truth : Course
-    log_noise : (K+1, 2) array, m/s
-        White, of a speed log with a row an epoch.
-    """
+    """The ideal log of the ship's IMU, and where it truly was."""
 
     ideal: IdealLog
     truth: Course
-    log_noise: Array
+    log_noise: Array  # (K+1, 2) m/s: white, of a speed log with a row an epoch
 
     def reference(self, c: float | Array) -> Array:
         """(K+1, 2) what the log says with a constant error (m/s)."""

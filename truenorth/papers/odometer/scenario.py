@@ -65,41 +65,22 @@ def with_walk(walk: str) -> Scenario:
 
 @dataclass(frozen=True)
 class Drives:
-    """The logs of R runs of one motion, and the truth at the ends of the K filter intervals.
-
-    Attributes
-    ----------
-    scenario : Scenario
-    records, odometers : lists of the records
-    steps : (N,) array, s
-    dtheta, dvel : (R, N, 3) arrays
-    wheel : (R, N) array, m
-        Distance in each sample.
-    rows : (K+1,) array of int
-        Samples before each epoch.
-    time : (K,) array, s
-    C_nb, v_n : (K+1, 3, 3) and (K+1, 3) arrays
-        True, the start first.
-    places : (K+1, 3) array
-        Latitude, longitude (rad), height (m), as `C_nb`.
-    gyro_bias, accel_bias : (R, 3) arrays
-        True.
-    """
+    """The logs of R runs of one motion, and the truth at the ends of the K filter intervals."""
 
     scenario: Scenario
-    records: list[ImuRecord]
-    odometers: list[OdometerRecord]
-    steps: Array
-    dtheta: Array
-    dvel: Array
-    wheel: Array
-    rows: NDArray[np.int64]
-    time: Array
-    C_nb: Array
-    v_n: Array
-    places: Array
-    gyro_bias: Array
-    accel_bias: Array
+    records: list[ImuRecord]  # lists of the records
+    odometers: list[OdometerRecord]  # lists of the records
+    steps: Array  # (N,) s
+    dtheta: Array  # (R, N, 3)
+    dvel: Array  # (R, N, 3)
+    wheel: Array  # (R, N) m: distance in each sample
+    rows: NDArray[np.int64]  # (K+1,): samples before each epoch
+    time: Array  # (K,) s
+    C_nb: Array  # (K+1, 3, 3) and (K+1: true, the start first
+    v_n: Array  # (K+1, 3, 3) 3) arrays
+    places: Array  # (K+1, 3): latitude, longitude (rad), height (m), as `C_nb`
+    gyro_bias: Array  # (R: true
+    accel_bias: Array  # 3)
 
     @property
     def spec(self) -> ImuSpec:

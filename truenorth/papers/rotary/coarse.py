@@ -24,17 +24,11 @@ SOURCES: tuple[RateSource, ...] = ("gyros", "nominal", "attitude")
 
 
 class Sampled(NamedTuple):
-    """A stretch of a run at whole seconds.
+    """A stretch of a run at whole seconds."""
 
-    Attributes
-    ----------
-    integrals : InertialIntegrals
-        Of the IMU.
-    arm : dict of (K+1, 3) arrays, m/s
-        Velocity that the lever arm makes, in the IMU's frame at the start, by the source of the base's rate.
-    """
-
-    integrals: InertialIntegrals
+    integrals: InertialIntegrals  # of the IMU
+    # dict of (K+1, 3) arrays, m/s; velocity that the lever arm makes, in the IMU's frame at the start, by the source of the
+    # base's rate
     arm: dict[RateSource, Array]
 
 

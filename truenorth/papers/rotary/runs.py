@@ -54,22 +54,12 @@ SWEEPS = (
 
 @dataclass(frozen=True)
 class Found:
-    """One answer.
+    """One answer."""
 
-    Attributes
-    ----------
-    phi, sigma : (3,) arrays, rad
-        Misalignment E, N, U, and what the method says of it (NaN where it says nothing).
-    nees : float
-        Over 3; NaN where there is no covariance.
-    seconds : float
-        That it took.
-    """
-
-    phi: Array
-    sigma: Array
-    nees: float = float("nan")
-    seconds: float = float("nan")
+    phi: Array  # (3,) rad: misalignment E, N, U, and what the method says of it (NaN where it says nothing)
+    sigma: Array  # (3,) rad
+    nees: float = float("nan")  # over 3; NaN where there is no covariance
+    seconds: float = float("nan")  # that it took
 
 
 @dataclass

@@ -50,28 +50,14 @@ WALKS: dict[str, dict[str, str]] = {
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a case.
-
-    Attributes
-    ----------
-    record : ImuRecord
-    encoder : EncoderRecord or None
-        None where the indexer rests.
-    motion : Motion or Indexed
-        Of the IMU.
-    imu : ImuSpec
-        As the aligner knows it.
-    place : Position
-        Where the IMU is in the mean.
-    arm : (3,) array, m
-    """
+    """One run of a case."""
 
     record: ImuRecord
-    encoder: EncoderRecord | None
-    motion: Moving
-    imu: ImuSpec
-    place: Position
-    arm: Array
+    encoder: EncoderRecord | None  # None where the indexer rests
+    motion: Moving  # Motion or Indexed; of the IMU
+    imu: ImuSpec  # as the aligner knows it
+    place: Position  # where the IMU is in the mean
+    arm: Array  # (3,) m
 
     def C_ns(self, time: Array) -> Array:
         """(..., 3, 3) true attitude of the IMU at times (s), against the level at the mean place.

@@ -50,22 +50,12 @@ Answers = dict[str, tuple[Array, Array | None]]
 
 @dataclass(frozen=True)
 class Logs:
-    """Logs of a still base, and attitudes to start from that are wrong by any azimuth.
-
-    Attributes
-    ----------
-    records : list of ImuRecord
-    integrals : list of InertialIntegrals
-    C_nb : (runs, 3, 3) array
-        True attitude; the base is still.
-    start : (runs, 3, 3) array
-        What the INS is given at the first sample.
-    """
+    """Logs of a still base, and attitudes to start from that are wrong by any azimuth."""
 
     records: list[ImuRecord]
     integrals: list[InertialIntegrals]
-    C_nb: Array
-    start: Array
+    C_nb: Array  # (runs, 3, 3): true attitude; the base is still
+    start: Array  # (runs, 3, 3): what the INS is given at the first sample
 
 
 @dataclass(frozen=True)

@@ -27,51 +27,28 @@ ARCMIN = math.radians(1.0) / 60.0
 
 @dataclass(frozen=True)
 class Base:
-    """How the base moves.
-
-    Attributes
-    ----------
-    name : str
-    sway : float, m/s
-        RMS velocity of a sway of 4 to 8 s period, along E and N.
-    vibration : float, m/s
-        RMS velocity of a vibration that is new at every sample.
-    headings : sequence of float, rad
-        Positions about the vertical that share the time equally; turned at once.
-    """
+    """How the base moves."""
 
     name: str
-    sway: float = 0.0
-    vibration: float = 0.0
+    sway: float = 0.0  # m/s; RMS velocity of a sway of 4 to 8 s period, along E and N
+    vibration: float = 0.0  # m/s; RMS velocity of a vibration that is new at every sample
+    # sequence of float, rad; positions about the vertical that share the time equally; turned at once
     headings: Sequence[float] = (0.0,)
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Measurements of a block of runs, and what they are measurements of.
+    """Measurements of a block of runs, and what they are measurements of."""
 
-    Attributes
-    ----------
-    time : (K,) array, s
-    velocity : (runs, K, 2) array, m/s
-        What the ten-state filter sees.
-    force : (runs, K, 2) array, m/s^2
-        Mean level acceleration over each interval, of a platform that is not fed by velocity: what the eight-state filter sees.
-    phi : (runs, K, 3) array, rad
-        Of the INS; `phi_platform` of the platform.
-    bias : (runs, 5) array
-        Gyro (x, y, z) and accelerometer (x, y) biases.
-    C_nb : (K, 3, 3) array
-        Attitude of the body during the interval that ends at each time.
-    """
-
-    time: Array
-    velocity: Array
+    time: Array  # (K,) s
+    velocity: Array  # (runs, K, 2) m/s: what the ten-state filter sees
+    # (runs, K, 2) m/s^2: mean level acceleration over each interval, of a platform that is not fed by velocity: what the
+    # eight-state filter sees
     force: Array
-    phi: Array
+    phi: Array  # (runs, K, 3) rad: of the INS; `phi_platform` of the platform
     phi_platform: Array
-    bias: Array
-    C_nb: Array
+    bias: Array  # (runs, 5): gyro (x, y, z) and accelerometer (x, y) biases
+    C_nb: Array  # (K, 3, 3): attitude of the body during the interval that ends at each time
 
 
 def simulate(

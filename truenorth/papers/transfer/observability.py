@@ -18,18 +18,10 @@ EVEN_ARM = TAU_SIGMA * 200.0  # m: the way flown in the delay's prior sigma, so 
 
 @dataclass(frozen=True)
 class Seen:
-    """What sixteen states and velocity matching tell in one manoeuvre.
+    """What sixteen states and velocity matching tell in one manoeuvre."""
 
-    Attributes
-    ----------
-    rank : int
-        With perfect measurements.
-    words : str
-        With the noise as it is: what stays above .9 of its prior sigma.
-    """
-
-    rank: int
-    words: str
+    rank: int  # with perfect measurements
+    words: str  # with the noise as it is: what stays above .9 of its prior sigma
 
     def __str__(self) -> str:
         return self.words

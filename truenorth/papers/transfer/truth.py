@@ -61,31 +61,15 @@ def scenario_of(manoeuvre: str) -> Scenario:
 
 @dataclass(frozen=True)
 class Case:
-    """A manoeuvre, and how the master stands and speaks.
-
-    Attributes
-    ----------
-    name : str
-    number : int
-        Of the random numbers.
-    manoeuvre : str
-    space_time : {"paper", "none", "drawn"}
-        Delay and lever arm: the paper's, none, or drawn with the paper's as sigmas.
-    flexure : bool
-        The slave's seat bends.
-    drop : tuple of (start, stop) or None, s
-        The master is silent.
-    extra_delay : float, s
-        By which the master is later still.
-    """
+    """A manoeuvre, and how the master stands and speaks."""
 
     name: str
-    number: int
+    number: int  # of the random numbers
     manoeuvre: str = "flat_turn"
-    space_time: str = "paper"
-    flexure: bool = False
-    drop: tuple[float, float] | None = None
-    extra_delay: float = 0.0
+    space_time: str = "paper"  # delay and lever arm: the paper's, none, or drawn with the paper's as sigmas
+    flexure: bool = False  # the slave's seat bends
+    drop: tuple[float, float] | None = None  # tuple of (start, stop) or None, s; the master is silent
+    extra_delay: float = 0.0  # s; by which the master is later still
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -95,33 +79,18 @@ class Case:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: records and truth.
-
-    Attributes
-    ----------
-    slave : ImuRecord
-    master : MasterRecord
-    motion : Moving
-        Of the slave.
-    C_nb, v_n : arrays
-        The slave's first attitude, handed over, and velocity.
-    mounting : (3,) array, rad
-        ``C_mb = exp([mounting x])``.
-    tau : float, s
-    arm : (3,) array, m
-    gyro_bias, accel_bias : (3,) arrays
-    """
+    """One run: records and truth."""
 
     slave: ImuRecord
     master: MasterRecord
-    motion: Moving
-    C_nb: Array
+    motion: Moving  # of the slave
+    C_nb: Array  # the slave's first attitude, handed over, and velocity
     v_n: Array
-    mounting: Array
-    tau: float
-    arm: Array
-    gyro_bias: Array
-    accel_bias: Array
+    mounting: Array  # (3,) rad: ``C_mb = exp([mounting x])``
+    tau: float  # s
+    arm: Array  # (3,) m
+    gyro_bias: Array  # (3,)
+    accel_bias: Array  # (3,)
 
 
 class Flights:
