@@ -14,10 +14,10 @@ demo: $(WARM)
 	$(BIN)/python examples/demo.py
 
 test: $(WARM)
-	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow"
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope --no-loadscope-reorder -m "not slow"
 
 test-all: $(WARM)
-	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope --no-loadscope-reorder
 
 fuzz: $(READY)
 	FUZZ=$(or $(FUZZ),5000) $(BIN)/python -m pytest -q -n $(WORKERS) tests/fuzz

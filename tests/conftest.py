@@ -2,8 +2,44 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
+
+# Files that take the most time, longest first: no worker begins one of them when the others are done.
+LONGEST = [
+    "papers/test_static",
+    "alignment/test_in_motion",
+    "damping/test_navigation",
+    "core/test_compiled",
+    "alignment/test_published",
+    "campaign/test_faults",
+    "alignment/test_positions",
+    "campaign/test_run",
+    "filters/test_particle",
+    "papers/test_damping",
+    "filters/test_nonlinear",
+    "navigation/test_cli",
+    "alignment/test_laws",
+    "alignment/test_transfer",
+    "physics/test_strapdown",
+    "test_cli",
+    "estimate/test_long",
+    "estimate/test_run",
+    "figures/test_simulation",
+    "damping/test_dynamics",
+    "papers/test_odometer",
+    "test_quality",
+]
 
 # Time on the wall counts what else the machine does; the first example of a property may compile its kernels.
 settings.register_profile("truenorth", deadline=None)
 settings.load_profile("truenorth")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first; the order within a file stays."""
+    root = Path(__file__).parent
+    order = {root / f"{name}.py": place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.path, len(order)))

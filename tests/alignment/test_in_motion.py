@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth import OdometerRecord, UsageError, imu_spec, navigate
 from truenorth.aiding.aids import Odometer
 from truenorth.alignment.in_motion import align_in_motion
@@ -221,9 +222,10 @@ def test_gnss_from_an_unknown_heading(imu, heading):
     assert 0.33 < np.sqrt(np.mean(np.square(off))) < 1.82
 
 
-def test_a_latitude_that_nobody_gives_is_found(ring):
-    """Three runs, either hemisphere's mirror refused: within 3.3 sigma of the truth, heading as good as with it."""
-    for run in range(3):
+@few_and_all(3, few=1)
+def test_a_latitude_that_nobody_gives_is_found(ring, runs):
+    """Either hemisphere's mirror refused: within 3.3 sigma of the truth, heading as good as with it."""
+    for run in range(runs):
         sim, odometer = logs(ring, run)
         answer = align_in_motion(sim.record, RING.imu_spec, odometer=odometer)
         given = align_in_motion(sim.record, RING.imu_spec, odometer=odometer, position=PLACE)

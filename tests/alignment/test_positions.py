@@ -6,7 +6,9 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
+from tests.runs import few_and_all
 from truenorth.alignment import align
 from truenorth.alignment.positions import align_positions, find_positions
 from truenorth.alignment.task import deflection_covariance
@@ -49,6 +51,7 @@ def errors_of(turns, spec, runs, dwell):
     return np.array(phi), np.array(P), answers
 
 
+@few_and_all(12, few=6)
 @pytest.mark.parametrize(
     ("grade", "turns", "dwell"),
     [
@@ -56,27 +59,30 @@ def errors_of(turns, spec, runs, dwell):
         ("tactical", [(0, math.pi), (1, math.pi / 2), (1, -math.pi / 2)], 120.0),
     ],
 )
-def test_sigma_is_honest(grade, turns, dwell):
-    """NEES of 12 runs: 36 numbers, within their 99.9 % band, 15.3 to 72.1 in sum."""
-    phi, P, answers = errors_of(turns, imu_spec(grade), 12, dwell)
+def test_sigma_is_honest(grade, turns, dwell, runs):
+    """NEES within its 99.9 % band; of 12 runs, 36 numbers, 14.9 to 72.1 in sum."""
+    phi, P, answers = errors_of(turns, imu_spec(grade), runs, dwell)
     nees = np.einsum("ri,rij,rj->r", phi, np.linalg.inv(P), phi)
-    assert 15.3 < nees.sum() < 72.1
+    low, high = chi2.ppf([5e-4, 1 - 5e-4], 3 * runs)
+    assert low < nees.sum() < high
     for answer, errors in answers:
         assert answer.status == ("aligned" if grade == "navigation" else answer.status)
         apart = (answer.accel_bias - errors.accel.bias) / answer.accel_bias_sigma
         assert np.all(np.abs(apart) < 5.0)
 
 
-def test_without_a_specification_sigma_is_honest_too():
-    """Heading of 8 runs over its sigma: the sum of squares within its 99.9 % band, .4 to 28.3 (chi-square with 8)."""
+@few_and_all(8, few=4)
+def test_without_a_specification_sigma_is_honest_too(runs):
+    """Heading over its sigma: the sum of squares within its 99.9 % band; of 8 runs .7 to 27.9."""
     total = 0.0
-    for seed in range(20, 28):
+    for seed in range(20, 20 + runs):
         made, C = turned([(0, math.pi)], imu_spec("navigation"), seed, 300.0)
         answer = align_positions(made.record, PLACE)
         assert answer.status == "aligned"
         phi = -rotation_vector_from_dcm(answer.C_nb @ C.T)
         total += phi[2] ** 2 / answer.phi_covariance[2, 2]
-    assert 0.4 < total < 28.3
+    low, high = chi2.ppf([5e-4, 1 - 5e-4], runs)
+    assert low < total < high
 
 
 def test_two_positions_take_the_biases_out():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.runs import few_and_all
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.campaign.fault_kinds import FAULTS, faults_of
 from truenorth.campaign.faults import SOUND, Trial, run_faults, table
@@ -43,9 +44,10 @@ def silent(trials: list[Trial]) -> list[Trial]:
     return [trial for trial in trials if trial.outcome in ("silent", "crash")]
 
 
+@few_and_all(4, few=1)
 @pytest.mark.parametrize("procedure", ONCE_SILENT)
-def test_nothing_that_passed_in_silence_does_so_again(procedure):
-    assert silent(run_faults([procedure], ONCE_SILENT[procedure], runs=2, seed=SEED)) == []
+def test_nothing_that_passed_in_silence_does_so_again(procedure, runs):
+    assert silent(run_faults([procedure], ONCE_SILENT[procedure], runs=runs, seed=SEED)) == []
 
 
 @pytest.mark.parametrize("procedure", BENCHES)

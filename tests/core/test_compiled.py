@@ -12,8 +12,8 @@ import time
 import pytest
 
 import truenorth
-from truenorth.core.compiled import Kernel
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
+from truenorth.core.kernel_source import KernelSource
 from truenorth.core.kernel_store import prune
 
 MODULES = {
@@ -143,7 +143,7 @@ def test_every_kernel_of_the_library_is_covered():
     for info in pkgutil.walk_packages(truenorth.__path__, "truenorth."):
         if not info.name.endswith("__main__"):
             for value in vars(importlib.import_module(info.name)).values():
-                if isinstance(value, Kernel):
+                if isinstance(value, KernelSource):
                     assert len(fingerprint(value.py_func, value.options, ())) == 64
                     count += 1
     assert count > 100

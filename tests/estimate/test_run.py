@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.aiding.source import Aiding
 from truenorth.analysis.consistency import nees
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
@@ -166,18 +167,19 @@ def test_flight_over_the_pole():
     assert np.sqrt(middle[6, 6] + middle[7, 7]) < 2000.0  # finite and sane where tan L is not
 
 
+@few_and_all(100)
 @pytest.mark.parametrize(
     ("lat", "aided", "fixed"), [(60.0, False, False), (60.0, True, False), (85.0, True, False), (-30.0, False, True)]
 )
-def test_covariance_is_that_of_many_runs(lat, aided, fixed):
-    """100 runs of a manoeuvring flight, every error drawn as the model says.
+def test_covariance_is_that_of_many_runs(lat, aided, fixed, runs):
+    """A manoeuvring flight, every error drawn as the model says.
 
-    NEES of all 15 errors over the runs at the end, chi-square of 1500 degrees: its band of 99.9 % is passed by a false
+    NEES of all 15 errors over the runs at the end, chi-square of 1500 degrees of 100 runs: its band of 99.9 % is passed by a false
     alarm in 1e-3 of tests, and so is each of the 15 variance ratios' band (99.98 %).
     """
     from scipy.stats import chi2
 
-    seconds, runs = 240.0, 100
+    seconds = 240.0
     motion = flight(lat, seconds)
     log = ideal_log(motion, rate=50.0, duration=seconds)
     model = InsModel.from_spec(SPEC)
@@ -211,11 +213,12 @@ def test_covariance_is_that_of_many_runs(lat, aided, fixed):
     assert np.all((low < ratio) & (ratio < high))
 
 
-def test_smoother_is_better_than_the_filter_and_as_honest():
-    """GNSS with an outage of 100 s: errors in its middle, 60 runs, NEES of position and velocity in its 99.9 % band."""
+@few_and_all(60)
+def test_smoother_is_better_than_the_filter_and_as_honest(runs):
+    """GNSS with an outage of 100 s: errors in its middle, NEES of position and velocity in its 99.9 % band."""
     from scipy.stats import chi2
 
-    seconds, runs = 240.0, 60
+    seconds = 240.0
     motion = flight(45.0, seconds)
     log = ideal_log(motion, rate=50.0, duration=seconds)
     model, root = InsModel.from_spec(SPEC), np.random.default_rng(2)
@@ -345,11 +348,12 @@ def test_third_order_loop_damps_as_its_poles_say():
         navigate_track(record, start, InsModel(0.0, 0.0), [baro], smooth=True)
 
 
-def test_covariance_of_the_loop_is_that_of_many_runs():
-    """A hundred runs of noise and bias under the loop: variance of height and vertical velocity in their 99.98 % band."""
+@few_and_all(100)
+def test_covariance_of_the_loop_is_that_of_many_runs(runs):
+    """Noise and bias under the loop: variance of height and vertical velocity in their 99.98 % band."""
     from scipy.stats import chi2
 
-    runs, seconds = 100, 300.0
+    seconds = 300.0
     motion = rest(Position.from_degrees(45.0))
     log = ideal_log(motion, rate=20.0, duration=seconds)
     model, rng = InsModel.from_spec(SPEC), np.random.default_rng(8)

@@ -15,6 +15,7 @@ from scipy.stats import t as student
 
 from tests.filters.dense import random_system
 from tests.filters.nonlinear_models import TURNING, conditionally_linear, growth, in_disguise, squared, tracking
+from tests.runs import few_and_all
 from truenorth.analysis.consistency import chi_square_band, nees
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import NonlinearSystem, gauss_hermite, kalman, particle
@@ -41,12 +42,13 @@ def bound(runs, rate=1e-3):
 LINEAR = random_system(S=False, n=3, m=2, epochs=8, seed=5)
 
 
+@few_and_all(100)
 @pytest.mark.parametrize("nonlinear", [None, [1], [2, 0]])
-def test_on_a_linear_system_it_is_the_kalman_filter_on_average(nonlinear):
+def test_on_a_linear_system_it_is_the_kalman_filter_on_average(nonlinear, runs):
     # Mean and variance of 3 states at 3 epochs, and the likelihood, which is unbiased whatever the number of particles:
     # 19 values, .019 of false alarms. 100 runs of 4000 particles: the bias of order 1 / 4000 is below a tenth of the
     # scatter of a mean over 100 runs.
-    runs, at = 100, [0, 4, 7]
+    at = [0, 4, 7]
     exact = kalman(LINEAR, history="full")
     ours = particle(
         again(in_disguise(LINEAR), runs),
@@ -110,9 +112,10 @@ def growing(epochs, seed):
     return NonlinearSystem(growth, squared, 10.0 * one, one, z[:, None], np.zeros(1), 5.0 * one[0], p[:, None])
 
 
-def test_on_a_nonlinear_system_it_is_bayes_rule_on_average():
+@few_and_all(100)
+def test_on_a_nonlinear_system_it_is_bayes_rule_on_average(runs):
     # Mean and variance at 4 epochs and the likelihood: 9 values, .009 of false alarms.
-    runs, at = 100, [0, 5, 12, 19]
+    at = [0, 5, 12, 19]
     system = growing(20, seed=1)
     exact, log_likelihood = on_a_grid(system.z[:, 0], system.p[:, 0], 10.0, 1.0, 0.0, 5.0)
     ours = particle(again(system, runs), generators=generators(runs), particles=4000, history="full", workers=2)
@@ -124,9 +127,9 @@ def test_on_a_nonlinear_system_it_is_bayes_rule_on_average():
     assert np.max(np.abs(gaussian - exact[:, 0]) / np.sqrt(exact[:, 1])) > 1.0
 
 
-def test_the_conditionally_linear_model_with_and_without_its_structure():
-    # Two samplings of one posterior: two-sample t over 60 runs each; 4 states at 2 epochs, .008 of false alarms.
-    runs = 60
+@few_and_all(60)
+def test_the_conditionally_linear_model_with_and_without_its_structure(runs):
+    # Two samplings of one posterior: two-sample t over the runs of each; 4 states at 2 epochs, .008 of false alarms.
     system = again(conditionally_linear(10, np.random.default_rng(4)), runs)
     few = particle(system, generators=generators(runs, 1), particles=2000, nonlinear=[TURNING], history="full").x
     all_ = particle(system, generators=generators(runs, 2), particles=20_000, history="full", workers=2).x
@@ -136,12 +139,13 @@ def test_the_conditionally_linear_model_with_and_without_its_structure():
         assert np.abs(t).max() < bound(2 * runs - 1)
 
 
-def test_consistent_on_mildly_nonlinear_tracking():
-    # NEES of 4 states over 150 runs at two epochs: 1 % two-sided each. Velocities are linear given positions. Coarse
+@few_and_all(150)
+def test_consistent_on_mildly_nonlinear_tracking(runs):
+    # NEES of 4 states over the runs at two epochs: 1 % two-sided each. Velocities are linear given positions. Coarse
     # sensor and manoeuvres: 2000 particles are too few for a prior of 30 m, a fix of 5 m and hardly any noise.
-    system, truth = tracking(150, 15, np.random.default_rng(5), missing=0.1, q=5.0, coarse=4.0)
-    ours = particle(system, generators=generators(150), particles=2000, nonlinear=[0, 1], history="full", workers=2)
-    low, high = chi_square_band(4, 150, 0.99)
+    system, truth = tracking(runs, 15, np.random.default_rng(5), missing=0.1, q=5.0, coarse=4.0)
+    ours = particle(system, generators=generators(runs), particles=2000, nonlinear=[0, 1], history="full", workers=2)
+    low, high = chi_square_band(4, runs, 0.99)
     for epoch in (7, 14):
         mean = nees(ours.x[:, epoch] - truth[:, epoch], ours.P[:, epoch]).mean()
         assert low < mean < high, (epoch, mean)

@@ -173,7 +173,8 @@ def test_every_source_gives_the_answer_of_the_file(how, record, log):
     assert answers
 
 
-@pytest.mark.parametrize("kills", [3, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [3, 20])
 def test_killed_and_resumed_the_last_answer_is_the_same_to_the_bit(kills, record, log, tmp_path):
     folder, chance = tmp_path / "out", random.Random(kills)
     arguments = [f"replay:{log}@20x", *WHERE, "-o", str(folder), "--json", "--resume"]

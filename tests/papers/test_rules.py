@@ -6,6 +6,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.core.errors import UsageError
 from truenorth.papers.claims import Claim, Rule, check, condition, exact, interval, markdown, paired, settled
 from truenorth.papers.study import STUDIES, Study, save_all
@@ -105,7 +106,7 @@ def test_noise_alone_settles_nothing():
     assert better <= 22
 
 
-@pytest.mark.parametrize("runs", [12, 60])
+@few_and_all(60, few=12)
 def test_the_interval_of_an_rms_holds_the_truth(runs):
     """Said to be below 1.0 where it is 1.0: in 2.5 % of the cases, more with few runs; at most 10 % of 300 here (99.9 %: 46)."""
     rng = np.random.default_rng(runs)

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from tests.runs import FEW
 from truenorth.cli import app
 from truenorth.core.errors import UsageError
 from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
@@ -15,10 +16,13 @@ from truenorth.papers.static.study import ACCEL_BIAS, GYRO_BIAS, LAT
 from truenorth.papers.static.truth import ARCMIN
 from truenorth.papers.table import UNITS
 
+WHOLE = pytest.param(60, marks=pytest.mark.slow)
+few, whole = (pytest.mark.parametrize("study", [runs], indirect=True) for runs in (FEW, WHOLE))
 
-@pytest.fixture(scope="module")
-def study():
-    return reproduce("static", runs=60, seed=11)
+
+@pytest.fixture(scope="module", params=[FEW, WHOLE])
+def study(request):
+    return reproduce("static", runs=request.param, seed=11)
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +94,7 @@ def test_both_filters_agree_on_a_still_base(value):
         assert eight == pytest.approx(ten, rel=0.03)
 
 
+@whole
 def test_bars_of_the_still_base(value):
     """60 runs: the bars leave room for the scatter of an RMS, 9 % at one sigma."""
     assert value("still", "states10", "level", "rms", 600.0) <= 0.40
@@ -98,24 +103,28 @@ def test_bars_of_the_still_base(value):
 
 
 @pytest.mark.parametrize("case", ["still", "two_position", "multi_position"])
-def test_sigma_is_honest(case, value):
-    """RMS over sigma within its 99.9 % band for 60 runs; NEES of 180 numbers likewise."""
-    spread = 3.3 / math.sqrt(2 * 60)
+def test_sigma_is_honest(case, study, value):
+    """RMS over sigma within its 99.9 % band; NEES of three numbers a run likewise."""
+    runs = max(figure.runs for figure in study.figures)
+    spread = 3.3 / math.sqrt(2 * runs)
     for method in ("states10", "states8"):
         for quantity in ("phi_e", "phi_n", "heading"):
             assert abs(value(case, method, quantity, "rms_over_sigma", 600.0) - 1) < spread
-        assert abs(value(case, method, "nees", "mean", 600.0) - 1) < 3.3 * math.sqrt(2 / 180)
+        assert abs(value(case, method, "nees", "mean", 600.0) - 1) < 3.3 * math.sqrt(2 / (3 * runs))
 
 
+@whole
 def test_two_positions_take_the_biases_out(value):
     assert value("two_position", "states10", "level", "rms", 600.0) <= 0.012
     assert value("two_position", "states10", "heading", "rms", 600.0) <= 1.1
 
 
+@whole
 def test_sway_hurts_the_eight_states_more(value):
     assert value("sway", "states8", "heading", "rms", 120.0) > 2 * value("sway", "states10", "heading", "rms", 120.0)
 
 
+@whole
 def test_the_right_noise_helps_more_than_h_infinity(value):
     right, robust = (value("sway", method, "heading", "rms", 120.0) for method in ("kf_retuned", "h_infinity"))
     assert right < 0.5 * robust
@@ -138,6 +147,7 @@ def test_degrees_say_what_a_second_position_brings(value):
     assert value("still", "states10", "degree_7", "value") > 1e3 * value("still", "states10", "degree_8", "value")
 
 
+@whole
 def test_from_any_azimuth_the_product_finds_north(value):
     """60 runs, none of which may fail; 4.6' is 1.3 times the sigma, 3.3 standard deviations of an RMS of 60 above it."""
     assert value("large_180", "product", "diverged", "mean") == 0.0
@@ -145,6 +155,7 @@ def test_from_any_azimuth_the_product_finds_north(value):
     assert abs(value("large_180", "product", "heading", "rms_over_sigma") - 1) < 3.3 / math.sqrt(2 * 60)
 
 
+@whole
 def test_what_becomes_of_one_normal_distribution_on_a_circle(value):
     """Filters with one mean lose many runs, and do not know it; several hypotheses or several passes lose none.
 
@@ -159,9 +170,10 @@ def test_what_becomes_of_one_normal_distribution_on_a_circle(value):
     assert value("large_180", "gyrocompass_loop", "diverged", "mean") < 0.2
 
 
-def test_the_study_repeats():
+@few
+def test_the_study_repeats(study):
     """To the bit, but for the time that a step takes."""
-    studies = [reproduce("static", runs=3, seed=11) for _ in range(2)]
+    studies = study, reproduce("static", runs=FEW, seed=11)
     one, two = (pd.DataFrame([f for f in s.figures if f.quantity != "runtime"]) for s in studies)
     pd.testing.assert_frame_equal(one, two, check_exact=True)
 

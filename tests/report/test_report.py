@@ -2,6 +2,8 @@
 
 import json
 import re
+import zlib
+from base64 import b64decode
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +41,7 @@ def test_files(aligned, tmp_path):
     import pandas as pd
 
     frame = pd.read_parquet(paths[1])
+    pd.testing.assert_frame_equal(frame, aligned.to_frame(), check_exact=True)
     assert frame.index.name == "time"
     assert frame["heading_deg"].iloc[-1] == pytest.approx(np.degrees(aligned.heading), abs=1e-6)
 
@@ -46,7 +49,7 @@ def test_files(aligned, tmp_path):
 def test_the_page_says_what_the_result_says(aligned, tmp_path):
     path = write_report(aligned, tmp_path / "report.html")
     page = path.read_text()
-    assert path.stat().st_size < 2.0e6
+    assert path.stat().st_size < 1.0e6
     assert f"{np.degrees(aligned.heading):.4f}°" in page
     assert "Aligned" in page
     for reason in aligned.reasons:
@@ -63,7 +66,18 @@ def test_the_page_asks_nothing_of_the_network(aligned, tmp_path):
     outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert not re.search(r"https?:|<link|<iframe|@import|url\(", outside)
     assert not re.search(r"<script[^>]+src", page)
-    assert "plotly.js (cartesian" in page
+    assert "plotly.js (cartesian" in unpacked(page)["plotly"]
+
+
+def unpacked(page):
+    """The deflated scripts of a page, by their names."""
+    found = re.findall(r'<script type="text/plain" id="([^"]+)" data-packed>([^<]*)</script>', page)
+    return {name: zlib.decompress(b64decode(text)).decode() for name, text in found}
+
+
+def test_the_charts_travel_with_the_page(aligned, tmp_path):
+    content = unpacked(write_report(aligned, tmp_path / "report.html").read_text())
+    assert json.loads(content["data-convergence"])["data"][0]["type"] == "scatter"
 
 
 def test_the_page_shows_all_that_led_to_the_answer(aligned, tmp_path):
