@@ -8,14 +8,11 @@ through a pointer, a row of a user's own module needs no edit here, and no kerne
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from numba import types
-
-from truenorth.core.compiled import compiled, compiled_callback
-from truenorth.core.pointers import pointer
+from truenorth.core.compiled import Callback, compiled, compiled_callback
+from truenorth.core.pointers import Pointer
 from truenorth.state.now import NOW_BEHIND
 
 SIGNATURE = "void(float64[::1], float64[::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[::1])"
@@ -58,20 +55,15 @@ class Row:
     """
 
     name: str
-    function: Any
+    function: Callback
     sizes: dict[str, int]
     rows: int = 3
     width: int = 3
     instant: bool = False
 
 
-def row(function: Callable[..., None]) -> Any:
-    """Compile a row of a measurement, with the signature that the loop calls."""
-    return compiled_callback(SIGNATURE)(function)
-
-
-_V, _M, _I = types.float64[::1], types.float64[:, ::1], types.int64[::1]
-row_at = pointer(types.void(_V, _V, _I, _V, _V, _M, _V, _V))
+row = compiled_callback(SIGNATURE)  # compiles a row of a measurement, with the signature that the loop calls
+row_at = Pointer(SIGNATURE)
 
 
 @compiled

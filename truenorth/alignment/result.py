@@ -307,10 +307,15 @@ class Alignment(Shown):
         """
         import pandas as pd
 
+        columns = self.history_columns()
+        return pd.DataFrame(columns, index=pd.Index(columns.pop("time"), name="time"))
+
+    def history_columns(self) -> dict[str, Array]:
+        """The columns of :meth:`to_frame`, `time` the first of them."""
         if self.history is None:
             raise ValueError(f"method {self.method!r} gives one answer and keeps no history")
         h = self.history
-        columns: dict[str, Array] = {}
+        columns: dict[str, Array] = {"time": h.time}
         for i, angle in enumerate(("heading", "pitch", "roll")):
             columns[f"{angle}_deg"] = np.degrees(h.euler[:, i])
             columns[f"{angle}_sigma_deg"] = np.degrees(h.euler_sigma[:, i])
@@ -323,4 +328,4 @@ class Alignment(Shown):
             columns[f"innovation_{axis}_m_s"] = h.innovation[:, i]
             columns[f"innovation_{axis}_sigma_m_s"] = h.innovation_sigma[:, i]
         columns["nis"] = h.nis
-        return pd.DataFrame(columns, index=pd.Index(h.time, name="time"))
+        return columns

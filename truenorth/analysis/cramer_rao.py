@@ -16,9 +16,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.compiled import Callback
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem, NonlinearSystem
-from truenorth.filters.nonlinear_system import ModelFunction, require_jacobians, require_vector_space
+from truenorth.filters.nonlinear_system import require_jacobians, require_vector_space
 
 Array = NDArray[np.float64]
 
@@ -109,7 +110,7 @@ def linearised_at(system: NonlinearSystem, truth: Array) -> LinearSystem:
         A Jacobian is missing, the system has a retraction or runs of its own, or `truth` has another shape.
     """
     require_jacobians(system, "the Cramer-Rao bound")
-    F, H = cast(ModelFunction, system.transition_jacobian), cast(ModelFunction, system.measurement_jacobian)
+    F, H = cast(Callback, system.transition_jacobian), cast(Callback, system.measurement_jacobian)
     require_vector_space(system, "the Cramer-Rao bound")
     truth = np.ascontiguousarray(truth, dtype=np.float64)
     n, m, K = system.states, system.rows, system.epochs

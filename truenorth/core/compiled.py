@@ -84,8 +84,47 @@ def compiled(function: F | None = None, **options: Any) -> Any:
     return Kernel(function, OPTIONS | options)
 
 
-def compiled_callback(signature: str) -> Callable[[F], Any]:
-    """Compile a function that kernels take as an *argument*, with a declared signature.
+class Callback(KernelSource):
+    """A compiled function behind an address; made, or loaded from the disk, where it is first asked for.
+
+    Parameters
+    ----------
+    function : callable
+        The Python function, of what Numba understands; it may call other kernels.
+    signature : str
+        Numba's, of arguments and result.
+    """
+
+    def __init__(self, function: Callable[..., Any], signature: str) -> None:
+        super().__init__(function, {"nopython": True, "error_model": "numpy"})
+        self.signature = signature
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the Python function."""
+        return self.py_func(*arguments)
+
+    @cached_property
+    def compiled(self) -> Any:
+        """Numba's own, which kernels take as an argument."""
+        import numba.experimental.function_type  # noqa: F401 (it registers the type)
+        from numba.core.ccallback import CFunc
+        from numba.core.sigutils import normalize_signature
+
+        from truenorth.core.kernel_store import KernelStore
+
+        callback: Any = CFunc(self.py_func, normalize_signature(self.signature), locals={}, options=self.options)
+        callback._cache = KernelStore(self.py_func, self.options | {"callback": True})
+        callback.compile()
+        return callback
+
+    @property
+    def address(self) -> int:
+        """Where the compiled function stands in this process; this object must live on."""
+        return int(self.compiled.address)
+
+
+def compiled_callback(signature: str) -> Callable[[Callable[..., Any]], Callback]:
+    """Compile a function that kernels take as an *argument* or by its address, with a declared signature.
 
     A dispatcher or closure as an argument would make each kernel be compiled anew for each such function, and miss the
     disk cache; one with a declared signature is a pointer, and all functions of that signature share one kernel.
@@ -98,19 +137,6 @@ def compiled_callback(signature: str) -> Callable[[F], Any]:
     Returns
     -------
     decorator
-        Of functions; compiles at once.
+        Of functions.
     """
-
-    def decorate(function: F) -> Any:
-        from numba.core.ccallback import CFunc
-        from numba.core.sigutils import normalize_signature
-
-        from truenorth.core.kernel_store import KernelStore
-
-        options = {"nopython": True, "error_model": "numpy"}
-        callback: Any = CFunc(function, normalize_signature(signature), locals={}, options=options)
-        callback._cache = KernelStore(function, options | {"callback": True})
-        callback.compile()
-        return callback
-
-    return decorate
+    return lambda function: Callback(function, signature)

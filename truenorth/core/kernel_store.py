@@ -22,6 +22,7 @@ from typing import Any
 
 from numba.core import config
 from numba.core.compiler import CompileResult
+from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
@@ -54,8 +55,11 @@ class KernelStore:
         return str(write_folder() or "")
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """The kernel of a signature, or None."""
-        target.refresh()
+        """The kernel of a signature, or None.
+
+        Code from the disk needs Numba's runtime only; what it knows of NumPy for compiling takes .3 s to load.
+        """
+        rtsys.initialize(target)
         name = self._file(signature, target.codegen())
         for folder in folders() if name else ():
             payload = _read(folder / str(name))

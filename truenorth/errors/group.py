@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from truenorth.core.compiled import compiled_callback
 from truenorth.core.errors import UsageError
-from truenorth.core.pointers import pointer
+from truenorth.core.pointers import Pointer
 
 Array = NDArray[np.float64]
 
 COLUMNS = "void(float64[::1], float64[::1], int64, float64[::1], float64[:, ::1])"
 FIGURES = 8
-_V, _M = types.float64[::1], types.float64[:, ::1]
-columns_at = pointer(types.void(_V, _V, types.int64, _V, _M))
+columns_at = Pointer(COLUMNS)
 
 
 def columns(function: Callable[..., None]) -> Any:

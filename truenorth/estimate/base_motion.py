@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 SAME_NOISE = 0.1  # of the expected innovation variance
 COLOUR_BLOCK = 10  # epochs over which the innovations are added up to see colour
-COLOUR_ALARM = 1e-3  # rate at which white innovations pass for coloured
+COLOUR_ALARM = 3.0902  # quantile of a normal that white innovations exceed once in a thousand
 COLOUR_RUNS = 5  # fewer blocks than this show nothing of it
 
 
@@ -44,9 +44,8 @@ def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, 
     if colour and blocks >= COLOUR_RUNS:
         e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
         low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
-        from scipy.special import chdtri  # .1 s of import
-
-        chance = chdtri(blocks, COLOUR_ALARM) / blocks  # what white noise itself may give
+        # What white noise itself may give: Wilson and Hilferty's limit of chi-square over its freedom, 1 % at 5 blocks.
+        chance = (1.0 - 2.0 / (9.0 * blocks) + COLOUR_ALARM * np.sqrt(2.0 / (9.0 * blocks))) ** 3
         # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
         coloured = low > chance * ratio
         ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)

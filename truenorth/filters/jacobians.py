@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truenorth.core.compiled import Callback
 from truenorth.core.errors import DataError, UsageError
-from truenorth.filters.nonlinear_system import ModelFunction, NonlinearSystem, added
+from truenorth.filters.nonlinear_system import NonlinearSystem, added
 from truenorth.filters.sigma_points import cholesky_order
 from truenorth.filters.stack import Array
 
@@ -116,7 +117,7 @@ def check_jacobians(
 
 
 def _differences(
-    function: ModelFunction, retract: ModelFunction, x: Array, p: Array, sigma: Array, length: int, is_state: bool
+    function: Callback, retract: Callback, x: Array, p: Array, sigma: Array, length: int, is_state: bool
 ) -> tuple[Array, Array]:
     """Central differences, in errors where the function gives a state, and what rounding does to them times sigma."""
     columns, rounding = [], []
@@ -137,13 +138,13 @@ def _differences(
     return np.stack(columns, axis=1), np.stack(rounding, axis=1)
 
 
-def _moved(retract: ModelFunction, x: Array, dx: Array) -> Array:
+def _moved(retract: Callback, x: Array, dx: Array) -> Array:
     out = np.empty_like(x)
     retract(x, dx, out)
     return out
 
 
-def _filled(function: ModelFunction, x: Array, p: Array, shape: tuple[int, ...]) -> Array:
+def _filled(function: Callback, x: Array, p: Array, shape: tuple[int, ...]) -> Array:
     out = np.zeros(shape)
     function(x, p, out)
     return out

@@ -21,12 +21,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from truenorth.core.compiled import compiled_callback
+from truenorth.core.compiled import Callback
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters.stack import Array, System, flatten_runs
 
@@ -34,38 +33,20 @@ VECTOR = "void(float64[::1], float64[::1], float64[::1])"
 MATRIX = "void(float64[::1], float64[::1], float64[:, ::1])"
 
 
-@dataclass(frozen=True)
-class ModelFunction:
-    """A function of a model, ``f(x, p, out)``; made by :func:`vector_function` and :func:`matrix_function`."""
-
-    # the Python function, of what Numba understands; it may call compiled functions
-    function: Callable[[Array, Array, Array], None]
-    signature: str  # its declared signature
-
-    def __call__(self, x: Array, p: Array, out: Array) -> None:
-        """Call the Python function."""
-        self.function(x, p, out)
-
-    @cached_property
-    def compiled(self) -> Any:
-        """What kernels take; compiled, or loaded from the disk, where it is first asked for."""
-        return compiled_callback(self.signature)(self.function)
-
-
-def vector_function(function: Callable[[Array, Array, Array], None]) -> ModelFunction:
+def vector_function(function: Callable[[Array, Array, Array], None]) -> Callback:
     """Declare ``f(x, p, out)`` that fills the vector `out`: a transition, a measurement, a retraction.
 
     `out` holds anything on entry and is as long as what it stands for; `x` and `p` are not to be changed.
     """
-    return ModelFunction(function, VECTOR)
+    return Callback(function, VECTOR)
 
 
-def matrix_function(function: Callable[[Array, Array, Array], None]) -> ModelFunction:
+def matrix_function(function: Callable[[Array, Array, Array], None]) -> Callback:
     """Declare ``f(x, p, out)`` that fills the matrix `out`: a Jacobian.
 
     `out` is zero on entry, so that only the elements that are not zero need be filled.
     """
-    return ModelFunction(function, MATRIX)
+    return Callback(function, MATRIX)
 
 
 @vector_function
@@ -127,17 +108,17 @@ class NonlinearSystem(System):
         A non-finite number, an asymmetric or indefinite covariance, naming the argument, run and epoch.
     """
 
-    transition: ModelFunction
-    measurement: ModelFunction
+    transition: Callback
+    measurement: Callback
     Q: Array
     R: Array
     z: Array
     x0: Array
     P0: Array
     p: Array | None = None
-    transition_jacobian: ModelFunction | None = None
-    measurement_jacobian: ModelFunction | None = None
-    retract: ModelFunction | None = None
+    transition_jacobian: Callback | None = None
+    measurement_jacobian: Callback | None = None
+    retract: Callback | None = None
 
     @property
     def axes(self) -> Mapping[str, str]:
@@ -230,7 +211,7 @@ def require_vector_space(system: NonlinearSystem, reason: str) -> None:
 def _try(name: str, function: Any, signature: str, x: Array, p: Array, shape: tuple[int, ...]) -> None:
     """Call a function in Python at the first epoch, where a wrong index is an error, not a wrong number."""
     kind = "vector_function" if signature == VECTOR else "matrix_function"
-    if not isinstance(function, ModelFunction) or function.signature != signature:
+    if not isinstance(function, Callback) or function.signature != signature:
         raise UsageError(
             f"NonlinearSystem: {name} is {function!r}, expected a function decorated with truenorth.filters.{kind}"
         )

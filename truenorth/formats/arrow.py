@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,11 +34,21 @@ def to_numpy(columns: list[pa.ChunkedArray]) -> Array:
 
 def table_of(record: Record) -> pa.Table:
     """A record with the documented columns."""
+    return table_from({"time": record.time, **record.columns()})
+
+
+def table_from(columns: Mapping[str, Array], index: str | None = None) -> pa.Table:
+    """Columns (N,) as a table; the column named `index` is the index where pandas reads it."""
     import pyarrow as pa
 
-    columns = {"time": record.time, **record.columns()}
     arrays = [
-        pa.Array.from_buffers(pa.float64(), len(record), [None, pa.py_buffer(np.ascontiguousarray(column))])
+        pa.Array.from_buffers(pa.float64(), len(column), [None, pa.py_buffer(np.ascontiguousarray(column))])
         for column in columns.values()
     ]
-    return pa.Table.from_arrays(arrays, names=list(columns))
+    table = pa.Table.from_arrays(arrays, names=list(columns))
+    if index is None:
+        return table
+    kinds = {"pandas_type": "float64", "numpy_type": "float64", "metadata": None}
+    described = [{"name": name, "field_name": name, **kinds} for name in columns]
+    pandas = {"index_columns": [index], "column_indexes": [], "columns": described}
+    return table.replace_schema_metadata({"pandas": json.dumps(pandas)})

@@ -77,7 +77,8 @@ class Columns:
         if pa.types.is_string(kind) or pa.types.is_large_string(kind):
             return self._text_clock(name, column.to_pylist())
         if pa.types.is_integer(kind) or pa.types.is_floating(kind):
-            return to_numpy([column.cast(pa.float64(), safe=False)])[:, 0], None
+            numbers = column if pa.types.is_float64(kind) else column.cast(pa.float64(), safe=False)
+            return to_numpy([numbers])[:, 0], None
         return self.read([name], False)[:, 0], None  # which names the cell that is no number
 
     def _text_clock(self, name: str, cells: list[str]) -> tuple[Array, str | None]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.language import translated as _
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
+from truenorth.figures.convergence import MEASURED, NIS_BLOCK, Course, averaged_nis, courses, settled_limits
 from truenorth.report.chart import Chart, Clock, speed_unit
 from truenorth.report.document import Panel
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from truenorth.quality import Inspection
 
 Array = NDArray[np.float64]
-
-MEASURED = 3  # velocities an epoch: what NIS is expected to be
 
 
 def panels(result: Alignment) -> list[Panel]:
