@@ -16,7 +16,8 @@ from truenorth.cli.options import grouped
 from truenorth.cli.reading import Rows, names_of
 
 if TYPE_CHECKING:
-    from truenorth.live.aligner import Aligner, Answer
+    from truenorth.live.aligner import Aligner
+    from truenorth.live.answer import Answer
     from truenorth.live.session import Listener
 
 EXAMPLES = """

@@ -1,6 +1,20 @@
-"""Alignment while the log is still running: rows come in, heading and its uncertainty come out."""
+"""Alignment and navigation while the log is still running: rows come in, heading and its uncertainty come out."""
 
-from truenorth.live.aligner import Aligner, Answer
+from truenorth.live.aligner import Aligner
+from truenorth.live.answer import Answer, Motion
+from truenorth.live.feeds import Feed, GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
 from truenorth.live.intake import Counts
+from truenorth.live.navigator import Navigator
 
-__all__ = ["Aligner", "Answer", "Counts"]
+__all__ = [
+    "Aligner",
+    "Answer",
+    "Counts",
+    "Feed",
+    "GnssFeed",
+    "HeightFeed",
+    "Motion",
+    "Navigator",
+    "OdometerFeed",
+    "VelocityFeed",
+]

@@ -1,18 +1,23 @@
 """`Aligner`: rows in, an answer at any time.
 
 The procedure that aligns a whole log looks back: it fits the motion of the base and passes over the log more than once. It runs
-again on all rows so far whenever the log has grown by a tenth, within a share of one core; between two runs the gyros carry the
-last answer on, and its uncertainty with it. :meth:`Aligner.finish` is that procedure on all rows, so that the last answer is that
-of :func:`truenorth.align` on the same log, to the bit as long as the rows fit into memory one by one (see :mod:`.log`).
+again on all rows so far whenever the log has grown by a tenth, within a share of one core. Between two runs the gyros carry the
+last answer on, and its uncertainty with it; on the move the closed loop does, aided by what comes. :meth:`Aligner.finish` is that
+procedure on all rows, so that the last answer is that of :func:`truenorth.align` on the same log, to the bit as long as the rows
+fit into memory one by one (see :mod:`.log`).
+
+With aiding sensors the regime is watched: as long as they say that the vehicle stays where it is, it is aligned as a base that
+stays; once they say that it moves, as a vehicle on the move, from all rows.
 """
 
 from __future__ import annotations
 
 import threading
 import time as clock
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -20,13 +25,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment import Alignment, align
-from truenorth.core.attitude import euler_from_dcm, euler_sigma
+from truenorth.alignment.recipes import RECIPES
+from truenorth.core.attitude import euler_sigma
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.live.answer import Answer, Motion
 from truenorth.live.carry import Carry
-from truenorth.live.intake import Counts, Intake
+from truenorth.live.feeds import FEEDS, Feed
+from truenorth.live.intake import Intake, as_rows
 from truenorth.live.log import MOST_ROWS, Kind, Log
-from truenorth.live.remaining import seconds_to
+from truenorth.live.navigator import Navigator
+from truenorth.navigation.procedure import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 
@@ -36,83 +45,21 @@ FIRST = 20.0  # s of log before the first answer: a filter needs as much
 GROWTH = 1.1  # times the length of the last solution, from which the next is due
 SHARE = 0.1  # of one core, for solutions
 SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What is known now.
-
-    Attributes
-    ----------
-    time : float, s
-        Of the newest row.
-    C_nb : (3, 3) array
-    sigma, floor : (3,) arrays, rad
-        Of heading, pitch, roll; the floor is the part that waiting does not improve.
-    status : str
-        Of the last solution, see :class:`truenorth.Alignment`.
-    reasons : tuple of str
-    solution : Alignment
-        The last one, at its own epoch.
-    counts : Counts
-        Rows taken and left out.
-    left : float or None, s
-        When the base began to leave its place; the solution ends there, and the gyros carry it on.
-    """
-
-    time: float
-    C_nb: Array
-    sigma: Array
-    floor: Array
-    status: str
-    reasons: tuple[str, ...]
-    solution: Alignment
-    counts: Counts
-    left: float | None = None
-
-    @property
-    def euler(self) -> Array:
-        """(3,) heading, pitch, roll, rad."""
-        return np.array(euler_from_dcm(self.C_nb))
-
-    @property
-    def heading_known(self) -> bool:
-        """Whether the heading may be used."""
-        return self.status == "aligned"
-
-    def remaining(self, goal: float) -> float | None:
-        """Seconds until the one-sigma heading error comes down to `goal` (rad); 0: it has; None: it will not."""
-        return seconds_to(self.solution, float(self.sigma[0]), goal, self.time)
-
-    def summary(self) -> dict[str, Any]:
-        """One flat dictionary in degrees, ready for JSON; a heading that may not be used is None."""
-        heading, pitch, roll = np.degrees(self.euler)
-        heading_sigma, pitch_sigma, roll_sigma = np.degrees(self.sigma)
-        return {
-            "time_s": self.time,
-            "status": self.status,
-            "heading_deg": float(heading) if self.heading_known else None,
-            "pitch_deg": float(pitch),
-            "roll_deg": float(roll),
-            "heading_sigma_deg": float(heading_sigma),
-            "pitch_sigma_deg": float(pitch_sigma),
-            "roll_sigma_deg": float(roll_sigma),
-            "heading_sigma_floor_deg": float(np.degrees(self.floor[0])),
-            "solution_time_s": self.solution.time,
-            "reasons": list(self.reasons),
-            "rows": self.counts.taken,
-            "rows_left_out": self.counts.left_out,
-        }
+RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
 
 
 class Aligner:
-    """Alignment of a base that stays where it is (still, shaken or swaying), while its log is still running.
+    """Alignment while its log is still running: of a base that stays (still, shaken or swaying), and on the move.
 
     Parameters
     ----------
-    place : Position
+    place : Position, optional
+        Not needed with GNSS positions.
     imu : ImuSpec, str, path or mapping, optional
-        Specification; inferred from the rows when left out.
+        Specification; on a base that stays it is inferred from the rows when left out.
+    aid : sequence of Feed
+        Aiding sensors, whose rows come by :meth:`push_gnss`, :meth:`push_odometer`, :meth:`push_velocity` or their own `push`. One
+        that is not named here begins with its first row, with the usual mounting.
     kind : {"rates", "increments"}
         What a row is, see :class:`truenorth.ImuRecord`.
     method : str
@@ -130,9 +77,10 @@ class Aligner:
 
     def __init__(
         self,
-        place: Position,
+        place: Position | None = None,
         imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
         *,
+        aid: Sequence[Feed] = (),
         kind: Kind = "rates",
         method: Any = "auto",
         share: float = SHARE,
@@ -143,6 +91,7 @@ class Aligner:
         if not 0.0 < share <= 1.0:
             raise UsageError(f"share {share}; expected a part of one core above 0, at most 1")
         self.place, self.imu, self.method, self.share = place, None if imu is None else imu_spec(imu), method, share
+        self.feeds = {feed.key: feed for feed in aid}
         self.log = Log(kind, most_rows)
         self._taken = taken or (lambda rows: None)
         self.intake = Intake()
@@ -152,7 +101,10 @@ class Aligner:
         self._solution: Alignment | None = None
         self._carry: Carry | None = None
         self._earlier: Carry | None = None  # of the solution before, which knows no row of a drive that has just begun
-        self._recent: list[Array] = []  # blocks since the running solution was begun
+        self._mover: Navigator | None = None  # on the move
+        self._newest: deque[Array] = (
+            deque()
+        )  # blocks as they came, of the last `RECENT` seconds and since the solution's epoch
         self._pool = ThreadPoolExecutor(1, "align") if background else None
         self._running: Future[Alignment] | None = None
         self._due, self._cost, self._free_at = FIRST, 0.0, 0.0
@@ -172,20 +124,27 @@ class Aligner:
         UsageError
             Shapes that do not fit.
         """
-        times = np.atleast_1d(np.asarray(time, dtype=np.float64))
-        try:
-            rows = np.column_stack([times, np.atleast_2d(gyro), np.atleast_2d(accel)]).astype(np.float64)
-        except (ValueError, TypeError):
-            rows = np.empty((0, 0))
-        if rows.shape != (len(times), 7):
-            raise UsageError(
-                f"rows of shapes {np.shape(time)}, {np.shape(gyro)}, {np.shape(accel)}; expected (K,), (K, 3) and (K, 3)"
-            )
+        rows = as_rows(time, gyro, accel)
         with self._lock:
             for block in self.intake.sift(rows):
                 self._take(block)
             self._collect()
             self._start_when_due()
+
+    def push_gnss(self, time: ArrayLike, lat: Any = None, lon: Any = None, alt: Any = None, **more: Any) -> None:
+        """Take fixes in, see :meth:`GnssFeed.push`; they may come up to a second after the IMU's rows of their time."""
+        self._feed("gnss").push(time, lat, lon, alt, **more)
+
+    def push_odometer(self, time: ArrayLike, values: ArrayLike) -> None:
+        """Take an odometer's rows in, see :meth:`OdometerFeed.push`: speeds, m/s, unless `aid` holds another one."""
+        self._feed("odometer").push(time, values)
+
+    def push_velocity(self, time: ArrayLike, velocity: ArrayLike, sigma: ArrayLike | None = None) -> None:
+        """Take a velocity log's rows in, see :meth:`VelocityFeed.push`: body axes, unless `aid` holds another one."""
+        self._feed("velocity").push(time, velocity, sigma)
+
+    def _feed(self, key: str) -> Any:
+        return self.feeds.setdefault(key, FEEDS[key]())
 
     @property
     def first_answer(self) -> float:
@@ -205,12 +164,20 @@ class Aligner:
         with self._lock:
             self._collect()
             at, carry = self._solution, self._carry
-            if at is None or carry is None:
+            if at is None:
                 return None
-            carry.advance()
-            C_nb, phi = carry.C_nb, carry.phi_covariance
+            now = None if self._mover is None else self._mover.answer
+            if now is not None:
+                return replace(
+                    now, status=at.status if now.status == "navigated" else now.status, floor=np.asarray(at.euler_sigma_floor),
+                    reasons=(*self._reasons(at), *now.reasons), counts=self.intake.counts, left=self.left,
+                )  # fmt: skip
+            time, C_nb, phi = at.time, at.C_nb, at.phi_covariance
+            if carry is not None:
+                carry.advance()
+                time, C_nb, phi = carry.time, carry.C_nb, carry.phi_covariance
             return Answer(
-                time=carry.time,
+                time=time,
                 C_nb=C_nb,
                 sigma=euler_sigma(C_nb, phi),
                 floor=np.asarray(at.euler_sigma_floor),
@@ -219,10 +186,11 @@ class Aligner:
                 solution=at,
                 counts=self.intake.counts,
                 left=self.left,
+                motion=None if at.moving is None else Motion.of(at),
             )
 
     def finish(self) -> Alignment:
-        """Align all rows (those before the base left its place), as :func:`truenorth.align` would.
+        """Align all rows as :func:`truenorth.align` would; without a sensor that aids on the move, those before the base left.
 
         Raises
         ------
@@ -230,10 +198,33 @@ class Aligner:
             As :func:`truenorth.align`.
         """
         self.close()
-        found = self._solve(self._record(np.inf if self.left is None else self.left))
-        if self.left is None:
-            self._solution, self._carry = found, Carry(found, self.log.source_kind)
+        aids = self._aids()
+        left = None if aids else self.left
+        found = self._solve(self._record(aids, np.inf if left is None else left), aids)
+        if left is None:
+            self._take_over(found)
         return found
+
+    def navigator(self, **options: Any) -> Navigator:
+        """Go on from the best alignment there is (:meth:`finish`), without a gap.
+
+        Parameters
+        ----------
+        **options
+            Of :class:`Navigator`.
+
+        Raises
+        ------
+        AlignmentError, DataError
+            As :meth:`finish`; the heading may not be used.
+        """
+        taken = options.pop("taken", None)
+        found = self.finish()
+        navigator = Navigator(found, feeds=list(self.feeds.values()), kind=self.log.source_kind, **options)
+        for block in self._newest:
+            navigator.push(block[:, 0], block[:, 1:4], block[:, 4:])
+        navigator.on_taken(taken)
+        return navigator
 
     def close(self) -> None:
         """Wait for a running solution, and let the thread end."""
@@ -254,8 +245,12 @@ class Aligner:
             self.intake.counts.too_late += len(block)
             return
         self._taken(block)
-        if self._running is not None:
-            self._recent.append(block)
+        self._newest.append(block)
+        oldest = self.log.end - RECENT if self._solution is None else min(self.log.end - RECENT, self._solution.time)
+        while self._newest[0][-1, 0] < oldest:
+            self._newest.popleft()
+        if self._mover is not None:
+            self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
         for carry in (self._earlier, self._carry):
             if carry is None:
                 continue
@@ -265,32 +260,57 @@ class Aligner:
                 self._solution = carry.solution
 
     def _start_when_due(self) -> None:
-        if self._running is not None or self.left is not None or self.duration < self._due:
+        if self._running is not None or self.duration < self._due:
             return
         if self._pool is not None and clock.monotonic() < self._free_at:
             return
-        self._recent = []
-        record = self._record()
+        aids = self._aids()
+        if self.left is not None and not aids:
+            return
+        record = self._record(aids)
         if self._pool is not None:
-            self._running = self._pool.submit(self._solve, record)
+            self._running = self._pool.submit(self._solve, record, aids)
             return
         self._running = Future()
         try:
-            self._running.set_result(self._solve(record))
+            self._running.set_result(self._solve(record, aids))
         except (AlignmentError, DataError) as error:
             self._running.set_exception(error)
         self._collect()
 
-    def _record(self, until: float = np.inf) -> ImuRecord:
-        """The rows since the last gap that cannot be bridged."""
-        return self.log.record(self.log.last_gap, until)
+    def _aids(self) -> list[Any]:
+        """What aids an alignment on the move; nothing as long as the vehicle stays where it is, or no sensor says that it moves."""
+        if all(feed.moves_from() is None for feed in self.feeds.values()):
+            return []
+        found = [feed.between(-np.inf, self.log.end) for feed in self.feeds.values()]
+        return [aid for aid in found if aid is not None and any(recipe.fits({type(aid)}) for recipe in RECIPES)]
 
-    def _solve(self, record: ImuRecord) -> Alignment:
+    def _record(self, aids: Sequence[Any], until: float = np.inf) -> ImuRecord:
+        """The rows since the last gap that cannot be bridged."""
+        since = self.log.last_gap
+        if aids:
+            time = self.log.rows[:, 0]
+            wide = np.flatnonzero(np.diff(time) > LONGEST_BRIDGE)
+            since = float(time[wide[-1]]) if wide.size else -np.inf
+        return self.log.record(since, until)
+
+    def _solve(self, record: ImuRecord, aids: Sequence[Any]) -> Alignment:
         begun = clock.thread_time()
         try:
-            return align(record, self.place, self.imu, method=self.method)
+            place = self.place or (None if aids else self._place())
+            return align(record, place, self.imu, aid=list(aids), method=self.method)
         finally:
             self._cost = clock.thread_time() - begun
+
+    def _place(self) -> Position | None:
+        """Of a vehicle that stays: the median of its fixes."""
+        gnss = self.feeds.get("gnss")
+        fixes = np.empty((0, 3)) if gnss is None else gnss.rows[:, 1:4]
+        fixes = fixes[np.isfinite(fixes[:, :2]).all(axis=1)]
+        if not len(fixes):
+            return None
+        lat, lon, alt = np.median(np.nan_to_num(fixes), axis=0)
+        return Position(float(lat), float(lon), float(alt), 10.0, 20.0)
 
     def _collect(self) -> None:
         """Take over a solution that is ready."""
@@ -306,25 +326,39 @@ class Aligner:
             self.failure = str(error)
             return
         self.failure, self.solutions = "", self.solutions + 1
-        if self.left is not None:
-            return
+        if self.left is None or found.moving is not None:
+            self._take_over(found)
+
+    def _take_over(self, found: Alignment) -> None:
+        """Carry a new solution on: by the closed loop on the move, by the gyros alone on a base that stays."""
         self._solution = found
-        if self._earlier is None or self._carry is None or self._carry.elapsed > SETTLED:
+        if found.moving is not None:
+            self._carry = self._earlier = self._mover = None
+            if found.heading_known:
+                self._mover = Navigator(found, feeds=list(self.feeds.values()), kind=self.log.source_kind)
+        elif self._earlier is None or self._carry is None or self._carry.elapsed > SETTLED:
             self._earlier = self._carry
-        self._carry = Carry(found, self.log.source_kind)
-        for block in self._recent:
-            self._carry.add(block)
-        self._recent = []
+        if found.moving is None:
+            self._carry = Carry(found, self.log.source_kind)
+        for block in self._newest:
+            if self._mover is not None:
+                self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
+            if self._carry is not None:
+                self._carry.add(block)
 
     def _reasons(self, at: Alignment) -> tuple[str, ...]:
         more = []
         if self.left is not None:
+            went_on = "alignment goes on in motion" if at.moving is not None else "carried on by the gyros"
             more.append(
-                f"the base left its place at {self.left:.1f} s: the heading is that of the rows until then, carried on by the gyros"
+                f"the base left its place at {self.left:.1f} s: the heading is that of the rows until then, {went_on}"
             )
         found = self.intake.counts.words()
         if found:
             more.append(found)
+        for key, feed in self.feeds.items():
+            if feed.left_out:
+                more.append(f"{key}: {feed.left_out} row{'s' * (feed.left_out > 1)} left out")
         if self.log.merged > 1:
             more.append(f"the log is long: rows are kept as increments over {self.log.merged} of them")
         if self.failure:

@@ -10,7 +10,9 @@ from collections import deque
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
 
@@ -51,6 +53,26 @@ class Counts:
         """What was left out or put in order, such as ``3 rows not finite, 1 row repeated``; empty where nothing was."""
         found = {name.replace("_", " "): count for name, count in asdict(self).items() if name != "taken" and count}
         return ", ".join(f"{count} row{'s' * (count > 1)} {name}" for name, count in found.items())
+
+
+def as_rows(time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> Array:
+    """(K, 7) rows ``time, gyro (3), accel (3)`` of one row or many.
+
+    Raises
+    ------
+    UsageError
+        Shapes that do not fit.
+    """
+    times = np.atleast_1d(np.asarray(time, dtype=np.float64))
+    try:
+        rows = np.column_stack([times, np.atleast_2d(gyro), np.atleast_2d(accel)]).astype(np.float64)
+    except (ValueError, TypeError):
+        rows = np.empty((0, 0))
+    if rows.shape != (len(times), 7):
+        raise UsageError(
+            f"rows of shapes {np.shape(time)}, {np.shape(gyro)}, {np.shape(accel)}; expected (K,), (K, 3) and (K, 3)"
+        )
+    return rows
 
 
 class Intake:

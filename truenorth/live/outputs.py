@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truenorth.core.units import significant
-from truenorth.live.aligner import Aligner, Answer
+from truenorth.live.aligner import Aligner
+from truenorth.live.answer import Answer
 
 if TYPE_CHECKING:
     from rich.table import Table

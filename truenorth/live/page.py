@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from truenorth.core.errors import UsageError
-from truenorth.live.aligner import Aligner, Answer
+from truenorth.live.aligner import Aligner
+from truenorth.live.answer import Answer
 from truenorth.live.outputs import waiting
 from truenorth.live.spectrum import motion_spectrum
 

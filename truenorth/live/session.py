@@ -16,7 +16,8 @@ from truenorth.alignment import Alignment
 from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.formats.layout import Layout
-from truenorth.live.aligner import SHARE, Aligner, Answer
+from truenorth.live.aligner import SHARE, Aligner
+from truenorth.live.answer import Answer
 from truenorth.live.journal import Journal
 from truenorth.live.log import Kind
 from truenorth.live.sources import open_source

@@ -120,7 +120,7 @@ def navigate(
     """
     tell = progress or (lambda stage: None)
     given = _by_key(aid)
-    begin, spec, imu_source = _start_of(start, imu)
+    begin, spec, imu_source = start_of(start, imu)
     check_start(begin)
     record = ImuRecord.of(record)
     record = _from_start(record if calibration is None else calibration.apply(record), begin)
@@ -131,7 +131,7 @@ def navigate(
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop("velocity", None) if damping is not None else None
     found = _sits_as_found(given, begin)
-    height, why = _altitude(altitude, given)
+    height, why = kept_altitude(altitude, given)
     plan = _Plan(
         record,
         begin,
@@ -260,7 +260,8 @@ def _intervals(record: ImuRecord, interval: float | None, output: float | None) 
     return interval, max(1, round(output / interval))
 
 
-def _start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
+def start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str]:
+    """Where navigation begins, the specification, and where that comes from; arguments as for :func:`navigate`."""
     spec = None if imu is None else imu_spec(imu)
     if isinstance(start, Start):
         if spec is None:
@@ -319,7 +320,14 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
     return record, gaps, [Aiding("gap", "velocity", record.time[rows], push**2, turn, does="disturbance")]
 
 
-def _altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:
+def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:
+    """How height is kept with these aids, and what is to be said of it.
+
+    Raises
+    ------
+    UsageError
+        What is wanted, no aid measures.
+    """
     gnss = _record_of(given, Gnss)
     heights = gnss is not None and bool(np.isfinite(gnss.alt).any())
     if wanted is not None and wanted not in get_args(Altitude):

@@ -1,0 +1,160 @@
+"""Live on the move: the answer of the whole log, whatever the chunks; from alignment to navigation without a gap."""
+
+import math
+
+import numpy as np
+import pytest
+
+import truenorth as tn
+from truenorth.aiding.aids import Gnss, Odometer
+from truenorth.core.position import Position
+from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
+from truenorth.records import OdometerRecord
+from truenorth.simulation.scenario import read_scenario
+
+DURATION = 120.0
+
+
+@pytest.fixture(scope="module")
+def van():
+    """A van in town that begins to drive after some seconds: IMU at 50 Hz, GNSS at 5 Hz, odometer, and the truth."""
+    content = read_scenario("van").to_mapping()
+    content |= {"duration": f"{DURATION:g} s", "imu": "tactical", "rate": "50 Hz"}
+    content["gnss"] = {"rate": "5 Hz", "position_noise": "0.5 m", "velocity_noise": "0.05 m/s"}
+    scenario = read_scenario(content)
+    sim = scenario.simulate(seed=2)
+    aiding = scenario.simulate_aiding(seed=2)
+    return sim, aiding["gnss"].record, aiding["odometer"].record
+
+
+def fed(run, record, gnss, odometer, chunk, *, until=math.inf, since=-math.inf, late=0.4):
+    """Push rows in the order in which they come: aiding rows some tenths of a second late."""
+    g = o = 0
+    for first in range(0, len(record), chunk):
+        part = slice(first, first + chunk)
+        now = min(record.time[part][-1], until)
+        while g < len(gnss) and gnss.time[g] + late <= now:
+            run.feeds["gnss"].push(
+                gnss.time[g], gnss.lat[g], gnss.lon[g], gnss.alt[g], v_n=gnss.v_n[g],
+                position_sigma=None if gnss.position_sigma is None else gnss.position_sigma[g],
+                velocity_sigma=None if gnss.velocity_sigma is None else gnss.velocity_sigma[g],
+            )  # fmt: skip
+            g += 1
+        while odometer is not None and o < len(odometer) and odometer.time[o] + late <= now:
+            run.feeds["odometer"].push(odometer.time[o], odometer.values[o])
+            o += 1
+        rows = (record.time[part] > since) & (record.time[part] <= until)
+        if rows.any():
+            run.push(record.time[part][rows], record.gyro[part][rows], record.accel[part][rows])
+
+
+def kept(gnss, end):
+    """The fixes that have come."""
+    return gnss[: int(np.searchsorted(gnss.time, end, side="right"))]
+
+
+@pytest.mark.parametrize("chunk", [1, 13, 1000])
+def test_on_the_move_the_last_answer_is_that_of_the_whole_log_to_the_bit(van, chunk):
+    sim, gnss, _ = van
+    record = sim.record
+    with Aligner(imu="tactical", aid=[GnssFeed()], kind=record.kind, background=False) as aligner:
+        fed(aligner, record, gnss, None, chunk)
+        found = aligner.finish()
+        answer = aligner.answer
+    whole = tn.align(record, imu="tactical", aid=[Gnss(kept(gnss, record.time[-1] - 0.4))])
+    assert found.moving is not None
+    assert np.array_equal(found.C_nb, whole.C_nb)
+    assert np.array_equal(found.phi_covariance, whole.phi_covariance)
+    assert found.status == whole.status == "aligned"
+    assert answer.time == record.time[-1]
+    truth = sim.motion.states(np.array([answer.time]))
+    assert np.all(np.abs(answer.motion.v_n - truth.v_n[0]) < 4.0 * answer.motion.v_sigma + 0.02)
+
+
+def test_between_two_solutions_the_loop_goes_on(van):
+    """Its answer is at the newest row, with a velocity within four sigmas of the truth."""
+    sim, gnss, _ = van
+    record = sim.record
+    answers = []
+    with Aligner(imu="tactical", aid=[GnssFeed()], kind=record.kind, background=False) as aligner:
+        for until in np.arange(60.0, DURATION, 7.0):
+            fed(aligner, record, gnss, None, 25, until=until, since=answers[-1].time if answers else -math.inf)
+            answers.append(aligner.answer)
+    assert any(a.solution.time < a.time - 3.0 for a in answers)
+    for a in answers:
+        if a.motion is None:
+            continue
+        truth = sim.motion.states(np.array([a.time]))
+        assert np.all(np.abs(a.motion.v_n - truth.v_n[0]) < 4.0 * a.motion.v_sigma)
+        off = (a.euler[0] - math.atan2(truth.C_nb[0, 0, 1], truth.C_nb[0, 1, 1]) + math.pi) % (2 * math.pi) - math.pi
+        assert abs(off) < 4.0 * a.sigma[0]
+
+
+def navigated(start, record, gnss, odometer, chunk):
+    with Navigator(
+        start, feeds=[GnssFeed(), OdometerFeed(odometer.kind, odometer.pulse_size)], kind=record.kind
+    ) as run:
+        fed(run, record, gnss, odometer, chunk)
+        answer, past = run.answer, run.past.track
+        return answer, past, run.finish()
+
+
+def test_navigation_in_chunks_is_one_and_the_same_to_the_bit(van):
+    sim, gnss, odometer = van
+    record = sim.record
+    start = tn.align(record.between(None, 60.06), imu="tactical", aid=[Gnss(gnss.between(None, 60.0))])
+    assert start.status == "aligned"
+    runs = [navigated(start, record, gnss, odometer, chunk) for chunk in (1, 13, 1000)]
+    end = record.time[-1] - 0.4
+    left = odometer[: int(np.searchsorted(odometer.time, end, side="right"))]
+    whole = tn.navigate(
+        record,
+        start,
+        aid=[Gnss(kept(gnss, end)), Odometer(OdometerRecord(left.time, left.values, left.kind, left.pulse_size))],
+        interval=0.2,
+        output=1.0,
+    )
+    for answer, past, result in runs:
+        assert np.array_equal(result.track.P, whole.track.P)
+        assert np.array_equal(result.position, whole.position)
+        assert result.status == whole.status == "navigated"
+        assert np.array_equal(past.P, runs[0][1].P)
+        assert np.array_equal(past.position, runs[0][1].position)
+        # The loop knows the interval of sampling from its first rows, the batch from all: equal within rounding.
+        np.testing.assert_allclose(past.position, whole.position[: len(past.time)], rtol=1e-12)
+        np.testing.assert_allclose(past.C_nb, whole.C_nb[: len(past.time)], rtol=0, atol=1e-11)
+        assert answer.time == record.time[-1]
+        np.testing.assert_allclose(answer.motion.v_n, whole.v_n[-1], atol=0.02)
+
+
+def test_from_alignment_to_navigation_without_a_gap(van):
+    """The navigator takes the rows after the alignment's epoch, and goes on with those that come."""
+    sim, gnss, _ = van
+    record = sim.record
+    aligner = Aligner(imu="tactical", aid=[GnssFeed()], kind=record.kind, background=False)
+    fed(aligner, record, gnss, None, 50, until=60.0)
+    navigator = aligner.navigator()
+    fed(navigator, record, gnss[int(np.searchsorted(gnss.time, 59.6, side="right")) :], None, 50, since=60.0)
+    result = navigator.finish()
+    assert result.status == "navigated"
+    assert result.time[-1] == pytest.approx(record.time[-1], abs=1e-9)
+    assert result.time[0] == pytest.approx(60.0, abs=0.02)
+    truth = sim.motion.states(result.time[-1:])
+    place = Position(truth.lat[0], truth.lon[0], truth.alt[0])
+    off = (result.position[-1, :2] - [place.lat, place.lon]) * 6.37e6
+    assert np.all(np.abs(off) < 4.0 * result.position_sigma[-1, 1::-1] + 0.1)
+
+
+def test_a_gap_that_is_too_long_is_named_and_the_answer_lost(van):
+    sim, gnss, _ = van
+    record = sim.record
+    start = tn.align(record.between(None, 60.06), imu="tactical", aid=[Gnss(gnss.between(None, 60.0))])
+    with Navigator(start, feeds=[GnssFeed()], kind=record.kind) as run:
+        fed(run, record, gnss, None, 20, until=80.0)
+        before = run.answer
+        fed(run, record, gnss, None, 20, since=83.0)
+        after = run.answer
+    assert before.status == "navigated"
+    assert after.status == "lost"
+    assert not after.heading_known
+    assert any("a gap of 3.0" in reason for reason in after.reasons)

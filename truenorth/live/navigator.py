@@ -1,0 +1,303 @@
+"""`Navigator`: from an alignment onward while the log is still running; attitude, velocity and place at any time.
+
+The closed loop of :func:`truenorth.navigate`, fed as rows come. Rows of the last second wait for measurements that come late; an
+answer carries the loop over them without taking them, so that it holds at the newest row. Whatever the chunks, the loop gives the
+same bits; :meth:`Navigator.finish` is :func:`truenorth.navigate` on all rows.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.aiding.aids import Aid
+from truenorth.aiding.source import Aiding
+from truenorth.alignment import Alignment
+from truenorth.core.errors import DataError
+from truenorth.errors.model import InsModel
+from truenorth.estimate.events import LoopState, Setting
+from truenorth.estimate.run import begin, go_on, with_states
+from truenorth.live.answer import Answer, Motion
+from truenorth.live.feeds import Feed
+from truenorth.live.intake import LATE, Intake, as_rows
+from truenorth.live.log import MOST_ROWS, Kind, Log
+from truenorth.live.past import Past
+from truenorth.navigation import Navigation, navigate
+from truenorth.navigation.procedure import FINE, LONGEST_BRIDGE, kept_altitude, start_of
+from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
+from truenorth.quality.innovations import innovation_evidence
+from truenorth.records.base import GAP_FACTOR
+from truenorth.records.specs import ImuSpec
+from truenorth.state.state import Start
+from truenorth.state.track import Track
+from truenorth.strapdown.increments import ImuRows
+
+Array = NDArray[np.float64]
+
+FIRST = 20  # rows that show the interval of sampling
+STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
+UNREST = 60.0  # s before a gap, whose motion says what may have happened in it
+
+
+class Navigator:
+    """Navigation while its log is still running.
+
+    Parameters
+    ----------
+    start : Alignment, Start, or path
+        See :func:`truenorth.navigate`; rows up to its epoch are passed over.
+    imu : ImuSpec or str, optional
+        Specification; the alignment's own when left out.
+    feeds : sequence of Feed
+        Aiding sensors; the caller pushes their rows.
+    altitude : {"fixed", "free", "baro", "gnss"}, optional
+        By default what the feeds allow.
+    kind : {"rates", "increments"}
+        What a row is.
+    output : float, s
+        Between two epochs of the track.
+    most_rows : int
+        Kept one by one, see :class:`truenorth.live.log.Log`.
+    """
+
+    first_answer = 0.0
+    solutions = 1
+
+    def __init__(
+        self,
+        start: Alignment | Start | str | PathLike[str],
+        imu: ImuSpec | str | None = None,
+        *,
+        feeds: Sequence[Feed] = (),
+        altitude: Altitude | None = None,
+        kind: Kind = "rates",
+        output: float = 1.0,
+        most_rows: int = MOST_ROWS,
+    ) -> None:
+        self.start, self.spec, self._imu_source = start_of(start, imu)
+        self._given, self._imu = start, imu
+        self.solution = start if isinstance(start, Alignment) else None
+        self.feeds = {feed.key: feed for feed in feeds}
+        dummies: dict[str, Aid] = {feed.key: feed.aid_of(feed.dummy()) for feed in feeds}
+        self.altitude, self._why = kept_altitude(altitude, dummies)
+        self.intake, self.log = Intake(), Log(kind, most_rows)
+        self.output = output
+        self.failure = ""
+        self.past = Past()
+        self.on_taken(None)
+        self._waiting: list[Array] = []
+        self._setting: Setting | None = None
+        self._state: LoopState | None = None
+        self._interval = 0.0
+        self._loop_end = self.start.time
+        self._sent: dict[str, dict[str, float]] = {feed.key: {} for feed in feeds}
+        self._gaps: list[tuple[float, float]] = []
+        self._lock = threading.Lock()
+
+    def push(self, time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
+        """Take rows in; any order within a second, any chunks. See :meth:`Aligner.push`.
+
+        Raises
+        ------
+        UsageError
+            Shapes that do not fit.
+        """
+        rows = as_rows(time, gyro, accel)
+        rows = rows[~(rows[:, 0] <= self.start.time)]
+        with self._lock:
+            for block in self.intake.sift(rows):
+                if not self.log.add(block):
+                    self.intake.counts.taken -= len(block)
+                    self.intake.counts.too_late += len(block)
+                    continue
+                self._taken(block)
+                self._waiting.append(block)
+            if self.log.end - LATE - self._loop_end > STEP:
+                self._advance(self.log.end - LATE)
+
+    def on_taken(self, taken: Callable[[Array], None] | None) -> None:
+        """Call this with each block of rows from now on."""
+        self._taken = taken or (lambda rows: None)
+
+    @property
+    def duration(self) -> float:
+        """Since the start, s."""
+        return max(0.0, self.log.end - self.start.time)
+
+    @property
+    def answer(self) -> Answer | None:
+        """Where the vehicle is now, at the newest row; None before the first rows."""
+        with self._lock:
+            self._advance(self.log.end - LATE)
+            found = self._now()
+        if found is None:
+            return None
+        result = self._judged(found)
+        track = result.track
+        sigma = track.sigma[-1]
+        return Answer(
+            time=float(track.time[-1]),
+            C_nb=track.C_nb[-1],
+            sigma=result.euler_sigma[-1],
+            floor=np.zeros(3),
+            status="lost" if self.failure else result.status,
+            reasons=self._reasons(result),
+            solution=self.solution,
+            counts=self.intake.counts,
+            motion=Motion(track.v_n[-1], track.position[-1], sigma[3:6].copy(), sigma[6:9].copy()),
+        )
+
+    def finish(self) -> Navigation:
+        """Navigate all rows, as :func:`truenorth.navigate` would; where they are kept one by one no longer, the loop's own track.
+
+        Raises
+        ------
+        DataError
+            As :func:`truenorth.navigate`.
+        """
+        with self._lock:
+            self._advance(np.inf)
+        if self.log.merged == 1 and not self.failure:
+            aids = [feed.between(-np.inf, self.log.end) for feed in self.feeds.values()]
+            return navigate(
+                self.log.record(),
+                self._given,
+                aid=[aid for aid in aids if aid is not None],
+                altitude=self.altitude,
+                imu=self._imu,
+                interval=FINE,
+                output=self.output,
+            )
+        found = self._now()
+        if found is None:
+            raise DataError(f"navigation: no rows came after the start at {self.start.time:.3f} s")
+        return self._judged(self.past.with_end(found))
+
+    def close(self) -> None:
+        """Nothing runs on."""
+
+    # The loop
+
+    def _begin(self, rows: Array) -> None:
+        """Make the loop ready, when enough rows are there to know their interval."""
+        self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
+        sources: list[Aiding] = [s for feed in self.feeds.values() for s in feed.sources(self.altitude)]
+        sources.append(Aiding("gap", "velocity", np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), does="disturbance"))
+        model = InsModel.from_spec(self.spec.with_random_walks(self._interval), fixed_altitude=self.altitude == "fixed")
+        stride = max(1, round(FINE / self._interval))
+        every = max(1, round(self.output / FINE))
+        self._setting = Setting(with_states(model, sources), tuple(sources), stride, every)
+        self._state = begin(self._setting, self.start, float(rows[0, 0]) - self._interval, self._interval)
+
+    def _advance(self, until: float) -> None:
+        """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
+        if self.failure or not self._waiting:
+            return
+        rows = np.vstack(self._waiting)
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]
+        if self._state is None:
+            if len(rows) < FIRST:
+                return
+            self._begin(rows)
+        self._waiting = [rows]
+        count = int(np.searchsorted(rows[:, 0], until, side="right"))
+        late = int(np.searchsorted(rows[:, 0], self._loop_end, side="right"))
+        if count <= late:
+            return
+        part, self._waiting = rows[late:count], [rows[count:]] if count < len(rows) else []
+        assert self._setting is not None
+        assert self._state is not None
+        try:
+            aiding = [*self._measurements(), *self._bridges(part)]
+            self._state, track = go_on(self._setting, self._state, self._samples(part), aiding)
+        except DataError as error:
+            self.failure = str(error)
+            return
+        self._loop_end = float(part[-1, 0])
+        self.past.add(track)
+
+    def _samples(self, rows: Array) -> ImuRows:
+        return ImuRows(rows[:, 0], rows[:, 1:4], rows[:, 4:], self.log.source_kind, "live")
+
+    def _measurements(self) -> list[Aiding]:
+        """New ones of all feeds; those of a feed whose rows cannot be are left out."""
+        found: list[Aiding] = []
+        for feed in self.feeds.values():
+            try:
+                found += feed.measurements(self.altitude, self._sent[feed.key], self.start.time)
+            except DataError as error:
+                self.past.note(feed.key, str(error))
+        return found
+
+    def _bridges(self, part: Array) -> list[Aiding]:
+        """What the vehicle may have done in gaps among these rows.
+
+        Raises
+        ------
+        DataError
+            A gap that is too long.
+        """
+        steps = np.diff(part[:, 0], prepend=self._loop_end)
+        rows = np.flatnonzero(steps > GAP_FACTOR * self._interval)
+        if not rows.size or (self._loop_end == self.start.time and rows.tolist() == [0]):
+            return []
+        missing = steps[rows] - self._interval
+        if missing.max() > LONGEST_BRIDGE:
+            raise DataError(
+                f"a gap of {steps[rows].max():.3f} s in the rows of the IMU; expected {LONGEST_BRIDGE:g} s at most: what the "
+                "vehicle did in it is not known; align again"
+            )
+        self._gaps += [(float(part[row, 0] - steps[row]), float(steps[row])) for row in rows]
+        before = self.log.record(self.log.end - UNREST)
+        scale = 1.0 if before.kind == "rates" else 1.0 / before.interval
+        turn, push = (
+            np.tile(missing[:, None] * max(float(np.std(values * scale, axis=0).max()), 1e-9), 3)
+            for values in (before.gyro, before.accel)
+        )
+        return [Aiding("gap", "velocity", part[rows, 0], push**2, turn, does="disturbance")]
+
+    def _now(self) -> Track | None:
+        """One row: the loop carried over the rows that wait, which it does not take."""
+        if self._state is None or self._setting is None:
+            return None
+        waiting = np.vstack(self._waiting) if self._waiting else np.empty((0, 7))
+        waiting = waiting[waiting[:, 0] > self._loop_end]
+        if not len(waiting) or self.failure:
+            return self.past.last
+        _, track = go_on(self._setting, self._state, self._samples(waiting), last=True)
+        last = slice(len(track.time) - 1, None)
+        return replace(
+            track,
+            time=track.time[last],
+            C_nb=track.C_nb[last],
+            v_n=track.v_n[last],
+            position=track.position[last],
+            sensors=track.sensors[last],
+            P=track.P[last],
+            residuals=(),
+        )
+
+    def _judged(self, track: Track) -> Navigation:
+        """The verdict on the loop's track."""
+        track = replace(track, residuals=self.past.residuals)
+        evidence = [*innovation_evidence(track.residuals, last_sigma(track)), *self._why]
+        result = Navigation(
+            "navigated", (), track, self.altitude, False, tuple(self._gaps), 0, self._imu_source, "live"
+        )
+        return judged_navigation(result, evidence)
+
+    def _reasons(self, result: Navigation) -> tuple[str, ...]:
+        more = [self.failure, self.intake.counts.words(), *self.past.notes.values()]
+        return (*result.reasons, *(text for text in more if text))
+
+    def __enter__(self) -> Navigator:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.close()
