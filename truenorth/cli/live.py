@@ -7,8 +7,9 @@ import math
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
@@ -16,9 +17,11 @@ from truenorth.cli.options import grouped
 from truenorth.cli.reading import Rows, names_of
 
 if TYPE_CHECKING:
-    from truenorth.live.aligner import Aligner
+    from truenorth.alignment import Alignment
     from truenorth.live.answer import Answer
-    from truenorth.live.session import Listener
+    from truenorth.live.feeds import Feed
+    from truenorth.live.session import Listener, Run, Session
+    from truenorth.navigation import Navigation
 
 EXAMPLES = """
 \b
@@ -29,24 +32,59 @@ Examples:
   truenorth live serial:/dev/ttyUSB0?baud=921600 --lat 48.1 --nmea > heading.nmea
   truenorth live tcp://192.0.2.7:5000 --lat 48.1 --page :8080
   truenorth live replay:log.csv@max --lat 34.246 -o quay --resume
+  truenorth live udp://:9000 --gnss udp://:9001 --imu industrial --until "0.5 deg" --navigate -o trip
+  truenorth live replay:log.csv@20x --gnss replay:gnss.csv --odometer replay:odo.csv --imu tactical
 
-Rows are CSV lines (a header with our names, or time and six numbers) or binary rows, see docs/live.md. Ctrl-C ends a run: the
-rows so far are aligned as `truenorth align` would.
+Rows are CSV lines (a header with our names, or time and six numbers), binary rows or the messages of a device, see docs/live.md.
+Ctrl-C ends a run: the rows so far are aligned as `truenorth align` would.
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
+
+
+@dataclass(frozen=True)
+class Aids:
+    """Sensors that aid, each with a source of its own: `same` is that of the IMU's rows."""
+
+    PANEL: ClassVar = "Sensors that aid"
+    gnss: Annotated[str | None, typer.Option(help="Source of fixes: NMEA, UBX, SBF, NovAtel, MAVLink or CSV.")] = None
+    odometer: Annotated[str | None, typer.Option(help="Source of an odometer's rows: CSV.")] = None
+    velocity: Annotated[str | None, typer.Option(help="Source of a velocity log's rows: CSV; in navigation.")] = None
+    baro: Annotated[str | None, typer.Option(help="Source of heights: CSV; in navigation.")] = None
+    lever_arm: Annotated[str | None, typer.Option(help="IMU to antenna, m: right,forward,up.")] = None
+
+    def sources(self) -> dict[str, str]:
+        """By the key of the feed."""
+        found = {"gnss": self.gnss, "odometer": self.odometer, "velocity": self.velocity, "baro": self.baro}
+        return {key: text for key, text in found.items() if text is not None}
+
+    def feeds(self) -> list[Feed]:
+        """What keeps their rows."""
+        from truenorth.cli.aiding_options import arm_of
+        from truenorth.live.feeds import FEEDS
+        from truenorth.state.mounting import Mounting
+
+        found = [FEEDS[key]() for key in self.sources()]
+        if self.lever_arm is not None:
+            for feed in found:
+                if feed.key == "gnss":
+                    feed.mounting = Mounting(lever_arm=arm_of(self.lever_arm, "--lever-arm"))
+        return found
 
 
 def live(
     source: Annotated[
         str,
         typer.Argument(
-            help="replay:FILE@10x, - (standard input), udp://:PORT, tcp://HOST:PORT, serial:/dev/NAME?baud=RATE.",
+            help="replay:FILE@10x, follow:FILE, - (standard input), udp://:PORT, tcp://HOST:PORT, serial:/dev/NAME?baud=RATE.",
             show_default=False,
         ),
     ],
-    lat: Annotated[float, typer.Option(help="Latitude, deg, north positive.", show_default=False)],
     rows: Rows,
+    aids: Aids,
+    lat: Annotated[
+        float | None, typer.Option(help="Latitude, deg, north positive; not needed with GNSS.", show_default=False)
+    ] = None,
     lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0,
     alt: Annotated[float, typer.Option(help="Height above the ellipsoid, m.")] = 0.0,
     position_sigma: Annotated[float, typer.Option(help="One-sigma error of that position, m.")] = 10.0,
@@ -59,8 +97,17 @@ def live(
     method: Annotated[str, typer.Option(help="As for `truenorth align`.")] = "auto",
     until: Annotated[
         str | None,
-        typer.Option(help="Stop when heading is as good as this, such as '0.1 deg' (one sigma).", show_default=False),
+        typer.Option(
+            help="Stop, or navigate on, when heading is as good as this: '0.1 deg' (one sigma).", show_default=False
+        ),
     ] = None,
+    navigate: Annotated[
+        bool,
+        typer.Option(
+            "--navigate", help="Go on to navigation: at --until, when the base leaves its place, or by the page."
+        ),
+    ] = False,
+    clock: Annotated[str, typer.Option(help="Time of a row: device (where it has one), or arrival.")] = "device",
     every: Annotated[float, typer.Option(help="Seconds between two answers.")] = 1.0,
     share: Annotated[float, typer.Option(help="Part of one core for solutions.")] = 0.1,
     output: Annotated[
@@ -88,43 +135,62 @@ def live(
         raise UsageError("--json and --nmea both print on standard output; expected one of them")
     if not (every > 0.0 and 0.0 < share <= 1.0):
         raise UsageError(f"--every {every:g}, --share {share:g}: expected seconds above 0, and a part of 1")
+    if clock not in ("device", "arrival"):
+        raise UsageError(f"--clock {clock!r}: expected device or arrival")
+    if lat is None and aids.gnss is None:
+        raise UsageError("no place; expected --lat (and --lon), or --gnss SOURCE")
     goal = None if until is None else parse(until, "angle")
     given = {"units": rows.units, "axes": rows.axes, "columns": names_of(rows.columns), "kind": rows.kind}
-    place = Position.from_degrees(lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2.0 * position_sigma)
+    place = None
+    if lat is not None:
+        place = Position.from_degrees(
+            lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2.0 * position_sigma
+        )
     session = Session(
         source,
         place,
         imu,
         layout=layout_for(Path(source), given),
+        feeds=aids.feeds(),
+        aids=aids.sources(),
         method=method,
         share=share,
         every=every,
         until=goal,
+        navigate=navigate,
+        by_arrival=clock == "arrival",
         folder=output,
         resume=resume,
         opened=lambda name: print(f"truenorth: rows from {name}; Ctrl-C ends the run", file=sys.stderr, flush=True),
     )
-    with _listeners(as_json, nmea, page, goal) as listeners:
-        result = session.run(listeners)
+    with _listeners(session, as_json, nmea, page, goal) as listeners:
+        alignment = session.run(listeners)
+    result: Alignment | Navigation = session.navigation or alignment
     if as_json:
         print(json.dumps({"final": True} | result.summary(), allow_nan=False), flush=True)
     paths = [] if output is None else result.save(output)
     if not (as_json or nmea):
         from truenorth.cli.print_alignment import print_alignment
 
-        print_alignment(result, paths)
-    if result.status not in ("aligned", "level_only"):
+        print_alignment(alignment, paths if session.navigation is None else [])
+        if session.navigation is not None:
+            from truenorth.cli.navigate import print_navigation
+
+            print_navigation(session.navigation, paths)
+    if result.status not in ("aligned", "level_only", "navigated"):
         raise typer.Exit(4)
 
 
 @contextmanager
-def _listeners(as_json: bool, nmea: bool, page: str | None, goal: float | None) -> Iterator[list[Listener]]:
+def _listeners(
+    session: Session, as_json: bool, nmea: bool, page: str | None, goal: float | None
+) -> Iterator[list[Listener]]:
     from truenorth.live.outputs import json_line, nmea_lines, view
 
     found: list[Listener] = []
     wished = math.radians(0.1) if goal is None else goal
 
-    def printed(aligner: Aligner, answer: Answer | None, note: str) -> None:
+    def printed(run: Run, answer: Answer | None, note: str) -> None:
         if answer is not None:
             for line in [json_line(answer)] if as_json else nmea_lines(answer):
                 print(line, flush=True)
@@ -135,7 +201,7 @@ def _listeners(as_json: bool, nmea: bool, page: str | None, goal: float | None) 
     if page is not None:
         from truenorth.live.page import serve
 
-        server = serve(page, wished)
+        server = serve(page, wished, session.go if session.navigate else None)
         found.append(server.publish)
         print(f"page: {server.address}", file=sys.stderr, flush=True)
     try:
@@ -147,7 +213,7 @@ def _listeners(as_json: bool, nmea: bool, page: str | None, goal: float | None) 
         from truenorth.cli.console import make_console
 
         with Live(console=make_console(stderr=True), refresh_per_second=4) as screen:
-            found.append(lambda aligner, answer, note: screen.update(view(aligner, answer, wished, note)))
+            found.append(lambda run, answer, note: screen.update(view(run, answer, wished, note)))
             yield found
     finally:
         if server is not None:

@@ -221,7 +221,7 @@ def navigate(
     if as_json:
         print(json.dumps(result.summary() | {"reasons": reasons_of(result)}, allow_nan=False))
     else:
-        _print(result, paths)
+        print_navigation(result, paths)
     if result.status != "navigated":
         raise typer.Exit(4)
 
@@ -241,7 +241,8 @@ def _stops(zupt: str | None) -> Any:
     return pairs
 
 
-def _print(result: Navigation, paths: list[Path]) -> None:
+def print_navigation(result: Navigation, paths: list[Path]) -> None:
+    """Status, figures and where the results are."""
     from rich.table import Table
     from rich.text import Text
 

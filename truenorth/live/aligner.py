@@ -71,8 +71,6 @@ class Aligner:
         that depend on the rows alone.
     most_rows : int
         That are kept one by one, see :class:`truenorth.live.log.Log`.
-    taken : callable, optional
-        Called with each block of rows that is taken in.
     """
 
     def __init__(
@@ -86,14 +84,13 @@ class Aligner:
         share: float = SHARE,
         background: bool = True,
         most_rows: int = MOST_ROWS,
-        taken: Callable[[Array], None] | None = None,
     ) -> None:
         if not 0.0 < share <= 1.0:
             raise UsageError(f"share {share}; expected a part of one core above 0, at most 1")
         self.place, self.imu, self.method, self.share = place, None if imu is None else imu_spec(imu), method, share
         self.feeds = {feed.key: feed for feed in aid}
         self.log = Log(kind, most_rows)
-        self._taken = taken or (lambda rows: None)
+        self.on_taken(None)
         self.intake = Intake()
         self.left: float | None = None
         self.failure = ""
@@ -130,6 +127,10 @@ class Aligner:
                 self._take(block)
             self._collect()
             self._start_when_due()
+
+    def on_taken(self, taken: Callable[[Array], None] | None) -> None:
+        """Call this with each block of rows that is taken in from now on."""
+        self._taken = taken or (lambda rows: None)
 
     def push_gnss(self, time: ArrayLike, lat: Any = None, lon: Any = None, alt: Any = None, **more: Any) -> None:
         """Take fixes in, see :meth:`GnssFeed.push`; they may come up to a second after the IMU's rows of their time."""
@@ -218,12 +219,10 @@ class Aligner:
         AlignmentError, DataError
             As :meth:`finish`; the heading may not be used.
         """
-        taken = options.pop("taken", None)
         found = self.finish()
         navigator = Navigator(found, feeds=list(self.feeds.values()), kind=self.log.source_kind, **options)
         for block in self._newest:
             navigator.push(block[:, 0], block[:, 1:4], block[:, 4:])
-        navigator.on_taken(taken)
         return navigator
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Bytes to rows: CSV lines with the documented columns, or a fixed binary row.
+"""Bytes to rows: CSV lines with the documented columns, a fixed binary row, or the messages of a device.
 
 Binary row: ``TNR1``, seven little-endian float64 (time s, gyro x y z rad/s, specific force x y z m/s^2) and the CRC-32 of those 56
 bytes as little-endian uint32: 64 bytes.
@@ -21,6 +21,7 @@ from truenorth.formats.layout import Layout
 from truenorth.formats.names import clock_of, heading_of
 from truenorth.formats.table import unit_factor
 from truenorth.live.log import Kind
+from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 from truenorth.records import COLUMNS
 
 Array = NDArray[np.float64]
@@ -28,7 +29,6 @@ Array = NDArray[np.float64]
 MAGIC = b"TNR1"
 PAYLOAD = struct.Struct("<7d")
 LENGTH = len(MAGIC) + PAYLOAD.size + 4
-LONGEST_LINE = 4096  # bytes; what is longer without an end is not text
 BARE = ("time", *COLUMNS["rates"])
 
 
@@ -60,6 +60,8 @@ class Decoder:
         Messages begin with it.
     now : callable
         Arrival time, s, of rows that carry none.
+    by_arrival : bool
+        Time is that of arrival, whatever the rows say.
 
     Attributes
     ----------
@@ -68,8 +70,12 @@ class Decoder:
     kind : {"rates", "increments"}
     """
 
-    def __init__(self, layout: Layout, source: str, now: Callable[[], float] = clock.monotonic) -> None:
-        self._layout, self._source, self._now = layout, source, now
+    def __init__(
+        self, layout: Layout, source: str, now: Callable[[], float] = clock.monotonic, *, by_arrival: bool = False
+    ) -> None:
+        self._layout, self._source, self._now, self._by_arrival = layout, source, now, by_arrival
+        self.others: list[Callable[[bytes], None]] = []  # sensors whose messages stand in the same stream
+        self._messages: Messages | None = None
         self._half = b""
         self._frames = False  # binary rows have come
         self._columns: _Columns | None = None
@@ -90,13 +96,34 @@ class Decoder:
         DataError
             A header that lacks a column, or text that is none.
         """
-        self._half += data
-        self._frames = self._frames or MAGIC in self._half
-        rows = self._binary() if self._frames else self._text()
-        result = np.array(rows, dtype=np.float64).reshape(-1, 7)
+        for other in self.others:
+            other(data)
+        if self._columns is None and self._messages is None and not self._frames:
+            protocol = protocol_of(self._half + data)
+            if protocol is not None:
+                self._messages, self._columns = Messages(protocol, self._source), None
+                self._turn = body_axes(self._layout.axes or self._messages.module.AXES)
+        if self._messages is not None:
+            result = self._table(self._messages.feed(data, "imu").get("imu", {}))
+        else:
+            self._half += data
+            self._frames = self._frames or MAGIC in self._half
+            result = np.array(self._binary() if self._frames else self._text(), dtype=np.float64).reshape(-1, 7)
+        if self._by_arrival and len(result):
+            self.arrival_time = True
+            result[:, 0] += self._now() - result[-1, 0]
         result[:, 1:4] = result[:, 1:4] @ self._turn.T
         result[:, 4:] = result[:, 4:] @ self._turn.T
         return result
+
+    def _table(self, table: dict[str, Array]) -> Array:
+        """A device's table: headings with their units."""
+        if not table:
+            return np.empty((0, 7))
+        if self._columns is None:
+            self._columns = self._from_header(list(table))
+        values = np.column_stack(list(table.values()))
+        return np.ascontiguousarray(values[:, self._columns.at] * self._columns.factor)
 
     def _binary(self) -> list[tuple[float, ...]]:
         rows = []

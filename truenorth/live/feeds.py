@@ -43,9 +43,18 @@ class Feed:
     def __init__(self, mounting: Mounting | None = None) -> None:
         self.mounting = mounting
         self.left_out = 0  # rows without a finite time, without any number, or repeated
+        self.failure = ""  # of the last rows that could not be read
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all rows."""
         self.thinned = 1  # rows of the source in a row of ours
         self._rows = np.empty((0, 1 + len(self.columns)))
         self._waiting: list[Array] = []
+
+    def rows_of(self, record: Any) -> Array:
+        """A whole record as rows; what its rows mean is then what those of the feed mean."""
+        raise NotImplementedError
 
     def aid_of(self, rows: Array) -> Aid:
         """These rows as an aid."""
@@ -62,9 +71,9 @@ class Feed:
     @property
     def rows(self) -> Array:
         """(N, 1 + columns) all rows so far."""
-        if self._waiting:
-            rows = np.vstack([self._rows, *self._waiting])
-            self._waiting = []
+        waiting, self._waiting = self._waiting, []  # another thread may add
+        if waiting:
+            rows = np.vstack([self._rows, *waiting])
             _, first = np.unique(rows[:, 0], return_index=True)
             self.left_out += len(rows) - len(first)
             self._rows = rows[first]
@@ -176,6 +185,18 @@ class GnssFeed(Feed):
         rest = [(v_n, 3), (position_sigma, 3), (velocity_sigma, 3), (dop, 2), (quality, 1)]
         self.add(_table(time, *place, *rest))
 
+    def rows_of(self, record: GnssRecord) -> Array:
+        """See :class:`Feed`."""
+        place = [(value, 1) for value in (record.lat, record.lon, record.alt)]
+        rest = [
+            (record.v_n, 3),
+            (record.position_sigma, 3),
+            (record.velocity_sigma, 3),
+            (record.dop, 2),
+            (record.quality, 1),
+        ]
+        return _table(record.time, *place, *rest)
+
     def aid_of(self, rows: Array) -> Gnss:
         """See :class:`Feed`."""
         t = rows.T
@@ -240,6 +261,11 @@ class OdometerFeed(Feed):
         """Take rows in: of the interval that ends at each time, or speeds."""
         self.add(_table(time, (values, 1)))
 
+    def rows_of(self, record: OdometerRecord) -> Array:
+        """See :class:`Feed`."""
+        self.kind, self.pulse_size, self.signed = record.kind, record.pulse_size, record.signed
+        return _table(record.time, (record.values, 1))
+
     def aid_of(self, rows: Array) -> Odometer:
         """See :class:`Feed`."""
         t = rows.T
@@ -279,6 +305,11 @@ class VelocityFeed(Feed):
         """Take rows in: right, forward, up, or east, north, up; NaN where an axis is not measured."""
         self.add(_table(time, (velocity, 3), (sigma, 3)))
 
+    def rows_of(self, record: VelocityRecord) -> Array:
+        """See :class:`Feed`."""
+        self.frame = record.frame
+        return _table(record.time, (record.velocity, 3), (record.sigma, 3))
+
     def aid_of(self, rows: Array) -> VelocityLog:
         """See :class:`Feed`."""
         velocity, sigma = (np.ascontiguousarray(rows[:, at : at + 3]) for at in (1, 4))
@@ -300,6 +331,10 @@ class HeightFeed(Feed):
     def push(self, time: ArrayLike, alt: ArrayLike, sigma: ArrayLike | None = None) -> None:
         """Take heights in, m."""
         self.add(_table(time, (alt, 1), (sigma, 1)))
+
+    def rows_of(self, record: HeightRecord) -> Array:
+        """See :class:`Feed`."""
+        return _table(record.time, (record.alt, 1), (record.sigma, 1))
 
     def aid_of(self, rows: Array) -> Barometer:
         """See :class:`Feed`."""

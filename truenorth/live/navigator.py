@@ -161,8 +161,6 @@ class Navigator:
         DataError
             As :func:`truenorth.navigate`.
         """
-        with self._lock:
-            self._advance(np.inf)
         if self.log.merged == 1 and not self.failure:
             aids = [feed.between(-np.inf, self.log.end) for feed in self.feeds.values()]
             return navigate(
@@ -174,7 +172,8 @@ class Navigator:
                 interval=FINE,
                 output=self.output,
             )
-        found = self._now()
+        with self._lock:
+            found = self._now()
         if found is None:
             raise DataError(f"navigation: no rows came after the start at {self.start.time:.3f} s")
         return self._judged(self.past.with_end(found))

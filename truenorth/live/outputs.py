@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truenorth.core.units import significant
-from truenorth.live.aligner import Aligner
 from truenorth.live.answer import Answer
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-COLOURS = {"aligned": "green", "level_only": "yellow"}
+    from truenorth.live.aligner import Aligner
+    from truenorth.live.navigator import Navigator
+
+COLOURS = {"aligned": "green", "navigated": "green", "level_only": "yellow"}
 
 
 def json_line(answer: Answer) -> str:
@@ -54,6 +56,8 @@ def angle(radians: float) -> str:
 
 def waiting(answer: Answer, goal: float) -> str:
     """How long until heading is as good as wished, in words."""
+    if answer.status == "navigated":
+        return f"heading {'good' if answer.sigma[0] <= goal else 'not good'} to {angle(goal)}"
     left = answer.remaining(goal)
     if left is None:
         if answer.floor[0] >= goal:
@@ -64,7 +68,7 @@ def waiting(answer: Answer, goal: float) -> str:
     return f"about {significant(left, 2)} s more to {angle(goal)}"
 
 
-def view(aligner: Aligner, answer: Answer | None, goal: float, note: str = "") -> Table:
+def view(aligner: Aligner | Navigator, answer: Answer | None, goal: float, note: str = "") -> Table:
     """A small table for the terminal."""
     from rich.table import Table
 
@@ -82,7 +86,15 @@ def view(aligner: Aligner, answer: Answer | None, goal: float, note: str = "") -
         shown = f"{heading:9.4f} deg  ± {sigma[0]}" if answer.heading_known else "not known"
         table.add_row("heading", f"[bold {colour}]{shown}[/]")
         table.add_row("pitch, roll", f"{pitch:9.4f} deg ± {sigma[1]}, {roll:9.4f} deg ± {sigma[2]}")
-        table.add_row("floor", f"{angle(answer.floor[0])}: what waiting does not improve")
+        if answer.motion is not None:
+            m = answer.motion
+            lat, lon = np.degrees(m.position[:2])
+            table.add_row(
+                "place", f"{lat:.6f}, {lon:.6f} deg, {m.position[2]:.1f} m ± {significant(m.position_sigma.max())} m"
+            )
+            table.add_row("speed", f"{np.linalg.norm(m.v_n):.2f} m/s ± {significant(m.v_sigma.max())} m/s")
+        if answer.status != "navigated":
+            table.add_row("floor", f"{angle(answer.floor[0])}: what waiting does not improve")
         table.add_row("verdict", f"[{colour}]{answer.status}[/]; {waiting(answer, goal)}")
         for reason in answer.reasons[:4]:
             table.add_row("", _plain(reason))

@@ -1,13 +1,14 @@
-"""A page in the browser while a log runs: heading and its band over time, compass, level, verdict, time that is left.
+"""A page in the browser while a log runs: heading and its band over time, compass, level, verdict, time that is left, the track.
 
-The page holds all it needs; nothing is fetched from elsewhere, and nothing can be changed from it. It is bound to this machine
-alone unless another address is named, and answers no page of another origin.
+The page holds all it needs; nothing is fetched from elsewhere. It is bound to this machine alone unless another address is named,
+and answers no page of another origin. One thing can be asked for from it, navigation, by a token that stands in the page alone.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import secrets
 import socket
 import threading
 import time as clock
@@ -21,6 +22,7 @@ import numpy as np
 from truenorth.core.errors import UsageError
 from truenorth.live.aligner import Aligner
 from truenorth.live.answer import Answer
+from truenorth.live.navigator import Navigator
 from truenorth.live.outputs import waiting
 from truenorth.live.spectrum import motion_spectrum
 
@@ -43,8 +45,8 @@ class Page:
         For the browser.
     """
 
-    def __init__(self, host: str, port: int, goal: float) -> None:
-        self._goal = goal
+    def __init__(self, host: str, port: int, goal: float, go: threading.Event | None) -> None:
+        self._goal, self._go, self._token = goal, go, secrets.token_urlsafe(16)
         self._events: deque[tuple[int, str]] = deque(maxlen=HISTORY)
         self._number = 0
         self._closing = False
@@ -56,12 +58,13 @@ class Page:
         self._thread = threading.Thread(target=self._server.run, args=([self._socket],), daemon=True)
         self._thread.start()
 
-    def publish(self, aligner: Aligner, answer: Answer | None, note: str) -> None:
+    def publish(self, aligner: Aligner | Navigator, answer: Answer | None, note: str) -> None:
         """Show an answer; a listener of :class:`truenorth.live.session.Session`."""
         self._number += 1
         event: dict[str, Any] = {"number": self._number, "rows": aligner.intake.counts.taken, "note": note}
         event["log_s"] = aligner.duration
         event["left_out"] = aligner.intake.counts.words()
+        event["may_go"] = self._go is not None and not self._go.is_set() and isinstance(aligner, Aligner)
         if answer is not None:
             event |= answer.summary() | {
                 "waiting": waiting(answer, self._goal),
@@ -86,6 +89,7 @@ class Page:
         except ImportError:
             raise UsageError("a page needs Starlette and uvicorn: pip install 'truenorth[live]'") from None
         text = (resources.files("truenorth.live") / "page.html").read_text(encoding="utf-8")
+        text = text.replace("TOKEN", self._token)
 
         def refused(request: Any) -> bool:
             """A page of another origin, or a name that some other server gave this address."""
@@ -96,6 +100,13 @@ class Page:
         async def home(request: Any) -> Any:
             return Response(status_code=403) if refused(request) else HTMLResponse(text, headers=HEADERS)
 
+        async def go(request: Any) -> Any:
+            given = request.headers.get("x-token", "")
+            if refused(request) or self._go is None or not secrets.compare_digest(given, self._token):
+                return Response(status_code=403)
+            self._go.set()
+            return Response(status_code=204)
+
         async def events(request: Any) -> Any:
             if refused(request):
                 return Response(status_code=403)
@@ -103,7 +114,7 @@ class Page:
             stream = self._stream(int(seen) if seen.isdigit() else 0, request.is_disconnected)
             return StreamingResponse(stream, media_type="text/event-stream", headers=HEADERS)
 
-        application = Starlette(routes=[Route("/", home), Route("/events", events)])
+        application = Starlette(routes=[Route("/", home), Route("/events", events), Route("/go", go, methods=["POST"])])
         return uvicorn.Server(uvicorn.Config(application, log_level="error", lifespan="off", access_log=False))
 
     async def _stream(self, seen: int, gone: Callable[[], Awaitable[bool]]) -> AsyncIterator[str]:
@@ -123,7 +134,7 @@ class Page:
             await asyncio.sleep(0.2)
 
 
-def serve(address: str, goal: float) -> Page:
+def serve(address: str, goal: float, go: threading.Event | None = None) -> Page:
     """Start the page.
 
     Parameters
@@ -132,6 +143,8 @@ def serve(address: str, goal: float) -> Page:
         ``:8080`` is this machine alone; ``0.0.0.0:8080`` all of its addresses. Port 0 takes a free one.
     goal : float, rad
         One-sigma of heading that is wished.
+    go : threading.Event, optional
+        Set when the page asks for navigation; None: it cannot.
 
     Raises
     ------
@@ -142,6 +155,6 @@ def serve(address: str, goal: float) -> Page:
     if not port.isdigit() or int(port) > 65535:
         raise UsageError(f"page address {address!r}; expected :8080 or HOST:8080")
     try:
-        return Page(host or "127.0.0.1", int(port), goal)
+        return Page(host or "127.0.0.1", int(port), goal, go)
     except OSError as error:
         raise UsageError(f"page address {address}: {error.strerror or error}") from None

@@ -88,5 +88,7 @@ def _together(tracks: list[Track]) -> Track:
 def _joined(first: Residuals | None, second: Residuals) -> Residuals:
     if first is None:
         return second
-    parts = {name: np.concatenate([getattr(first, name), getattr(second, name)])[-MOST_ROWS:] for name in _RESIDUALS}
+    parts: dict[str, Any] = {}
+    for name in _RESIDUALS:
+        parts[name] = np.concatenate([getattr(first, name), getattr(second, name)])[-MOST_ROWS:]
     return replace(second, **parts)

@@ -1,6 +1,7 @@
-"""Where rows come from: a log replayed, standard input, UDP, TCP, a serial line.
+"""Where rows come from: a log replayed or still being written, standard input, UDP, TCP, a serial line.
 
-``replay:log.csv@10x``, ``-``, ``udp://:9000``, ``tcp://host:port``, ``serial:/dev/ttyUSB0?baud=921600``.
+``replay:log.csv@10x``, ``follow:log.csv`` (a file that another program goes on writing), ``-``, ``udp://:9000``,
+``tcp://host:port``, ``serial:/dev/ttyUSB0?baud=921600``.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ Array = NDArray[np.float64]
 
 CHUNK = 0.02  # s of a replayed log in a chunk
 BYTES = 65536
-WAIT = 0.5  # s: a silent line is asked again after it, so that an interrupt is heard
-EXAMPLES = "replay:log.csv@10x, -, udp://:9000, tcp://host:port or serial:/dev/ttyUSB0?baud=921600"
+WAIT = 0.5  # s: a silent line is asked again after it, so that an interrupt is noticed
+POLL = 0.05  # s, between two looks at a file that grows
+EXAMPLES = "replay:log.csv@10x, follow:log.csv, -, udp://:9000, tcp://host:port or serial:/dev/ttyUSB0?baud=921600"
 
 
 class Source(Protocol):
@@ -94,6 +96,10 @@ class Stream:
     def __init__(self, read: Callable[[], bytes | None], decoder: Decoder) -> None:
         self._read, self._decoder = read, decoder
 
+    def share(self, hear: Callable[[bytes], None]) -> None:
+        """Hand the bytes to another sensor's listener as well."""
+        self._decoder.others.append(hear)
+
     @property
     def kind(self) -> Kind:
         """See :class:`Source`."""
@@ -116,7 +122,7 @@ class Stream:
             yield np.empty((0, 7)) if data is None else self._decoder.feed(data)
 
 
-def open_source(text: str, layout: Layout, after: float = -np.inf) -> Source:
+def open_source(text: str, layout: Layout, after: float = -np.inf, *, by_arrival: bool = False) -> Source:
     """The source that a text names.
 
     Parameters
@@ -126,6 +132,8 @@ def open_source(text: str, layout: Layout, after: float = -np.inf) -> Source:
         Columns, units and axes of its rows.
     after : float, s
         A replayed log is passed over up to this time.
+    by_arrival : bool
+        Time is that of arrival, whatever the rows say.
 
     Raises
     ------
@@ -134,17 +142,29 @@ def open_source(text: str, layout: Layout, after: float = -np.inf) -> Source:
     """
     if text.startswith("replay:"):
         return _replay(text.removeprefix("replay:"), layout, after)
-    decoder = Decoder(layout, text)
+    return Stream(open_bytes(text), Decoder(layout, text, by_arrival=by_arrival))
+
+
+def open_bytes(text: str) -> Callable[[], bytes | None]:
+    """What reads the bytes of a source: some of them, none at all (b"") at the end, None where nothing came for a while.
+
+    Raises
+    ------
+    UsageError
+        As :func:`open_source`.
+    """
     if text == "-":
-        return Stream(lambda: os.read(sys.stdin.fileno(), BYTES), decoder)
+        return lambda: os.read(sys.stdin.fileno(), BYTES)
     address = urlsplit(text)
     try:
         if address.scheme == "udp" and address.port:
-            return Stream(_udp(address.hostname or "127.0.0.1", address.port), decoder)
+            return _udp(address.hostname or "127.0.0.1", address.port)
         if address.scheme == "tcp" and address.port:
-            return Stream(_tcp(address.hostname or "127.0.0.1", address.port), decoder)
+            return _tcp(address.hostname or "127.0.0.1", address.port)
         if address.scheme == "serial" and address.path:
-            return Stream(_serial(address.path, parse_qs(address.query)), decoder)
+            return _serial(address.path, parse_qs(address.query))
+        if address.scheme == "follow" and address.path:
+            return _follow(Path(address.path))
     except OSError as error:
         raise UsageError(f"source {text}: cannot be opened ({error.strerror or error})") from None
     except ValueError as error:
@@ -166,6 +186,19 @@ def _replay(text: str, layout: Layout, after: float) -> Replay:
     if factor <= 0.0:
         raise UsageError(f"source replay:{text}: expected a speed above zero, such as @10x or @max")
     return Replay(record, factor, after)
+
+
+def _follow(path: Path) -> Callable[[], bytes | None]:
+    """A file that another program goes on writing."""
+    file = path.open("rb")
+
+    def read() -> bytes | None:
+        data = file.read(BYTES)
+        if not data:
+            clock.sleep(POLL)
+        return data or None
+
+    return read
 
 
 def _udp(host: str, port: int) -> Callable[[], bytes | None]:

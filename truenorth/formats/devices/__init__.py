@@ -6,7 +6,8 @@ A module of this folder has
 - `EXTRA`: what installs its decoder, ``pip install 'truenorth[EXTRA]'``;
 - `AXES`: where x, y and z of its IMU point;
 - ``tables(path, topic)``: tables by what they hold, ``imu``, ``gnss``, ``velocity``, ``poses``; each maps headings with their
-  units, such as ``gyro_x [rad/s]``, to arrays. The clock is one and the same in all of them.
+  units, such as ``gyro_x [rad/s]``, to arrays. The clock is one and the same in all of them;
+- where messages need what came before them, `Memory`: a stream hands one over, ``tables(path, topic, memory=...)``.
 
 A new format is a new file here, and a line in `DEVICES`.
 """

@@ -8,6 +8,7 @@ F9 interface description, ESF-MEAS data types (2^-12 deg/s, 2^-10 m/s^2, 24 bits
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,27 +21,42 @@ Tables = dict[str, dict[str, Array]]
 EXTRA = "ublox"
 AXES = "RFU"
 GYROS, ACCELS = {14: 0, 13: 1, 5: 2}, {16: 0, 17: 1, 18: 2}
+FIXES = 10  # of a stream, that tell its clock
 TICKS = (1e-3, 39.0625e-6, 1e-6)  # s, of the sensor clocks of the modules
 
 
-def tables(path: Path, part: str, topic: str | None = None) -> Tables:
-    """Position and velocity; rates and specific forces, where the module writes them."""
+@dataclass
+class Memory:
+    """What a stream's next messages need of those before: the sensor's clock, and samples that are not whole yet."""
+
+    time: float | None = None  # of the last fix, s
+    samples: dict[int, dict[tuple[str, int], float]] = field(default_factory=dict)
+    arrivals: list[tuple[int, float]] = field(default_factory=list)
+    clock: tuple[float, float] | None = None  # size of a tick, and time of tick zero, s
+
+
+def tables(path: Path, part: str, topic: str | None = None, memory: Memory | None = None) -> Tables:
+    """Position and velocity; rates and specific forces, where the module writes them; from a stream once its clock is known."""
     from pyubx2 import ERR_IGNORE, UBX_PROTOCOL, UBXReader
 
+    m = memory or Memory()
     fixes: list[tuple[float, ...]] = []
-    samples: dict[int, dict[tuple[str, int], float]] = {}
-    arrivals: list[tuple[int, float]] = []
     with path.open("rb") as stream:
         for _, message in UBXReader(stream, protfilter=UBX_PROTOCOL, quitonerror=ERR_IGNORE):
             kind = getattr(message, "identity", "")
             if kind == "NAV-PVT" and message.fixType >= 2:
                 fixes.append(_fix(message))
+                m.time = fixes[-1][0]
             elif kind in ("ESF-RAW", "ESF-MEAS"):
                 for tag, key, value in _values(message):
-                    samples.setdefault(tag, {})[key] = value
-                    if fixes:
-                        arrivals.append((tag, fixes[-1][0]))
-    return {"gnss": _gnss(fixes), "imu": _imu(samples, arrivals)}
+                    m.samples.setdefault(tag, {})[key] = value
+                    if m.time is not None and m.clock is None:
+                        m.arrivals.append((tag, m.time))
+    if m.clock is None and (memory is None or len({when for _, when in m.arrivals}) >= FIXES):
+        m.clock, m.arrivals = _clock(m.arrivals), []
+    if memory is not None and m.clock is None:
+        return {"gnss": _gnss(fixes), "imu": {}}
+    return {"gnss": _gnss(fixes), "imu": _imu(m)}
 
 
 def _fix(m: Any) -> tuple[float, ...]:
@@ -81,18 +97,27 @@ def _gnss(fixes: list[tuple[float, ...]]) -> dict[str, Array]:
     }  # fmt: skip
 
 
-def _imu(samples: dict[int, dict[tuple[str, int], float]], arrivals: list[tuple[int, float]]) -> dict[str, Array]:
-    keys = [(sensor, axis) for sensor in ("gyro", "accel") for axis in range(3)]
-    tags = [tag for tag, row in samples.items() if len(row) == len(keys)]
-    if not tags:
-        return {}
-    values = np.array([[samples[tag][key] for key in keys] for tag in tags])
-    names = [f"gyro_{axis} [deg/s]" for axis in "xyz"] + [f"accel_{axis} [m/s^2]" for axis in "xyz"]
-    table = dict(zip(names, values.T))
-    clock = np.array(tags, dtype=np.float64)
+def _clock(arrivals: list[tuple[int, float]]) -> tuple[float, float] | None:
+    """Size of a tick and time of tick zero; None where too few fixes are there to tell."""
     if len({when for _, when in arrivals}) < 3:
-        return {"time": clock, **table}
+        return None
     tag, when = np.array(arrivals, dtype=np.float64).T
     slope = float(np.polyfit(tag - tag[0], when - when[0], 1)[0])
     tick = min(TICKS, key=lambda size: abs(np.log(max(slope, 1e-12) / size)))
-    return {"time [s]": clock * tick + float(np.median(when - tag * tick)), **table}
+    return tick, float(np.median(when - tag * tick))
+
+
+def _imu(m: Memory) -> dict[str, Array]:
+    """The samples that are whole, which are then forgotten."""
+    keys = [(sensor, axis) for sensor in ("gyro", "accel") for axis in range(3)]
+    tags = [tag for tag, row in m.samples.items() if len(row) == len(keys)]
+    if not tags:
+        return {}
+    values = np.array([[row[key] for key in keys] for row in map(m.samples.pop, tags)])
+    names = [f"gyro_{axis} [deg/s]" for axis in "xyz"] + [f"accel_{axis} [m/s^2]" for axis in "xyz"]
+    table = dict(zip(names, values.T))
+    clock = np.array(tags, dtype=np.float64)
+    if m.clock is None:
+        return {"time": clock, **table}
+    tick, zero = m.clock
+    return {"time [s]": clock * tick + zero, **table}

@@ -1,0 +1,185 @@
+"""Streams of devices and sensors: the bytes of their logs in pieces, noise in between, are the rows of those logs."""
+
+import socket
+import struct
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.formats.test_devices import FRD, SWAY, TIME, TOW, novatel_line
+from tests.formats.test_devices import LAT as LAT
+from truenorth.core.errors import UsageError
+from truenorth.formats import read_gnss, read_imu
+from truenorth.formats.layout import Layout
+from truenorth.live import GnssFeed, OdometerFeed, VelocityFeed
+from truenorth.live.aid_sources import open_aid
+from truenorth.live.decode import Decoder
+from truenorth.live.listening import Listener
+
+LON, ALT = 11.5, 500.0
+
+
+def in_pieces(data, hear, seed=0, longest=700):
+    random, at = np.random.default_rng(seed), 0
+    found = []
+    while at < len(data):
+        step = int(random.integers(1, longest))
+        found.append(hear(data[at : at + step]))
+        at += step
+    return found
+
+
+def ubx_bytes(pyubx2):
+    parts = []
+    for k, t in enumerate(TIME):
+        if k % 20 == 0:
+            fix = pyubx2.UBXMessage(
+                "NAV", "NAV-PVT", pyubx2.GET, iTOW=round((TOW + t) * 1e3), lat=LAT, lon=LON, height=500000, velE=2000,
+                velN=1000, velD=500, hAcc=1000, vAcc=2000, sAcc=100, fixType=3,
+            )  # fmt: skip
+            parts.append(fix.serialize())
+        counts = [*np.degrees(SWAY.gyro[k]) * 2**12, *SWAY.accel[k] * 2**10]
+        words = [kind << 24 | round(value) % (1 << 24) for kind, value in zip((14, 13, 5, 16, 17, 18), counts)]
+        payload = bytes(4) + b"".join(struct.pack("<II", word, k * 256) for word in words)
+        parts.append(pyubx2.UBXMessage("ESF", "ESF-RAW", pyubx2.GET, payload=payload).serialize())
+    return parts
+
+
+def test_ublox_in_pieces_is_the_log(tmp_path):
+    pyubx2 = pytest.importorskip("pyubx2")
+    parts = ubx_bytes(pyubx2)
+    path = tmp_path / "log.ubx"
+    path.write_bytes(b"".join(parts))
+    noisy = b"".join(part if k % 97 else part + b"\x00noise\xb5" for k, part in enumerate(parts))
+    feed = GnssFeed()
+    decoder = Decoder(Layout(), "test")
+    decoder.others.append(Listener(feed, "test", shared=True).hear)
+    found = np.vstack(in_pieces(noisy, decoder.feed))
+    record = read_imu(path)
+    np.testing.assert_allclose(found[:, 1:4], record.gyro, atol=1e-12)
+    np.testing.assert_allclose(found[:, 4:], record.accel, atol=1e-12)
+    np.testing.assert_allclose(np.diff(found[:, 0]), np.diff(record.time), atol=1e-9)
+    assert abs(found[0, 0] - record.time[0]) < 0.11
+    fixes = read_gnss(path)
+    np.testing.assert_allclose(feed.rows[:, 0], fixes.time)
+    np.testing.assert_allclose(feed.rows[:, 1], fixes.lat)
+    np.testing.assert_allclose(feed.rows[:, 4:7], fixes.v_n)
+    np.testing.assert_allclose(feed.rows[:, 7:10], fixes.position_sigma)
+    assert decoder.others
+
+
+def test_a_message_that_is_damaged_is_lost_alone():
+    pyubx2 = pytest.importorskip("pyubx2")
+    fixes = [part for part in ubx_bytes(pyubx2) if part[2:4] == b"\x01\x07"]
+    damaged = bytearray(fixes[7])
+    damaged[30] ^= 0xFF
+    feed = GnssFeed()
+    in_pieces(b"".join([*fixes[:7], bytes(damaged), *fixes[8:]]), Listener(feed, "test").hear, longest=90)
+    assert len(feed.rows) == len(fixes) - 1
+
+
+def test_septentrio_and_novatel_in_pieces():
+    pysbf2, _ = pytest.importorskip("pysbf2"), pytest.importorskip("novatel_edie")
+    blocks, lines = [], []
+    for k in range(10):
+        place = {
+            "Latitude": np.radians(LAT),
+            "Longitude": np.radians(LON),
+            "Height": ALT,
+            "Vn": 1.0,
+            "Ve": 2.0,
+            "Vu": -0.5,
+        }
+        blocks.append(
+            pysbf2.SBFMessage("PVTGeodetic", Error=0, TOW=round(TOW * 1e3) + 1000 * k, WNc=2300, **place).serialize()
+        )
+        fix = f'SOL_COMPUTED,SINGLE,{LAT},{LON},455.0,45.0,WGS84,2.0,1.0,3.0,"",0.0,0.0,12,12,12,0,00,06,00,33'
+        lines.append(novatel_line("BESTPOSA", fix, TOW + k).encode())
+    for data in (b"".join(blocks), b"".join(lines)):
+        feed = GnssFeed()
+        listener = Listener(feed, "test")
+        in_pieces(b"\x00\x01" + data, listener.hear, longest=120)
+        np.testing.assert_allclose(feed.rows[:, 0], TOW + np.arange(10))
+        np.testing.assert_allclose(np.degrees(feed.rows[:, 1]), LAT)
+        np.testing.assert_allclose(feed.rows[:, 3], ALT)
+
+
+def test_mavlink_in_pieces():
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    link = mavutil.mavlink.MAVLink(SimpleNamespace(write=lambda _: None), srcSystem=1, srcComponent=1)
+    gyro, accel, data = FRD(SWAY.gyro), FRD(SWAY.accel), b""
+    for k, t in enumerate(TIME):
+        data += link.highres_imu_encode(round(t * 1e6), *accel[k], *gyro[k], 0, 0, 0, 0, 0, 0, 0, 63).pack(link)
+    found = np.vstack(in_pieces(data, Decoder(Layout(), "test").feed))
+    np.testing.assert_allclose(found[:, 0], TIME, atol=1e-6)
+    np.testing.assert_allclose(found[:, 1:4], SWAY.gyro, atol=1e-6)
+    np.testing.assert_allclose(found[:, 4:], SWAY.accel, atol=1e-5)
+
+
+def sentence(body):
+    total = 0
+    for letter in body:
+        total ^= ord(letter)
+    return f"${body}*{total:02X}\r\n".encode()
+
+
+def epoch(k, seconds):
+    clock = f"{int(seconds // 3600) % 24:02d}{int(seconds // 60) % 60:02d}{seconds % 60:05.2f}"
+    place = f"{48 + k * 1e-6 * 0:02.0f}06.{60000 + 5 * k:05d},N,01130.{k:05d},E"
+    return sentence(f"GPGGA,{clock},{place},1,08,0.9,500.0,M,45.0,M,,"), sentence(
+        f"GPRMC,{clock},A,{place},1.94,090.0,221126,,"
+    )
+
+
+def test_nmea_in_pieces_over_midnight():
+    """A broken sentence is counted; the clock goes on from one day to the next; no epoch waits for the one after it."""
+    feed = GnssFeed()
+    listener = Listener(feed, "test")
+    start = 86390.0
+    for k in range(20):
+        gga, rmc = epoch(k, (start + k) % 86400.0)
+        in_pieces(gga + (b"$GPGGA,broken*00\r\n" if k == 7 else b"") + rmc, listener.hear, seed=k, longest=30)
+        if k:
+            assert feed.rows[-1, 0] == start + k
+    assert listener.broken == 1
+    np.testing.assert_allclose(feed.rows[:, 0], start + np.arange(20))
+    np.testing.assert_allclose(feed.rows[:, 3], 545.0)
+    np.testing.assert_allclose(feed.rows[:, 4], 1.94 * 1852 / 3600, atol=1e-9)
+
+
+def test_text_of_other_sensors_with_units_and_totals():
+    odometer, velocity = OdometerFeed(), VelocityFeed()
+    counts = "time,distance_total [m]\n" + "".join(f"{k * 0.1:.1f},{k * 0.5:.2f}\n" for k in range(100))
+    speeds = "time,v_right [km/h],v_forward [km/h],v_up [km/h]\n" + "".join(
+        f"{k * 0.1:.1f},0,36,0\n" for k in range(50)
+    )
+    in_pieces(counts.encode(), Listener(odometer, "test").hear, longest=25)
+    in_pieces(speeds.encode(), Listener(velocity, "test").hear, longest=25)
+    assert odometer.kind == "distance"
+    np.testing.assert_allclose(odometer.rows[:, 0], 0.1 * np.arange(1, 100))
+    np.testing.assert_allclose(odometer.rows[:, 1], 0.5)
+    np.testing.assert_allclose(velocity.rows[:, 2], 10.0)
+    assert odometer.moves_from() == pytest.approx(0.1)
+
+
+def test_a_sensor_of_its_own_source_and_a_clock_that_is_another(tmp_path):
+    """Fixes over UDP with the time of day, an IMU that counts from zero: named, and what to do."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    feed = GnssFeed()
+    source, listener = open_aid(f"udp://:{port}", feed)
+    assert listener is None
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for k in range(6):
+            sender.sendto(b"".join(epoch(k, 43200.0 + k)), ("127.0.0.1", port))
+    for _ in range(100):
+        if len(feed.rows) == 6:
+            break
+        time.sleep(0.05)
+    source.advance(5.0)
+    assert "its clock is +43200 s off that of the IMU" in source.note
+    with pytest.raises(UsageError, match="no file"):
+        open_aid("replay:missing.csv", feed)
