@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.timing import best as seconds
 from truenorth.filters import LinearSystem, fading, feedback, innovation_adaptive, kalman, smoother, square_root
 
 STATES, ROWS, EVERY = 15, 3, 10
@@ -37,13 +37,7 @@ def system(epochs: int, runs: tuple[int, ...] = (), every: int = EVERY, seed: in
 
 def best(call: Callable[[], object], steps: int, repeats: int = REPEATS) -> float:
     """Shortest time of a step over repeats, us."""
-    call()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return 1e6 * min(times) / steps
+    return 1e6 * seconds(call, repeats) / steps
 
 
 def by_filterpy(s: LinearSystem) -> np.ndarray:

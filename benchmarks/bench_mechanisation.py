@@ -7,7 +7,6 @@ Euler angles, so its compiled loop is timed alone too. Run: ``python -m benchmar
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +15,7 @@ from pyins import strapdown as pyins_strapdown
 from pyins import transform
 from pyins.util import ACCEL_COLS, GYRO_COLS, LLA_COLS, RPH_COLS, VEL_COLS
 
+from benchmarks.timing import best as seconds
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.records import ImuRecord
 from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
@@ -35,13 +35,7 @@ def log() -> ImuRecord:
 
 def best(call: Callable[[], object]) -> float:
     """Shortest time a sample over repeats, ns."""
-    call()
-    times = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return 1e9 * min(times) / COUNT
+    return 1e9 * seconds(call, REPEATS) / COUNT
 
 
 def main() -> None:

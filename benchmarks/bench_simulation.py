@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.timing import best as seconds
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import IdealLog, Sway, Tone, ideal_log, simulate, simulate_runs
@@ -36,13 +37,7 @@ EVERYTHING = imu_spec(Path(__file__).parents[1] / "examples" / "imu_every_term.y
 
 def best(call: Callable[[], object]) -> float:
     """Shortest time over repeats, ms."""
-    call()
-    times = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return 1e3 * min(times)
+    return 1e3 * seconds(call, REPEATS)
 
 
 def many(ideal: IdealLog, spec: ImuSpec, workers: int) -> float:

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from tests.campaign.test_plan import PLAN, REST
-from truenorth.cli import main
+from tests.helpers import run_command
 from truenorth.core.position import Position
 from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
@@ -33,13 +33,7 @@ def log(tmp_path_factory) -> Path:
 
 
 def run(capsys, monkeypatch, *arguments) -> tuple[int, str, str]:
-    monkeypatch.setattr(sys, "argv", ["truenorth", *map(str, arguments)])
-    code = 0
-    try:
-        main()
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out = capsys.readouterr()
+    code, out = run_command(capsys, monkeypatch, *arguments)
     return code, out.out, out.err
 
 
@@ -144,27 +138,27 @@ def test_wrong_units_are_found(capsys, monkeypatch, log, tmp_path):
     assert json.loads(out)["status"] == "aligned"
 
 
-def test_degrees_a_second_are_found(capsys, monkeypatch, log, tmp_path):
-    path = tmp_path / "deg.csv"
+def _in_degrees(log, path):
     write_imu(_scaled(log, np.degrees(1.0), 1.0), path)
-    code, _, err = run(capsys, monkeypatch, "align", path, *WHERE)
-    assert code == 3
-    assert "deg/s" in err
-    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, "--units", "deg/s,m/s^2", "--json")
-    assert code == 0
-    assert abs(json.loads(out)["heading_deg"] - 77.0) < 1.0
 
 
-def test_wrong_axes_are_found(capsys, monkeypatch, log, tmp_path):
-    from truenorth.formats import read_imu
-
+def _in_frd(log, path):
     frd = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    path = tmp_path / "frd.csv"
     write_imu(read_imu(log).rotated(frd), path)
+
+
+@pytest.mark.parametrize(
+    ("write", "named", "option"),
+    [(_in_degrees, "deg/s", ("--units", "deg/s,m/s^2")), (_in_frd, "--axes FRD", ("--axes", "FRD"))],
+    ids=["degrees a second", "axes"],
+)
+def test_wrong_units_and_axes_are_found(capsys, monkeypatch, log, tmp_path, write, named, option):
+    path = tmp_path / "other.csv"
+    write(log, path)
     code, _, err = run(capsys, monkeypatch, "align", path, *WHERE)
     assert code == 3
-    assert "--axes FRD" in err
-    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, "--axes", "FRD", "--json")
+    assert named in err
+    code, out, _ = run(capsys, monkeypatch, "align", path, *WHERE, *option, "--json")
     assert code == 0
     assert abs(json.loads(out)["heading_deg"] - 77.0) < 1.0
 

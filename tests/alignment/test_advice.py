@@ -2,16 +2,15 @@
 
 import json
 import math
-import sys
 
 import numpy as np
 import pytest
 
+from tests.helpers import run_command
 from truenorth.advice import advise
 from truenorth.advice.positions import SCHEMES
 from truenorth.alignment import align
 from truenorth.alignment.positions import align_positions
-from truenorth.cli import main
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
@@ -92,19 +91,11 @@ def test_what_makes_no_sense(given, text):
         advise("navigation", PLACE, **{"heading_sigma": 0.01} | given)
 
 
-def run(capsys, monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", ["truenorth", *map(str, arguments)])
-    code = 0
-    try:
-        main()
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    return code, capsys.readouterr()
-
-
 def test_the_command(capsys, monkeypatch, tmp_path):
     where = ("--lat", 45, "--imu", "navigation", "--longest", 900)
-    code, out = run(capsys, monkeypatch, "advise", *where, "--heading", 0.03, "--json", "-o", tmp_path / "advice")
+    code, out = run_command(
+        capsys, monkeypatch, "advise", *where, "--heading", 0.03, "--json", "-o", tmp_path / "advice"
+    )
     assert code == 0
     assert json.loads(out.out)["best"] == "four positions, 90 deg apart"
     assert {path.name for path in (tmp_path / "advice").iterdir()} == {"advice.json", "advice.png"}
@@ -112,13 +103,15 @@ def test_the_command(capsys, monkeypatch, tmp_path):
 
 def test_the_command_for_manoeuvres(capsys, monkeypatch, tmp_path):
     where = ("--lat", 34, "--imu", "tactical")
-    code, out = run(capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--speed", 200, "--json", "-o", tmp_path)
+    code, out = run_command(
+        capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--speed", 200, "--json", "-o", tmp_path
+    )
     told = json.loads(out.out)["manoeuvres"]
     assert code == 0
     assert told["straight"]["reached_s"] is None  # heading is not observed without an acceleration
     assert 20.0 < told["flat turn"]["reached_s"] < 40.0  # the turn begins at 20 s
     assert {path.name for path in tmp_path.iterdir()} == {"advice.json", "advice.png"}
-    code, out = run(capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--attitude-noise", 3)
+    code, out = run_command(capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--attitude-noise", 3)
     assert code == 2
     assert "expected --speed with it" in out.err
 
@@ -128,7 +121,7 @@ def test_advice_after_an_alignment(capsys, monkeypatch, tmp_path):
 
     record = simulate(rest(PLACE), imu=imu_spec("navigation"), rate=10.0, duration=60.0, seed=1).record
     write_imu(record, tmp_path / "log.csv")
-    code, out = run(
+    code, out = run_command(
         capsys, monkeypatch, "align", tmp_path / "log.csv", "--lat", 45, "--imu", "navigation", "--advise", 0.03
     )
     assert code == 0

@@ -2,18 +2,17 @@
 
 import json
 import math
-import sys
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from tests.helpers import run_command
 from tests.runs import few_and_all
 from truenorth.alignment import align
 from truenorth.alignment.positions import align_positions, find_positions
 from truenorth.alignment.task import deflection_covariance
 from truenorth.alignment.touched import find_touch
-from truenorth.cli import main
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
@@ -183,24 +182,17 @@ def log(tmp_path_factory):
 
 
 class TestCommand:
-    def run(self, capsys, monkeypatch, *arguments):
-        monkeypatch.setattr(sys, "argv", ["truenorth", "align", *map(str, arguments)])
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        return code, capsys.readouterr()
-
     def test_prints_positions(self, capsys, monkeypatch, log):
-        code, out = self.run(capsys, monkeypatch, log, "--lat", 45, "--imu", "navigation", "--positions", "auto")
+        code, out = run_command(
+            capsys, monkeypatch, "align", log, "--lat", 45, "--imu", "navigation", "--positions", "auto"
+        )
         assert code == 0
         assert "turned, deg" in out.out
         assert "179.9" in out.out or "180.0" in out.out
 
     def test_json_and_folder(self, capsys, monkeypatch, log, tmp_path):
         where = ("--lat", 45, "--imu", "navigation", "--positions", "auto")
-        code, out = self.run(capsys, monkeypatch, log, *where, "--json", "-o", tmp_path / "out")
+        code, out = run_command(capsys, monkeypatch, "align", log, *where, "--json", "-o", tmp_path / "out")
         assert code == 0
         found = json.loads(out.out)
         assert found["method"] == "positions"
@@ -219,6 +211,6 @@ class TestCommand:
         ],
     )
     def test_what_does_not_go_together(self, capsys, monkeypatch, log, more, text):
-        code, out = self.run(capsys, monkeypatch, log, "--lat", 45, *more)
+        code, out = run_command(capsys, monkeypatch, "align", log, "--lat", 45, *more)
         assert code == 2
         assert text in out.err

@@ -79,12 +79,9 @@ def test_damped_modes_everywhere(lat, v):
                 assert abs(mode.eigenvalue.real) < 0.1 * earth.EARTH_RATE  # position itself is not damped
 
 
-@pytest.mark.parametrize("make", [first_order, second_order])
-@pytest.mark.parametrize("azimuth", [0.0, 0.5])
-def test_the_correction_is_the_loop(make, azimuth):
-    """Undamped errors less the correction obey the damped loop's own equation, its reference being in error."""
-    _, truth = ideal_and_truth(hours=24.0)
-    error = np.array([-0.3, 0.2])
+def undamped(hours):
+    """A ship's truth, its model, the errors at the start, and what they become in a free INS: those of the motion, its course."""
+    _, truth = ideal_and_truth(hours=hours)
     x = np.zeros(13)
     x[:7], x[BG], x[BA] = BEGIN, 0.005 * DEG_PER_HOUR, 50 * MICRO_G
     F, Phi = truth.linearise(QUIET)
@@ -94,7 +91,15 @@ def test_the_correction_is_the_loop(make, azimuth):
     free = np.array(free)[:, MOTION]
     v = truth.v_n.copy()
     v[:, :2] += free[:, :2]
-    course = Course(truth.time, truth.C_nb, v, truth.position)
+    return truth, F, x, free, Course(truth.time, truth.C_nb, v, truth.position)
+
+
+@pytest.mark.parametrize("make", [first_order, second_order])
+@pytest.mark.parametrize("azimuth", [0.0, 0.5])
+def test_the_correction_is_the_loop(make, azimuth):
+    """Undamped errors less the correction obey the damped loop's own equation, its reference being in error."""
+    truth, F, x, free, course = undamped(hours=24.0)
+    error = np.array([-0.3, 0.2])
     loop = Loop(make(0.5), azimuth)
     corrected = free - network_correction(course, loop, truth.v_n[:, :2] + error)
 
@@ -124,17 +129,7 @@ def test_the_correction_is_the_loop(make, azimuth):
 
 def swing(**options):
     """Greatest velocity error (m/s) in four hours after a switch at 2.5 h, and four hours of undamped before it."""
-    _, truth = ideal_and_truth(hours=8.0)
-    x = np.zeros(13)
-    x[:7], x[BG], x[BA] = BEGIN, 0.005 * DEG_PER_HOUR, 50 * MICRO_G
-    _, Phi = truth.linearise(QUIET)
-    free = [x]
-    for step in Phi:
-        free.append(step @ free[-1])
-    free = np.array(free)[:, MOTION]
-    v = truth.v_n.copy()
-    v[:, :2] += free[:, :2]
-    course = Course(truth.time, truth.C_nb, v, truth.position)
+    truth, _, _, free, course = undamped(hours=8.0)
     switch = 900
     x0 = free[switch] if options.pop("corrected", False) else None
     reference = truth.v_n[:, :2] if options.pop("external", False) else None

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.helpers import assert_lines
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity, radii, transport_rate_n
 from truenorth.core.position import Position
@@ -78,17 +79,7 @@ def test_lines_of_48_hours_at_rest():
     assert minutes["slow"] == pytest.approx(89.0, abs=1.0)
     assert 2 * np.pi / np.sqrt(normal_gravity(LAT, 0.0) / np.mean(radii(LAT))) / 60 == pytest.approx(84.4, abs=0.1)
     dL = track.position[:, 0] - LAT
-
-    def left(names):
-        columns = [np.ones_like(track.time)]
-        for name in names:
-            columns += [np.cos(lines[name] * track.time), np.sin(lines[name] * track.time)]
-        A = np.stack(columns, axis=1)
-        return np.std(dL - A @ np.linalg.lstsq(A, dL)[0]) / np.std(dL)
-
-    assert left(list(lines)) < 0.01
-    for name in lines:
-        assert left([other for other in lines if other != name]) > 0.25
+    assert_lines(track.time, dL, lines, left=0.01, without=0.25)
 
 
 @pytest.mark.parametrize("speeds", [(0.0, 0.0), (10.0, 8.0)])

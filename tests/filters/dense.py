@@ -1,9 +1,13 @@
 """The oracle of the filter tests: the joint Gaussian of all states and measurements, conditioned densely."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pytest
+from numpy.testing import assert_allclose
 
+from tests.helpers import changed
+from truenorth.core.errors import DataError
 from truenorth.filters import LinearSystem
 
 
@@ -111,3 +115,34 @@ def one_run(system: LinearSystem, index: tuple[int, ...]) -> LinearSystem:
     """One run of a system whose every array has all run axes."""
     values = {name: getattr(system, name) for name in LinearSystem.__dataclass_fields__}
     return LinearSystem(**{name: None if a is None else a[index] for name, a in values.items()})
+
+
+def assert_infinite_is_named(system, name):
+    """An infinite number in the last epoch of run 1 is refused by its name and place."""
+    a = getattr(system, name)
+    index = (1, *(n - 1 for n in a.shape[1:]))
+    where = "run 1" if name in ("x0", "P0") else "epoch 4, run 1"
+    with pytest.raises(DataError, match=rf"{type(system).__name__}: {name} is inf at {where}"):
+        replace(system, **{name: changed(a, index, np.inf)})
+
+
+def three_states(Q, H, R, z, x0=(0.5, -1.0, 2.0)) -> LinearSystem:
+    """A chain of three states, the last of them known exactly."""
+    return LinearSystem(
+        Phi=np.array([[[1.0, 0.1, 0.0], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]]),
+        Q=np.asarray(Q, float)[None],
+        H=np.asarray(H, float)[None],
+        R=np.diag(R)[None],
+        z=np.asarray(z, float),
+        x0=np.asarray(x0, float),
+        P0=np.diag([4.0, 1.0, 0.0]),
+    )
+
+
+def assert_is_joint(system, found, upto=None, **close):
+    """States and covariances are those of the joint Gaussian given the rows up to each epoch; `upto`: up to that one."""
+    dense = Dense.of(system)
+    for k in range(len(found.x)):
+        x, P = dense.state(k, k + 1 if upto is None else upto)
+        assert_allclose(found.x[k], x, **close)
+        assert_allclose(found.P[k], P, **close)

@@ -111,17 +111,18 @@ def tracking(runs, epochs, rng, missing=0.0, q=0.05, coarse=1.0):
     seen = np.stack([np.hypot(truth[..., 0], truth[..., 1]), np.arctan2(truth[..., 0], truth[..., 1])], axis=-1)
     z = seen + rng.standard_normal(seen.shape) @ np.sqrt(R)
     z[rng.random(z.shape) < missing] = np.nan
+    p = np.array([[dt]])
     system = NonlinearSystem(
-        transition=straight_on,
-        measurement=range_and_bearing,
-        Q=Q[None],
-        R=R[None],
-        z=z,
-        x0=x0,
-        P0=P0,
-        p=np.array([[dt]]),
-        transition_jacobian=straight_on_jacobian,
-        measurement_jacobian=range_and_bearing_jacobian,
+        straight_on,
+        range_and_bearing,
+        Q[None],
+        R[None],
+        z,
+        x0,
+        P0,
+        np.array([[dt]]),
+        straight_on_jacobian,
+        range_and_bearing_jacobian,
     )
     return system, truth
 
@@ -180,18 +181,7 @@ def conditionally_linear(epochs, rng, runs=(), missing=0.2):
             turned(x, p[k], h)
             z[(*run, k)] = rng.multivariate_normal(h, R)
     z[rng.random(z.shape) < missing] = np.nan
-    return NonlinearSystem(
-        transition=turning,
-        measurement=turned,
-        Q=Q[None],
-        R=R[None],
-        z=z,
-        x0=x0,
-        P0=P0,
-        p=p,
-        transition_jacobian=turning_jacobian,
-        measurement_jacobian=turned_jacobian,
-    )
+    return NonlinearSystem(turning, turned, Q[None], R[None], z, x0, P0, p, turning_jacobian, turned_jacobian)
 
 
 # The growth model that particle filters are tried on: two valleys wherever x is, since only its square is seen.

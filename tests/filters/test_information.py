@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.filters.dense import Dense, one_run, random_system
+from tests.filters.dense import Dense, assert_is_joint, one_run, random_system, three_states
 from tests.filters.test_kalman import SYSTEMS, TIGHT
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import (
@@ -126,20 +126,10 @@ def test_information_behind_is_what_the_prior_does_not_hold():
 
 
 def test_two_filter_smoother_takes_singular_covariances_and_goes_on():
-    system = LinearSystem(
-        Phi=np.array([[[1.0, 0.1, 0.0], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]]),
-        Q=np.outer([1.0, 2.0, 0.0], [1.0, 2.0, 0.0])[None],
-        H=np.array([[[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]]),
-        R=np.diag([0.1, 0.3])[None],
-        z=np.array([[1.0, np.nan], [1.3, 2.0], [0.4, 0.2]]),
-        x0=np.array([0.5, -1.0, 2.0]),
-        P0=np.diag([4.0, 1.0, 0.0]),
-    )
-    dense, smoothed = Dense.of(system), two_filter_smoother(system)
-    for k in range(3):
-        x, P = dense.state(k, 3)
-        assert_allclose(smoothed.x[k], x, **TIGHT)
-        assert_allclose(smoothed.P[k], P, **TIGHT)
+    Q, H = np.outer([1.0, 2.0, 0.0], [1.0, 2.0, 0.0]), [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
+    system = three_states(Q, H, [0.1, 0.3], [[1.0, np.nan], [1.3, 2.0], [0.4, 0.2]])
+    smoothed = two_filter_smoother(system)
+    assert_is_joint(system, smoothed, upto=3, **TIGHT)
     late = two_filter_smoother(system.between(1, 3), kalman(system.between(0, 1)).state)
     assert_allclose(late.x, smoothed.x[1:], **TIGHT)
     assert_allclose(late.x0, smoothed.x[0], **TIGHT)

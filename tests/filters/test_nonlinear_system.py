@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.filters.dense import random_system
+from tests.filters.dense import assert_infinite_is_named, random_system
 from tests.filters.nonlinear_models import (
     TURNING,
     conditionally_linear,
@@ -14,6 +14,7 @@ from tests.filters.nonlinear_models import (
     linear_transition_jacobian,
     tracking,
 )
+from tests.helpers import changed
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import check_jacobians, matrix_function, vector_function
 
@@ -23,19 +24,9 @@ def system():
     return in_disguise(random_system(S=False, runs=(2,), epochs=5))
 
 
-def changed(a, index, value):
-    a = np.array(a)
-    a[index] = value
-    return a
-
-
 @pytest.mark.parametrize("name", ["Q", "R", "z", "x0", "P0", "p"])
 def test_an_infinite_number_is_named_with_its_place(system, name):
-    a = getattr(system, name)
-    index = (1, *(n - 1 for n in a.shape[1:]))
-    where = "run 1" if name in ("x0", "P0") else "epoch 4, run 1"
-    with pytest.raises(DataError, match=rf"NonlinearSystem: {name} is inf at {where}"):
-        replace(system, **{name: changed(a, index, np.inf)})
+    assert_infinite_is_named(system, name)
 
 
 @pytest.mark.parametrize(

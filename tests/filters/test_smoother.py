@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.filters.dense import Dense, one_run, random_system
+from tests.filters.dense import Dense, assert_is_joint, one_run, random_system, three_states
 from tests.filters.test_kalman import SYSTEMS, TIGHT
 from truenorth.filters import LinearSystem, kalman, smoother
 
@@ -54,20 +54,9 @@ def test_the_last_epoch_is_the_filters():
 
 def test_no_covariance_is_inverted():
     # A state known exactly, a constant without process noise and a noiseless row: P and Q are singular throughout.
-    system = LinearSystem(
-        Phi=np.array([[[1.0, 0.1, 0.0], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]]),
-        Q=np.zeros((1, 3, 3)),
-        H=np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]),
-        R=np.diag([0.3, 0.0])[None],
-        z=np.array([[1.0, np.nan], [1.3, np.nan], [0.4, 0.2], [2.0, np.nan]]),
-        x0=np.array([0.5, -1.0, 2.0]),
-        P0=np.diag([4.0, 1.0, 0.0]),
-    )
-    dense, smoothed = Dense.of(system), smoother(system)
-    for k in range(4):
-        x, P = dense.state(k, 4)
-        assert_allclose(smoothed.x[k], x, **TIGHT)
-        assert_allclose(smoothed.P[k], P, **TIGHT)
+    z = [[1.0, np.nan], [1.3, np.nan], [0.4, 0.2], [2.0, np.nan]]
+    system = three_states(np.zeros((3, 3)), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [0.3, 0.0], z)
+    assert_is_joint(system, smoother(system), upto=4, **TIGHT)
 
 
 @pytest.mark.parametrize("workers", [1, 3])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.filters.dense import Dense, one_run, random_system
+from tests.filters.dense import Dense, assert_is_joint, one_run, random_system, three_states
 from tests.filters.test_kalman import SYSTEMS, TIGHT
 from truenorth.core.errors import DataError
 from truenorth.filters import LinearSystem, kalman, square_root
@@ -47,20 +47,9 @@ def test_runs_are_those_alone_to_the_bit():
 
 
 def test_singular_noise_and_prior_pass():
-    system = LinearSystem(
-        Phi=np.array([[[1.0, 0.1, 0.0], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]]),
-        Q=np.outer([1.0, 2.0, 0.0], [1.0, 2.0, 0.0])[None],
-        H=np.array([[[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]]),
-        R=np.diag([0.0, 0.3])[None],
-        z=np.array([[1.0, np.nan], [1.3, 2.0], [0.4, 0.2]]),
-        x0=np.zeros(3),
-        P0=np.diag([4.0, 1.0, 0.0]),
-    )
-    dense, estimates = Dense.of(system), square_root(system, history="full")
-    for k in range(3):
-        x, P = dense.state(k, k + 1)
-        assert_allclose(estimates.x[k], x, **TIGHT)
-        assert_allclose(estimates.P[k], P, **TIGHT)
+    Q, H = np.outer([1.0, 2.0, 0.0], [1.0, 2.0, 0.0]), [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
+    system = three_states(Q, H, [0.0, 0.3], [[1.0, np.nan], [1.3, 2.0], [0.4, 0.2]], x0=(0.0, 0.0, 0.0))
+    assert_is_joint(system, square_root(system, history="full"), **TIGHT)
 
 
 SLOPE = 1e-3

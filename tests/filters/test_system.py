@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.filters.dense import random_system
+from tests.filters.dense import assert_infinite_is_named, random_system
+from tests.helpers import changed
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import LinearSystem
 
@@ -15,19 +16,9 @@ def system() -> LinearSystem:
     return random_system(runs=(2,), epochs=5)
 
 
-def changed(a, index, value):
-    a = a.copy()
-    a[index] = value
-    return a
-
-
 @pytest.mark.parametrize("name", ["Phi", "Q", "H", "R", "z", "x0", "P0", "u", "S"])
 def test_an_infinite_number_is_named_with_its_place(system, name):
-    a = getattr(system, name)
-    index = (1, *(n - 1 for n in a.shape[1:]))
-    where = "run 1" if name in ("x0", "P0") else "epoch 4, run 1"
-    with pytest.raises(DataError, match=rf"LinearSystem: {name} is inf at {where}"):
-        replace(system, **{name: changed(a, index, np.inf)})
+    assert_infinite_is_named(system, name)
 
 
 @pytest.mark.parametrize("name", ["Phi", "Q", "H", "R", "x0", "P0", "u", "S"])

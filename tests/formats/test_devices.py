@@ -105,14 +105,6 @@ def ulog_bytes():
     return b"".join(parts)
 
 
-def test_px4(tmp_path):
-    pytest.importorskip("pyulog")
-    path = tmp_path / "log.ulg"
-    path.write_bytes(ulog_bytes())
-    assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
-    assert_is_at_home(read_gnss(path), 10)
-
-
 def dataflash_bytes():
     """A DataFlash log as ArduPilot writes it: formats, then messages."""
 
@@ -132,10 +124,15 @@ def dataflash_bytes():
     return b"".join(parts)
 
 
-def test_ardupilot(tmp_path):
-    pytest.importorskip("pymavlink")
-    path = tmp_path / "00000001.bin"
-    path.write_bytes(dataflash_bytes())
+@pytest.mark.parametrize(
+    ("module", "name", "content"),
+    [("pyulog", "log.ulg", ulog_bytes), ("pymavlink", "00000001.bin", dataflash_bytes)],
+    ids=["px4", "ardupilot"],
+)
+def test_flight_controllers(tmp_path, module, name, content):
+    pytest.importorskip(module)
+    path = tmp_path / name
+    path.write_bytes(content())
     assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
     assert_is_at_home(read_gnss(path), 10)
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.helpers import assert_lines
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE, FLATTENING, SEMI_MAJOR, earth_rate_n, normal_gravity, radii
 from truenorth.records import ImuRecord
@@ -65,17 +66,7 @@ def test_lines_of_the_undamped_spectrum():
     swing = np.sqrt(normal_gravity(lat, 0.0) / R + foucault**2)  # of a pendulum on a turning table
     lines = {"24 h": EARTH_RATE, "slow": swing - foucault, "fast": swing + foucault}
     dL = out.position[:, 0] - lat
-
-    def left(names):
-        columns = [np.ones_like(out.time)]
-        for name in names:
-            columns += [np.cos(lines[name] * out.time), np.sin(lines[name] * out.time)]
-        A = np.stack(columns, axis=1)
-        return np.std(dL - A @ np.linalg.lstsq(A, dL)[0]) / np.std(dL)
-
-    assert left(list(lines)) < 0.003
-    for name in lines:
-        assert left([other for other in lines if other != name]) > 0.3
+    assert_lines(out.time, dL, lines, left=0.003, without=0.3)
 
 
 def test_free_vertical_channel_diverges_as_it_must():

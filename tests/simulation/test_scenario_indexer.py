@@ -6,18 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.simulation.test_scenario import BASE
 from truenorth.core.errors import DataError
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.simulation.folder import save_run
 from truenorth.simulation.scenario import read_scenario
 
-BASE = {
-    "name": "base",
-    "duration": "20 s",
-    "rate": "50 Hz",
-    "position": {"lat": "45 deg", "lon": "10 deg"},
-    "motion": {"kind": "rest"},
-}
 STEPS = {"scheme": "8", "dwell": "1 s", "rate": "90 deg/s"}
 
 

@@ -1,0 +1,42 @@
+"""What several test files do: run the command, take known lines out of a signal, change an array."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+
+def run_command(capsys, monkeypatch, *arguments):
+    """Exit code of ``truenorth`` with these arguments, and what it printed (``out`` and ``err``)."""
+    from truenorth.cli import main
+
+    monkeypatch.setattr(sys, "argv", ["truenorth", *map(str, arguments)])
+    code = 0
+    try:
+        main()
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    return code, capsys.readouterr()
+
+
+def assert_lines(time, signal, lines, left, without):
+    """A constant and lines (name to rad/s) leave less than `left` of a signal; without any one of them more than `without`."""
+
+    def share(names):
+        columns = [np.ones_like(time)]
+        for name in names:
+            columns += [np.cos(lines[name] * time), np.sin(lines[name] * time)]
+        A = np.stack(columns, axis=1)
+        return np.std(signal - A @ np.linalg.lstsq(A, signal)[0]) / np.std(signal)
+
+    assert share(list(lines)) < left
+    for name in lines:
+        assert share([other for other in lines if other != name]) > without
+
+
+def changed(a, index, value):
+    """A copy of an array with one element or row changed."""
+    a = np.array(a)
+    a[index] = value
+    return a
