@@ -111,7 +111,6 @@ def tracking(runs, epochs, rng, missing=0.0, q=0.05, coarse=1.0):
     seen = np.stack([np.hypot(truth[..., 0], truth[..., 1]), np.arctan2(truth[..., 0], truth[..., 1])], axis=-1)
     z = seen + rng.standard_normal(seen.shape) @ np.sqrt(R)
     z[rng.random(z.shape) < missing] = np.nan
-    p = np.array([[dt]])
     system = NonlinearSystem(
         straight_on,
         range_and_bearing,

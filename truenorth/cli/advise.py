@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truenorth.cli.console import make_console, stages
+from truenorth.cli.console import make_console, print_written, stages
+from truenorth.cli.options import AsJson, command, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,43 +31,33 @@ Exit codes: 0 within reach; 2 wrong usage; 4 out of reach.
 """
 
 
+@command(EXAMPLES)
 def advise(
-    lat: Annotated[float, typer.Option(help="Latitude, deg, north positive.", show_default=False)],
+    lat: Annotated[float, option("Latitude, deg, north positive.", panel="IMU and base")],
     imu: Annotated[
-        str,
-        typer.Option(
-            help="Specification: navigation, tactical, industrial, consumer, or a YAML file.", show_default=False
-        ),
+        str, option("Specification: navigation, tactical, industrial, consumer, or a YAML file.", panel="IMU and base")
     ],
-    heading: Annotated[float, typer.Option(help="Wanted one-sigma of heading, deg.", show_default=False)],
-    disturbance: Annotated[float, typer.Option(help="RMS velocity of the base, mean over one second, m/s.")] = 1e-4,
+    heading: Annotated[float, option("Wanted one-sigma of heading, deg.", panel="What is wanted")],
+    disturbance: Annotated[
+        float, option("RMS velocity of the base, mean over one second, m/s.", panel="IMU and base")
+    ] = 1e-4,
     longest: Annotated[
         float | None,
-        typer.Option(
-            help="Longest recording that is considered, s; 3600, of manoeuvres 120, without it.", show_default=False
-        ),
+        option("Longest recording that is considered, s; 3600, of manoeuvres 120, without it.", panel="What is wanted"),
     ] = None,
-    rate: Annotated[float, typer.Option(help="Sampling rate of the IMU, Hz.")] = 100.0,
+    rate: Annotated[float, option("Sampling rate of the IMU, Hz.", panel="IMU and base")] = 100.0,
     speed: Annotated[
         float | None,
-        typer.Option(
-            help="Of a vehicle whose master INS aligns this IMU, m/s: which manoeuvre?",
-            show_default=False,
-            rich_help_panel="Transfer alignment",
-        ),
+        option("Of a vehicle whose master INS aligns this IMU, m/s: which manoeuvre?", panel="Transfer alignment"),
     ] = None,
     attitude_noise: Annotated[
         float | None,
-        typer.Option(
-            help="Of the master's attitude, arcmin, where that is matched beside its velocity.",
-            show_default=False,
-            rich_help_panel="Transfer alignment",
+        option(
+            "Of the master's attitude, arcmin, where that is matched beside its velocity.", panel="Transfer alignment"
         ),
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for advice.json and advice.png.", show_default=False)
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    output: Annotated[Path | None, option("Folder for advice.json and advice.png.", "-o", "--output")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Say how long, and in which positions or by which manoeuvre, an IMU needs for a wanted heading."""
     from truenorth.advice.manoeuvres import advise_manoeuvre
@@ -97,8 +88,7 @@ def advise(
     else:
         console = make_console()
         print_advice(console, advice)
-        for path in paths:
-            console.print(f"wrote {path}", soft_wrap=True)
+        print_written(paths)
     if advice.best is None:
         raise typer.Exit(4)
 
@@ -129,6 +119,3 @@ def _save(advice: Advice | ManoeuvreAdvice, folder: Path) -> list[Path]:
         file(paths[0]).write_text(json.dumps(advice.summary(), indent=2, allow_nan=False), "utf-8")
         advice.plot().savefig(file(paths[1]))
     return paths
-
-
-advise.__doc__ = f"{advise.__doc__}\n{EXAMPLES}"

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import typer
-
+from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
 if TYPE_CHECKING:
@@ -42,14 +41,13 @@ class Turntable:
 
     PANEL: ClassVar = "Turntable"
     positions: Annotated[
-        str | None,
-        typer.Option(help="auto: a turntable takes the IMU from position to position; turns are found in the gyros."),
+        str | None, option("auto: a turntable takes the IMU from position to position; turns are found in the gyros.")
     ] = None
-    arm_sigma: Annotated[float, typer.Option(help="How far the IMU may sit from the table's axes, m.")] = 0.05
+    arm_sigma: Annotated[float, option("How far the IMU may sit from the table's axes, m.")] = 0.05
     advise: Annotated[
         float | None,
-        typer.Option(
-            help="A wanted one-sigma of heading, deg: how long, and in which positions, this IMU on this base needs for it."
+        option(
+            "A wanted one-sigma of heading, deg: how long, and in which positions, this IMU on this base needs for it."
         ),
     ] = None
 
@@ -72,15 +70,13 @@ class OnIndexer:
     PANEL: ClassVar = "IMU on an indexer"
     indexer: Annotated[
         str | None,
-        typer.Option(
-            help="Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns."
-        ),
+        option("Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns."),
     ] = None
-    indexer_axes: Annotated[str, typer.Option(help="Axes of the indexer, the outermost first.")] = "z,x"
+    indexer_axes: Annotated[str, option("Axes of the indexer, the outermost first.")] = "z,x"
     lever_arm: Annotated[
         str | None,
-        typer.Option(
-            help="Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it."
+        option(
+            "Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it."
         ),
     ] = None
 
@@ -108,29 +104,20 @@ class ByMaster:
     PANEL: ClassVar = "Against a master INS"
     master: Annotated[
         Path | None,
-        typer.Option(
-            help="Log of the master: time, heading, pitch, roll and/or VE, VN, VU, and lat, lon, alt where it has them."
-        ),
+        option("Log of the master: time, heading, pitch, roll and/or VE, VN, VU, and lat, lon, alt where it has them."),
     ] = None
-    master_columns: Annotated[
-        str | None, typer.Option(help="Names of the columns in the master's log, as 'time=t,VE=ve'.")
-    ] = None
-    master_units: Annotated[str | None, typer.Option(help="Units of its columns, as 'attitude=rad,position=rad'.")] = (
-        None
-    )
-    matching: Annotated[str, typer.Option(help="What is matched: auto, velocity, attitude or both.")] = "auto"
+    master_columns: Annotated[str | None, option("Names of the columns in the master's log, as 'time=t,VE=ve'.")] = None
+    master_units: Annotated[str | None, option("Units of its columns, as 'attitude=rad,position=rad'.")] = None
+    matching: Annotated[str, option("What is matched: auto, velocity, attitude or both.")] = "auto"
     delay: Annotated[
         str | None,
-        typer.Option(
-            help="By which the master's stamps are late: '30 ms', or with its uncertainty '30 ms,5 ms'; 0 and 50 ms without it."
+        option(
+            "By which the master's stamps are late: '30 ms', or with its uncertainty '30 ms,5 ms'; 0 and 50 ms without it."
         ),
     ] = None
-    lever_arm_sigma: Annotated[
-        float, typer.Option(help="What --lever-arm (master to IMU) is uncertain by, m; 0: known.")
-    ] = 1.0
+    lever_arm_sigma: Annotated[float, option("What --lever-arm (master to IMU) is uncertain by, m; 0: known.")] = 1.0
     flexure: Annotated[
-        str | None,
-        typer.Option(help="The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time."),
+        str | None, option("The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time.")
     ] = None
 
     def aids(self, arm: Any, mounting: str | None, mounting_sigma: float) -> list[Any]:
@@ -164,29 +151,25 @@ class OnTheMove:
 
     PANEL: ClassVar = "On the move"
     odometer: Annotated[
-        Path | None, typer.Option(help="Odometer log of a vehicle that moves from the first second on (needs --imu).")
+        Path | None, option("Odometer log of a vehicle that moves from the first second on (needs --imu).")
     ] = None
     gnss: Annotated[
         Path | None,
-        typer.Option(
-            help="GNSS log, positions and/or velocities, alone or with an odometer; --lat is then not needed."
-        ),
+        option("GNSS log, positions and/or velocities, alone or with an odometer; --lat is then not needed."),
     ] = None
-    offset: Annotated[float, typer.Option(help="Added to the times of the odometer's and the GNSS log, s.")] = 0.0
+    offset: Annotated[float, option("Added to the times of the odometer's and the GNSS log, s.")] = 0.0
     wheel_arm: Annotated[
-        str | None,
-        typer.Option(help="IMU to the odometer's wheel, m: right,forward,up; estimated without it."),
+        str | None, option("IMU to the odometer's wheel, m: right,forward,up; estimated without it.")
     ] = None
-    antenna_arm: Annotated[str | None, typer.Option(help="IMU to the GNSS antenna, m: right,forward,up.")] = None
+    antenna_arm: Annotated[str | None, option("IMU to the GNSS antenna, m: right,forward,up.")] = None
     latency: Annotated[
-        float | None,
-        typer.Option(help="GNSS measurements are older than their stamps by this, s; estimated without it."),
+        float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
     ] = None
     mounting: Annotated[
-        str | None, typer.Option(help="Heading,pitch,roll of the IMU against the vehicle (or the master), deg.")
+        str | None, option("Heading,pitch,roll of the IMU against the vehicle (or the master), deg.")
     ] = None
-    mounting_sigma: Annotated[float, typer.Option(help="How far off those may be, one sigma, deg; estimated.")] = 3.0
-    odometer_noise: Annotated[float | None, typer.Option(help="One-sigma noise of the odometer's speed, m/s.")] = None
+    mounting_sigma: Annotated[float, option("How far off those may be, one sigma, deg; estimated.")] = 3.0
+    odometer_noise: Annotated[float | None, option("One-sigma noise of the odometer's speed, m/s.")] = None
 
     @property
     def given(self) -> bool:
@@ -228,34 +211,28 @@ class Sensors:
     """Options of the aids of a navigation."""
 
     PANEL: ClassVar = "Aiding sensors"
-    gnss: Annotated[Path | None, typer.Option(help="GNSS log: CSV, Parquet, NMEA, ...")] = None
-    odometer: Annotated[Path | None, typer.Option(help="Odometer log.")] = None
-    velocity: Annotated[
-        Path | None, typer.Option(help="Log of a Doppler or speed log, or of a reference velocity.")
-    ] = None
-    baro: Annotated[Path | None, typer.Option(help="Log of a barometer.")] = None
+    gnss: Annotated[Path | None, option("GNSS log: CSV, Parquet, NMEA, ...")] = None
+    odometer: Annotated[Path | None, option("Odometer log.")] = None
+    velocity: Annotated[Path | None, option("Log of a Doppler or speed log, or of a reference velocity.")] = None
+    baro: Annotated[Path | None, option("Log of a barometer.")] = None
     aid: Annotated[
-        list[str] | None, typer.Option(help="Log of a plug-in's sensor, as NAME=FILE; more than one by repeating it.")
+        list[str] | None, option("Log of a plug-in's sensor, as NAME=FILE; more than one by repeating it.")
     ] = None
     baro_loop: Annotated[
-        float, typer.Option(help="Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
+        float, option("Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
     ] = 0.0
-    lever_arm: Annotated[str | None, typer.Option(help="IMU to GNSS antenna, m: right,forward,up.")] = None
-    wheel_arm: Annotated[str | None, typer.Option(help="IMU to the odometer's wheel, m: right,forward,up.")] = None
+    lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up.")] = None
+    wheel_arm: Annotated[str | None, option("IMU to the odometer's wheel, m: right,forward,up.")] = None
     mounting: Annotated[
-        str | None, typer.Option(help="Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log).")
+        str | None, option("Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log).")
     ] = None
-    estimate: Annotated[str | None, typer.Option(help=f"What is not known and estimated, of: {', '.join(PARTS)}.")] = (
-        None
-    )
-    odometer_noise: Annotated[float | None, typer.Option(help="One-sigma noise of the odometer's speed, m/s.")] = None
-    offset: Annotated[float, typer.Option(help="Added to the times of all aiding logs, s.")] = 0.0
-    latency: Annotated[float, typer.Option(help="GNSS measurements are older than their stamps by this, s.")] = 0.0
+    estimate: Annotated[str | None, option(f"What is not known and estimated, of: {', '.join(PARTS)}.")] = None
+    odometer_noise: Annotated[float | None, option("One-sigma noise of the odometer's speed, m/s.")] = None
+    offset: Annotated[float, option("Added to the times of all aiding logs, s.")] = 0.0
+    latency: Annotated[float, option("GNSS measurements are older than their stamps by this, s.")] = 0.0
     gnss_drift: Annotated[
         str | None,
-        typer.Option(
-            help="Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."
-        ),
+        option("Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."),
     ] = None
 
     @property

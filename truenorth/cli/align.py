@@ -5,18 +5,17 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable
 from truenorth.cli.align_options import check_options
 from truenorth.cli.console import make_console, stages
-from truenorth.cli.options import grouped
+from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.print_alignment import print_alignment
-from truenorth.cli.reading import Log, ReadingWindow
+from truenorth.cli.reading import Log, Place, ReadingWindow
 from truenorth.cli.remedies import reasons_of
 
 if TYPE_CHECKING:
@@ -42,60 +41,32 @@ Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data canno
 """
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where the IMU stands."""
-
-    PANEL: ClassVar = "Place"
-    lat: Annotated[float | None, typer.Option(help="Latitude, deg, north positive.")] = None
-    lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0
-    alt: Annotated[float, typer.Option(help="Height above the ellipsoid, m.")] = 0.0
-    position_sigma: Annotated[float, typer.Option(help="One-sigma error of that position, m.")] = 10.0
-
-    def position(self) -> Position | None:
-        """The position; None: no latitude was given."""
-        from truenorth.core.position import Position
-
-        if self.lat is None:
-            return None
-        sigmas = {"horizontal_sigma": self.position_sigma, "vertical_sigma": 2 * self.position_sigma}
-        return Position.from_degrees(self.lat, self.lon, self.alt, **sigmas)
-
-
+@command(EXAMPLES)
 def align(
     context: typer.Context,
     log: Log,
     where: Place,
     imu: Annotated[
         str | None,
-        typer.Option(
-            help="Specification: navigation, tactical, industrial, consumer, or a YAML file; else inferred from the log.",
-            show_default=False,
+        option(
+            "Specification: navigation, tactical, industrial, consumer, or a YAML file; else inferred from the log."
         ),
     ] = None,
     method: Annotated[
-        str, typer.Option(help="auto, analytic, inertial, oba, kalman or swaying; on the move gyrocompass or motion.")
+        str, option("auto, analytic, inertial, oba, kalman or swaying; on the move gyrocompass or motion.")
     ] = "auto",
-    at: Annotated[
-        float | None, typer.Option(help="Epoch of the attitude, s; the last sample without it.", show_default=False)
-    ] = None,
-    heading_limit: Annotated[float, typer.Option(help="Largest usable one-sigma heading error, deg.")] = 5.0,
+    at: Annotated[float | None, option("Epoch of the attitude, s; the last sample without it.")] = None,
+    heading_limit: Annotated[float, option("Largest usable one-sigma heading error, deg.")] = 5.0,
     calibration: Annotated[
-        Path | None,
-        typer.Option(
-            help="YAML file of known bias, scale factor and misalignment, taken off first.", show_default=False
-        ),
+        Path | None, option("YAML file of known bias, scale factor and misalignment, taken off first.")
     ] = None,
     any_attitude: Annotated[
-        bool, typer.Option("--any-attitude", help="The IMU really lies on its head: do not refuse z pointing down.")
+        bool, option("The IMU really lies on its head: do not refuse z pointing down.", "--any-attitude")
     ] = False,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Folder for summary.json, history.parquet and report.html.", show_default=False
-        ),
+        Path | None, option("Folder for summary.json, history.parquet and report.html.", "-o", "--output")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
     *,
     reading: ReadingWindow,
     table: Turntable,
@@ -195,7 +166,3 @@ def _refuse_implausible(record: ImuRecord, lat: float | None, any_attitude: bool
             raise DataError(f"{record.source}: rows 1 to {len(record)}: {finding.message}{extra}")
         if finding.severity == "warning":
             print(f"truenorth: warning: {finding.message}", file=sys.stderr)
-
-
-align.__doc__ = f"{align.__doc__}\n{EXAMPLES}"
-align = grouped(align)

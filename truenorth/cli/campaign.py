@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from truenorth.cli.console import make_console
+from truenorth.cli.console import bar, make_console, print_written
+from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -39,22 +34,21 @@ Exit codes: 0 done; 2 wrong usage; 3 a plan with a mistake.
 """
 
 
+@command(EXAMPLES)
 def campaign(
-    plan: Annotated[Path, typer.Argument(help="YAML file: scenarios, grid, methods, runs.", show_default=False)],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for the runs and the report.", show_default=False)
-    ],
-    runs: Annotated[int | None, typer.Option(min=1, help="In place of the plan's own.", show_default=False)] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; one for each core without it.", show_default=False)
-    ] = None,
+    plan: Annotated[Path, argument("YAML file: scenarios, grid, methods, runs.")],
+    output: Annotated[Path, option("Folder for the runs and the report.", "-o", "--output")],
+    runs: Annotated[int | None, option("In place of the plan's own.", min=1, panel="Runs")] = None,
+    workers: Annotated[int | None, option("Processes; one for each core without it.", min=1, panel="Runs")] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler, tcp://host:port, in place of processes.", show_default=False)
+        str | None, option("Dask scheduler, tcp://host:port, in place of processes.", panel="Runs")
     ] = None,
     resume: Annotated[
         bool,
-        typer.Option(
-            "--resume/--no-resume", help="Go on with the runs that the folder holds, or remove them and begin anew."
+        option(
+            "Go on with the runs that the folder holds, or remove them and begin anew.",
+            "--resume/--no-resume",
+            panel="Runs",
         ),
     ] = True,
 ) -> None:
@@ -67,7 +61,7 @@ def campaign(
     used = (
         workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else workers or os.cpu_count() or 1
     )
-    with _bar() as progress:
+    with bar("runs", pace) as progress:
         result = run_campaign(chosen, output, workers=used, scheduler=scheduler, resume=resume, progress=progress)
     console = make_console()
     table = result.summary
@@ -78,32 +72,7 @@ def campaign(
             f"{row['name']}, {row['method']}: heading RMS {row['rms']:.3g} arcmin over {row['runs']} runs, {honest}",
             soft_wrap=True,
         )
-    for path in result.save():
-        console.print(f"wrote {path}", soft_wrap=True)
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[int, int], None] | None]:
-    """Runs done, runs a second and time left, on standard error where a person looks at it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[pace]}"))
-    with Progress(*columns, console=make_console(stderr=True)) as progress:
-        task = progress.add_task("runs", total=None, pace="")
-        start: list[tuple[float, int]] = []  # when, and with how many that were there
-
-        def tell(done: int, total: int) -> None:
-            now = time.monotonic()
-            if not start:
-                start.append((now, done))
-            since, before = start[0]
-            words = pace(done - before, total - done, now - since)
-            progress.update(task, completed=done, total=total, pace=words)
-
-        yield tell
+    print_written(result.save())
 
 
 def pace(done: int, left: int, seconds: float) -> str:
@@ -115,6 +84,3 @@ def pace(done: int, left: int, seconds: float) -> str:
         return ""
     rate = done / seconds
     return f"{rate:.3g} runs/s, {timedelta(seconds=math.ceil(left / rate))} left"
-
-
-campaign.__doc__ = f"{campaign.__doc__}\n{EXAMPLES}"

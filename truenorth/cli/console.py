@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+Progress = Callable[[int, int], None]  # done and total
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -28,3 +31,45 @@ def stages(quiet: bool) -> Iterator[Callable[[str], None]]:
 
     with make_console(stderr=True).status("starting") as status:
         yield lambda stage: status.update(Text(stage))
+
+
+def print_written(paths: Iterable[Path]) -> None:
+    """Say which files were written."""
+    console = make_console()
+    for path in paths:
+        console.print(f"wrote {path}", soft_wrap=True)
+
+
+@contextmanager
+def bar(
+    what: str, pace: Callable[[int, int, float], str] = lambda done, left, seconds: ""
+) -> Iterator[Progress | None]:
+    """A function of done and total that moves a bar on standard error; None where no person looks at it.
+
+    `pace` says in words how fast it goes, from what was done since the start, what is left, and the seconds it took.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    import time
+
+    from rich import progress as rich
+
+    columns = (
+        rich.TextColumn(what),
+        rich.BarColumn(),
+        rich.MofNCompleteColumn(),
+        rich.TextColumn("{task.fields[pace]}"),
+    )
+    with rich.Progress(*columns, console=make_console(stderr=True)) as shown:
+        task = shown.add_task(what, total=None, pace="")
+        start: list[tuple[float, int]] = []  # when, and with how many that were there
+
+        def tell(done: int, total: int) -> None:
+            now = time.monotonic()
+            if not start:
+                start.append((now, done))
+            since, before = start[0]
+            shown.update(task, completed=done, total=total, pace=pace(done - before, total - done, now - since))
+
+        yield tell

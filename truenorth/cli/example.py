@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from truenorth.cli.console import make_console
+from truenorth.cli.console import make_console, print_written
+from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -23,17 +22,14 @@ Examples:
 """
 
 
+@command(EXAMPLES)
 def example(
-    name: Annotated[str, typer.Argument(help="rlg, fog or transfer.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the logs.")] = Path(),
+    name: Annotated[str, argument("rlg, fog or transfer.")],
+    output: Annotated[Path, option("Folder for the logs.", "-o", "--output")] = Path(),
 ) -> None:
     """Write a sample recording as logs that the other commands read."""
     from truenorth.formats.samples import SAMPLES, write_sample
 
     console = make_console()
-    for path in write_sample(name, output):
-        console.print(f"wrote {path}", soft_wrap=True)
+    print_written(write_sample(name, output))
     console.print(f"{SAMPLES[name].what}; try: {SAMPLES[name].command}", soft_wrap=True)
-
-
-example.__doc__ = f"{example.__doc__}\n{EXAMPLES}"

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from truenorth.cli.console import make_console, stages
+from truenorth.cli.options import command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -21,18 +22,15 @@ Exit codes: 0 no wrong answer passed in silence; 1 some did; 2 wrong usage.
 """
 
 
+@command(EXAMPLES)
 def faults(
-    procedure: Annotated[
-        list[str] | None, typer.Option(help="One or more; all without it.", show_default=False)
-    ] = None,
+    procedure: Annotated[list[str] | None, option("One or more; all without it.", panel="Trials")] = None,
     fault: Annotated[
-        list[str] | None, typer.Option(help="One or more; all without it. 'none' is a sound log.", show_default=False)
+        list[str] | None, option("One or more; all without it. 'none' is a sound log.", panel="Trials")
     ] = None,
-    runs: Annotated[int, typer.Option(min=1, help="Of each procedure with each fault.")] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="Of motions, errors, and sizes of the faults.")] = 0,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for faults.csv and trials.csv.", show_default=False)
-    ] = None,
+    runs: Annotated[int, option("Of each procedure with each fault.", min=1, panel="Trials")] = 3,
+    seed: Annotated[int, option("Of motions, errors, and sizes of the faults.", min=0, panel="Trials")] = 0,
+    output: Annotated[Path | None, option("Folder for faults.csv and trials.csv.", "-o", "--output")] = None,
 ) -> None:
     """Try faults of logs, clocks, places and specifications on every procedure, with drawn sizes."""
     import pandas as pd
@@ -60,6 +58,3 @@ def faults(
             console.print(f"wrote {folder / name}", soft_wrap=True)
     if any(row["silent"] or row["crash"] for row in rows):
         raise typer.Exit(1)
-
-
-faults.__doc__ = f"{faults.__doc__}\n{EXAMPLES}"

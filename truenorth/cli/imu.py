@@ -6,9 +6,8 @@ import json
 import sys
 from typing import Annotated, Any
 
-import typer
-
 from truenorth.cli.console import make_console
+from truenorth.cli.options import AsJson, argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -20,12 +19,11 @@ Examples:
 """
 
 
+@command(EXAMPLES)
 def imu(
-    name: Annotated[
-        str | None, typer.Argument(help="A preset or a YAML file; printed as YAML.", show_default=False)
-    ] = None,
-    listed: Annotated[bool, typer.Option("--list", help="All presets with their values.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    name: Annotated[str | None, argument("A preset or a YAML file; printed as YAML.")] = None,
+    listed: Annotated[bool, option("All presets with their values.", "--list")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Show specifications of IMUs: the presets, or one of them as a YAML file."""
     import yaml
@@ -67,6 +65,3 @@ def _terms(content: dict[str, Any], before: str = "") -> list[tuple[str, str]]:
         elif key != "name":
             found.append((f"{before}{key}", str(value)))
     return found
-
-
-imu.__doc__ = f"{imu.__doc__}\n{EXAMPLES}"

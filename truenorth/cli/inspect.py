@@ -6,10 +6,8 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from truenorth.cli.console import make_console
-from truenorth.cli.options import grouped
+from truenorth.cli.console import make_console, print_written
+from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, ReadingWindow, in_line
 
 FIGURES = (".png", ".svg", ".pdf")
@@ -25,17 +23,16 @@ Examples:
 """
 
 
+@command(EXAMPLES)
 def inspect(
     log: Log,
     reading: ReadingWindow,
-    lat: Annotated[
-        float | None, typer.Option(help="Latitude, deg: lets the earth's rate be checked.", show_default=False)
-    ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write a figure (.png, .svg, .pdf).", show_default=False)] = None,
+    lat: Annotated[float | None, option("Latitude, deg: lets the earth's rate be checked.")] = None,
+    plot: Annotated[Path | None, option("Write a figure (.png, .svg, .pdf).", panel="Files")] = None,
     layout: Annotated[
-        bool, typer.Option("--write-layout", help="Write what the log was taken for as LOG.yaml beside it.")
+        bool, option("Write what the log was taken for as LOG.yaml beside it.", "--write-layout", panel="Files")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Look at a log: what it is taken for, rate, gaps, frozen or saturated samples, mistakes of units and axes, motion, noise."""
     from truenorth.core.atomic import atomic_path, writable_folder
@@ -75,11 +72,4 @@ def inspect(
         console.print(finding.message, soft_wrap=True)
     if not found.findings:
         console.print("nothing wrong was found")
-    if plot is not None:
-        console.print(f"wrote {plot}", soft_wrap=True)
-    if written is not None:
-        console.print(f"wrote {written}", soft_wrap=True)
-
-
-inspect.__doc__ = f"{inspect.__doc__}\n{EXAMPLES}"
-inspect = grouped(inspect)
+    print_written(path for path in (plot, written) if path is not None)

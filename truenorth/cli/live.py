@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
-from truenorth.cli.options import grouped
-from truenorth.cli.reading import Rows, names_of
+from truenorth.cli.options import argument, command, option
+from truenorth.cli.reading import Place, Rows, names_of
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -47,11 +47,11 @@ class Aids:
     """Sensors that aid, each with a source of its own: `same` is that of the IMU's rows."""
 
     PANEL: ClassVar = "Sensors that aid"
-    gnss: Annotated[str | None, typer.Option(help="Source of fixes: NMEA, UBX, SBF, NovAtel, MAVLink or CSV.")] = None
-    odometer: Annotated[str | None, typer.Option(help="Source of an odometer's rows: CSV.")] = None
-    velocity: Annotated[str | None, typer.Option(help="Source of a velocity log's rows: CSV; in navigation.")] = None
-    baro: Annotated[str | None, typer.Option(help="Source of heights: CSV; in navigation.")] = None
-    lever_arm: Annotated[str | None, typer.Option(help="IMU to antenna, m: right,forward,up.")] = None
+    gnss: Annotated[str | None, option("Source of fixes: NMEA, UBX, SBF, NovAtel, MAVLink or CSV.")] = None
+    odometer: Annotated[str | None, option("Source of an odometer's rows: CSV.")] = None
+    velocity: Annotated[str | None, option("Source of a velocity log's rows: CSV; in navigation.")] = None
+    baro: Annotated[str | None, option("Source of heights: CSV; in navigation.")] = None
+    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up.")] = None
 
     def sources(self) -> dict[str, str]:
         """By the key of the feed."""
@@ -72,59 +72,51 @@ class Aids:
         return found
 
 
+@command(EXAMPLES)
 def live(
     source: Annotated[
         str,
-        typer.Argument(
-            help="replay:FILE@10x, follow:FILE, - (standard input), udp://:PORT, tcp://HOST:PORT, serial:/dev/NAME?baud=RATE.",
-            show_default=False,
+        argument(
+            "replay:FILE@10x, follow:FILE, - (standard input), udp://:PORT, tcp://HOST:PORT, serial:/dev/NAME?baud=RATE."
         ),
     ],
+    where: Place,
     rows: Rows,
     aids: Aids,
-    lat: Annotated[
-        float | None, typer.Option(help="Latitude, deg, north positive; not needed with GNSS.", show_default=False)
-    ] = None,
-    lon: Annotated[float, typer.Option(help="Longitude, deg, east positive.")] = 0.0,
-    alt: Annotated[float, typer.Option(help="Height above the ellipsoid, m.")] = 0.0,
-    position_sigma: Annotated[float, typer.Option(help="One-sigma error of that position, m.")] = 10.0,
     imu: Annotated[
-        str | None,
-        typer.Option(
-            help="Specification: a preset or a YAML file. Without it, it is inferred from the rows.", show_default=False
-        ),
+        str | None, option("Specification: a preset or a YAML file. Without it, it is inferred from the rows.")
     ] = None,
-    method: Annotated[str, typer.Option(help="As for `truenorth align`.")] = "auto",
+    method: Annotated[str, option("As for `truenorth align`.")] = "auto",
     until: Annotated[
         str | None,
-        typer.Option(
-            help="Stop, or navigate on, when heading is as good as this: '0.1 deg' (one sigma).", show_default=False
-        ),
+        option("Stop, or navigate on, when heading is as good as this: '0.1 deg' (one sigma).", panel="Answers"),
     ] = None,
     navigate: Annotated[
         bool,
-        typer.Option(
-            "--navigate", help="Go on to navigation: at --until, when the base leaves its place, or by the page."
+        option(
+            "Go on to navigation: at --until, when the base leaves its place, or by the page.",
+            "--navigate",
+            panel="Answers",
         ),
     ] = False,
-    clock: Annotated[str, typer.Option(help="Time of a row: device (where it has one), or arrival.")] = "device",
-    every: Annotated[float, typer.Option(help="Seconds between two answers.")] = 1.0,
-    share: Annotated[float, typer.Option(help="Part of one core for solutions.")] = 0.1,
+    clock: Annotated[str, option("Time of a row: device (where it has one), or arrival.", panel="Answers")] = "device",
+    every: Annotated[float, option("Seconds between two answers.", panel="Answers")] = 1.0,
+    share: Annotated[float, option("Part of one core for solutions.", panel="Answers")] = 0.1,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Folder for the rows as they come, and the result.", show_default=False),
+        option("Folder for the rows as they come, and the result.", "-o", "--output", panel="Kept in a folder"),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the rows in the folder.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print each answer as a JSON object on one line.")] = False,
-    nmea: Annotated[bool, typer.Option("--nmea", help="Print each heading as NMEA HDT and PASHR.")] = False,
+    resume: Annotated[bool, option("Go on with the rows in the folder.", "--resume", panel="Kept in a folder")] = False,
+    as_json: Annotated[
+        bool, option("Print each answer as a JSON object on one line.", "--json", panel="Shown as")
+    ] = False,
+    nmea: Annotated[bool, option("Print each heading as NMEA HDT and PASHR.", "--nmea", panel="Shown as")] = False,
     page: Annotated[
-        str | None,
-        typer.Option(help="Show a page in the browser, at this address such as :8080 (loopback).", show_default=False),
+        str | None, option("Show a page in the browser, at this address such as :8080 (loopback).", panel="Shown as")
     ] = None,
 ) -> None:
     """Find heading while the log is still running: watch it converge, stop when it is good."""
     from truenorth.core.errors import UsageError
-    from truenorth.core.position import Position
     from truenorth.core.units import parse
     from truenorth.formats.layout import layout_for
     from truenorth.live.session import Session
@@ -137,15 +129,11 @@ def live(
         raise UsageError(f"--every {every:g}, --share {share:g}: expected seconds above 0, and a part of 1")
     if clock not in ("device", "arrival"):
         raise UsageError(f"--clock {clock!r}: expected device or arrival")
-    if lat is None and aids.gnss is None:
+    place = where.position()
+    if place is None and aids.gnss is None:
         raise UsageError("no place; expected --lat (and --lon), or --gnss SOURCE")
     goal = None if until is None else parse(until, "angle")
     given = {"units": rows.units, "axes": rows.axes, "columns": names_of(rows.columns), "kind": rows.kind}
-    place = None
-    if lat is not None:
-        place = Position.from_degrees(
-            lat, lon, alt, horizontal_sigma=position_sigma, vertical_sigma=2.0 * position_sigma
-        )
     session = Session(
         source,
         place,
@@ -218,7 +206,3 @@ def _listeners(
     finally:
         if server is not None:
             server.close()
-
-
-live.__doc__ = f"{live.__doc__}\n{EXAMPLES}"
-live = grouped(live)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import typer
 
 from truenorth.cli.aiding_options import Sensors
-from truenorth.cli.console import make_console, stages
-from truenorth.cli.options import grouped
+from truenorth.cli.console import make_console, print_written, stages
+from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
 
@@ -48,16 +48,16 @@ class Damping:
     PANEL: ClassVar = "Damping"
     damping: Annotated[
         str | None,
-        typer.Option(
-            help="Damp a free INS at sea: none, internal, external, kalman, double or augmented; --velocity is the reference."
+        option(
+            "Damp a free INS at sea: none, internal, external, kalman, double or augmented; --velocity is the reference."
         ),
     ] = None
-    damping_ratio: Annotated[float, typer.Option(help="Of the networks (internal, external).")] = 0.5
-    damping_order: Annotated[int, typer.Option(help="Of the networks: 1 or 2.")] = 2
-    azimuth_damping: Annotated[float, typer.Option(help="Ratio for the 24 h oscillation (external); 0: none.")] = 0.0
-    damping_start: Annotated[float, typer.Option(help="Seconds after the start, when it is switched on.")] = 0.0
-    damping_ramp: Annotated[float, typer.Option(help="Seconds in which a network is switched on.")] = 0.0
-    log_error: Annotated[float, typer.Option(help="One-sigma constant error of the reference velocity, m/s.")] = 0.3
+    damping_ratio: Annotated[float, option("Of the networks (internal, external).")] = 0.5
+    damping_order: Annotated[int, option("Of the networks: 1 or 2.")] = 2
+    azimuth_damping: Annotated[float, option("Ratio for the 24 h oscillation (external); 0: none.")] = 0.0
+    damping_start: Annotated[float, option("Seconds after the start, when it is switched on.")] = 0.0
+    damping_ramp: Annotated[float, option("Seconds in which a network is switched on.")] = 0.0
+    log_error: Annotated[float, option("One-sigma constant error of the reference velocity, m/s.")] = 0.3
 
     def damper(self) -> Damper | None:
         """The method; None: no damping."""
@@ -83,18 +83,13 @@ class KnownStart:
     PANEL: ClassVar = "A start that is known"
     heading: Annotated[
         str | None,
-        typer.Option(
-            help="Heading and its one-sigma, deg: '123,1'; with --position, or with a --start that has levelled."
-        ),
+        option("Heading and its one-sigma, deg: '123,1'; with --position, or with a --start that has levelled."),
     ] = None
     position: Annotated[
-        str | None,
-        typer.Option(help="Where the log begins: lat,lon or lat,lon,alt in degrees and metres; needs --imu."),
+        str | None, option("Where the log begins: lat,lon or lat,lon,alt in degrees and metres; needs --imu.")
     ] = None
-    pitch: Annotated[float | None, typer.Option(help="Deg; without it the level is that of the log's beginning.")] = (
-        None
-    )
-    roll: Annotated[float | None, typer.Option(help="Deg; with --pitch.")] = None
+    pitch: Annotated[float | None, option("Deg; without it the level is that of the log's beginning.")] = None
+    roll: Annotated[float | None, option("Deg; with --pitch.")] = None
 
     def given(self) -> tuple[float, float]:
         """Heading and sigma, rad."""
@@ -142,36 +137,24 @@ class KnownStart:
         return None if self.heading is None or folder is None else load(folder).imu
 
 
+@command(EXAMPLES)
 def navigate(
     log: Log,
-    start: Annotated[
-        Path | None, typer.Option(help="Folder that `truenorth align -o` wrote.", show_default=False)
-    ] = None,
+    start: Annotated[Path | None, option("Folder that `truenorth align -o` wrote.")] = None,
     altitude: Annotated[
-        str | None,
-        typer.Option(help="fixed, free, baro or gnss; by default what the logs allow, else fixed.", show_default=False),
+        str | None, option("fixed, free, baro or gnss; by default what the logs allow, else fixed.")
     ] = None,
     zupt: Annotated[
-        str | None,
-        typer.Option(
-            help="Stops: auto, or seconds such as '0-20,63-70'. None are used without it.", show_default=False
-        ),
+        str | None, option("Stops: auto, or seconds such as '0-20,63-70'. None are used without it.")
     ] = None,
-    smooth: Annotated[bool, typer.Option("--smooth", help="Estimate each epoch from the whole log.")] = False,
-    imu: Annotated[
-        str | None, typer.Option(help="Specification; the alignment's own without it.", show_default=False)
-    ] = None,
-    every: Annotated[float | None, typer.Option(help="Seconds between rows of the track.", show_default=False)] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(help="YAML file of known errors of the IMU, taken off first.", show_default=False)
-    ] = None,
+    smooth: Annotated[bool, option("Estimate each epoch from the whole log.", "--smooth")] = False,
+    imu: Annotated[str | None, option("Specification; the alignment's own without it.")] = None,
+    every: Annotated[float | None, option("Seconds between rows of the track.")] = None,
+    calibration: Annotated[Path | None, option("YAML file of known errors of the IMU, taken off first.")] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Folder for summary.json, track.parquet, .geojson, report.html.", show_default=False
-        ),
+        Path | None, option("Folder for summary.json, track.parquet, .geojson, report.html.", "-o", "--output")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
     *,
     known: KnownStart,
     sensors: Sensors,
@@ -277,9 +260,4 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     if result.damping is not None:
         console.print(f"damping: {result.damping.in_words()}", soft_wrap=True)
     console.print(f"height: {result.altitude}; IMU: {result.imu_source}", soft_wrap=True)
-    for path in paths:
-        console.print(f"wrote {path}", soft_wrap=True)
-
-
-navigate.__doc__ = f"{navigate.__doc__}\n{EXAMPLES}"
-navigate = grouped(navigate)
+    print_written(paths)

@@ -7,10 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from truenorth.cli.console import make_console
-from truenorth.cli.options import grouped
+from truenorth.cli.console import make_console, print_written
+from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, ReadingWindow
 
 if TYPE_CHECKING:
@@ -36,17 +34,15 @@ TERMS = (
 )
 
 
+@command(EXAMPLES)
 def noise(
     log: Log,
     reading: ReadingWindow,
     like: Annotated[
-        str | None,
-        typer.Option(help="Specification of what rest does not show: biases, scale factors.", show_default=False),
+        str | None, option("Specification of what rest does not show: biases, scale factors.", panel="Files")
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the files.", show_default=False)
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    output: Annotated[Path | None, option("Folder for the files.", "-o", "--output", panel="Files")] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure the sensors' noise in a log at rest: Allan deviation, its coefficients with their one-sigma."""
     from truenorth.core.errors import AlignmentError
@@ -126,9 +122,4 @@ def _print(source: str, start: float, stop: float, figures: list[dict[str, Any]]
         ]
         table.add_row(f"{row['sensor']} {row['term']}", *cells, row["unit"])
     console.print(table)
-    for path in paths:
-        console.print(f"wrote {path}", soft_wrap=True)
-
-
-noise.__doc__ = f"{noise.__doc__}\n{EXAMPLES}"
-noise = grouped(noise)
+    print_written(paths)

@@ -1,6 +1,6 @@
 """Options in groups: a frozen dataclass declares the options of one panel, and builds what they mean.
 
-A command is a function whose parameters may be such groups; :func:`grouped` lays their fields out as options.
+A command is a function whose parameters may be such groups; :func:`command` lays their fields out as options.
 """
 
 from __future__ import annotations
@@ -12,13 +12,38 @@ from dataclasses import fields, is_dataclass
 from functools import wraps
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from typer.models import OptionInfo
+import typer
+from typer.models import ArgumentInfo, OptionInfo
 
 
-def grouped(run: Callable[..., None]) -> Callable[..., None]:
+def option(help: str, *names: str, panel: str | None = None, **more: Any) -> Any:
+    """An option; its names are made from the parameter's where none is given."""
+    return typer.Option(*names, help=help, rich_help_panel=panel, **more)
+
+
+def argument(help: str) -> Any:
+    """An argument; its default speaks in the help."""
+    return typer.Argument(help=help, show_default=False)
+
+
+AsJson = Annotated[bool, option("Print one JSON object and nothing else.", "--json")]
+
+
+def command(examples: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command of a function; its help is the docstring, then the examples."""
+
+    def made(run: Callable[..., None]) -> Callable[..., None]:
+        run.__doc__ = f"{run.__doc__}\n{examples}"
+        return _grouped(run)
+
+    return made
+
+
+def _grouped(run: Callable[..., None]) -> Callable[..., None]:
     """A command of a function whose parameters are options, arguments or groups of options.
 
-    Each field of a group is ``name: Annotated[type, typer.Option(help=...)] = default``; its panel is the group's `PANEL`.
+    Each field of a group is ``name: Annotated[type, option("help")] = default``; its panel is the group's `PANEL`. A default
+    of None is not shown.
     """
     hints = get_type_hints(run, include_extras=True)
     groups: dict[str, Any] = {}
@@ -29,7 +54,8 @@ def grouped(run: Callable[..., None]) -> Callable[..., None]:
             groups[name] = kind
             parameters += _laid_out(kind)
         else:
-            parameters.append(parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY))
+            shown = _in_panel(kind, None, None if parameter.default is inspect.Parameter.empty else parameter.default)
+            parameters.append(parameter.replace(annotation=shown, kind=inspect.Parameter.KEYWORD_ONLY))
 
     @wraps(run)
     def command(**given: Any) -> None:
@@ -57,8 +83,8 @@ def _laid_out(group: Any) -> list[inspect.Parameter]:
 
 def _in_panel(hint: Any, panel: str | None, default: Any) -> Any:
     kind, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    infos = [copy(mark) for mark in marks if isinstance(mark, OptionInfo)]
+    infos = [copy(mark) for mark in marks if isinstance(mark, OptionInfo | ArgumentInfo)]
     for info in infos:
         info.rich_help_panel = info.rich_help_panel or panel
         info.show_default = info.show_default and default is not None
-    return Annotated[kind, *infos] if infos else kind
+    return Annotated[kind, *infos] if infos else hint

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truenorth.cli.console import make_console
+from truenorth.cli.console import make_console, print_written
 from truenorth.cli.remedies import reasons_of
 
 if TYPE_CHECKING:
@@ -55,8 +55,7 @@ def print_alignment(result: Alignment, paths: list[Path]) -> None:
     if result.table is not None:
         print_table(console, result)
     print_moving(console, result)
-    for path in paths:
-        console.print(f"wrote {path}", soft_wrap=True)
+    print_written(paths)
 
 
 def print_moving(console: Console, result: Alignment) -> None:

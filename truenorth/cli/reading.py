@@ -1,4 +1,4 @@
-"""Options by which every command reads a log."""
+"""Options by which every command reads a log, and of the place where it was taken."""
 
 from __future__ import annotations
 
@@ -9,18 +9,35 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import typer
+from truenorth.cli.options import argument, option
 
 if TYPE_CHECKING:
+    from truenorth.core.position import Position
     from truenorth.records import Guess, ImuRecord
 
 Log = Annotated[
-    Path,
-    typer.Argument(
-        help="IMU log: text, .parquet, .feather, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.",
-        show_default=False,
-    ),
+    Path, argument("IMU log: text, .parquet, .feather, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.")
 ]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the IMU stands."""
+
+    PANEL: ClassVar = "Place"
+    lat: Annotated[float | None, option("Latitude, deg, north positive.")] = None
+    lon: Annotated[float, option("Longitude, deg, east positive.")] = 0.0
+    alt: Annotated[float, option("Height above the ellipsoid, m.")] = 0.0
+    position_sigma: Annotated[float, option("One-sigma error of that position, m.")] = 10.0
+
+    def position(self) -> Position | None:
+        """The position; None: no latitude was given."""
+        from truenorth.core.position import Position
+
+        if self.lat is None:
+            return None
+        sigmas = {"horizontal_sigma": self.position_sigma, "vertical_sigma": 2 * self.position_sigma}
+        return Position.from_degrees(self.lat, self.lon, self.alt, **sigmas)
 
 
 @dataclass(frozen=True)
@@ -29,32 +46,26 @@ class Rows:
 
     PANEL: ClassVar = "The log"
     axes: Annotated[
-        str | None, typer.Option(help="Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, even FLD.")
+        str | None, option("Where x, y, z point: RFU (right, forward, up; the default), FRD, FLU, even FLD.")
     ] = None
-    units: Annotated[
-        str | None, typer.Option(help="Units of the columns, as 'deg/s,g' or 'gyro=deg/s'; else found or asked.")
-    ] = None
+    units: Annotated[str | None, option("Units of the columns, as 'deg/s,g' or 'gyro=deg/s'; else found or asked.")] = (
+        None
+    )
     columns: Annotated[
         str | None,
-        typer.Option(
-            help="Names of the columns in the log, as 'time=t,gyro_x=wx,gyro_y=-wy'; for .npz and .mat the variables."
-        ),
+        option("Names of the columns in the log, as 'time=t,gyro_x=wx,gyro_y=-wy'; for .npz and .mat the variables."),
     ] = None
-    kind: Annotated[
-        str | None, typer.Option(help="What a row is, where the names do not tell: rates or increments.")
-    ] = None
+    kind: Annotated[str | None, option("What a row is, where the names do not tell: rates or increments.")] = None
 
 
 @dataclass(frozen=True)
 class Reading(Rows):
     """How a log is read."""
 
-    rate: Annotated[float | None, typer.Option(help="Samples a second, of a log without time, or with bad stamps.")] = (
-        None
-    )
-    format: Annotated[str | None, typer.Option("--format", help="Format, where the suffix does not tell.")] = None
-    topic: Annotated[str | None, typer.Option(help="Topic of a ROS bag with several IMUs.")] = None
-    stop: Annotated[float | None, typer.Option("--to", help="Use the log up to this time, s.")] = None
+    rate: Annotated[float | None, option("Samples a second, of a log without time, or with bad stamps.")] = None
+    format: Annotated[str | None, option("Format, where the suffix does not tell.", "--format")] = None
+    topic: Annotated[str | None, option("Topic of a ROS bag with several IMUs.")] = None
+    stop: Annotated[float | None, option("Use the log up to this time, s.", "--to")] = None
 
     def read(self, log: Path) -> ImuRecord:
         """The log, up to --to."""
@@ -64,9 +75,9 @@ class Reading(Rows):
         from truenorth.core.errors import DataError, UsageError
         from truenorth.formats import UnsureError, read_imu
 
-        for option, value in (("--from", start), ("--to", self.stop)):
+        for name, value in (("--from", start), ("--to", self.stop)):
             if value is not None and not math.isfinite(value):
-                raise UsageError(f"{option} {value}: expected seconds on the log's clock")
+                raise UsageError(f"{name} {value}: expected seconds on the log's clock")
         if start is not None and self.stop is not None and start >= self.stop:
             raise UsageError(f"--from {start:g} --to {self.stop:g}: the window ends before it begins")
         try:
@@ -92,7 +103,7 @@ class Reading(Rows):
 class ReadingWindow(Reading):
     """How a log is read, and from when on."""
 
-    start: Annotated[float | None, typer.Option("--from", help="Use the log from this time on, s.")] = None
+    start: Annotated[float | None, option("Use the log from this time on, s.", "--from")] = None
 
     def read(self, log: Path) -> ImuRecord:
         """The log from --from to --to."""

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from truenorth.cli.console import make_console
+from truenorth.cli.console import make_console, print_written, stages
+from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -34,16 +30,15 @@ Exit codes: 0 done; 2 wrong usage.
 """
 
 
+@command(EXAMPLES)
 def reproduce(
-    name: Annotated[str, typer.Argument(help="The study.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.", show_default=False)],
-    runs: Annotated[
-        int | None, typer.Option(min=2, help="Of each case; the study's own without it.", show_default=False)
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all random numbers.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="That share the runs.")] = 1,
+    name: Annotated[str, argument("The study.")],
+    output: Annotated[Path, option("Folder for the results.", "-o", "--output")],
+    runs: Annotated[int | None, option("Of each case; the study's own without it.", min=2, panel="Runs")] = None,
+    seed: Annotated[int, option("Of all random numbers.", min=0, panel="Runs")] = 0,
+    workers: Annotated[int, option("That share the runs.", min=1, panel="Runs")] = 1,
     full: Annotated[
-        bool, typer.Option("--full", help="The paper's own lengths, where the study shortens them.")
+        bool, option("The paper's own lengths, where the study shortens them.", "--full", panel="Runs")
     ] = False,
 ) -> None:
     """Reproduce a published system: figures.csv, the paper's figures, and claims.md with what holds."""
@@ -53,7 +48,7 @@ def reproduce(
 
     writable_folder(output)  # before the work, not after it
     names = list(STUDIES) if name == "all" else [name]
-    with _stages() as progress:
+    with stages(False) as progress:
         studies = {
             each: reproduced(each, runs=runs, seed=seed, full=full, workers=workers, progress=progress)
             for each in names
@@ -62,20 +57,4 @@ def reproduce(
     for study in studies.values():
         for claim in study.claims:
             console.print(f"{claim.verdict}: {claim.text}", soft_wrap=True)
-    for path in save_all(studies, output) if name == "all" else studies[name].save(output):
-        console.print(f"wrote {path}", soft_wrap=True)
-
-
-@contextmanager
-def _stages() -> Iterator[Callable[[str], None] | None]:
-    """A spinner with the stage's name on standard error, where a person looks at it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.text import Text
-
-    with make_console(stderr=True).status("starting") as status:
-        yield lambda stage: status.update(Text(stage))
-
-
-reproduce.__doc__ = f"{reproduce.__doc__}\n{EXAMPLES}"
+    print_written(save_all(studies, output) if name == "all" else studies[name].save(output))

@@ -7,9 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from truenorth.cli.console import make_console
+from truenorth.cli.console import make_console, print_written
+from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -25,25 +24,20 @@ Exit codes: 0 done; 2 wrong usage; 3 a scenario with a mistake.
 """
 
 
+@command(EXAMPLES)
 def simulate(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(help="A YAML file, or the name of a scenario that ships with us.", show_default=False),
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the results.", show_default=False)
-    ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="In place of the scenario's own.", show_default=False)] = None,
-    run: Annotated[int, typer.Option(min=0, help="Number of the run; it draws its own errors.")] = 0,
+    scenario: Annotated[str | None, argument("A YAML file, or the name of a scenario that ships with us.")] = None,
+    output: Annotated[Path | None, option("Folder for the results.", "-o", "--output", panel="Files")] = None,
+    seed: Annotated[int | None, option("In place of the scenario's own.", min=0, panel="Runs")] = None,
+    run: Annotated[int, option("Number of the run; it draws its own errors.", min=0, panel="Runs")] = 0,
     runs: Annotated[
-        int | None,
-        typer.Option(min=1, help="So many runs from --run on, each in a folder of its own.", show_default=False),
+        int | None, option("So many runs from --run on, each in a folder of its own.", min=1, panel="Runs")
     ] = None,
-    csv: Annotated[bool, typer.Option("--csv", help="Logs and truth as CSV instead of Parquet.")] = False,
-    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Also draw figure.png.")] = True,
-    list_: Annotated[bool, typer.Option("--list", help="List the scenarios that ship with us.")] = False,
+    csv: Annotated[bool, option("Logs and truth as CSV instead of Parquet.", "--csv", panel="Files")] = False,
+    plot: Annotated[bool, option("Also draw figure.png.", "--plot/--no-plot", panel="Files")] = True,
+    list_: Annotated[bool, option("List the scenarios that ship with us.", "--list", panel="The scenario")] = False,
     show: Annotated[
-        bool, typer.Option("--show", help="Print the scenario with all its defaults; simulate nothing.")
+        bool, option("Print the scenario with all its defaults; simulate nothing.", "--show", panel="The scenario")
     ] = False,
 ) -> None:
     """Simulate a scenario: the IMU's log and those of its aiding sensors, and the truth that made them."""
@@ -80,8 +74,7 @@ def simulate(
         suffix: Any = "csv" if csv else "parquet"
         paths = save_run(chosen, simulated, folder, seed=drawn_with, run=number, suffix=suffix, plot=plot)
     if runs is None:
-        for path in paths:
-            console.print(f"wrote {path}", soft_wrap=True)
+        print_written(paths)
     else:
         console.print(f"wrote {len(numbers)} runs into {output}", soft_wrap=True)
 
@@ -93,6 +86,3 @@ def _with_bar(numbers: range) -> Iterable[int]:
     from rich.progress import track
 
     return track(numbers, description="simulating", console=make_console(stderr=True))
-
-
-simulate.__doc__ = f"{simulate.__doc__}\n{EXAMPLES}"

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from truenorth.cli.console import make_console
+from truenorth.cli.console import bar, make_console, print_written
+from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
 EXAMPLES = """
@@ -31,9 +27,10 @@ Exit codes: 0 done; 2 wrong usage; 3 a search with a mistake, or one without an 
 """
 
 
+@command(EXAMPLES)
 def tune(
-    search: Annotated[Path, typer.Argument(help="YAML file: scenario, method, ranges.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the result.", show_default=False)],
+    search: Annotated[Path, argument("YAML file: scenario, method, ranges.")],
+    output: Annotated[Path, option("Folder for the result.", "-o", "--output")],
 ) -> None:
     """Search for the specification with which a method errs least and says so honestly, with the extra 'tune'."""
     from truenorth.campaign.tuning import read_search
@@ -42,7 +39,7 @@ def tune(
 
     chosen = read_search(search)
     writable_folder(output)  # before the work, not after it
-    with _bar() as progress:
+    with bar("trials") as progress:
         result = search_for(chosen, progress=progress)
     console = make_console()
     for row in result.judged.to_dict("records"):
@@ -51,21 +48,4 @@ def tune(
         honesty = f"RMS/sigma {row['rms_over_sigma']:.2f}, NEES {row['nees']:.2f}: {verdict}"
         data = f"{row['answers']} runs of seed {row['seed']}, which the search never saw"
         console.print(f"{row['specification']}: {chosen.quantity} {errors}, {honesty}; {data}", soft_wrap=True)
-    for path in result.save(output):
-        console.print(f"wrote {path}", soft_wrap=True)
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[int, int], None] | None]:
-    """Trials done and time left, on standard error where a person looks at it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.progress import Progress
-
-    with Progress(console=make_console(stderr=True)) as progress:
-        task = progress.add_task("trials", total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
-
-
-tune.__doc__ = f"{tune.__doc__}\n{EXAMPLES}"
+    print_written(result.save(output))

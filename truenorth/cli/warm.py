@@ -12,9 +12,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from truenorth.cli.console import make_console
+from truenorth.cli.options import command, option
 
 PACKAGE = Path(__file__).parents[1]
 EXAMPLES = """
@@ -52,10 +51,9 @@ TASKS: dict[str, tuple[str, ...]] = {
 }
 
 
+@command(EXAMPLES)
 def warm(
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes at once; one a core without it.", show_default=False)
-    ] = None,
+    workers: Annotated[int | None, option("Processes at once; one a core without it.", min=1)] = None,
 ) -> None:
     """Compile what the other commands need and keep it for all that follow; a second call finds it done."""
     from multiprocessing import get_context
@@ -130,6 +128,3 @@ def run_task(name: str) -> None:
                 app(command.split(), standalone_mode=False)
         finally:
             os.chdir(before)
-
-
-warm.__doc__ = f"{warm.__doc__}\n{EXAMPLES}"

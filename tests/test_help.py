@@ -1,0 +1,55 @@
+"""Options in ``--help``: in groups, and with the defaults of the models that they are for."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+import typer
+
+from truenorth.cli import app
+from truenorth.damping.options import Damper
+from truenorth.live.session import Session
+
+COMMANDS = typer.main.get_command(app).commands
+ALONE = {"help", "output", "as_json"}  # of every command, and not in a group
+
+
+def options(name):
+    return [p for p in COMMANDS[name].params if p.param_type_name == "option" and p.name not in ALONE]
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_many_options_stand_in_groups(name):
+    found = options(name)
+    loose = [p.opts[0] for p in found if not getattr(p, "rich_help_panel", None)]
+    assert len(loose) <= (7 if name in ("align", "navigate") else 2)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_option_says_what_it_is(name):
+    assert all(p.help for p in options(name))
+
+
+@pytest.mark.parametrize(
+    ("command", "model", "names"),
+    [
+        ("live", Session, {"share": "share", "every": "every", "method": "method"}),
+        (
+            "navigate",
+            Damper,
+            {
+                "damping_ratio": "ratio",
+                "damping_order": "order",
+                "azimuth_damping": "azimuth",
+                "damping_start": "start",
+                "damping_ramp": "ramp",
+                "log_error": "reference_sigma",
+            },
+        ),
+    ],
+)
+def test_defaults_are_those_of_the_model(command, model, names):
+    usual = {name: p.default for name, p in inspect.signature(model).parameters.items()}
+    given = {p.name: p.default for p in COMMANDS[command].params}
+    assert {option: given[option] for option in names} == {option: usual[name] for option, name in names.items()}
