@@ -1,6 +1,7 @@
 """The house: who may import whom, no circles, no function over 120 lines. Imports for type checkers count."""
 
 import ast
+import re
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -26,6 +27,7 @@ FLOOR["simulation"] = FLOOR["state"] + 0.5  # it stands aside: on floors up to t
 FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, beside the package itself
 SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
 LONGEST = 120
+TYPES_COMMANDS = {"truenorth.formats.samples"}  # it shows commands to type
 
 FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
 TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
@@ -91,3 +93,37 @@ def test_no_long_functions():
         if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno + 1 > LONGEST
     ]
     assert wrong == []
+
+
+def documented(tree):
+    """The docstrings of a module: their nodes."""
+    kinds = ast.Module | ast.ClassDef | ast.FunctionDef
+    return {id(node.body[0].value) for node in ast.walk(tree) if isinstance(node, kinds) and ast.get_docstring(node)}
+
+
+def test_the_library_names_no_options():
+    """Messages name Python's parameters, between backticks; the command line makes its options of them."""
+    wrong = [
+        f"{name}: {node.value!r}"
+        for name, tree in TREES.items()
+        if folder(name) != "cli" and name not in TYPES_COMMANDS
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documented(tree)
+        if re.search(r"(?<![\w-])--[a-z]|(?<!\S)-o\b", node.value)
+    ]
+    assert wrong == []
+
+
+def test_what_a_message_names_has_an_option():
+    """Each option that the table of names offers exists, and each name in it stands in a message of the library."""
+    from typer.main import get_command
+
+    from truenorth.cli import app
+    from truenorth.cli.wording import OPTIONS
+
+    parameters = [p for command in get_command(app).commands.values() for p in command.params]
+    known = {flag for p in parameters for flag in (*p.opts, *p.secondary_opts)}
+    text = "".join(path.read_text("utf-8") for name, path in FILES.items() if folder(name) != "cli")
+    for name, option in OPTIONS.items():
+        assert set(re.findall(r"--[a-z-]+", option)) <= known, option
+        assert f"`{name}`" in text, name

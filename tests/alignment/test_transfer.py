@@ -345,7 +345,7 @@ def test_bad_requests(real):
         align_transfer(slave, master, mounting_sigma=math.radians(-2.0))
     with pytest.raises(UsageError, match="in Python the slave's heading="):  # no option of that name
         align_transfer(slave, replace(master, C_nb=None, v_n=0.0 * master.v_n))
-    with pytest.raises(UsageError, match="--lat"):
+    with pytest.raises(UsageError, match="`place`"):
         align_transfer(slave, replace(master, lat=None, lon=None, alt=None))
     with pytest.raises(DataError, match="gap of"):
         align_transfer(slave._with(time=np.where(slave.time > 25, slave.time + 5, slave.time)), master)

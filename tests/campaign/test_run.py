@@ -230,7 +230,7 @@ def test_runs_of_two_versions_are_not_mixed(tmp_path, name):
     plan = PLAN | {"methods": ["oba"], "runs": 2}
     before = run_campaign(plan, tmp_path).table
     _begun_with(tmp_path, **{name: "0.0"})
-    with pytest.raises(UsageError, match=rf"was begun with {name} 0\.0 \(here .*--no-resume"):
+    with pytest.raises(UsageError, match=rf"was begun with {name} 0\.0 \(here .*`resume=False`"):
         run_campaign(plan | {"runs": 4}, tmp_path)
     pd.testing.assert_frame_equal(run_campaign(plan, tmp_path).table, before)  # nothing is missing: nothing is mixed
 

@@ -170,7 +170,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     }
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
-        why += " (where a turntable does it, --positions auto tells more)"
+        why += " (where a turntable does it, the aid `Positions()` shows more)"
     if task.record.duration < SHORTEST_SWAYING or not (overall in words or _rocks_all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"

@@ -173,7 +173,7 @@ def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> A
     if time.min() < encoder.time[0] - slack or time.max() > encoder.time[-1] + slack:
         raise DataError(
             f"{encoder.source}: angles from {encoder.time[0]:.3f} s to {encoder.time[-1]:.3f} s, wanted from {time.min():.3f} s to "
-            f"{time.max():.3f} s: expected the encoder's log to cover the IMU's; cut the IMU's log (--from, --to)"
+            f"{time.max():.3f} s: expected the encoder's log to cover the IMU's; cut the IMU's log (`record.between`)"
         )
     columns = [np.interp(time, encoder.time, column) for column in angles.T]
     # Beyond its ends by a row at most: on along the first or last two rows.

@@ -115,7 +115,7 @@ def bridged(record: ImuRecord) -> ImuRecord:
         raise DataError(
             f"{record.source}: row {worst + 1}, column time: a gap of {record.steps[worst]:.3f} s after "
             f"{record.time[worst - 1]:.3f} s, where samples come every {record.interval:.4f} s; what the base did in it is "
-            "not known: align a part without the gap (--from, --to)"
+            "not known: align a part without the gap (`record.between`)"
         )
     if record.kind == "rates":
         return record

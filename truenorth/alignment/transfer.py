@@ -151,8 +151,8 @@ def align_transfer(
     part, start = hand_over(slave, master, model, spec, assumed, noise, position)
     if part.duration < SHORTEST:
         raise DataError(
-            f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check --delay "
-            "and the clocks"
+            f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
+            "`mounting.latency` and the clocks"
         )
     matched = Matching(*noise, gate=GATE)
     track = transfer_filter(part, master, model, start, matched, linear=linear)

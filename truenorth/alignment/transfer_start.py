@@ -65,8 +65,8 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
         raise DataError(
             f"{master.source}: it runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s, the slave's log from "
             f"{slave.time[0]:.3f} s to {slave.time[-1]:.3f} s, and no shift makes their motion agree (best correlation "
-            f"{found.correlation:.2f}, elsewhere {found.rival:.2f}): give --delay, the offset of the master's clock, or logs with "
-            "more motion in common"
+            f"{found.correlation:.2f}, elsewhere {found.rival:.2f}): give `mounting.latency`, the offset "
+            "of the master's clock, or logs with more motion in common"
         )
     return assumed, ()
 
@@ -155,7 +155,7 @@ def hand_over(
     if first > len(slave) - 2 or master.time[-1] - assumed.delay <= slave.time[0]:
         raise DataError(
             f"{master.source}: no row falls into the slave's record ({slave.time[0]:.3f} s to {slave.time[-1]:.3f} s, the master's "
-            f"from {master.time[0]:.3f} s to {master.time[-1]:.3f} s less {assumed.delay:.3f} s): check --delay"
+            f"from {master.time[0]:.3f} s to {master.time[-1]:.3f} s less {assumed.delay:.3f} s): check `mounting.latency`"
         )
     part = slave[first + 1 :]
     begin = float(slave.time[first])
@@ -167,7 +167,7 @@ def hand_over(
     elif position is not None:
         lat, lon, alt = position.lat, position.lon, position.alt
     else:
-        raise UsageError(f"{master.source}: no position in it; give one (--lat, --lon, --alt)")
+        raise UsageError(f"{master.source}: no position in it; give one (`place`)")
 
     dtheta, dvel = increments(part)
     rows = max(1, round(FIRST / part.interval))
@@ -219,7 +219,7 @@ def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:
     else:
         raise UsageError(
             f"{master.source}: it tells velocity alone, and {math.hypot(east, north):.1f} m/s at the start, too slow for a course: "
-            "give a master with attitude, a part of the logs that begins on the move (--from), or in Python the slave's heading="
+            "give a master with attitude, a part of the logs that begins on the move (`record.between`), or the slave's `heading`"
         )
     t = master.time[:rows] - master.time[:rows].mean()
     a_n = t @ v / float(t @ t)

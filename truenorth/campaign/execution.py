@@ -91,7 +91,7 @@ def in_processes(plan: Plan, blocks: Sequence[Block], workers: int) -> Iterator[
                     if attempts[block] >= ATTEMPTS:
                         raise UsageError(
                             f"worker processes were killed {ATTEMPTS} times on runs {block.first} to {block.last} of case "
-                            f"{block.case}; is there enough memory? Fewer --workers or a smaller block need less"
+                            f"{block.case}; is there enough memory? Fewer `workers` or a smaller block need less"
                         ) from None
                 left = lost + left
 
@@ -173,7 +173,7 @@ def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[
     try:
         client = Client(scheduler, timeout="5s", set_as_default=False)
     except (OSError, ValueError) as error:
-        raise UsageError(f"--scheduler {scheduler}: no Dask scheduler answers there ({error})") from None
+        raise UsageError(f"`scheduler` {scheduler}: no Dask scheduler answers there ({error})") from None
     with client:
         mapping = plan.to_mapping()  # goes with each block: data scattered to workers dies with the last of them
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
@@ -198,12 +198,12 @@ def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[
                 yield block, result
         except KilledWorker as error:
             raise UsageError(
-                f"--scheduler {scheduler}: workers were killed again and again ({error}); is there enough memory? A smaller "
+                f"`scheduler` {scheduler}: workers were killed again and again ({error}); is there enough memory? A smaller "
                 "block needs less"
             ) from None
         except CommClosedError as error:
             raise UsageError(
-                f"--scheduler {scheduler}: the scheduler went away ({error}); what was done stays: start again with one that runs"
+                f"`scheduler` {scheduler}: the scheduler went away ({error}); what was done stays: start again with one that runs"
             ) from None
 
 

@@ -154,14 +154,14 @@ def _claim(store: Store, plan: Plan) -> None:
         held = json.loads(manifest.read_text(encoding="utf-8"))
         if held.get("plan_sha256") != plan.fingerprint:
             raise UsageError(
-                f"{folder}: holds the runs of another plan (see its plan.yaml); name another folder with -o, or begin anew "
-                "with --no-resume"
+                f"{folder}: holds the runs of another plan (see its plan.yaml); name another folder, or begin anew "
+                "with `resume=False`"
             )
         other = other_versions({name: held[name] for name in versions() if name in held})
         if other and store.missing(len(plan.cases), plan.runs, plan.block):
             raise UsageError(
                 f"{folder}: was begun with {other}, and runs of both would not be alike to the bit; finish it with what it was "
-                "begun with, name another folder with -o, or begin anew with --no-resume"
+                "begun with, name another folder, or begin anew with `resume=False`"
             )
     text = yaml.safe_dump(plan.to_mapping(), sort_keys=False, allow_unicode=True, width=110)
     kept = folder / "plan.yaml"
@@ -189,7 +189,7 @@ def _locked(path: Path) -> Iterator[None]:
             lock(file.fileno())
         except OSError:
             raise UsageError(
-                f"{path.parent}: another process works on this folder; wait for it, or name another with -o"
+                f"{path.parent}: another process works on this folder; wait for it, or name another"
             ) from None
         yield
 

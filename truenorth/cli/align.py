@@ -17,6 +17,7 @@ from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.print_alignment import print_alignment
 from truenorth.cli.reading import Log, Place, ReadingWindow
 from truenorth.cli.remedies import reasons_of
+from truenorth.cli.wording import in_options
 
 if TYPE_CHECKING:
     from truenorth.core.position import Position
@@ -165,4 +166,4 @@ def _refuse_implausible(record: ImuRecord, lat: float | None, any_attitude: bool
             extra = "; if they are in rad/s, say so: --units rad/s,m/s^2" if doubtful_unit else extra
             raise DataError(f"{record.source}: rows 1 to {len(record)}: {finding.message}{extra}")
         if finding.severity == "warning":
-            print(f"truenorth: warning: {finding.message}", file=sys.stderr)
+            print(f"truenorth: warning: {in_options(finding.message)}", file=sys.stderr)

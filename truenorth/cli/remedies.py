@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from truenorth.cli.wording import in_options
+
 OPTIONS = {
     "end_before": "--to {until:.0f}",
     "still_part": "--from, --to",
@@ -41,4 +43,4 @@ def reasons_of(result: Any) -> tuple[str, ...]:
     """The evidence of an alignment or a navigation in words, with the options of this program."""
     from truenorth.state.wording import sentences
 
-    return sentences(result.evidence, OPTIONS)
+    return tuple(in_options(text) for text in sentences(result.evidence, OPTIONS))

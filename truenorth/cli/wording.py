@@ -1,23 +1,34 @@
-"""Messages of the library name Python; here what they name becomes the command line's options."""
+"""Messages of the library name parameters of Python, between backticks; here they become the command line's options."""
 
 from __future__ import annotations
 
 import re
 
-# What the library writes, and what a person at the command line types for it.
-OPTIONS = (
-    (r"expected an aid Barometer\(record\)", "expected --baro FILE"),
-    (r"expected an aid Gnss\(record\) with heights", "expected --gnss FILE with a column of heights"),
-    (r"for its heights altitude 'baro'", "for its heights --altitude baro"),
-    (r"shift the aiding log onto the IMU's", "bring the aiding log onto the IMU's with --offset SECONDS"),
-    (r"(latitude .* north positive)$", r"\1: check --lat"),
-    (r"(longitude .* east positive)$", r"\1: check --lon"),
-    (r"(height .* metres between -12000 and 50000)$", r"\1: check --alt"),
-)
+# What a message of the library names, and what a person at the command line types for it.
+OPTIONS = {
+    "Barometer(record)": "--baro FILE",
+    "Gnss(record)": "--gnss FILE",
+    "Positions()": "--positions auto",
+    "alt": "--alt",
+    "altitude": "--altitude",
+    "at": "--at",
+    "axes": "--axes",
+    "horizontal_sigma": "--position-sigma",
+    "lat": "--lat",
+    "lon": "--lon",
+    "mounting.latency": "--delay",
+    "place": "--lat, --lon, --alt",
+    "rate": "--rate",
+    "record.between": "--from, --to",
+    "record.shifted": "--offset",
+    "resume=False": "--no-resume",
+    "scheduler": "--scheduler",
+    "units": "--units",
+    "vertical_sigma": "--position-sigma",
+    "workers": "--workers",
+}
 
 
 def in_options(text: str) -> str:
-    """The message with options where the library names parameters and classes."""
-    for python, option in OPTIONS:
-        text = re.sub(python, option, text)
-    return text
+    """A message with options where the library names parameters; a parameter without an option stays as it is."""
+    return re.sub(r"`([\w.=()]+)`", lambda found: OPTIONS.get(found[1], found[0]), text)

@@ -158,7 +158,7 @@ def gnss_track(gnss: GnssRecord, at: Array, latency: float = 0.0) -> tuple[Array
     if inside.sum() < LEAST_FIXES:
         raise DataError(
             f"{gnss.source}: {int(inside.sum())} positions between {at[0]:.1f} s and {at[-1]:.1f} s; expected at least "
-            f"{LEAST_FIXES} within the IMU's log, on its clock: check --offset"
+            f"{LEAST_FIXES} within the IMU's log, on its clock: check it (`record.shifted`)"
         )
     height = np.where(np.isfinite(gnss.alt), gnss.alt, 0.0)
     place = np.stack([np.interp(at, time[fixed], a[fixed]) for a in (gnss.lat, gnss.lon, height)], axis=1)
@@ -198,7 +198,7 @@ def _wheel_displacement(
     if starts[0] > at[0] + 2.0 or ends[-1] < at[-1] - 2.0:
         raise DataError(
             f"{odometer.source}: runs from {starts[0]:.3f} s to {ends[-1]:.3f} s, {record.source} from {at[0]:.3f} s to "
-            f"{at[-1]:.3f} s; expected an odometer that covers the log, on its clock: check --offset"
+            f"{at[-1]:.3f} s; expected an odometer that covers the log, on its clock: check it (`record.shifted`)"
         )
     # Attitude half way through each row's interval; the wheel goes along the vehicle's forward axis.
     edges = np.concatenate([[at[0]], record.time])

@@ -39,11 +39,11 @@ class Position:
     def __post_init__(self) -> None:
         lat, lon = math.degrees(self.lat), math.degrees(self.lon)
         if not abs(lat) <= 90.0:
-            raise UsageError(f"latitude {lat:g} deg; expected -90 to 90 deg, north positive")
+            raise UsageError(f"latitude {lat:g} deg; expected -90 to 90 deg, north positive: check `lat`")
         if not abs(lon) <= 360.0:
-            raise UsageError(f"longitude {lon:g} deg; expected -180 to 180 deg, east positive")
+            raise UsageError(f"longitude {lon:g} deg; expected -180 to 180 deg, east positive: check `lon`")
         if not -12_000.0 <= self.alt <= 50_000.0:
-            raise UsageError(f"height {self.alt:g} m; expected metres between -12000 and 50000")
+            raise UsageError(f"height {self.alt:g} m; expected metres between -12000 and 50000: check `alt`")
         if not (self.horizontal_sigma >= 0.0 and self.vertical_sigma >= 0.0):
             raise UsageError("a position sigma is negative or not a number; expected metres, zero or more")
 

@@ -333,9 +333,9 @@ def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitud
     if wanted is not None and wanted not in get_args(Altitude):
         raise UsageError(f"altitude {wanted!r}; expected one of {', '.join(get_args(Altitude))}")
     if wanted == "baro" and "baro" not in given:
-        raise UsageError("altitude 'baro' without a barometer's record; expected an aid Barometer(record)")
+        raise UsageError("altitude 'baro' without a barometer's record; expected an aid `Barometer(record)`")
     if wanted == "gnss" and not heights:
-        raise UsageError("altitude 'gnss' without heights of GNSS; expected an aid Gnss(record) with heights")
+        raise UsageError("altitude 'gnss' without heights of GNSS; expected an aid `Gnss(record)` with heights")
     if wanted is not None:
         return wanted, []  # type: ignore[return-value]  # one of the four
     if heights:
@@ -383,5 +383,5 @@ def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:
             raise DataError(
                 f"{sensor.name}: runs from {sensor.time.min():.3f} s to {sensor.time.max():.3f} s, the navigated part of "
                 f"{record.source} from {record.time[0] - record.interval:.3f} s to {record.time[-1]:.3f} s: no overlap; "
-                "expected one clock: shift the aiding log onto the IMU's"
+                "expected one clock: shift the aiding log onto the IMU's (`record.shifted`)"
             )

@@ -197,10 +197,10 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         s: dict[str, Any] = json.loads(path.read_text("utf-8"))
     except OSError as error:
         raise DataError(
-            f"{folder}: {path.name} cannot be read ({error.strerror}); expected the folder that `truenorth align -o` wrote"
+            f"{folder}: {path.name} cannot be read ({error.strerror}); expected the folder of a saved alignment"
         ) from None
     except ValueError as error:
-        raise DataError(f"{path}: not JSON ({error}); expected the summary that `truenorth align -o` wrote") from None
+        raise DataError(f"{path}: not JSON ({error}); expected the summary of a saved alignment") from None
     if s.get("heading_deg") is None:
         raise AlignmentError(
             f"{path}: the alignment is {s.get('status')!r}, it holds no heading that may be used; navigation needs one: align "

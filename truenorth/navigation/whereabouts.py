@@ -77,7 +77,7 @@ def _check_heights(source: str, rows: NDArray[np.intp], alt: Array, passed: Arra
     if abs(alt[k] + place.alt) < CLOSER * off[k] + LEAST_HIGH:
         advice = "the heights seem to be counted downwards: name the column depth, or turn its sign"
     else:
-        advice = f"align with --alt {alt[k]:.0f}, or with a --position-sigma that says how rough that is"
+        advice = f"align with `alt` {alt[k]:.0f}, or with a `vertical_sigma` that says how rough that is"
     raise DataError(
         f"{source}: row {rows[k] + 1}, column alt: {alt[k]:.1f} m, {off[k]:.0f} m from {place.alt:.1f} m, where the alignment "
         f"stands to {place.vertical_sigma:g} m; expected the track to begin there: {advice}"
@@ -101,9 +101,9 @@ def _mistake(lat: float, lon: float, place: Position, far: float) -> str:
     ):
         if abs(lat_meant) <= math.pi / 2 and _distance(np.array(lat_meant), np.array(lon_meant), place) < CLOSER * far:
             return words
-    left_out = "was --lon left out? " if place.lon == 0.0 else ""
+    left_out = "was `lon` left out? " if place.lon == 0.0 else ""
     return (
-        f"{left_out}align with --lat {math.degrees(lat):.5f} --lon {math.degrees(lon):.5f}, or with a --position-sigma that says "
+        f"{left_out}align with `lat` {math.degrees(lat):.5f} `lon` {math.degrees(lon):.5f}, or with a `horizontal_sigma` that says "
         "how rough its place is"
     )
 

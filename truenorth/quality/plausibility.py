@@ -72,10 +72,10 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     if abs(level / G - 1.0) < LEVEL_TOLERANCE:
         return True
     readings = [
-        (1.0 / G, "in g", "--units with accel in g, or multiply by 9.80665"),
-        (1000.0 / G, "in mg", "--units with accel in mg, or multiply by 0.00980665"),
+        (1.0 / G, "in g", "`units` with accel in g, or multiply by 9.80665"),
+        (1000.0 / G, "in mg", "`units` with accel in mg, or multiply by 0.00980665"),
         (100.0, "in cm/s^2", "divide by 100"),
-        (1e6 / G, "in ug", "--units with accel in ug, or multiply by 9.80665e-6"),
+        (1e6 / G, "in ug", "`units` with accel in ug, or multiply by 9.80665e-6"),
         (G, "multiplied by 9.80665 twice", "remove one conversion"),
     ]
     if record.kind == "rates":
@@ -114,8 +114,8 @@ def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
                 "error",
                 "axes_down",
                 f"{share}: z points down; expected up (x right, y forward, z up): if the axes are forward, right, "
-                "down use --axes FRD; if the log holds gravity instead of specific force, change the "
-                "accelerometers' sign; an IMU mounted upside down needs its own --axes",
+                "down use `axes` FRD; if the log holds gravity instead of specific force, change the "
+                "accelerometers' sign; an IMU mounted upside down needs its own `axes`",
             )
         )
     elif abs(up[axis]) > np.cos(UP_LIMIT / 2.0):
@@ -125,7 +125,7 @@ def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
                 "warning",
                 "axes_up",
                 f"{share}: {name} points up; expected +z (x right, y forward, z up): give the mounting with "
-                "--axes, unless the IMU really stands on its side",
+                "`axes`, unless the IMU really stands on its side",
             )
         )
     else:
@@ -134,7 +134,7 @@ def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
                 "warning",
                 "axes_tilted",
                 f"{share}, {np.degrees(np.arccos(up[2])):.0f} deg from z; expected z up: give the mounting with "
-                "--axes, unless the IMU really is tilted so far",
+                "`axes`, unless the IMU really is tilted so far",
             )
         )
 
@@ -163,7 +163,7 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
     readings = [(1.0 / DEG, "in deg/s"), (3600.0 / DEG, "in deg/h"), (1000.0, "in mrad/s")]
     for factor, unit in readings:
         if abs(turning.scale / factor - 1.0) < 0.1:
-            text = f"{found}: the values look {unit}, not rad/s; use --units, or convert them"
+            text = f"{found}: the values look {unit}, not rad/s; use `units`, or convert them"
             findings.append(Finding("error", "gyro_unit", text))
             return True
     severity, code = ("error", "gyro_unit") if not 0.5 < turning.scale < 2.0 else ("warning", "gyro_scale")
@@ -220,7 +220,7 @@ def _gyro_against_earth(record: ImuRecord, motion: MotionSummary, lat: float | N
     for factor, what in readings:
         quiet = np.linalg.norm(motion.angle_noise) < GYROCOMPASS_NOISE * factor
         if sharp and quiet and abs(size / (EARTH_RATE * factor) - 1.0) < 0.03:
-            text = f"{found}: the values may be {what}; check --units (a bias of that size would look the same)"
+            text = f"{found}: the values may be {what}; check `units` (a bias of that size would look the same)"
             findings.append(Finding("warning", "gyro_unit", text))
             return
 

@@ -88,7 +88,7 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
                 "gaps",
                 f"{gaps.size} gap(s), {lost:.3g} s lost in all, the longest of {record.steps[longest]:.3g} s before "
                 f"row {longest + 1} (t = {record.time[longest]:.3f} s); expected a row every "
-                f"{record.interval:.4g} s: use a stretch without gaps (--from, --to), or repair the log",
+                f"{record.interval:.4g} s: use a stretch without gaps (`record.between`), or repair the log",
             )
         )
     if rms > JITTER * record.interval:
@@ -98,7 +98,7 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
                 "jitter",
                 f"the time steps scatter by {rms * 1e3:.3g} ms RMS ({largest * 1e3:.3g} ms at most) about "
                 f"{record.interval * 1e3:.4g} ms; expected a steady clock: if the sensor samples evenly and the "
-                "computer stamped the rows, give the sensor's rate instead (--rate)",
+                "computer stamped the rows, give the sensor's rate instead (`rate`)",
             )
         )
     if record.interval >= 1.0 or record.interval < 2e-5:
@@ -108,7 +108,7 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
                 "warning",
                 "time_unit",
                 f"a row every {record.interval:.4g} s; expected 1 to 10,000 rows a second: time is probably in "
-                f"{guess}; convert it to seconds or give --rate",
+                f"{guess}; convert it to seconds or give `rate`",
             )
         )
     return rms, largest

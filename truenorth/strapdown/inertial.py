@@ -125,7 +125,7 @@ def integrate(
     if count < 2:
         raise AlignmentError(
             f"{record.source}: {edges[-1]:.2f} s of data; at least {2 * interval:g} s are needed for any answer: "
-            "record longer, or widen --from/--to"
+            "record longer, or use more of the log (`record.between`)"
         )
     sub = max(1, min(SUB_EPOCHS, int(interval / record.interval)))
     wanted = np.arange(count * sub + 1) * (interval / sub)
