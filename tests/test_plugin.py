@@ -12,6 +12,7 @@ UV = shutil.which("uv", path=str(Path(sys.executable).parent))
 
 PROGRAM = """
 import numpy as np, sys, truenorth as tn
+from dataclasses import replace
 from truenorth.simulation.scenario import read_scenario
 folder = sys.argv[1]
 place = tn.Position.from_degrees(40.0, 118.0, 50.0)
@@ -28,6 +29,9 @@ scenario = read_scenario({"name": "s", "duration": "60 s", "position": {"lat": "
 print(round(float(np.linalg.norm(scenario.simulate().truth.v_n[-1])), 2))
 rows = ["time,lat,lon,alt", *(f"{t},40.0,118.0,50.0" for t in range(31, 60))]
 open(f"{folder}/fixes.csv", "w").write(chr(10).join(rows))
+spec = replace(tn.imu_spec("navigation"), gyro_g_sensitivity=1e-6)
+ends = [tn.navigate(record, answer, imu=spec, altitude="fixed", errors=e).track.sigma[-1, :3] for e in ([], ["g_sensitivity"])]
+print(float(np.sqrt(ends[1] ** 2 - ends[0] ** 2)[2]))
 """
 
 
@@ -62,13 +66,18 @@ def run(installed, *arguments):
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=environment)
 
 
-def test_reader_method_motion_and_aid(installed):
+def test_reader_method_motion_errors_and_aid(installed):
     done = run(installed, "-c", PROGRAM, str(installed))
-    assert done.stdout.split() == ["True", "triad", "5.0"], done.stderr
+    same, method, speed, grown = done.stdout.split() or ["", "", "", "nan"]
+    assert (same, method, speed) == ("True", "triad", "5.0"), done.stderr
+    # At rest a sensitivity of 1e-6 rad/s by m/s^2 turns the heading by 9.8e-6 rad in each of the 30 seconds.
+    assert float(grown) == pytest.approx(9.8e-6 * 30.0, rel=0.01)
     aid = f"fixes={installed / 'fixes.csv'}"
     log, start = installed / "log.semicolon", installed / "start"
     done = run(installed, "-m", "truenorth", "navigate", log, "--start", start, "--aid", aid, "--altitude", "free")
     assert "fixes: 29 measurements, 0 rejected" in done.stdout, done.stderr
+    done = run(installed, "-m", "truenorth", "navigate", log, "--start", start, "--error", "nothing")
+    assert "plug-in 'nothing' of truenorth.errors is not installed; installed: g_sensitivity" in done.stderr
 
 
 def test_a_plug_in_that_is_not_installed(tmp_path):

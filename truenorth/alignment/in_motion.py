@@ -32,6 +32,7 @@ from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
+from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
@@ -119,6 +120,7 @@ def align_in_motion(
     wheel: Mounting | None = None,
     antenna: Mounting | None = None,
     sources: Sequence[Aiding] = (),
+    errors: Sequence[Group | str] = (),
     zupt: bool = True,
     method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
@@ -148,6 +150,8 @@ def align_in_motion(
         How they sit. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m) of the wheel are estimated.
     sources : sequence of Aiding
         Further measurements, such as rows of one's own.
+    errors : sequence of Group or str
+        Further error states of the INS, or names of plug-ins that make them.
     zupt : bool
         Use stops: seconds in which the wheel, or GNSS, says that nothing moves.
     method : {"auto", "gyrocompass", "motion", ...}
@@ -180,6 +184,7 @@ def align_in_motion(
     """
     tell = progress or (lambda stage: None)
     task = _task(record, imu, odometer, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
+    task = replace(task, model=replace(task.model, groups=(*task.model.groups, *groups_of(errors, task.spec))))
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
         raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")
     if not heading_limit > 0.0 or passes < 1:

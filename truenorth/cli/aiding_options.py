@@ -170,6 +170,9 @@ class OnTheMove:
     ] = None
     mounting_sigma: Annotated[float, option("How far off those may be, one sigma, deg; estimated.")] = 3.0
     odometer_noise: Annotated[float | None, option("One-sigma noise of the odometer's speed, m/s.")] = None
+    error: Annotated[list[str] | None, option("Error states of a plug-in, by name; more than one by repeating it.")] = (
+        None
+    )
 
     @property
     def given(self) -> bool:
@@ -218,6 +221,9 @@ class Sensors:
     aid: Annotated[
         list[str] | None, option("Log of a plug-in's sensor, as NAME=FILE; more than one by repeating it.")
     ] = None
+    error: Annotated[list[str] | None, option("Error states of a plug-in, by name; more than one by repeating it.")] = (
+        None
+    )
     baro_loop: Annotated[
         float, option("Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
     ] = 0.0

@@ -120,6 +120,7 @@ def align(
             calibration=None if calibration is None else Calibration.from_file(calibration),
             heading_limit=math.radians(heading_limit),
             progress=tell,
+            **({"errors": moving.error} if moving.error else {}),
         )
         if output is not None:
             tell("inspecting the log")

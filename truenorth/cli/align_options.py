@@ -27,6 +27,7 @@ BELONGS = {
     "--wheel-arm": ("--odometer",),
     "--odometer-noise": ("--odometer",),
     "--antenna-arm": ("--gnss",),
+    "--error": ("--odometer", "--gnss"),
     "--latency": ("--gnss",),
     "--mounting": ("--odometer", "--gnss", "--master"),
     "--mounting-sigma": ("--odometer", "--gnss", "--master"),

@@ -190,6 +190,7 @@ def navigate(
             smooth=smooth,
             imu=imu or known.imu_of(start),
             scale_factors="scale_factors" in sensors.parts,
+            errors=sensors.error or (),
             calibration=None if calibration is None else Calibration.from_file(calibration),
             output=every,
             damping=damper,

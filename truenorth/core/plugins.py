@@ -3,6 +3,7 @@
 - ``truenorth.formats``: ``read(path, layout) -> ImuRecord``, by ``read_imu(path, format=NAME)`` or the suffix ``.NAME``;
 - ``truenorth.methods``: ``align(request) -> Alignment``, by ``align(..., method=NAME)``, in campaigns too;
 - ``truenorth.motions``: ``build(position, arm, rng, **options) -> Motion``, by ``motion: {kind: plug-in, name: NAME}``;
+- ``truenorth.errors``: ``make(spec) -> Group``, by ``navigate(..., errors=[NAME])``, ``align`` on the move and ``--error NAME``;
 - ``truenorth.aiding``: ``read(path) -> aid``, by ``truenorth navigate --aid NAME=FILE``; the aid brings its own error states.
 
 ``examples/plugin`` has one of each.

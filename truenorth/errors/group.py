@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from truenorth.core.compiled import compiled_callback
 from truenorth.core.errors import UsageError
+from truenorth.core.plugins import plugin
 from truenorth.core.pointers import Pointer
+from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 
@@ -96,3 +98,18 @@ class Group:
     def prior(self) -> Array:
         """(m,) one-sigma of all its states at the start, rates of a second-order process included."""
         return self.sigma if self.frequency == 0.0 else np.concatenate([self.sigma, self.frequency * self.sigma])
+
+
+def groups_of(errors: Sequence[Group | str], spec: ImuSpec) -> tuple[Group, ...]:
+    """Groups as they are, or of plug-ins by name: entry points ``truenorth.errors`` of functions ``make(spec) -> Group``.
+
+    Raises
+    ------
+    UsageError
+        No plug-in of such a name, or two groups of one name.
+    """
+    found = tuple(each if isinstance(each, Group) else plugin("truenorth.errors", each)(spec) for each in errors)
+    names = [group.name for group in found]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise UsageError(f"two groups of error states are called {twice[0]!r}; expected different names")
+    return found

@@ -52,7 +52,7 @@ class InsModel:
         scale_factors : bool
             States for the scale factors; else they count as noise in turns, as the gyros' misalignments do.
         groups : tuple of Group
-            Of aiding sensors.
+            On top.
         fixed_altitude : bool
         """
         own: list[Group] = []

@@ -15,6 +15,7 @@ from truenorth.aiding.aids import WEATHER, Aid, Barometer, Gnss, Odometer, Veloc
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
@@ -63,6 +64,7 @@ def navigate(
     smooth: bool = False,
     imu: ImuSpec | str | None = None,
     scale_factors: bool = False,
+    errors: Sequence[Group | str] = (),
     calibration: Calibration | None = None,
     check_clocks: bool = True,
     interval: float | None = None,
@@ -91,6 +93,8 @@ def navigate(
         Specification; the alignment's own when left out.
     scale_factors : bool
         Estimate the IMU's scale factors.
+    errors : sequence of Group or str
+        Further error states of the INS, or names of plug-ins that make them.
     calibration : Calibration, optional
         Known errors, taken off first.
     check_clocks : bool
@@ -135,7 +139,9 @@ def navigate(
     plan = _Plan(
         record,
         begin,
-        InsModel.from_spec(noise, scale_factors=scale_factors, fixed_altitude=height == "fixed"),
+        InsModel.from_spec(
+            noise, scale_factors=scale_factors, groups=groups_of(errors, noise), fixed_altitude=height == "fixed"
+        ),
         height,
         disturbances,
         *_intervals(record, interval, output),

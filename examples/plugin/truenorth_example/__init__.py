@@ -1,4 +1,4 @@
-"""A reader, a method, a motion and an aid of one's own: each is found by its entry point in pyproject.toml."""
+"""A reader, a method, a motion, an aid and error states (errors.py) of one's own: found by entry points, see pyproject.toml."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
