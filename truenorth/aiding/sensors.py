@@ -111,7 +111,6 @@ def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:
 
     Parameters
     ----------
-    record : OdometerRecord
     mounting : Mounting
         Lever arm: to the wheel, the rear axle where nothing steers it.
         Its noise is that of the speed beside the size of the pulses.
@@ -189,8 +188,6 @@ def from_height(record: HeightRecord, mounting: Mounting, loop: float = 0.0) -> 
 
     Parameters
     ----------
-    record : HeightRecord
-    mounting : Mounting
     loop : float, s
         Time constant of the third-order vertical loop; 0: a Kalman gain.
 

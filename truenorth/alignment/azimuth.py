@@ -60,10 +60,8 @@ def azimuth_track(
     ----------
     record : ImuRecord
         Without gaps.
-    odometer : OdometerRecord
     position : Position
         At the start.
-    spec : ImuSpec
     wheel : Mounting
         Its mounting, scale's sigma and latency are used.
     method : str

@@ -161,10 +161,8 @@ def run_loop(
 
     Parameters
     ----------
-    logs : Logs
     which : (B,) array of int
         The log of each.
-    begin : Begin
     method : str
         A key of `METHODS`.
     gated : bool
@@ -172,7 +170,6 @@ def run_loop(
     turned : bool
         Turn the covariance of velocity with a correction of the azimuth; see
         :func:`truenorth.models.in_motion_azimuth.after_correction`.
-    belief : Belief
     keep_P : bool
         Keep the covariance of each epoch.
     """

@@ -22,7 +22,6 @@ def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array,
 
     Parameters
     ----------
-    spec : ImuSpec
     C_n_b : (3, 3) array
         ``v_b = C_n_b v_n``, about; heading does not matter.
     position : Position

@@ -154,11 +154,8 @@ def fine_align(
 
     Parameters
     ----------
-    record : ImuRecord
     C_n0_i : (3, 3) array
         Coarse attitude.
-    position : Position
-    model : StaticModel
     P_bias : (6, 6) array
         Prior covariance of the biases about zero.
     interval : float, s
@@ -169,10 +166,6 @@ def fine_align(
         Of the log as it is, with `interval` and `rows_at`, where they are known already.
     form : {"velocity", "force"}
         Measure the mean velocity of each interval, or the velocity gained in it.
-
-    Returns
-    -------
-    FineAlignment
     """
     prior = prior_of(P_bias)
     log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)

@@ -30,7 +30,6 @@ def pick_form(gained: Array, motion: MotionSummary) -> tuple[Form, str]:
     ----------
     gained : (K, 3) array, m/s
         Velocity gained in each interval, level axes first, of an INS that is about aligned.
-    motion : MotionSummary
     """
     if motion.overall != "still" or len(gained) < FEWEST:
         return "velocity", "velocity form"

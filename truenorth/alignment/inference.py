@@ -51,10 +51,6 @@ def predictive_sigma(
         One sigma of its logarithm.
     smallest, largest : float
         Range of s.
-
-    Returns
-    -------
-    float
     """
     s = np.geomspace(smallest, largest, 400)
     variance = s[:, None] ** 2 + np.square(noises)
@@ -77,13 +73,8 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
 
     Parameters
     ----------
-    check : LogCheck
     noise : StaticModel
         Random walks, as fitted to the log.
-
-    Returns
-    -------
-    ImuSpec
     """
     best = imu_spec("navigation")
     typical_gyro = usual_bias("gyro", noise.gyro_random_walk)

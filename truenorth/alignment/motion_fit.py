@@ -50,15 +50,10 @@ def fit_motion(
     residual : (K,) array, m/s
         Mean velocity of the base over each interval, but for a smooth trend.
     interval : float, s
-    walks : Walks
     start : AxisMotion, optional
         A good guess, which competes with what a search from nothing finds.
     most : int
         Oscillators.
-
-    Returns
-    -------
-    AxisMotion
     """
     series = Series(residual, interval, walks)
     best = _search(series, most)

@@ -36,10 +36,6 @@ def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usu
         Variance of the base's velocity to begin with; fitted along.
     usual : StaticModel
         Centre of the log-normal prior; terms that are zero stay zero.
-
-    Returns
-    -------
-    StaticModel
     """
     centre = np.array(astuple(usual))
     free = np.flatnonzero(centre > 0.0)

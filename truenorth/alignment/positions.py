@@ -73,7 +73,6 @@ def align_positions(
     ----------
     record : ImuRecord
         Body axes RFU.
-    position : Position
     imu : ImuSpec, str, path or mapping, optional
         Specification; its scale factors and misalignments are the prior of the matrices. Inferred from the log without one.
     calibration : Calibration, optional

@@ -129,7 +129,6 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
 
     Parameters
     ----------
-    task : Task
     C_n0_i : (3, 3) array
         Coarse attitude at the first sample.
     model : StaticModel

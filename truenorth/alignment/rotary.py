@@ -67,7 +67,6 @@ def align_rotary(
         Of the IMU, its own axes; at angles of zero they are the body's (RFU).
     encoder : EncoderRecord or None
         Angles of the indexer, over the whole record. None: the body is still, its axes are the IMU's at the record's beginning.
-    position : Position
     imu : ImuSpec, str, path or mapping
         Specification, a preset's name, or a YAML file.
     axes : sequence of {"x", "y", "z"}
@@ -192,7 +191,6 @@ def angles_from_gyros(
 
     Parameters
     ----------
-    integrals : InertialIntegrals
     C_n0_i : (3, 3) array
         Attitude of the IMU at the beginning, which is the body's.
     lat : float, rad

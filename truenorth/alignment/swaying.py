@@ -102,13 +102,8 @@ def sway_align(
     ----------
     record, C_n0_i, position, model, P_bias, interval, rows_at
         As in :func:`truenorth.alignment.fine.fine_align`.
-    mount : Mount
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
-
-    Returns
-    -------
-    SwayAlignment
     """
     log, residual = _settled(record, C_n0_i, position, model, P_bias, interval, rows_at, mount, turned)
     step = float(np.mean(log.integrals.intervals))

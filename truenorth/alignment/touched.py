@@ -61,10 +61,6 @@ def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
     force : (K, 2) array, m/s^2
         Level specific force in axes that do not turn.
     gravity : float, m/s^2
-
-    Returns
-    -------
-    Touch or None
     """
     length = max(1, len(time) // BLOCKS)
     count = len(time) // length

@@ -45,8 +45,6 @@ def find_delay(
 
     Parameters
     ----------
-    slave : ImuRecord
-    master : MasterRecord
     C_mb : (3, 3) array
         Slave to master axes, within some ten degrees.
     around, within : float, s

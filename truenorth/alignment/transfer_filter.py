@@ -117,17 +117,11 @@ def transfer_filter(
         Without gaps.
     master : MasterRecord
         Rows that fall outside the slave's record say nothing.
-    model : TransferModel
     start : SlaveStart
         At the beginning of the slave's record.
-    matching : Matching
     linear : Linear, optional
         Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
         rows (as much as 1 rad^-2 of information a row), would otherwise tell a little of the mounting and of the delay falsely.
-
-    Returns
-    -------
-    TransferTrack
 
     Raises
     ------

@@ -36,7 +36,6 @@ def system_of_motion(
     ----------
     motion : Motion
         Of the slave.
-    model : TransferModel
     P0 : (n, n) array
     R : (6,) array
         Variances of velocity and attitude; infinite: not measured.
@@ -62,7 +61,6 @@ def system_along(
 
     Parameters
     ----------
-    middle, at : MotionStates
     T : (K,) array, s
     model, P0, R
         As :func:`system_of_motion`.

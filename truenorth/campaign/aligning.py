@@ -29,16 +29,6 @@ def align_runs(plan: Plan, case: Case, runs: Sequence[int]) -> list[Row]:
     """Rows of some runs of a case.
 
     What fails, fails as a row: its status is ``failed``, its reason the message.
-
-    Parameters
-    ----------
-    plan : Plan
-    case : Case
-    runs : sequence of int
-
-    Returns
-    -------
-    list of Row
     """
     scenario = case.built
     shared = None

@@ -29,10 +29,6 @@ Array = NDArray[np.float64]
 def bounds(plan: Plan) -> pd.DataFrame:
     """Bound of each attitude error of each case at each time.
 
-    Parameters
-    ----------
-    plan : Plan
-
     Returns
     -------
     DataFrame

@@ -100,8 +100,6 @@ def opened(folder: str | os.PathLike[str], plan: Plan, *, resume: bool = True) -
 
     Parameters
     ----------
-    folder : path
-    plan : Plan
     resume : bool
         Keep the runs that are there; without it they are removed, whosever plan they are of.
 

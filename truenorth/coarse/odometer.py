@@ -72,8 +72,6 @@ def odometer_alignment(
 
     Parameters
     ----------
-    record : ImuRecord
-    odometer : OdometerRecord
     position : Position
         At the start.
     mounting : Mounting, optional
@@ -118,7 +116,6 @@ def gnss_alignment(
 
     Parameters
     ----------
-    record : ImuRecord
     gnss : GnssRecord
         Velocities where it has them, else differences of positions.
     mounting : Mounting, optional

@@ -44,7 +44,6 @@ def read_archive(path: str | PathLike[str], more: Collection[str] = ()) -> Any:
 
     Parameters
     ----------
-    path : path
     more : collection of str
         ``module:name`` of types that may be made besides those of Truenorth.
 

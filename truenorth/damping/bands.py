@@ -30,8 +30,6 @@ def network_sigma(
 
     Parameters
     ----------
-    course : Course
-    loop : Loop
     P0 : (13, 13) array
         Of the undamped errors and biases at the start.
     model : MarineModel

@@ -48,7 +48,6 @@ def step_response(network: Network, time: Array) -> Array:
 
     Parameters
     ----------
-    network : Network
     time : (K,) array, s
         Evenly spaced, from zero.
     """

@@ -48,12 +48,10 @@ class InsModel:
 
         Parameters
         ----------
-        spec : ImuSpec
         scale_factors : bool
             States for the scale factors; else they count as noise in turns, as the gyros' misalignments do.
         groups : tuple of Group
             On top.
-        fixed_altitude : bool
         """
         own: list[Group] = []
         for name, sigma, time in (

@@ -37,12 +37,10 @@ def taken_apart(model: InsModel, P15: Array, bias: Array, whole: WholeBiases) ->
 
     Parameters
     ----------
-    model : InsModel
     P15 : (15, 15) array
         Of phi, dv, dp and the whole biases.
     bias : (6,) array
         The whole biases, gyro and accelerometer.
-    whole : WholeBiases
 
     Returns
     -------

@@ -30,7 +30,6 @@ def rows_along(motion: MotionStates, sources: list[Aiding], model: InsModel) -> 
         At the epochs.
     sources : list of Aiding
         Each with K rows.
-    model : InsModel
 
     Returns
     -------

@@ -165,10 +165,8 @@ def navigate_track(
     ----------
     record : ImuRecord
         Its first sample begins at the start's epoch.
-    start : Start
     model : InsModel
         With the states that `aiding` asks for among its groups (see :func:`with_states`).
-    aiding : sequence of Aiding
     interval : float, s
         Of the filter's prediction; forces and turns within it are integrated sample by sample.
     every : int
@@ -181,10 +179,6 @@ def navigate_track(
         Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
     prior : (P, values), optional
         Of all states, see :func:`begin`.
-
-    Returns
-    -------
-    Track
 
     Raises
     ------

@@ -29,10 +29,6 @@ SMALL = 1e-4  # arcmin: below it a logarithmic axis tells nothing
 def plot_campaign(campaign: Campaign) -> dict[str, Figure]:
     """Every figure that the campaign's plan gives reason to.
 
-    Parameters
-    ----------
-    campaign : Campaign
-
     Returns
     -------
     dict of str to matplotlib.figure.Figure

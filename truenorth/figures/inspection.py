@@ -36,10 +36,6 @@ FAULT = "#B00020"
 def plot_inspection(inspection: Inspection) -> Figure:
     """Draw rates, specific force and wander over the regimes of motion, and the Allan deviations.
 
-    Parameters
-    ----------
-    inspection : Inspection
-
     Returns
     -------
     matplotlib.figure.Figure

@@ -26,10 +26,6 @@ KILO = 5000.0  # m, from which the track is drawn in kilometres
 def plot_navigation(result: Navigation) -> Figure:
     """Draw track with error ellipses, height, velocity and attitude with one-sigma bands, sigmas, innovations.
 
-    Parameters
-    ----------
-    result : Navigation
-
     Returns
     -------
     matplotlib.figure.Figure

@@ -38,8 +38,6 @@ def plot_simulation(simulation: Simulation, title: str = "", aiding: Mapping[str
 
     Parameters
     ----------
-    simulation : Simulation
-    title : str
     aiding : mapping of name to Aided, optional
         Logs of aiding sensors; what they say of track, speed and height is drawn as dots.
 

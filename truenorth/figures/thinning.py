@@ -18,7 +18,6 @@ def thin(time: ArrayLike, values: ArrayLike, points: int = POINTS) -> NDArray[np
     ----------
     time, values : (N,) arrays
         `time` gives the length only.
-    points : int
     """
     v = np.asarray(values, dtype=np.float64)
     if v.size <= points:

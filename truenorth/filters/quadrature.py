@@ -35,7 +35,6 @@ def gauss_hermite_rule(dimensions: int, order: int) -> QuadratureRule:
 
     Parameters
     ----------
-    dimensions : int
     order : int
         Nodes along each axis, at least 2; with 1 there would be no second moment.
 
@@ -72,7 +71,6 @@ def unscented_rule(dimensions: int, *, alpha: float, beta: float, kappa: float) 
 
     Parameters
     ----------
-    dimensions : int
     alpha : float
         Spread of the nodes, which stand at ``alpha sqrt(d + kappa)``. Small values lose digits: about 1e-16 / alpha^2
         of a mean is rounding.

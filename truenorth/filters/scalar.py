@@ -39,7 +39,6 @@ def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stat
     P0 : (n, n) array
         At the first epoch: of the first states such that ``Phi P0 Phi' + Q = P0``, zero beyond.
     h : (n,) array
-    r : float
     Y : (K, 1 + p) array
         The series, and the columns of B.
     stationary : int

@@ -89,7 +89,6 @@ def accel_readings(
 
     Parameters
     ----------
-    level : float
     interval : float, s
         NaN where it is not known: then increments cannot be told.
     kinds : sequence of {"rates", "increments"}

@@ -55,8 +55,6 @@ def options_for(
 
     Parameters
     ----------
-    path : Path
-    given : mapping
     checked : callable
         Refuses what is wrong with a UsageError, and gives the rest in the form that readers want.
 

@@ -30,7 +30,6 @@ def put_in_order(
     time : (N,) array, s
     label : str
         What the log calls it.
-    source : str
     place : callable
         Where a row stands in the file, in words.
 

@@ -18,7 +18,6 @@ def seconds_to(solution: Alignment, sigma: float, goal: float, now: float) -> fl
 
     Parameters
     ----------
-    solution : Alignment
     sigma : float, rad
         Of heading, now.
     goal : float, rad

@@ -127,7 +127,6 @@ def open_source(text: str, layout: Layout, after: float = -np.inf, *, by_arrival
 
     Parameters
     ----------
-    text : str
     layout : Layout
         Columns, units and axes of its rows.
     after : float, s

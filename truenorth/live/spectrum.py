@@ -15,10 +15,6 @@ POINTS = 120
 def motion_spectrum(log: Log) -> dict[str, list[float]]:
     """Amplitude spectral density of the turning rate, all axes together.
 
-    Parameters
-    ----------
-    log : Log
-
     Returns
     -------
     dict

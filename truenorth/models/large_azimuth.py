@@ -182,10 +182,6 @@ def large_azimuth_system(
         Variance of the base's velocity along each axis.
     form : {"tilt_azimuth", "rotation_vector", "quaternion"}
         How the attitude error is written; Jacobians come with the first.
-
-    Returns
-    -------
-    NonlinearSystem
     """
     time, T = integrals[0].time, integrals[0].intervals
     gravity = gravity_velocity(time, model.lat, model.alt)

@@ -33,7 +33,6 @@ def with_matrices(
 
     Parameters
     ----------
-    system : LinearSystem
     record : ImuRecord
         As integrated: nominal errors taken off.
     integrals : InertialIntegrals

@@ -74,7 +74,6 @@ def check_start_at_rest(start: Start, record: ImuRecord) -> None:
 
     Parameters
     ----------
-    start : Start
     record : ImuRecord
         From the start on.
 

@@ -105,7 +105,6 @@ def zero_updates(
 
     Parameters
     ----------
-    record : ImuRecord
     stops : "auto" or sequence of (start, stop)
         Found from the IMU, or given, s on the record's clock.
     interval : float, s

@@ -26,7 +26,6 @@ def check_fixes(record: GnssRecord, place: Position, time: float, *, heights: bo
 
     Parameters
     ----------
-    record : GnssRecord
     place : Position
         Of the IMU at `time`, with its sigmas.
     time : float, s

@@ -28,7 +28,6 @@ def encoder_evidence(
 
     Parameters
     ----------
-    record : ImuRecord
     C_sb : callable
         Attitude (K, 3, 3) of the base in the IMU at times (s), by the angles as given.
     others : mapping

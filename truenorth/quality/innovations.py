@@ -87,7 +87,6 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
 
     Parameters
     ----------
-    sources : iterable of Residuals
     sigma : Effect
         Of the answer, one sigma of each output: what grows.
     by_motion : bool

@@ -40,7 +40,6 @@ def check_plausibility(
 
     Parameters
     ----------
-    record : ImuRecord
     motion : MotionSummary
         Of the same record.
     lat : float, rad, optional

@@ -29,7 +29,6 @@ def record_evidence(
 
     Parameters
     ----------
-    record : ImuRecord
     motion : MotionSummary
         Of the same record.
     C_sb : callable, optional

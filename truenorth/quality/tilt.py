@@ -92,7 +92,6 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
 
     Parameters
     ----------
-    record : ImuRecord
     C_sb : callable, optional
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
 

@@ -34,8 +34,6 @@ def gauss_markov(sigma: float, tau: float, interval: float, count: int, rng: np.
     tau : float, s
         Correlation time.
     interval : float, s
-    count : int
-    rng : Generator
 
     Returns
     -------

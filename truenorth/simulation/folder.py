@@ -37,19 +37,12 @@ def save_run(
 
     Parameters
     ----------
-    scenario : Scenario
-    simulation : Simulation
-    folder : path
     seed, run : int
         That the run was made with.
     suffix : {"parquet", "csv"}
         Of the logs and the truth.
     plot : bool
         Also figure.png.
-
-    Returns
-    -------
-    list of Path
 
     Raises
     ------

@@ -53,7 +53,6 @@ def apply_errors(
     interval : float, s
     spec : ImuSpec
         Terms that are zero are left out.
-    seed, run, scenario : int
     given : mapping, optional
         See :func:`truenorth.simulation.true_errors.drawn_errors`.
 

@@ -61,10 +61,6 @@ def profile(value: float, ramps: Sequence[Ramp]) -> Profile:
         Before the first ramp.
     ramps : sequence of Ramp
         In order, not overlapping.
-
-    Returns
-    -------
-    Profile
     """
     breaks, pieces = [min(0.0, ramps[0].start if ramps else 0.0) - 1.0], []
 

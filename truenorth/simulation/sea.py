@@ -123,14 +123,11 @@ def sea_motion(
 
     Parameters
     ----------
-    spectrum : WaveSpectrum
-    hull : Hull
     rng : numpy.random.Generator
     direction : float, rad
         That the waves run to, clockwise from north.
     heading, speed : float, rad and m/s
         Of the ship: waves are met at ``w_e = w - k V cos(beta)``.
-    components : int
 
     Returns
     -------
@@ -184,7 +181,6 @@ def narrow_band(
     bandwidth : float
         Width of the spectrum at half its height, over the centre's frequency: .15 is a narrow swell.
     rng : numpy.random.Generator
-    components : int
 
     Raises
     ------

@@ -126,8 +126,6 @@ def drawn_errors(
 
     Parameters
     ----------
-    spec : ImuSpec
-    seed, run, scenario : int
     given : mapping, optional
         Values in SI that stand in place of their draws, by name: ``{"gyro_bias": (1e-7, -1e-7, 2e-7)}``; one number
         means all three axes.

@@ -39,11 +39,6 @@ def random_vibration(
     spectrum : sequence of (frequency, density), Hz and (m/s^2)^2/Hz
         Break points of the one-sided power spectral density, straight in between on doubly logarithmic paper.
     rng : numpy.random.Generator
-    components : int
-
-    Returns
-    -------
-    tuple of Tone
 
     Raises
     ------

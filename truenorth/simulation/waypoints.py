@@ -37,10 +37,6 @@ def read_waypoints(path: str | PathLike[str], spacing: float | None = None) -> l
     spacing : float, m, optional
         Points closer to the last one kept are left out; 10 m for the track of a receiver, which wanders, else none.
 
-    Returns
-    -------
-    list of WayPoint
-
     Raises
     ------
     UsageError

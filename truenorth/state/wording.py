@@ -48,7 +48,6 @@ def sentence(item: Evidence, options: Mapping[str, str] | None = None) -> str:
 
     Parameters
     ----------
-    item : Evidence
     options : mapping of remedy to str, optional
         How a program offers a remedy, with fields of the same figures, such as ``--to {until:.0f}``; named in parentheses.
     """

@@ -65,7 +65,6 @@ def run_method(
 
     Parameters
     ----------
-    drives : Drives
     which : (B,) array of int
         The log of each.
     phi0 : (B, 3) array, rad

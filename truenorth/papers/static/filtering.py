@@ -40,7 +40,6 @@ def system_of(truth: Truth, model: StationaryModel, states: int, P0: Array, R: f
 
     Parameters
     ----------
-    truth : Truth
     model : StationaryModel
         As the filter believes it.
     states : {10, 8}
