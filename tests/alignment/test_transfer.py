@@ -343,7 +343,7 @@ def test_bad_requests(real):
         align_transfer(slave, master, delay_sigma=-1.0)
     with pytest.raises(UsageError, match="mounting_sigma is -2 deg"):
         align_transfer(slave, master, mounting_sigma=math.radians(-2.0))
-    with pytest.raises(UsageError, match="in Python the slave's heading="):  # no option of that name
+    with pytest.raises(UsageError, match="or the slave's `heading`"):
         align_transfer(slave, replace(master, C_nb=None, v_n=0.0 * master.v_n))
     with pytest.raises(UsageError, match="`place`"):
         align_transfer(slave, replace(master, lat=None, lon=None, alt=None))

@@ -42,8 +42,8 @@ def refused(check, *arguments):
         (lambda r: {"lat": np.radians(r.lat), "lon": np.radians(r.lon)}, ["read as radians", "units position=rad"]),
         (lambda r: {"lon": -r.lon}, ["longitude's other sign", "east is positive"]),
         (lambda r: {"lat": -r.lat}, ["latitude's other sign", "north is positive"]),
-        (lambda r: {"lat": r.lat + 0.01}, ["align with --lat 48.57", "--lon 11.00", "64 km"]),
-        (lambda r: {"alt": r.alt - PLACE.alt}, ["column alt: 4", "from 500.0 m", "--alt 4"]),
+        (lambda r: {"lat": r.lat + 0.01}, ["align with `lat` 48.57", "`lon` 11.00", "64 km"]),
+        (lambda r: {"alt": r.alt - PLACE.alt}, ["column alt: 4", "from 500.0 m", "`alt` 4"]),
         (lambda r: {"alt": -r.alt}, ["counted downwards", "depth"]),
     ],
 )
@@ -58,8 +58,8 @@ def test_a_track_from_elsewhere_says_what_it_looks_like(change, words):
 
 def test_without_longitude_or_height_the_alignment_is_named():
     found = refused(check_fixes, journey(), Position(PLACE.lat, 0.0, PLACE.alt), T[0])
-    assert "was --lon left out? align with --lat 48.000" in found
-    assert "--lon 11.00" in found
+    assert "was `lon` left out? align with `lat` 48.000" in found
+    assert "`lon` 11.00" in found
     assert "column alt" in refused(check_fixes, journey(), replace(PLACE, alt=0.0), T[0])
     check_fixes(journey(), replace(PLACE, alt=0.0), T[0], heights=False)
     check_fixes(journey(), replace(PLACE, alt=0.0, vertical_sigma=100.0), T[0])
@@ -78,7 +78,7 @@ def test_a_barometer_of_another_zero():
     baro = HeightRecord(T, np.full(N, 812.0), source="baro.csv")
     found = refused(check_heights, baro, PLACE, T[0])
     assert "baro.csv: row 3, column alt: 812.0 m, 312 m from 500.0 m" in found
-    assert "--alt 812" in found
+    assert "`alt` 812" in found
     check_heights(baro, replace(PLACE, vertical_sigma=50.0), T[0])
 
 

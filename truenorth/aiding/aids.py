@@ -48,9 +48,12 @@ class Aid(Protocol):
 class _Mounted:
     """An aid with a mounting; None: the usual one of the procedure."""
 
+    record: Any
+    mounting: Mounting | None = None
+
     def mounted(self, mounting: Mounting) -> Self:
         """The same aid, mounted so."""
-        return replace(self, mounting=mounting)  # type: ignore[call-arg]  # a field of each subclass
+        return replace(self, mounting=mounting)
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,6 @@ class Gnss(_Mounted):
     """
 
     record: GnssRecord
-    mounting: Mounting | None = None
     key: ClassVar[str] = "gnss"
 
     def sources(self, altitude: str) -> list[Aiding]:
@@ -85,7 +87,6 @@ class Odometer(_Mounted):
     """
 
     record: OdometerRecord
-    mounting: Mounting | None = None
     key: ClassVar[str] = "odometer"
 
     def sources(self, altitude: str) -> list[Aiding]:
@@ -104,7 +105,6 @@ class VelocityLog(_Mounted):
     """
 
     record: VelocityRecord
-    mounting: Mounting | None = None
     key: ClassVar[str] = "velocity"
 
     def sources(self, altitude: str) -> list[Aiding]:
@@ -126,7 +126,6 @@ class Barometer(_Mounted):
     """
 
     record: HeightRecord
-    mounting: Mounting | None = None
     loop: float = 0.0
     key: ClassVar[str] = "baro"
 
@@ -157,7 +156,6 @@ class Master(_Mounted):
     """
 
     record: MasterRecord
-    mounting: Mounting | None = None
     matching: Literal["auto", "velocity", "attitude", "both"] = "auto"
     flexure: FlexureSpec | None = None
     errors: MasterErrors | str | None = None

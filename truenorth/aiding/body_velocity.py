@@ -34,7 +34,7 @@ from truenorth.aiding.row import (
     state_of,
     with_state,
 )
-from truenorth.core.attitude import cross, quaternion_from_rotation_vector, rotate
+from truenorth.core.attitude import cross, quaternion_from_rotation_vector, rotate, times_back
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 
@@ -65,10 +65,8 @@ def body_velocity_row(
 
     Parameters
     ----------
-    s : (24,) array
-        The state, see :mod:`truenorth.strapdown.wander`.
-    C : (3, 3) array
-        ``C_wb``.
+    s, C, H, z
+        As of :func:`truenorth.aiding.position.position_row`; z in m/s.
     w_b : tuple of 3, rad/s
         Rate of the body against the earth, body axes.
     push : tuple of 3, m/s^2
@@ -81,14 +79,10 @@ def body_velocity_row(
         The first state of each; -1: none. The mounting angles are those about x and z.
     measured : (3,) array, m/s
         Right, forward, up.
-    H : (3, N) array
-        Zeros; filled in.
-    z : (3,) array, m/s
-        Filled in.
     """
     gain = 1.0 + scale
-    v = _into_body(C, (s[4], s[5], s[6]))
-    change = _into_body(C, push)  # of the velocity as its axes do not turn
+    v = times_back(C, (s[4], s[5], s[6]))
+    change = times_back(C, push)  # of the velocity as its axes do not turn
     swing = cross(w_b, v)  # and as they do: in a steady turn nothing changes sideways
     u = cross(w_b, arm)
     y = (0.0, 0.0, 0.0)
@@ -97,7 +91,7 @@ def body_velocity_row(
         y = (y[0] + C_mb[0, k] * shown, y[1] + C_mb[1, k] * shown, y[2] + C_mb[2, k] * shown)
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
-        along, tilt = _into_body(C, e), _into_body(C, cross((s[4], s[5], s[6]), e))
+        along, tilt = times_back(C, e), times_back(C, cross((s[4], s[5], s[6]), e))
         along_late, tilt_late = cross(w_b, along), cross(w_b, tilt)
         turn, turn_late, sweep, mount = cross(e, arm), cross(e, v), cross(w_b, e), cross(y, e)
         for i in range(3):
@@ -121,16 +115,6 @@ def body_velocity_row(
             z[i] -= lag * M * change[k]
             if at_lag >= 0:
                 H[i, at_lag] += M * (change[k] - swing[k])
-
-
-@compiled
-def _into_body(C: Any, v: Any) -> Any:
-    """``C^T v``, for a matrix and a tuple."""
-    return (
-        C[0, 0] * v[0] + C[1, 0] * v[1] + C[2, 0] * v[2],
-        C[0, 1] * v[0] + C[1, 1] * v[1] + C[2, 1] * v[2],
-        C[0, 2] * v[0] + C[1, 2] * v[1] + C[2, 2] * v[2],
-    )
 
 
 @row

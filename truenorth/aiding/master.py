@@ -39,7 +39,14 @@ from truenorth.aiding.row import (
     with_state,
 )
 from truenorth.aiding.velocity import velocity_row
-from truenorth.core.attitude import cross, quaternion_from_rotation_vector, quaternion_product, rotate
+from truenorth.core.attitude import (
+    cross,
+    quaternion_from_rotation_vector,
+    quaternion_product,
+    rotate,
+    times,
+    times_back,
+)
 from truenorth.core.compiled import compiled
 from truenorth.state.now import (
     NOW_C,
@@ -72,16 +79,6 @@ def turned_from_north(now: Any, q: Any, first: int) -> Any:
     return quaternion_product(turn, (q[first], q[first + 1], q[first + 2], q[first + 3]))
 
 
-@compiled
-def _times(C: Any, v: Any) -> Any:
-    """``C v``, for a matrix and a tuple."""
-    return (
-        C[0, 0] * v[0] + C[0, 1] * v[1] + C[0, 2] * v[2],
-        C[1, 0] * v[0] + C[1, 1] * v[1] + C[1, 2] * v[2],
-        C[2, 0] * v[0] + C[2, 1] * v[1] + C[2, 2] * v[2],
-    )
-
-
 @row
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     """Measured: velocity; the master's acceleration; the slave's attitude to linearise with (quaternion); all of n or NaN."""
@@ -90,26 +87,23 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     r = with_state(figures, ARM, assumed, at[AT_ARM])
     C, w, spin, f = matrix_of(now, NOW_C), vector_of(now, NOW_RATE), vector_of(now, NOW_SPIN), vector_of(now, NOW_FORCE)
     earth = vector_of(now, NOW_EARTH)
-    w_eb = (
-        w[0] - (C[0, 0] * earth[0] + C[1, 0] * earth[1] + C[2, 0] * earth[2]),
-        w[1] - (C[0, 1] * earth[0] + C[1, 1] * earth[1] + C[2, 1] * earth[2]),
-        w[2] - (C[0, 2] * earth[0] + C[1, 2] * earth[1] + C[2, 2] * earth[2]),
-    )
+    still = times_back(C, earth)
+    w_eb = (w[0] - still[0], w[1] - still[1], w[2] - still[2])
     if not np.isnan(measured[3]):
         push = from_north(now, (measured[3], measured[4], measured[5]))
     else:
-        force = _times(C, f)
+        force = times(C, f)
         if not np.isnan(measured[6]):
             force = rotate(turned_from_north(now, measured, 6), f)
         swing, roll = cross(w, cross(w, r)), cross(spin, r)
-        arms = _times(C, (swing[0] + roll[0], swing[1] + roll[1], swing[2] + roll[2]))
+        arms = times(C, (swing[0] + roll[0], swing[1] + roll[1], swing[2] + roll[2]))
         own = acceleration(now, force, False)
         push = (own[0] - arms[0], own[1] - arms[1], own[2] - arms[2])
     away = (-r[0], -r[1], -r[2])
     velocity_row(now, C, w_eb, push, away, lag_now(now, assumed, at[AT_LAG]), -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
         for j in range(3):
-            m = _times(C, cross(w_eb, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))))
+            m = times(C, cross(w_eb, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))))
             a = at[AT_ARM] + j
             x, y = m[0], m[1]
             s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
@@ -163,7 +157,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     Kxx, Kxy, Kyy = curvature(axis, now[11])
     v, w, earth = (now[4], now[5], now[6]), vector_of(now, NOW_RATE), vector_of(now, NOW_EARTH)
     w_n = (earth[0] - (Kxy * v[0] + Kyy * v[1]), earth[1] + Kxx * v[0] + Kxy * v[1], earth[2])
-    turn = _times(C, w)
+    turn = times(C, w)
     turn = (turn[0] - w_n[0], turn[1] - w_n[1], turn[2] - w_n[2])
     z[0], z[1], z[2] = scale * zx + lag * turn[0], scale * zy + lag * turn[1], scale * zz + lag * turn[2]
     for j in range(3):

@@ -20,7 +20,7 @@ import math
 from typing import Any
 
 from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, Row, lag_now, row, with_state
-from truenorth.core.attitude import cross, rotate
+from truenorth.core.attitude import cross, rotate, times
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, matrix_of, vector_of
 from truenorth.strapdown.wander import azimuth, curvature, earth_axis
@@ -84,11 +84,7 @@ def position_row(
     # The measured place's normal leans by K dr from ours.
     Kxx, Kxy, Kyy = curvature(earth_axis(s), s[11])
     determinant = Kxx * Kyy - Kxy * Kxy
-    out = (
-        C[0, 0] * arm[0] + C[0, 1] * arm[1] + C[0, 2] * arm[2],
-        C[1, 0] * arm[0] + C[1, 1] * arm[1] + C[1, 2] * arm[2],
-        C[2, 0] * arm[0] + C[2, 1] * arm[1] + C[2, 2] * arm[2],
-    )
+    out = times(C, arm)
     z[0] = -(Kyy * n[0] - Kxy * n[1]) / determinant + out[0] - lag * s[4]
     z[1] = -(Kxx * n[1] - Kxy * n[0]) / determinant + out[1] - lag * s[5]
     z[2] = s[11] - measured[2] + out[2] - lag * s[6]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +62,13 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
     time = record.time - mounting.latency
     sound = np.ones(len(record), dtype=bool) if record.quality is None else ~np.isin(record.quality, (0, 6))
     found = []
+
+    def rows_of(
+        row: str, there: NDArray[np.bool_], measured: Array, sigma: Array, states: Mapping[Role, Group]
+    ) -> Aiding:
+        rows = time[there], measured[there], sigma[there]
+        return Aiding(f"GNSS {row}", row, *rows, mounting.lever_arm, states=states, gate=mounting.gate)
+
     place = record.has_position & sound
     if place.any():
         measured = np.stack([record.lat, record.lon, record.alt], axis=1)
@@ -70,18 +78,7 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         states = states_of(mounting, "GNSS", "lever arm", "lag")
         if mounting.bias_sigma > 0.0:
             states |= state("GNSS", "bias", np.full(3, mounting.bias_sigma), mounting.bias_time)
-        found.append(
-            Aiding(
-                "GNSS position",
-                "position",
-                time[place],
-                measured[place],
-                sigma[place],
-                mounting.lever_arm,
-                states=states,
-                gate=mounting.gate,
-            )
-        )
+        found.append(rows_of("position", place, measured, sigma, states))
     moving = record.has_velocity & sound
     if moving.any() and record.v_n is not None:
         measured = record.v_n.copy()
@@ -89,18 +86,7 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
             measured[:, 2] = np.nan
         sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
         states = states_of(mounting, "GNSS", "lever arm", "lag")
-        found.append(
-            Aiding(
-                "GNSS velocity",
-                "velocity",
-                time[moving],
-                measured[moving],
-                sigma[moving],
-                mounting.lever_arm,
-                states=states,
-                gate=mounting.gate,
-            )
-        )
+        found.append(rows_of("velocity", moving, measured, sigma, states))
     return found
 
 

@@ -157,16 +157,12 @@ def align_in_motion(
     method : {"auto", "gyrocompass", "motion", ...}
         Where the heading begins: coarse alignment by the earth's rate, or a bank of headings that motion decides between. Published
         filters, to be compared (:mod:`truenorth.alignment.azimuth`): ekf, ukf, ckf, gh3, gh5, gh7, sgkf3, sgkf7, sgkf.
-    heading_limit : float, rad
-        Largest one-sigma heading error that still counts as `aligned`.
-    calibration : Calibration, optional
-        Known errors, taken off first.
     offset : float, s
         Added to the times of the aiding logs.
     passes : int
         Over the log, two or more with backtracking.
-    progress : callable, optional
-        Told what is being done.
+    calibration, heading_limit, progress
+        As of :func:`truenorth.align`.
 
     Returns
     -------

@@ -75,15 +75,11 @@ def align_positions(
         Body axes RFU.
     imu : ImuSpec, str, path or mapping, optional
         Specification; its scale factors and misalignments are the prior of the matrices. Inferred from the log without one.
-    calibration : Calibration, optional
-        Known errors, taken off first.
     arm_sigma : float, m
         How far the IMU may sit from where the table's axes meet. At a constant rate its centripetal force is an accelerometer
         bias to all eyes: ``rate^2 arm``.
-    heading_limit : float, rad
-        Largest one-sigma heading error that still counts as `aligned`.
-    progress : callable, optional
-        Called with a word about each stage.
+    calibration, heading_limit, progress
+        As of :func:`truenorth.align`.
 
     Returns
     -------

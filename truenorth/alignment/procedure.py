@@ -77,14 +77,8 @@ def align_base(
         velocity, re-linearised. ``swaying``: the same with the base's motion and the IMU's lever arm as states.
         ``auto`` looks at the motion, picks, and says why. Published filters, to be compared (:mod:`truenorth.alignment.published`):
         ``kf``, ``sakf``, ``makf``, ``imakf``; ``states10``, ``states8``.
-    at : float, s, optional
-        Epoch of the answer on the record's clock; the last sample when left out.
-    calibration : Calibration, optional
-        Known bias, scale factor and misalignment, taken off first.
-    heading_limit : float, rad
-        Largest one-sigma heading error that still counts as `aligned`.
-    progress : callable, optional
-        Called with a word about each stage.
+    at, calibration, heading_limit, progress
+        As of :func:`truenorth.align`.
 
     Returns
     -------

@@ -100,12 +100,8 @@ def align_transfer(
         Where the master tells none.
     heading : float, rad, optional
         Of the slave at the start, where the master tells no attitude; its course when left out.
-    calibration : Calibration, optional
-        Of the slave, taken off first.
-    heading_limit : float, rad
-        Largest one-sigma heading error that still counts as `aligned`.
-    progress : callable, optional
-        Called with a word about each stage.
+    calibration, heading_limit, progress
+        As of :func:`truenorth.align`; the calibration is the slave's.
 
     Returns
     -------

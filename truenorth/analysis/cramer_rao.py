@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.compiled import Callback
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import symmetric
 from truenorth.filters import LinearSystem, NonlinearSystem
 from truenorth.filters.nonlinear_system import require_jacobians, require_vector_space
 
@@ -84,7 +85,7 @@ def cramer_rao(system: LinearSystem) -> CramerRao:
             D11 = np.mean(np.swapaxes(Phi, -1, -2) @ noise @ Phi, axis=0)
             D12 = -mean.T @ noise
             J = noise - D12.T @ np.linalg.solve(J + D11, D12) + told
-        J = 0.5 * (J + J.T)
+        J = symmetric(J)
         out[k] = _inverse(J, _LOST)
     return CramerRao(out, np.sqrt(np.diagonal(out, axis1=-2, axis2=-1)))
 

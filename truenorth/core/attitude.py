@@ -242,6 +242,22 @@ def cross(a: Any, b: Any) -> Any:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
+@compiled
+def times(C: Any, v: Any) -> Any:
+    """``C v`` of a (3, 3) matrix and a vector as a tuple."""
+    return (
+        C[0, 0] * v[0] + C[0, 1] * v[1] + C[0, 2] * v[2],
+        C[1, 0] * v[0] + C[1, 1] * v[1] + C[1, 2] * v[2],
+        C[2, 0] * v[0] + C[2, 1] * v[1] + C[2, 2] * v[2],
+    )
+
+
+@compiled
+def times_back(C: Any, v: Any) -> Any:
+    """``C^T v`` of a (3, 3) matrix and a vector as a tuple."""
+    return times(C.T, v)
+
+
 @compiled(inline="always")
 def quaternion_product(p: Any, q: Any) -> Any:
     """Hamilton's product of two quaternions as tuples."""

@@ -38,10 +38,8 @@ class KernelStore:
 
     Parameters
     ----------
-    function : callable
-        The Python function.
-    options : dict
-        What it is compiled with.
+    function, options
+        As of :func:`truenorth.core.fingerprint.fingerprint`.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:

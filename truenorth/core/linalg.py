@@ -107,3 +107,13 @@ def take_off_pair(size: Size, P: Array, a: Array, b: Array) -> None:
     for i in range(len(size)):
         for j in range(len(size)):
             P[i, j] -= 0.5 * (a[i] * b[j] + b[i] * a[j])
+
+
+def symmetric(P: Any) -> Array:
+    """The symmetric part of (..., n, n) matrices."""
+    return np.asarray(0.5 * (P + np.swapaxes(P, -1, -2)))
+
+
+def times(A: Any, x: Any) -> Array:
+    """``A x`` of (..., m, n) matrices and (..., n) vectors."""
+    return np.asarray((A @ x[..., None])[..., 0])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core import earth
+from truenorth.core.linalg import symmetric
 from truenorth.core.units import parse
 from truenorth.damping.course import Course
 from truenorth.models.marine import BA, BG, DP, DV, PHI, REF, STATES, MarineModel
@@ -59,7 +60,7 @@ def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array, ref
         Q = np.diag(model.noise * part.interval)
         for step in Phi:
             P = step @ P @ step.T + Q
-    P = 0.5 * (P + P.T)
+    P = symmetric(P)
     if model.with_reference:
         P[REF, REF] = reference_sigma**2 * np.eye(2)
     return P

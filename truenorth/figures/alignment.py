@@ -23,11 +23,6 @@ Array = NDArray[np.float64]
 def plot_alignment(result: Alignment) -> Figure:
     """Draw convergence with one-sigma bands and floors, sigmas, biases, innovations over their sigmas, and NIS.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Its `savefig` works without a display.
-
     Raises
     ------
     ValueError

@@ -24,13 +24,7 @@ KILO = 5000.0  # m, from which the track is drawn in kilometres
 
 
 def plot_navigation(result: Navigation) -> Figure:
-    """Draw track with error ellipses, height, velocity and attitude with one-sigma bands, sigmas, innovations.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Its `savefig` works without a display.
-    """
+    """Draw track with error ellipses, height, velocity and attitude with one-sigma bands, sigmas, innovations."""
     with style():
         figure = new_figure(12.0, 10.5)
         columns = figure.add_gridspec(1, 2)

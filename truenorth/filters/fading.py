@@ -165,7 +165,7 @@ def fading(
 ) -> Estimates:
     """Fading Kalman filter; the kinds are those of the table above.
 
-    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -187,8 +187,6 @@ def fading(
     ------
     UsageError
         An option out of range, or a row that measures several states.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     if kind not in get_args(Fading):
         raise UsageError(f'kind is {kind!r}, expected "single", "noise", "multiple" or "improved"')

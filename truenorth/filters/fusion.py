@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import symmetric, times
 from truenorth.filters.gains import filter_gains
 from truenorth.filters.kalman import kalman
 from truenorth.filters.stack import Array
@@ -73,9 +74,9 @@ def fuse(x1: ArrayLike, P1: ArrayLike, x2: ArrayLike, P2: ArrayLike, P12: ArrayL
     Ct = np.swapaxes(C, -1, -2)
     G = _solved(A + B - C - Ct, np.swapaxes(A - C, -1, -2))  # G' = (P1 + P2 - P12 - P21)^-1 (P1 - P12)'
     G = np.swapaxes(G, -1, -2)
-    x = a + _times(G, b - a)
+    x = a + times(G, b - a)
     P = A - G @ np.swapaxes(A - C, -1, -2)
-    return Fused(x, _symmetric(P), np.eye(a.shape[-1]) - G)
+    return Fused(x, symmetric(P), np.eye(a.shape[-1]) - G)
 
 
 def diagonal_weighted(
@@ -109,7 +110,7 @@ def diagonal_weighted(
     W1, W2 = w[..., :, None], (1.0 - w)[..., :, None]
     across = W1 * C * np.swapaxes(W2, -1, -2)
     P = W1 * A * np.swapaxes(W1, -1, -2) + W2 * B * np.swapaxes(W2, -1, -2) + across + np.swapaxes(across, -1, -2)
-    return Fused(x, _symmetric(P), w[..., :, None] * np.eye(a.shape[-1]))
+    return Fused(x, symmetric(P), w[..., :, None] * np.eye(a.shape[-1]))
 
 
 def covariance_intersection(x1: ArrayLike, P1: ArrayLike, x2: ArrayLike, P2: ArrayLike) -> Fused:
@@ -130,9 +131,9 @@ def covariance_intersection(x1: ArrayLike, P1: ArrayLike, x2: ArrayLike, P2: Arr
     a, A, b, B, _ = _checked(x1, P1, x2, P2, np.zeros_like(np.asarray(P1, dtype=np.float64)))
     Y1, Y2 = _inverse(A), _inverse(B)
     # In the axes in which P1 is unity and P2 diagonal, log det of the information is a sum: concave in w.
-    L = np.linalg.cholesky(_symmetric(A))
+    L = np.linalg.cholesky(symmetric(A))
     half = np.linalg.solve(L, B)
-    ratio = np.linalg.eigvalsh(_symmetric(np.linalg.solve(L, np.swapaxes(half, -1, -2))))
+    ratio = np.linalg.eigvalsh(symmetric(np.linalg.solve(L, np.swapaxes(half, -1, -2))))
     low, high = np.zeros(ratio.shape[:-1]), np.ones(ratio.shape[:-1])
 
     def gathered(w: Array) -> Array:
@@ -147,7 +148,7 @@ def covariance_intersection(x1: ArrayLike, P1: ArrayLike, x2: ArrayLike, P2: Arr
     # At an end one estimate alone is best: no rest of the other.
     w = np.where(w < 1e-9, 0.0, np.where(w > 1.0 - 1e-9, 1.0, w))[..., None, None]
     P = _inverse(w * Y1 + (1.0 - w) * Y2)
-    x = _times(P, _times(w * Y1, a) + _times((1.0 - w) * Y2, b))
+    x = times(P, times(w * Y1, a) + times((1.0 - w) * Y2, b))
     return Fused(x, P, w[..., 0, 0])
 
 
@@ -296,7 +297,7 @@ def _gathered(x: Sequence[Array], P: Sequence[Array]) -> tuple[Array, Array]:
     """Sum of the information of independent estimates."""
     Y = [_inverse(p) for p in P]
     total = _inverse(sum(Y[1:], Y[0]))
-    return _times(total, sum((_times(i, a) for i, a in zip(Y, x)), np.zeros(1))), total
+    return times(total, sum((times(i, a) for i, a in zip(Y, x)), np.zeros(1))), total
 
 
 def _checked(
@@ -313,7 +314,7 @@ def _checked(
 
 def _inverse(A: Array) -> Array:
     """Of a covariance or an information matrix in whatever units."""
-    return _symmetric(_solved(A, np.broadcast_to(np.eye(A.shape[-1]), A.shape)))
+    return symmetric(_solved(A, np.broadcast_to(np.eye(A.shape[-1]), A.shape)))
 
 
 def _solved(A: Array, B: Array) -> Array:
@@ -330,11 +331,3 @@ def _solved(A: Array, B: Array) -> Array:
         ) from None
     half = np.linalg.solve(L, B / size[..., :, None])
     return np.asarray(np.linalg.solve(np.swapaxes(L, -1, -2), half) / size[..., :, None])
-
-
-def _symmetric(P: Array) -> Array:
-    return 0.5 * (P + np.swapaxes(P, -1, -2))
-
-
-def _times(A: Array, x: Array) -> Array:
-    return np.asarray((A @ x[..., None])[..., 0])

@@ -86,7 +86,7 @@ def h_infinity(
 ) -> Estimates:
     """H-infinity filter.
 
-    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -109,8 +109,6 @@ def h_infinity(
         An option out of range.
     NoFilterError
         There is no filter that keeps the bound, naming run and epoch.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     if not bound > 0.0:
         raise UsageError(f"bound is {bound}, expected a positive number")

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import symmetric, times
 from truenorth.filters.kalman import kalman
 from truenorth.filters.smoother import Smoothed
 from truenorth.filters.stack import Array
@@ -117,9 +118,9 @@ def information(
         except np.linalg.LinAlgError:
             raise DataError(f"information filter: Phi is singular at epoch {k}; use the Kalman filter") from None
         forth = np.swapaxes(back, -1, -2)
-        M, y = forth @ Y @ back, _times(forth, y)
+        M, y = forth @ Y @ back, times(forth, y)
         if system.u is not None:
-            y = y + _times(M, _at(system.u, k, 1))
+            y = y + times(M, _at(system.u, k, 1))
         Y, y = _spread(M, y, _root(_at(system.Q, k, 2)))
         dY, dy = _told(system, k)
         Y, y = Y + dY, y + dy
@@ -156,8 +157,8 @@ def information_behind(system: LinearSystem) -> InformationState:
         Phi = _at(system.Phi, k, 2)
         Phi_t = np.swapaxes(Phi, -1, -2)
         if system.u is not None:
-            y = y - _times(Y, _at(system.u, k, 1))
-        ys[..., k, :], Ys[..., k, :, :] = _times(Phi_t, y), Phi_t @ Y @ Phi
+            y = y - times(Y, _at(system.u, k, 1))
+        ys[..., k, :], Ys[..., k, :, :] = times(Phi_t, y), Phi_t @ Y @ Phi
     return InformationState(ys, Ys)
 
 
@@ -192,8 +193,8 @@ def two_filter_smoother(system: LinearSystem, state: FilterState | None = None) 
     B = _root(P)
     half = np.swapaxes(B, -1, -2)
     C = np.linalg.inv(np.eye(n) + half @ behind.Y @ B)
-    P_s = B @ (0.5 * (C + np.swapaxes(C, -1, -2))) @ half
-    x_s = x + _times(P_s, behind.y - _times(behind.Y, x))
+    P_s = B @ symmetric(C) @ half
+    x_s = x + times(P_s, behind.y - times(behind.Y, x))
     sigma = np.sqrt(np.diagonal(P_s, axis1=-2, axis2=-1))
     return Smoothed(x_s[..., 1:, :], sigma[..., 1:, :], P_s[..., 1:, :, :], x_s[..., 0, :], P_s[..., 0, :, :], forward)
 
@@ -221,7 +222,7 @@ def determined(y: Array, Y: Array) -> tuple[Array, Array, Array]:
     P = (V * inverse[..., None, :]) @ V_t / (size[..., :, None] * size[..., None, :])
     open_part = np.sqrt(np.sum(np.where(known[..., None, :], 0.0, V) ** 2, axis=-1))
     is_open = open_part > TOUCHED
-    x = np.where(is_open, np.nan, _times(P, y))
+    x = np.where(is_open, np.nan, times(P, y))
     P = np.where(is_open[..., :, None] | is_open[..., None, :], np.nan, P)
     diagonal = np.where(is_open, np.inf, np.diagonal(P, axis1=-2, axis2=-1))
     i = np.arange(P.shape[-1])
@@ -244,7 +245,7 @@ def _of_prior(system: LinearSystem) -> InformationState:
     except np.linalg.LinAlgError:
         raise DataError("information filter: P0 is singular; use the Kalman filter") from None
     Y = np.swapaxes(Y, -1, -2) @ Y / scale
-    return InformationState(_times(Y, system.x0), Y)
+    return InformationState(times(Y, system.x0), Y)
 
 
 def _spread(M: Array, y: Array, B: Array) -> tuple[Array, Array]:
@@ -254,7 +255,7 @@ def _spread(M: Array, y: Array, B: Array) -> tuple[Array, Array]:
     J = np.swapaxes(np.linalg.solve(inside, np.swapaxes(MB, -1, -2)), -1, -2)
     L = np.eye(M.shape[-1]) - J @ np.swapaxes(B, -1, -2)
     Y = L @ M @ np.swapaxes(L, -1, -2) + J @ np.swapaxes(J, -1, -2)
-    return 0.5 * (Y + np.swapaxes(Y, -1, -2)), _times(L, y)
+    return symmetric(Y), times(L, y)
 
 
 def _told(system: LinearSystem, k: int) -> tuple[Array, Array]:
@@ -291,7 +292,3 @@ def _at(a: Array, k: int, core: int) -> Array:
     """Epoch k of an array with time before its last `core` axes."""
     time = a.ndim - core - 1
     return np.asarray(np.take(a, k if a.shape[time] > 1 else 0, axis=time))
-
-
-def _times(A: Array, x: Array) -> Array:
-    return np.asarray((A @ x[..., None])[..., 0])

@@ -108,7 +108,7 @@ def innovation_adaptive(
 ) -> Estimates:
     """Kalman filter that takes the measurement noise from a window of innovations or residuals.
 
-    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -129,8 +129,6 @@ def innovation_adaptive(
     ------
     UsageError
         An option out of range, R not diagonal, or S given.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     if kind not in get_args(AdaptiveKind):
         raise UsageError(f'kind is {kind!r}, expected "innovation" or "residual"')

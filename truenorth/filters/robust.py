@@ -222,7 +222,7 @@ def gated(
 ) -> Estimates:
     """Kalman filter with a chi-square gate.
 
-    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -239,8 +239,6 @@ def gated(
     ------
     UsageError
         An option out of range.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     kind, k0, believed, quantiles = Gate(probability, by, patience).limits(system.rows)
     return _robust(system, state, Rule(kind, k0, k0, believed, quantiles), **running)
@@ -257,7 +255,7 @@ def robust(
 ) -> Estimates:
     """Kalman filter with robust weights.
 
-    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -277,8 +275,6 @@ def robust(
     ------
     UsageError
         An option out of range.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     if weighting not in get_args(Weighting):
         raise UsageError(f'weighting is {weighting!r}, expected "huber" or "igg3"')

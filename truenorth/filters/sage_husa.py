@@ -76,7 +76,7 @@ def sage_husa(
 ) -> Estimates:
     """Kalman filter that estimates the measurement noise (Sage and Husa).
 
-    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -96,8 +96,6 @@ def sage_husa(
     ------
     UsageError
         An option out of range, R not diagonal, or S given.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     if not 0.0 < b < 1.0:
         raise UsageError(f"b is {b}, expected a number between 0 and 1")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.linalg import symmetric
 from truenorth.filters.stack import Array
 from truenorth.filters.system import LinearSystem
 
@@ -78,7 +79,7 @@ def steady_state(system: LinearSystem) -> SteadyState:
         P = solve_discrete_are(Phi.T, H.T, Q, noise, s=Phi @ S)
     except np.linalg.LinAlgError as error:
         raise DataError(f"steady_state: the Riccati equation has no solution that settles ({error})") from None
-    P = 0.5 * (P + P.T)
+    P = symmetric(P)
     cross, W = P @ H.T + S, H @ P @ H.T + noise
     gain = np.linalg.solve(W, cross.T).T
     after = P - gain @ cross.T
@@ -91,7 +92,7 @@ def steady_state(system: LinearSystem) -> SteadyState:
             f"steady_state: the Riccati equation is not solved to better than {np.max(missed / np.diag(P)):.1g}, slowest pole "
             f"{np.abs(poles[0]):.9g}; bring the states to like sizes by other units"
         )
-    return SteadyState(gain, 0.5 * (after + after.T), P, W, poles)
+    return SteadyState(gain, symmetric(after), P, W, poles)
 
 
 def _check_modes(Phi: Array, Q: Array, H: Array) -> None:

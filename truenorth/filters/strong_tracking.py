@@ -52,7 +52,7 @@ def strong_tracking(
 ) -> Estimates:
     """Strong tracking filter.
 
-    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `system`, `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -73,7 +73,5 @@ def strong_tracking(
     ------
     UsageError
         An option out of range.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     return faded(system, state, FadingOptions(SINGLE, float(rho), float(softening), float(cap)), **running)

@@ -121,7 +121,7 @@ def variational(
 ) -> Estimates:
     """Kalman filter that estimates the measurement noise by variational Bayes.
 
-    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`.
+    `state` and ``**running`` are as of :func:`truenorth.filters.kalman`, which also says when a DataError is raised.
 
     Parameters
     ----------
@@ -144,8 +144,6 @@ def variational(
     ------
     UsageError
         An option out of range, R not diagonal or with a zero, or S given.
-    DataError
-        As :func:`truenorth.filters.kalman`.
     """
     if not 0.0 < rho <= 1.0:
         raise UsageError(f"rho is {rho}, expected more than 0 and at most 1")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.records.base import first_disorder
 
 Array = NDArray[np.float64]
 
@@ -25,10 +26,8 @@ def check_finite(values: Array, labels: Sequence[str], source: str, place: Calla
 
 def check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:
     """Refuse time that does not increase, by its place in the file."""
-    bad = np.flatnonzero(np.diff(time) <= 0)
-    if bad.size:
-        k = int(bad[0]) + 1
-        what = "repeats" if time[k] == time[k - 1] else "goes back"
+    if (found := first_disorder(time)) is not None:
+        k, what = found
         raise DataError(
             f"{source}: {place(k)}, column {label}: time {what} ({time[k - 1]:.15g}, then {time[k]:.15g}); expected "
             "strictly increasing time: sort the log or drop the repeated rows"

@@ -291,14 +291,21 @@ def _listed(items: Any) -> str:
     return f"{', '.join(first)} and {last}" if first else str(last)
 
 
+def first_disorder(time: Array) -> tuple[int, str] | None:
+    """The first row whose time does not increase, and what it does; None where there is none."""
+    bad = np.flatnonzero(np.diff(time) <= 0)
+    if not bad.size:
+        return None
+    k = int(bad[0]) + 1
+    return k, "repeats" if time[k] == time[k - 1] else "goes back"
+
+
 def _check_time(time: Array, source: str) -> None:
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise DataError(f"{source}: row {bad[0] + 1}, column time: {time[bad[0]]}; expected a finite number")
-    bad = np.flatnonzero(np.diff(time) <= 0)
-    if bad.size:
-        k = int(bad[0]) + 1
-        what = "repeats" if time[k] == time[k - 1] else "goes back"
+    if (found := first_disorder(time)) is not None:
+        k, what = found
         raise DataError(
             f"{source}: row {k + 1}, column time: time {what} ({time[k - 1]:.6f} s, then {time[k]:.6f} s); expected "
             "strictly increasing seconds: sort the log or drop the repeated rows"

@@ -77,17 +77,8 @@ class Motion(ABC):
         w_in_b = _apply(C_bn, w_ie + w_en)
         # The rate of n changes with acceleration; what it changes by the change of latitude, (v/R)^2, is left out.
         dw_in_b = _apply(C_bn, transport_rate_n(lat, alt, a)) - np.cross(w_nb, w_in_b)
-        return MotionStates(
-            time=t,
-            C_nb=C_nb,
-            v_n=v,
-            lat=lat,
-            lon=lon,
-            alt=alt,
-            w_ib_b=w_nb + w_in_b,
-            f_b=_apply(C_bn, f_n),
-            dw_ib_b=dw_nb + dw_in_b,
-        )
+        w_ib_b, dw_ib_b = w_nb + w_in_b, dw_nb + dw_in_b
+        return MotionStates(t, C_nb, v, lat, lon, alt, w_ib_b, _apply(C_bn, f_n), dw_ib_b)
 
 
 Path = tuple[Array, Array, Array, Array, Array]  # latitude, longitude, height, velocity, its derivative

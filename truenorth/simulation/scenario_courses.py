@@ -41,18 +41,26 @@ class RingMotion(Strict):
         return ring(position, lever_arm=arm, **own)
 
 
-class Straight(Strict):
+class _Manoeuvre(Strict):
+    """What becomes legs by the function of :mod:`truenorth.simulation.manoeuvres` that its kind names, with its own fields."""
+
+    kind: str
+
+    def legs(self, speed: float) -> list[Leg]:
+        """The manoeuvre as legs, begun at a speed (m/s)."""
+        own = {name: value for name, value in self if name != "kind"}
+        legs: list[Leg] = getattr(manoeuvres, self.kind)(**own)
+        return legs
+
+
+class Straight(_Manoeuvre):
     """Straight on, or standing, for a time."""
 
     kind: Literal["straight"]
     duration: Time
 
-    def legs(self, speed: float) -> list[Leg]:
-        """The manoeuvre as legs, begun at a speed (m/s)."""
-        return manoeuvres.straight(self.duration)
 
-
-class Turn(Strict):
+class Turn(_Manoeuvre):
     """A level turn, clockwise positive."""
 
     kind: Literal["turn"]
@@ -61,12 +69,8 @@ class Turn(Strict):
     bank: Literal["flat", "coordinated"] = "flat"
     onset: Time = 2.0
 
-    def legs(self, speed: float) -> list[Leg]:
-        """The manoeuvre as legs, begun at a speed (m/s)."""
-        return manoeuvres.turn(self.angle, self.rate, self.bank, self.onset)
 
-
-class STurn(Strict):
+class STurn(_Manoeuvre):
     """Out to one side and back, to the other and back."""
 
     kind: Literal["s_turn"]
@@ -76,12 +80,8 @@ class STurn(Strict):
     bank: Literal["flat", "coordinated"] = "coordinated"
     onset: Time = 2.0
 
-    def legs(self, speed: float) -> list[Leg]:
-        """The manoeuvre as legs, begun at a speed (m/s)."""
-        return manoeuvres.s_turn(self.angle, self.rate, self.times, self.bank, self.onset)
 
-
-class Accelerate(Strict):
+class Accelerate(_Manoeuvre):
     """To another speed, higher or lower."""
 
     kind: Literal["accelerate"]
@@ -94,7 +94,7 @@ class Accelerate(Strict):
         return manoeuvres.accelerate(self.to, self.acceleration, speed, self.onset)
 
 
-class Climb(Strict):
+class Climb(_Manoeuvre):
     """Up (or down) at a slope for a time, and level again."""
 
     kind: Literal["climb"]
@@ -103,12 +103,8 @@ class Climb(Strict):
     rate: AngularRate = math.radians(2.0)
     onset: Time = 1.0
 
-    def legs(self, speed: float) -> list[Leg]:
-        """The manoeuvre as legs, begun at a speed (m/s)."""
-        return manoeuvres.climb(self.slope, self.duration, self.rate, self.onset)
 
-
-class WingRock(Strict):
+class WingRock(_Manoeuvre):
     """Straight on, rolling from side to side."""
 
     kind: Literal["wing_rock"]

@@ -16,8 +16,20 @@ from truenorth.simulation.tones import Tone, Triple, cosines, shortest, sines
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Tones:
+    """Oscillations of the angles, rad, and of the centre, m."""
+
+    heading_tones: tuple[Tone, ...] = ()
+    pitch_tones: tuple[Tone, ...] = ()
+    roll_tones: tuple[Tone, ...] = ()
+    east_tones: tuple[Tone, ...] = ()
+    north_tones: tuple[Tone, ...] = ()
+    up_tones: tuple[Tone, ...] = ()
+
+
 @dataclass(frozen=True)
-class Sway(Motion):
+class Sway(_Tones, Motion):
     """A base that sways about a fixed place; without tones, a base at rest.
 
     Attributes
@@ -38,12 +50,6 @@ class Sway(Motion):
     heading: float = 0.0
     pitch: float = 0.0
     roll: float = 0.0
-    heading_tones: tuple[Tone, ...] = ()
-    pitch_tones: tuple[Tone, ...] = ()
-    roll_tones: tuple[Tone, ...] = ()
-    east_tones: tuple[Tone, ...] = ()
-    north_tones: tuple[Tone, ...] = ()
-    up_tones: tuple[Tone, ...] = ()
     lever_arm: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
 
     @property
@@ -74,7 +80,7 @@ def rest(position: Position, heading: float = 0.0, pitch: float = 0.0, roll: flo
 
 
 @dataclass(frozen=True)
-class Disturbed(Motion):
+class Disturbed(_Tones, Motion):
     """Another motion with sway or vibration on top.
 
     Attributes
@@ -96,12 +102,6 @@ class Disturbed(Motion):
     """
 
     motion: Motion
-    heading_tones: tuple[Tone, ...] = ()
-    pitch_tones: tuple[Tone, ...] = ()
-    roll_tones: tuple[Tone, ...] = ()
-    east_tones: tuple[Tone, ...] = ()
-    north_tones: tuple[Tone, ...] = ()
-    up_tones: tuple[Tone, ...] = ()
     mount_tones: tuple[tuple[Tone, ...], tuple[Tone, ...], tuple[Tone, ...]] = ((), (), ())
     window: tuple[float, float, float] | None = None
     _envelope: Profile | None = field(init=False, repr=False, compare=False, default=None)

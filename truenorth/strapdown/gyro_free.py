@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
+from truenorth.core.linalg import symmetric
 
 Array = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ def field_of(force: ArrayLike, places: ArrayLike) -> Field:
     )
     A = np.swapaxes(solved[..., 1:, :], -1, -2)
     S = 0.5 * (A - np.swapaxes(A, -1, -2))
-    W = 0.5 * (A + np.swapaxes(A, -1, -2))
+    W = symmetric(A)
     outer = W - 0.5 * np.trace(W, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
     acceleration = np.stack([S[..., 2, 1], S[..., 0, 2], S[..., 1, 0]], axis=-1)
     return Field(solved[..., 0, :], acceleration, outer[..., ROWS, COLUMNS])
