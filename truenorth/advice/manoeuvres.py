@@ -144,10 +144,6 @@ def advise_manoeuvre(
     manoeuvres : sequence of str
         Those considered; all when left out.
 
-    Returns
-    -------
-    ManoeuvreAdvice
-
     Raises
     ------
     UsageError

@@ -182,10 +182,6 @@ def advise(
     arm_sigma : float, m
         How far the IMU may sit from the table's axis.
 
-    Returns
-    -------
-    Advice
-
     Raises
     ------
     UsageError

@@ -80,10 +80,6 @@ def align_base(
     at, calibration, heading_limit, progress
         As of :func:`truenorth.align`.
 
-    Returns
-    -------
-    Alignment
-
     Raises
     ------
     UsageError

@@ -270,10 +270,6 @@ def align(
     **options
         Of the recipe alone, such as ``passes=2`` on the move.
 
-    Returns
-    -------
-    Alignment
-
     Raises
     ------
     UsageError

@@ -105,10 +105,6 @@ def overlapping_adev(
     kind : {"rates", "increments"}
         What a row is.
 
-    Returns
-    -------
-    AllanDeviation
-
     Raises
     ------
     UsageError

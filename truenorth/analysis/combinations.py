@@ -82,10 +82,6 @@ def entangled_states(
     negligible : float
         Coefficients below this, each state in units of its `scale`, are left out.
 
-    Returns
-    -------
-    tuple of Entangled
-
     Raises
     ------
     UsageError

@@ -174,10 +174,6 @@ def consistency(values: ArrayLike, dof: ArrayLike, level: float = 0.95) -> Consi
         Degrees of freedom of one run; epochs without any are left out.
     level : float
         Probability of the band, two-sided.
-
-    Returns
-    -------
-    Consistency
     """
     v = np.asarray(values, dtype=np.float64)
     if v.ndim != 2:
@@ -220,10 +216,6 @@ def whiteness(innovation: ArrayLike, covariance: ArrayLike, lags: int = 20, leve
         Longest lag, epochs.
     level : float
         Probability with which white innovations pass.
-
-    Returns
-    -------
-    Whiteness
 
     Raises
     ------

@@ -54,10 +54,6 @@ def cramer_rao(system: LinearSystem) -> CramerRao:
         Jacobians at the truth, the run axes being drawn trajectories; `x0` and `u` do not matter, of `z` only which rows are
         present. Without S.
 
-    Returns
-    -------
-    CramerRao
-
     Raises
     ------
     UsageError

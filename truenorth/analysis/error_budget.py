@@ -88,10 +88,6 @@ def error_budget(
         Independent of each other; :func:`sources_of` splits the model's own.
     history : "variance" or "full"
 
-    Returns
-    -------
-    ErrorBudget
-
     Raises
     ------
     UsageError

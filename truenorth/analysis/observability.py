@@ -124,10 +124,6 @@ def piecewise_observability(
     names, units : n str
         Of the states, units as in "rad/s".
 
-    Returns
-    -------
-    PiecewiseObservability
-
     Raises
     ------
     UsageError
@@ -229,10 +225,6 @@ def observability(
         Of the states, units as in "rad/s".
     not_estimated : float
         Part of its prior sigma above which a direction is reported as hardly seen.
-
-    Returns
-    -------
-    Observability
 
     Raises
     ------

@@ -126,10 +126,6 @@ def run_campaign(
     progress : callable, optional
         Called with the runs done and the runs in all, cases counted apart.
 
-    Returns
-    -------
-    Campaign
-
     Raises
     ------
     UsageError

@@ -126,10 +126,6 @@ def tune(
     progress : callable, optional
         Called with the trials done and the trials in all.
 
-    Returns
-    -------
-    Tuned
-
     Raises
     ------
     UsageError

@@ -55,10 +55,6 @@ def dual_vector(integrals: InertialIntegrals, lat: float, alt: float, form: Form
     lat, alt : float, rad and m
     form : {"velocity", "position"}
         Integrated velocity, or its second integral (smoother, slower).
-
-    Returns
-    -------
-    CoarseAttitude
     """
     last = len(integrals.time) - 1
     rows = np.array([max(1, round(FIRST_PART * last)), last])

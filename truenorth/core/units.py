@@ -251,10 +251,6 @@ def parse(text: str, dimension: str) -> float:
     dimension : str
         A key of `DIMENSIONS`.
 
-    Returns
-    -------
-    float
-
     Raises
     ------
     UsageError
@@ -287,10 +283,6 @@ def format(value: float, unit: str, digits: int | None = 6) -> str:
     unit : str
     digits : int or None
         Significant digits; None takes the fewest that `parse` reads back to the same value, to rounding (1e-15).
-
-    Returns
-    -------
-    str
     """
     factor, _ = parse_unit(unit)
     number = value / factor

@@ -188,10 +188,6 @@ def run_filters(
     workers : int
         Threads; filter 2 follows filter 1, the others are free.
 
-    Returns
-    -------
-    dict of name to Estimate
-
     Raises
     ------
     UsageError

@@ -101,10 +101,6 @@ def settle(
         The pass that moves less is the last.
     most, least : int
         Passes.
-
-    Returns
-    -------
-    Settled
     """
     for passes in range(1, most + 1):
         found = estimate(log.linearise())

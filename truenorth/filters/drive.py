@@ -73,10 +73,6 @@ def drive(
         Figures that an adaptive filter reports of each epoch.
     flatten : callable
         ``flatten(system, shape)`` brings the system's arrays to what the kernel takes.
-
-    Returns
-    -------
-    Estimates
     """
     if history not in get_args(History):
         raise UsageError(f'history is {history!r}, expected "last", "sigma" or "full"')

@@ -39,10 +39,6 @@ def extended(
     **running
         ``tracking``, ``gate``, ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Guarded`.
 
-    Returns
-    -------
-    Estimates
-
     Raises
     ------
     UsageError

@@ -59,10 +59,6 @@ def fuse(x1: ArrayLike, P1: ArrayLike, x2: ArrayLike, P2: ArrayLike, P12: ArrayL
     P12 : (..., n, n) array
         Covariance of the first's error with the second's, of :func:`cross_covariance`; zeros for independent ones.
 
-    Returns
-    -------
-    Fused
-
     Raises
     ------
     UsageError
@@ -255,10 +251,6 @@ def federated(
         Whether the fusion goes back to the local filters.
     workers : int
         Threads that share the runs.
-
-    Returns
-    -------
-    Federated
 
     Raises
     ------

@@ -42,10 +42,6 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
     estimates : Estimates
         Of this system, with ``history="full"``.
 
-    Returns
-    -------
-    Gains
-
     Raises
     ------
     UsageError

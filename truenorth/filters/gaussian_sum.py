@@ -105,10 +105,6 @@ def gaussian_sum(
     **options
         Of the filter.
 
-    Returns
-    -------
-    GaussianSum
-
     Raises
     ------
     UsageError
@@ -153,10 +149,6 @@ def split(x: ArrayLike, P: ArrayLike, state: int, count: int) -> Hypotheses:
     count : int
         Hypotheses, at least 6; each has ``4.2 / (count - 1)`` of the whole sigma.
 
-    Returns
-    -------
-    Hypotheses
-
     Raises
     ------
     UsageError
@@ -194,10 +186,6 @@ def around_circle(x: ArrayLike, P: ArrayLike, state: int, count: int) -> Hypothe
         The angle, rad.
     count : int
         Hypotheses, ``2 pi / count`` from each other, with .6 of that as sigma.
-
-    Returns
-    -------
-    Hypotheses
 
     Raises
     ------

@@ -92,10 +92,6 @@ def information(
         In the place of ``x0, P0``: from an earlier call, or :func:`no_information`.
     history : "last" or "full"
 
-    Returns
-    -------
-    InformationEstimates
-
     Raises
     ------
     UsageError
@@ -173,10 +169,6 @@ def two_filter_smoother(system: LinearSystem, state: FilterState | None = None) 
         With positive definite R and without S.
     state : FilterState, optional
         From an earlier call of a filter; replaces ``x0, P0``.
-
-    Returns
-    -------
-    Smoothed
 
     Raises
     ------

@@ -53,10 +53,6 @@ def check_jacobians(
         Also test that the columns of all other states do not change with these other states: that the model is
         conditionally linear, as the filters with `nonlinear` need it.
 
-    Returns
-    -------
-    JacobianCheck
-
     Raises
     ------
     DataError

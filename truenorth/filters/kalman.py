@@ -53,10 +53,6 @@ def kalman(
     **running
         ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
-    Returns
-    -------
-    Estimates
-
     Raises
     ------
     DataError

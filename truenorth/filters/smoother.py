@@ -207,10 +207,6 @@ def smoother(system: LinearSystem, state: FilterState | None = None, *, workers:
     workers : int
         Threads that share the runs; the bits do not depend on it.
 
-    Returns
-    -------
-    Smoothed
-
     Raises
     ------
     DataError

@@ -245,10 +245,6 @@ def square_root(
     **running
         ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
-    Returns
-    -------
-    Estimates
-
     Raises
     ------
     DataError

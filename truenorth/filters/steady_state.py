@@ -50,10 +50,6 @@ def steady_state(system: LinearSystem) -> SteadyState:
     system : LinearSystem
         Of one run, with constant ``Phi, Q, H, R, S``; of `z` only the number of rows matters.
 
-    Returns
-    -------
-    SteadyState
-
     Raises
     ------
     UsageError

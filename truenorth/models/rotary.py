@@ -60,10 +60,6 @@ class RotaryModel:
             That the lever arm makes, in the IMU's frame at the start.
         keep_first : bool
             Leave its value at the start in, as the paper does.
-
-        Returns
-        -------
-        LinearSystem
         """
         C_ne = earth_axes(lat)
         system = self.walks.linearise(integrals, C_ne @ C_i_s0, lat, alt, np.eye(STATES), np.ones(3))

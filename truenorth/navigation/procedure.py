@@ -108,10 +108,6 @@ def navigate(
     progress : callable, optional
         Called with a word about each stage.
 
-    Returns
-    -------
-    Navigation
-
     Raises
     ------
     UsageError

@@ -123,10 +123,6 @@ def reproduce(
     progress : callable, optional
         Called with a word about each part.
 
-    Returns
-    -------
-    Study
-
     Raises
     ------
     UsageError

@@ -208,10 +208,6 @@ def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
     record : ImuRecord
     lat : float, rad, optional
         Latitude; lets the earth's rate be checked by its vertical part too.
-
-    Returns
-    -------
-    Inspection
     """
     motion = motion_summary(record)
     sampling, findings = check_sampling(record)

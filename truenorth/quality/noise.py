@@ -114,10 +114,6 @@ def noise_from_log(
     name : str
         Of the new specification.
 
-    Returns
-    -------
-    LogNoise
-
     Raises
     ------
     UsageError

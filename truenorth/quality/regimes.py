@@ -181,10 +181,6 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     ----------
     record : ImuRecord
         At least 3 s; a shorter one gives the kind ``unknown``.
-
-    Returns
-    -------
-    MotionSummary
     """
     if record.duration < SHORTEST_RECORD or len(record) < 2 * SHORTEST_RECORD:
         return _unknown(record)

@@ -187,10 +187,6 @@ def course(
         To begin with.
     lever_arm : (3,) floats, m
 
-    Returns
-    -------
-    Course
-
     Raises
     ------
     UsageError

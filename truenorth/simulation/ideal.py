@@ -62,10 +62,6 @@ def ideal_log(motion: Moving, *, rate: float, duration: float, start: float = 0.
     rate : float, Hz
     duration, start : float, s
 
-    Returns
-    -------
-    IdealLog
-
     Raises
     ------
     UsageError

@@ -89,10 +89,6 @@ def route(
     lever_arm : (3,) floats, m
         To the IMU, body axes.
 
-    Returns
-    -------
-    Course
-
     Raises
     ------
     UsageError

@@ -93,10 +93,6 @@ def simulate(
         Constant errors in SI that are given, not drawn, by name: ``{"gyro_bias": (1e-7, -1e-7, 2e-7)}``; from datasheet
         units by :func:`truenorth.simulation.given_errors`.
 
-    Returns
-    -------
-    Simulation
-
     Raises
     ------
     UsageError

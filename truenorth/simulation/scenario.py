@@ -194,10 +194,6 @@ class Scenario(Strict):
             Of the run, and of the scenario among others: the same three give the same bits.
         ideal : IdealLog, optional
             Made before by :meth:`ideal`, where all runs share the motion.
-
-        Returns
-        -------
-        Simulation
         """
         seed = self.seed if seed is None else seed
         return simulate(

@@ -65,10 +65,6 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
     ----------
     claim : Claim
     evidence : iterable of Evidence
-
-    Returns
-    -------
-    Verdict
     """
     deciding, adding, rest = [], [], []
     added = NO_EFFECT

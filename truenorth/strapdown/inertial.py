@@ -103,10 +103,6 @@ def integrate(
     rows_at : sequence of int
         Rows after which the attitude is wanted besides.
 
-    Returns
-    -------
-    InertialIntegrals
-
     Raises
     ------
     AlignmentError

@@ -142,10 +142,6 @@ def mechanise(
     every : int
         Output after every so many updates; 1 is the full rate.
 
-    Returns
-    -------
-    Mechanisation
-
     Raises
     ------
     UsageError

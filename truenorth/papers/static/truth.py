@@ -77,10 +77,6 @@ def simulate(
     gyro_bias, accel_bias : float or array of each axis, rad/s and m/s^2
     every : int
         Periods of .02 s between measurements.
-
-    Returns
-    -------
-    Truth
     """
     steps = round(duration / PERIOD)
     count, T = steps // every, PERIOD * every
