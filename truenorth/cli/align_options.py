@@ -52,7 +52,7 @@ def check_options(context: typer.Context) -> None:
     UsageError
         It names both options, and what to do.
     """
-    given = [p.opts[0] for p in context.command.params if p.name and context.params[p.name] != p.default]
+    given = [p.opts[0] for p in context.command.params if p.name and context.params[p.name] not in (p.default, [], ())]
     chosen = [option for option in given if option in PROCEDURES]
     for option in chosen[1:]:
         if PROCEDURES[option] != PROCEDURES[chosen[0]]:
