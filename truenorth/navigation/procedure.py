@@ -132,16 +132,9 @@ def navigate(
     reference = given.pop("velocity", None) if damping is not None else None
     found = _sits_as_found(given, begin)
     height, why = kept_altitude(altitude, given)
-    plan = _Plan(
-        record,
-        begin,
-        InsModel.from_spec(
-            noise, scale_factors=scale_factors, groups=groups_of(errors, noise), fixed_altitude=height == "fixed"
-        ),
-        height,
-        disturbances,
-        *_intervals(record, interval, output),
-    )
+    fixed, groups = height == "fixed", groups_of(errors, noise)
+    model = InsModel.from_spec(noise, scale_factors=scale_factors, groups=groups, fixed_altitude=fixed)
+    plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output))
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
     _check_places(given, begin, height)
