@@ -158,3 +158,42 @@ def test_a_gap_that_is_too_long_is_named_and_the_answer_lost(van):
     assert after.status == "lost"
     assert not after.heading_known
     assert any("a gap of 3.0" in reason for reason in after.reasons)
+
+
+def test_a_run_that_is_saved_goes_on_to_the_same_bits(van, tmp_path):
+    sim, gnss, _ = van
+    record = sim.record
+    with Aligner(imu="tactical", aid=[GnssFeed()], kind=record.kind, background=False) as aligner:
+        fed(aligner, record, gnss, None, 25, until=50.0)
+        aligner.save(tmp_path / "aligner.npz")
+        fed(
+            aligner,
+            record,
+            gnss[int(np.searchsorted(gnss.time, 49.6, side="right")) :],
+            None,
+            25,
+            since=50.0,
+            until=60.0,
+        )
+        start = aligner.finish()
+    with Aligner.load(tmp_path / "aligner.npz", background=False) as again:
+        fed(
+            again, record, gnss[int(np.searchsorted(gnss.time, 49.6, side="right")) :], None, 25, since=50.0, until=60.0
+        )
+        found = again.finish()
+    assert np.array_equal(found.phi_covariance, start.phi_covariance)
+    assert np.array_equal(found.C_nb, start.C_nb)
+    navigator = Navigator(start, feeds=[GnssFeed()], kind=record.kind)
+    fed(navigator, record, gnss, None, 25, until=80.0)
+    navigator.save(tmp_path / "navigator.npz")
+    with pytest.raises(tn.DataError, match="holds no Aligner"):
+        Aligner.load(tmp_path / "navigator.npz")
+    later = gnss[int(np.searchsorted(gnss.time, 79.6, side="right")) :]
+    runs = [navigator, Navigator.load(tmp_path / "navigator.npz")]
+    for run in runs:
+        fed(run, record, later, None, 25, since=80.0)
+    one, other = (run.past.track for run in runs)
+    assert np.array_equal(one.P, other.P)
+    assert np.array_equal(one.position, other.position)
+    assert runs[0].answer.summary() == runs[1].answer.summary()
+    assert np.array_equal(runs[0].finish().position, runs[1].finish().position)

@@ -14,7 +14,7 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,8 @@ SMALLEST_PACKED = 6  # columns of a symmetric matrix, below which packing saves 
 TREE = "tree"
 
 
-def write_archive(value: Any, path: str | PathLike[str]) -> None:
-    """Write a value to an npz file.
+def write_archive(value: Any, path: str | PathLike[str] | IO[bytes]) -> None:
+    """Write a value to an npz file, or to an open one.
 
     Raises
     ------

@@ -19,12 +19,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment import Alignment, align
+from truenorth.alignment.in_motion import usual_antenna
 from truenorth.alignment.recipes import RECIPES
 from truenorth.core.attitude import euler_sigma
 from truenorth.core.errors import AlignmentError, DataError, UsageError
@@ -33,6 +35,7 @@ from truenorth.live.answer import Answer, Motion
 from truenorth.live.carry import Carry
 from truenorth.live.feeds import FEEDS, Feed
 from truenorth.live.intake import Intake, as_rows
+from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.navigator import Navigator
 from truenorth.navigation.procedure import LONGEST_BRIDGE
@@ -45,6 +48,23 @@ FIRST = 20.0  # s of log before the first answer: a filter needs as much
 GROWTH = 1.1  # times the length of the last solution, from which the next is due
 SHARE = 0.1  # of one core, for solutions
 SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
+# What a run goes on from; the rest is made anew from it.
+KEPT = (
+    "place",
+    "imu",
+    "method",
+    "share",
+    "feeds",
+    "log",
+    "intake",
+    "left",
+    "failure",
+    "solutions",
+    "_solution",
+    "_newest",
+    "_due",
+)
+UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
 
 
@@ -220,10 +240,35 @@ class Aligner:
             As :meth:`finish`; the heading may not be used.
         """
         found = self.finish()
-        navigator = Navigator(found, feeds=list(self.feeds.values()), kind=self.log.source_kind, **options)
+        navigator = self._navigator(found, **options)
         for block in self._newest:
             navigator.push(block[:, 0], block[:, 1:4], block[:, 4:])
         return navigator
+
+    def _navigator(self, start: Alignment, **options: Any) -> Navigator:
+        feeds = list(self.feeds.values())
+        return Navigator(start, feeds=feeds, mountings=UNKNOWN, kind=self.log.source_kind, **options)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write all that the run goes on from, whole or not at all; see :meth:`load`."""
+        with self._lock:
+            return keep(path, "Aligner", {name: getattr(self, name) for name in KEPT})
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], *, background: bool = True) -> Aligner:
+        """The run that :meth:`save` wrote; the last answer is the same to the bit.
+
+        Raises
+        ------
+        DataError
+            No such file, a damaged one, or one of another kind.
+        """
+        state = kept(path, "Aligner")
+        found = cls(state["place"], state["imu"], background=background, share=state["share"], method=state["method"])
+        vars(found).update(state)
+        if found._solution is not None:
+            found._take_over(found._solution)
+        return found
 
     def close(self) -> None:
         """Wait for a running solution, and let the thread end."""
@@ -281,7 +326,7 @@ class Aligner:
         """What aids an alignment on the move; nothing as long as the vehicle stays where it is, or no sensor says that it moves."""
         if all(feed.moves_from() is None for feed in self.feeds.values()):
             return []
-        found = [feed.between(-np.inf, self.log.end) for feed in self.feeds.values()]
+        found = [feed.until(self.log.end) for feed in self.feeds.values()]
         return [aid for aid in found if aid is not None and any(recipe.fits({type(aid)}) for recipe in RECIPES)]
 
     def _record(self, aids: Sequence[Any], until: float = np.inf) -> ImuRecord:
@@ -334,7 +379,7 @@ class Aligner:
         if found.moving is not None:
             self._carry = self._earlier = self._mover = None
             if found.heading_known:
-                self._mover = Navigator(found, feeds=list(self.feeds.values()), kind=self.log.source_kind)
+                self._mover = self._navigator(found)
         elif self._earlier is None or self._carry is None or self._carry.elapsed > SETTLED:
             self._earlier = self._carry
         if found.moving is None:

@@ -91,10 +91,10 @@ class Feed:
         self.left_out += int(np.sum(~sound))
         self._waiting.append(np.where(np.isfinite(rows), rows, np.nan)[sound])
 
-    def between(self, since: float, until: float) -> Aid | None:
-        """The rows with ``since < time <= until`` as an aid; None where there are fewer than two."""
-        first, last = np.searchsorted(self.rows[:, 0], (since, until), side="right")
-        return self.aid_of(self.rows[first:last].copy()) if last - first > 1 else None
+    def until(self, until: float, mounting: Mounting | None = None) -> Aid | None:
+        """The rows up to a time as an aid; None where there are fewer than two."""
+        last = int(np.searchsorted(self.rows[:, 0], until, side="right"))
+        return self._mounted(self.rows[:last].copy(), mounting) if last > 1 else None
 
     def moves_from(self) -> float | None:
         """Time from which the vehicle moves, s; None as long as it stays."""
@@ -103,17 +103,26 @@ class Feed:
         lasting = np.convolve(fast, np.ones(LASTING), "valid") == LASTING
         return float(self.rows[int(np.argmax(lasting)), 0]) if lasting.any() else None
 
-    def sources(self, altitude: str) -> list[Aiding]:
-        """The measurements that may come, none of them there yet."""
-        return [replace(s, **_rows_of(s, np.zeros(0, np.intp))) for s in self.aid_of(self.dummy()).sources(altitude)]
+    def sources(self, altitude: str, mounting: Mounting | None) -> list[Aiding]:
+        """The measurements that may come, none of them there yet; `mounting` stands for one that is not given."""
+        found = self._mounted(self.dummy(), mounting).sources(altitude)
+        return [replace(source, **_rows_of(source, np.zeros(0, np.intp))) for source in found]
 
-    def measurements(self, altitude: str, sent: dict[str, float], since: float) -> list[Aiding]:
+    def _mounted(self, rows: Array, mounting: Mounting | None) -> Any:
+        aid: Any = self.aid_of(rows)
+        return aid if mounting is None or self.mounting is not None else aid.mounted(mounting)
+
+    def measurements(
+        self, altitude: str, mounting: Mounting | None, sent: dict[str, float], since: float
+    ) -> list[Aiding]:
         """Measurements that were not given away before.
 
         Parameters
         ----------
         altitude : str
             How height is kept.
+        mounting : Mounting or None
+            Where none is given.
         sent : dict
             Time of the last measurement of each source that was given away; changed.
         since : float, s
@@ -130,7 +139,7 @@ class Feed:
         if len(rows) - first < 2 or rows[-1, 0] <= max(sent.values(), default=since):
             return []
         found = []
-        for source in self.aid_of(rows[first:].copy()).sources(altitude):
+        for source in self._mounted(rows[first:].copy(), mounting).sources(altitude):
             new = np.flatnonzero(source.time > sent.get(source.name, since))
             if new.size:
                 sent[source.name] = float(source.time[new].max())

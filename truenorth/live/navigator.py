@@ -8,9 +8,10 @@ same bits; :meth:`Navigator.finish` is :func:`truenorth.navigate` on all rows.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
 from truenorth.live.feeds import Feed
 from truenorth.live.intake import LATE, Intake, as_rows
+from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
@@ -34,12 +36,18 @@ from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
 from truenorth.records.specs import ImuSpec
+from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import ImuRows
 
 Array = NDArray[np.float64]
 
+# What a run goes on from; the rest is made anew from it.
+KEPT = (
+    "start", "spec", "_given", "_imu", "_imu_source", "feeds", "_mountings", "altitude", "intake", "log", "output", "failure",
+    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps",
+)  # fmt: skip
 FIRST = 20  # rows that show the interval of sampling
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
 UNREST = 60.0  # s before a gap, whose motion says what may have happened in it
@@ -56,6 +64,8 @@ class Navigator:
         Specification; the alignment's own when left out.
     feeds : sequence of Feed
         Aiding sensors; the caller pushes their rows.
+    mountings : mapping of str to Mounting, optional
+        Of feeds to which none is given, by their keys.
     altitude : {"fixed", "free", "baro", "gnss"}, optional
         By default what the feeds allow.
     kind : {"rates", "increments"}
@@ -75,6 +85,7 @@ class Navigator:
         imu: ImuSpec | str | None = None,
         *,
         feeds: Sequence[Feed] = (),
+        mountings: Mapping[str, Mounting] | None = None,
         altitude: Altitude | None = None,
         kind: Kind = "rates",
         output: float = 1.0,
@@ -83,7 +94,7 @@ class Navigator:
         self.start, self.spec, self._imu_source = start_of(start, imu)
         self._given, self._imu = start, imu
         self.solution = start if isinstance(start, Alignment) else None
-        self.feeds = {feed.key: feed for feed in feeds}
+        self.feeds, self._mountings = {feed.key: feed for feed in feeds}, mountings or {}
         dummies: dict[str, Aid] = {feed.key: feed.aid_of(feed.dummy()) for feed in feeds}
         self.altitude, self._why = kept_altitude(altitude, dummies)
         self.intake, self.log = Intake(), Log(kind, most_rows)
@@ -162,7 +173,7 @@ class Navigator:
             As :func:`truenorth.navigate`.
         """
         if self.log.merged == 1 and not self.failure:
-            aids = [feed.between(-np.inf, self.log.end) for feed in self.feeds.values()]
+            aids = [feed.until(self.log.end, self._mountings.get(key)) for key, feed in self.feeds.items()]
             return navigate(
                 self.log.record(),
                 self._given,
@@ -178,6 +189,36 @@ class Navigator:
             raise DataError(f"navigation: no rows came after the start at {self.start.time:.3f} s")
         return self._judged(self.past.with_end(found))
 
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write all that the run goes on from, whole or not at all; see :meth:`load`."""
+        with self._lock:
+            return keep(path, "Navigator", {name: getattr(self, name) for name in KEPT})
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Navigator:
+        """The run that :meth:`save` wrote: it goes on to the same bits.
+
+        Raises
+        ------
+        DataError
+            No such file, a damaged one, or one of another kind.
+        """
+        state = kept(path, "Navigator")
+        feeds, mountings = list(state["feeds"].values()), state["_mountings"]
+        start = state["_given"] or state["start"]
+        found = cls(
+            start,
+            state["_imu"] if state["_given"] else state["spec"],
+            feeds=feeds,
+            mountings=mountings,
+            altitude=state["altitude"],
+        )
+        vars(found).update(state)
+        found._given = start
+        if found._state is not None:
+            found._setting = found._set()
+        return found
+
     def close(self) -> None:
         """Nothing runs on."""
 
@@ -186,13 +227,17 @@ class Navigator:
     def _begin(self, rows: Array) -> None:
         """Make the loop ready, when enough rows are there to know their interval."""
         self._interval = float(np.median(np.diff(rows[:FIRST, 0])))
-        sources: list[Aiding] = [s for feed in self.feeds.values() for s in feed.sources(self.altitude)]
+        self._setting = self._set()
+        self._state = begin(self._setting, self.start, float(rows[0, 0]) - self._interval, self._interval)
+
+    def _set(self) -> Setting:
+        sources: list[Aiding] = []
+        for key, feed in self.feeds.items():
+            sources += feed.sources(self.altitude, self._mountings.get(key))
         sources.append(Aiding("gap", "velocity", np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), does="disturbance"))
         model = InsModel.from_spec(self.spec.with_random_walks(self._interval), fixed_altitude=self.altitude == "fixed")
-        stride = max(1, round(FINE / self._interval))
-        every = max(1, round(self.output / FINE))
-        self._setting = Setting(with_states(model, sources), tuple(sources), stride, every)
-        self._state = begin(self._setting, self.start, float(rows[0, 0]) - self._interval, self._interval)
+        stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
+        return Setting(with_states(model, sources), tuple(sources), stride, every)
 
     def _advance(self, until: float) -> None:
         """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
@@ -229,7 +274,8 @@ class Navigator:
         found: list[Aiding] = []
         for feed in self.feeds.values():
             try:
-                found += feed.measurements(self.altitude, self._sent[feed.key], self.start.time)
+                mounting, sent = self._mountings.get(feed.key), self._sent[feed.key]
+                found += feed.measurements(self.altitude, mounting, sent, self.start.time)
             except DataError as error:
                 self.past.note(feed.key, str(error))
         return found

@@ -22,7 +22,7 @@ from truenorth.core.position import Position
 from truenorth.core.shown import load, save
 from truenorth.formats.layout import Layout
 from truenorth.live.aid_sources import AidSource, open_aid
-from truenorth.live.aligner import SHARE, Aligner
+from truenorth.live.aligner import SHARE, UNKNOWN, Aligner
 from truenorth.live.answer import Answer
 from truenorth.live.feeds import Feed
 from truenorth.live.journal import Journal
@@ -136,7 +136,7 @@ class Session:
         start = None if self.folder is None else self.folder / START
         run: Run
         if earlier and start is not None and start.exists():
-            run = Navigator(load(start), feeds=self.feeds, kind=kind)
+            run = Navigator(load(start), feeds=self.feeds, mountings=UNKNOWN, kind=kind)
         else:
             run = Aligner(self.place, self.imu, aid=self.feeds, kind=kind, method=self.method, share=self.share)
         for _, rows in earlier:

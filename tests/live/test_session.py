@@ -1,0 +1,139 @@
+"""A live run with sensors that aid: from alignment to navigation, killed and resumed, asked for by the page."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+
+import truenorth as tn
+from truenorth.formats import write_imu
+from truenorth.live.journal import Journal
+from truenorth.live.session import START, Session
+from truenorth.simulation.scenario import read_scenario
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """A van in town: an IMU's log, a receiver's and an odometer's."""
+    folder = tmp_path_factory.mktemp("van")
+    content = read_scenario("van").to_mapping()
+    content |= {"duration": "90 s", "imu": "tactical", "rate": "50 Hz"}
+    content["gnss"] = {"rate": "5 Hz", "position_noise": "0.5 m", "velocity_noise": "0.05 m/s"}
+    scenario = read_scenario(content)
+    sim, aiding = scenario.simulate(seed=2), scenario.simulate_aiding(seed=2)
+    write_imu(sim.record, folder / "log.csv")
+    for name in ("gnss", "odometer"):
+        aiding[name].record.to_frame().assign(pulse_size=0.04).to_csv(folder / f"{name}.csv")
+    return folder
+
+
+def sources(folder):
+    return {name: f"replay:{folder / name}.csv" for name in ("gnss", "odometer")}
+
+
+def session(logs, speed, **options):
+    from truenorth.live.feeds import FEEDS
+
+    aids = sources(logs)
+    return Session(
+        f"replay:{logs / 'log.csv'}@{speed}",
+        None,
+        "tactical",
+        feeds=[FEEDS[key]() for key in aids],
+        aids=aids,
+        **options,
+    )
+
+
+def test_a_replayed_run_on_the_move_is_the_batch_to_the_bit(logs):
+    found = session(logs, "max").run()
+    record, gnss = tn.read_imu(logs / "log.csv"), tn.read_gnss(logs / "gnss.csv")
+    odometer = tn.read_odometer(logs / "odometer.csv")
+    end = record.time[-1]
+    aid = [tn.Gnss(gnss.between(None, end)), tn.Odometer(odometer.between(None, end))]
+    whole = tn.align(record, imu="tactical", aid=aid)
+    assert found.status == whole.status == "aligned"
+    assert np.array_equal(found.C_nb, whole.C_nb)
+    assert np.array_equal(found.phi_covariance, whole.phi_covariance)
+
+
+def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
+    statuses = []
+    run = session(logs, "25x", until=np.radians(0.5), navigate=True, every=0.05, share=1.0, folder=tmp_path)
+    alignment = run.run([lambda run, answer, note: statuses.append(None if answer is None else answer.status)])
+    assert alignment.euler_sigma[0] <= 1.1 * np.radians(0.5)
+    assert run.navigation.status == "navigated"
+    assert run.navigation.time[0] == pytest.approx(alignment.time, abs=0.03)
+    assert run.navigation.time[-1] == pytest.approx(90.0, abs=0.03)
+    assert statuses[-1] == "navigated"
+    assert tn.load(tmp_path / START).time == alignment.time
+    # The rows of both parts are kept.
+    kept = sum(len(rows) for _, rows in Journal(tmp_path, resume=True).earlier())
+    assert kept == len(tn.read_imu(logs / "log.csv"))
+
+
+def live(*arguments):
+    command = [sys.executable, "-m", "truenorth", "live", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+@pytest.mark.slow
+def test_navigation_killed_and_resumed_goes_on_from_the_same_alignment(logs, tmp_path):
+    aids = [text for key, source in sources(logs).items() for text in (f"--{key}", source)]
+    arguments = [*aids, "--imu", "tactical", "--until", "0.5 deg", "--navigate", "-o", tmp_path, "--json", "--resume"]
+    for _ in range(3):
+        process = live(f"replay:{logs / 'log.csv'}@10x", *arguments)
+        for _ in range(300):
+            if (tmp_path / START).exists() or process.poll() is not None:
+                break
+            time.sleep(0.1)
+        time.sleep(1.0)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+    process = live(f"replay:{logs / 'log.csv'}@max", *arguments)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    final = json.loads(out.splitlines()[-1])
+    start = tn.load(tmp_path / START)
+    record = tn.read_imu(logs / "log.csv")
+    gnss, odometer = tn.read_gnss(logs / "gnss.csv"), tn.read_odometer(logs / "odometer.csv")
+    from truenorth.live.aligner import UNKNOWN
+
+    aid = [
+        tn.Gnss(gnss.between(None, record.time[-1]), UNKNOWN["gnss"]),
+        tn.Odometer(odometer.between(None, record.time[-1])),
+    ]
+    whole = tn.navigate(record, start, aid=aid, interval=0.2, output=1.0)
+    assert final["lat_deg"] == np.degrees(whole.position[-1, 0])
+    assert final["heading_deg"] == np.degrees(whole.euler[-1, 0])
+
+
+def test_the_page_asks_for_navigation_by_its_token_alone(logs):
+    pytest.importorskip("uvicorn")
+    from truenorth.live.page import serve
+
+    run = session(logs, "20x", navigate=True, every=0.1, share=1.0)
+    page = serve(":0", 0.01, run.go)
+    try:
+        thread = threading.Thread(target=lambda: run.run([page.publish]))
+        thread.start()
+        text = urllib.request.urlopen(page.address, timeout=10).read().decode()
+        token = text.split('"X-Token": "')[1].split('"')[0]
+        for headers in ({}, {"X-Token": "guessed"}, {"X-Token": token, "Origin": "http://elsewhere.example"}):
+            with pytest.raises(urllib.error.HTTPError, match="403"):
+                urllib.request.urlopen(urllib.request.Request(page.address + "go", b"", headers), timeout=10)
+        assert not run.go.is_set()
+        urllib.request.urlopen(urllib.request.Request(page.address + "go", b"", {"X-Token": token}), timeout=10)
+        assert run.go.is_set()
+        thread.join(timeout=60)
+        assert run.navigation.status == "navigated"
+    finally:
+        page.close()
