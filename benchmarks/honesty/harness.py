@@ -51,25 +51,37 @@ class Case:
     scenario: Callable[[np.random.Generator], Mapping[str, Any]]
     align: Callable[[Log], Alignment]  # ``align(log)``: the procedure
     good: Sequence[str] = ("aligned",)  # statuses that are no refusal
+    of_imu: bool = False  # the truth is the attitude of the IMU, not of the body that it turns in
 
 
-def simulated(scenario: Mapping[str, Any], seed: int, run: int) -> Log:
+def place(rng: np.random.Generator) -> dict[str, str]:
+    """A position between 20 and 55 deg N."""
+    return {"lat": f"{rng.uniform(20.0, 55.0):.4f} deg", "lon": "10 deg"}
+
+
+def direction(rng: np.random.Generator) -> Array:
+    """(3,) unit vector, any direction alike."""
+    v = rng.standard_normal(3)
+    return np.asarray(v / np.linalg.norm(v))
+
+
+def simulated(scenario: Mapping[str, Any], seed: int, run: int, of_imu: bool = False) -> Log:
     """A run of a scenario."""
     read = read_scenario({"name": "honesty", **scenario})
     simulation = read.simulate(seed=seed, run=run)
     aiding = read.simulate_aiding(seed=seed, run=run)
     record = simulation.record
     at = simulation.motion.states(record.time[:: max(1, round(read.rate))])
-    place = Position(float(at.lat.mean()), float(at.lon.mean()), float(at.alt.mean()))
-    body = getattr(simulation.motion, "motion", simulation.motion) if "indexer" in scenario else simulation.motion
+    here = Position(float(at.lat.mean()), float(at.lon.mean()), float(at.alt.mean()))
+    body = getattr(simulation.motion, "motion", simulation.motion) if not of_imu else simulation.motion
 
     def C_nb(when: float) -> Array:
-        here = body.states(np.asarray(when))
-        C: Array = ecef_axes(place.lat, place.lon).T @ ecef_axes(here.lat, here.lon) @ here.C_nb
+        then = body.states(np.asarray(when))
+        C: Array = ecef_axes(here.lat, here.lon).T @ ecef_axes(then.lat, then.lon) @ then.C_nb
         return C
 
     encoder = aiding["encoder"].record if "encoder" in aiding else None
-    return Log(record, encoder, place, C_nb)
+    return Log(record, encoder, here, C_nb)
 
 
 def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> str:
@@ -77,15 +89,17 @@ def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> str:
     ratios, refusals, worst = [], [], (0.0, 0)
     begun = time.perf_counter()
     for run in range(runs):
-        log = simulated(case.scenario(np.random.default_rng([seed, run])), seed, run)
+        log = simulated(case.scenario(np.random.default_rng([seed, run])), seed, run, case.of_imu)
         try:
             answer = case.align(log)
         except TruenorthError as error:
             refusals.append((run, str(error)))
             continue
-        place = log.position
-        deflection = deflection_covariance(place.lat, float(normal_gravity(place.lat, place.alt)))
-        phi = -rotation_vector_from_dcm(answer.C_nb @ log.C_nb(answer.time).T)
+        here = log.position
+        deflection = deflection_covariance(here.lat, float(normal_gravity(here.lat, here.alt)))
+        true = log.C_nb(answer.time)
+        phi = -rotation_vector_from_dcm(answer.C_nb @ true.T)
+        phi[:2] = answer.C_nb[:2] @ np.cross(answer.C_nb[2], true[2])  # level alone, whatever heading
         phi += np.random.default_rng([seed, run, 1]).multivariate_normal(np.zeros(3), deflection)
         ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
         if answer.status == "level_only" and "level_only" in case.good:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.honesty.harness import Case, Log, main
+from benchmarks.honesty.harness import Case, Log, direction, main, place
 from truenorth.alignment import align
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rotary import align_rotary
@@ -19,10 +19,6 @@ UNSCALED = {
     "gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "bias_instability": "0.001 deg/h"},
     "accel": {"bias": "50 ug", "random_walk": "10 ug/sqrt(Hz)", "bias_instability": "5 ug"},
 }
-
-
-def _place(rng: np.random.Generator) -> dict[str, str]:
-    return {"lat": f"{rng.uniform(20.0, 55.0):.4f} deg", "lon": "10 deg"}
 
 
 def _rest(rng: np.random.Generator) -> dict[str, str]:
@@ -47,7 +43,7 @@ def rotary_scheme(rng: np.random.Generator) -> Mapping[str, Any]:
     """Eight positions, slews of 10 deg/s, all errors of a navigation grade IMU."""
     return {
         "duration": "600 s",
-        "position": _place(rng),
+        "position": place(rng),
         "motion": _rest(rng),
         "imu": "navigation",
         "indexer": {"scheme": "8", "dwell": "60 s", "encoder": {"resolution": "1 arcsec"}},
@@ -58,7 +54,7 @@ def rotary_spin(imu: Any) -> Any:
     """Spin about x with 15 deg/s and about z with 6 deg/s."""
     return lambda rng: {
         "duration": "600 s",
-        "position": _place(rng),
+        "position": place(rng),
         "motion": _rest(rng),
         "imu": imu,
         "indexer": {
@@ -77,7 +73,7 @@ def ship(rng: np.random.Generator) -> Mapping[str, Any]:
         "duration": "600 s",
         "position": {"lat": "-20 deg", "lon": "10 deg"},
         "motion": _sway(rng, (8.0, 4.0, 6.0), (11.0, 7.0, 5.0)),
-        "lever_arm": [f"{v:.3f} m" for v in 14.0 * _direction(rng)],
+        "lever_arm": [f"{v:.3f} m" for v in 14.0 * direction(rng)],
         "imu": "navigation",
     }
 
@@ -86,7 +82,7 @@ def gentle(rng: np.random.Generator) -> Mapping[str, Any]:
     """A tactical IMU that sways by a degree."""
     return {
         "duration": "300 s",
-        "position": _place(rng),
+        "position": place(rng),
         "motion": _sway(rng, (1.0, 0.7, 0.5), (7.0, 6.0, 9.0)),
         "imu": "tactical",
     }
@@ -106,7 +102,7 @@ def still(gyro: str) -> Any:
         return {
             "duration": "300 s",
             "rate": "50 Hz",
-            "position": _place(rng),
+            "position": place(rng),
             "motion": _rest(rng),
             "imu": _imu(gyro),
         }
@@ -119,7 +115,7 @@ def low_cost(rng: np.random.Generator) -> Mapping[str, Any]:
     return {
         "duration": f"{rng.uniform(120.0, 300.0):.0f} s",
         "rate": "50 Hz",
-        "position": _place(rng),
+        "position": place(rng),
         "motion": _rest(rng),
         "imu": "consumer" if rng.random() < 0.5 else "industrial",
     }
@@ -127,14 +123,9 @@ def low_cost(rng: np.random.Generator) -> Mapping[str, Any]:
 
 def offset(rng: np.random.Generator) -> Mapping[str, Any]:
     """A consumer IMU at rest whose gyros are off by .5 to 20 deg/s."""
-    bias = 0.5 * 40.0 ** rng.random() * _direction(rng)
+    bias = 0.5 * 40.0 ** rng.random() * direction(rng)
     gyro = {"bias": [f"{v:.4f} deg/s" for v in bias]}
     return low_cost(rng) | {"imu": "consumer", "errors": {"gyro": gyro}}
-
-
-def _direction(rng: np.random.Generator) -> np.ndarray:
-    v = rng.standard_normal(3)
-    return v / np.linalg.norm(v)
 
 
 def _by_rotary(axes: tuple[str, ...], imu: Any = "navigation") -> Any:

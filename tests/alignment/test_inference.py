@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from truenorth.alignment.inference import predictive_sigma, usual_bias
+from truenorth.alignment.inference import predictive_sigma, usual
 from truenorth.records.specs import PRESETS, imu_spec
 
 
@@ -49,4 +49,4 @@ def test_the_usual_bias_is_that_of_the_presets(sensor):
     for name in PRESETS:
         spec = imu_spec(name)
         walk, bias = getattr(spec, f"{sensor}_random_walk"), getattr(spec, f"{sensor}_bias")
-        assert math.isclose(usual_bias(sensor, walk), bias, rel_tol=1e-9)
+        assert math.isclose(usual(sensor, "bias", walk), bias, rel_tol=1e-9)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,12 +59,12 @@ def predictive_sigma(
     return math.sqrt(float(weight @ s**2) / float(weight.sum()))
 
 
-def usual_bias(sensor: Literal["gyro", "accel"], random_walk: float) -> float:
-    """The bias that is usual of a sensor with a random walk: between the presets by a power law, SI."""
+def usual(sensor: str, what: str, random_walk: float) -> float:
+    """What is usual of a sensor with a random walk, such as its ``bias``: between the presets by a power law, SI."""
     presets = [imu_spec(name) for name in PRESETS]
     walks = np.log([getattr(spec, f"{sensor}_random_walk") for spec in presets])
-    biases = np.log([getattr(spec, f"{sensor}_bias") for spec in presets])
-    return math.exp(float(np.interp(math.log(max(random_walk, 1e-12)), walks, biases)))
+    sizes = np.log([getattr(spec, f"{sensor}_{what}") for spec in presets])
+    return math.exp(float(np.interp(math.log(max(random_walk, 1e-12)), walks, sizes)))
 
 
 def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
@@ -77,8 +76,8 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
         Random walks, as fitted to the log.
     """
     best = imu_spec("navigation")
-    typical_gyro = usual_bias("gyro", noise.gyro_random_walk)
-    typical_accel = usual_bias("accel", noise.accel_random_walk)
+    typical_gyro = usual("gyro", "bias", noise.gyro_random_walk)
+    typical_accel = usual("accel", "bias", noise.accel_random_walk)
     force, force_noise = np.array([check.force_residual]), np.array([check.force_noise])
     gyro_bias = predictive_sigma(
         check.rate_residual, check.rate_noise, typical_gyro, GYRO_WIDTH, LEAST * best.gyro_bias, WORST_GYRO

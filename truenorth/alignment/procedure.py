@@ -24,6 +24,7 @@ from truenorth.alignment.published import FADING, STATIONARY, Published, faded_a
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
+from truenorth.alignment.turning import infer_turning, turning_align, turns_blindly
 from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.uncertainty import base_velocity
@@ -48,6 +49,8 @@ SHORTEST = 1.0  # s: below that no mean is worth its name
 MOSTLY = 0.95  # of the seconds
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be told
+POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
+INFERRED = "inferred from the log"
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
 
@@ -116,6 +119,13 @@ def align_base(
             f"{asked}the gyros do not see the earth turn: the mean force levels, nothing finds north",
         )
         found = _align_level(task, spec)
+    elif method == "auto" and turns_blindly(task, spec):
+        chosen = "kalman"
+        why = (
+            "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
+            f"are fitted, nothing finds north{POSITIONS}"
+        )
+        found = _align_turning(task, spec)
     elif chosen == "analytic":
         found = _align_analytic(task, spec)
     else:
@@ -160,7 +170,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     }
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
-        why += " (where a turntable does it, the aid `Positions()` shows more)"
+        why += POSITIONS
     if task.record.duration < SHORTEST_SWAYING or not (overall in words or _rocks_all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
@@ -192,6 +202,23 @@ def _align_level(task: Task, spec: ImuSpec | None) -> _Found:
     bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2))
     bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
     return _Found(replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check)
+
+
+def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
+    """Level of an IMU that turns, with gyros that do not see the earth; heading zero at the start by convention."""
+    task = last_part(task)
+    used, where = (infer_turning(task), INFERRED) if spec is None else (spec, f"specification {spec.name!r}")
+    fine = turning_align(task, used, np.array([task.epoch.row]))
+    answer = answer_of(task, fine, used, where, np.diag(used.bias_variance))
+    answer = replace(
+        answer,
+        phi_covariance=without_heading(answer.phi_covariance),
+        phi_floor=without_heading(answer.phi_floor),
+        pays_until=None,
+        handover=None,
+    )
+    unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
+    return _Found(answer, unchecked, fine.settled)
 
 
 def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
@@ -288,4 +315,4 @@ def _moves_from(motion: MotionSummary) -> float | None:
 def _specification(spec: ImuSpec | None, check: LogCheck, noise: StaticModel) -> tuple[ImuSpec, str]:
     if spec is not None:
         return spec, f"specification {spec.name!r}"
-    return infer_spec(check, noise), "inferred from the log"
+    return infer_spec(check, noise), INFERRED

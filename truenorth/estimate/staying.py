@@ -1,7 +1,8 @@
 """A log of a base that stays: what is taken off it, and the linear system of the errors that are left.
 
 States: misalignment, velocity error, gyro and accelerometer bias (:mod:`truenorth.models.static`), then groups by name:
-``matrices``, the scale factors and misalignments of the sensors, and ``arm``, the lever arm.
+``matrices``, the scale factors and misalignments of the sensors, ``arm``, the lever arm, and ``rate``, the earth's level rate of
+an INS that is levelled to some heading.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.filters import LinearSystem
+from truenorth.models.level_rate import LEVEL_RATE, with_level_rate
 from truenorth.models.matrices import MATRICES, matrices_of, with_matrices, without_errors
 from truenorth.models.static import BG, DV, PHI, QUIETEST_BASE, STATES, StaticModel
 from truenorth.models.static_force import Form, force_system
@@ -52,6 +54,7 @@ def prior_of(
     spec: ImuSpec | None = None,
     arm: ArrayLike | None = None,
     arm_sigma: float = 0.0,
+    level_rate: float = 0.0,
 ) -> Prior:
     """The prior of a base of whose attitude nothing is known but that it is about level.
 
@@ -67,6 +70,8 @@ def prior_of(
         With it, the lever arm from the base's centre of rotation to the IMU is a state.
     arm_sigma : float, m
         One sigma along each axis; zero where it is known.
+    level_rate : float, rad/s
+        One sigma, along east and along north, of the earth's level rate where heading is a convention; zero where it is not.
     """
     means, blocks, groups = [np.zeros(6), np.asarray(bias, dtype=np.float64)], [P_bias], {}
     size = STATES
@@ -83,8 +88,13 @@ def prior_of(
         means.append(np.asarray(arm, dtype=np.float64))
         blocks.append(arm_sigma**2 * np.eye(3))
         size += 3
+    if level_rate:
+        groups["rate"] = slice(size, size + LEVEL_RATE)
+        means.append(np.zeros(LEVEL_RATE))
+        blocks.append(level_rate**2 * np.eye(LEVEL_RATE))
+        size += LEVEL_RATE
     P = np.zeros((size, size))
-    P[PHI, PHI] = np.diag([LEVEL_PRIOR**2, LEVEL_PRIOR**2, HEADING_PRIOR**2])
+    P[PHI, PHI] = np.diag([LEVEL_PRIOR, LEVEL_PRIOR, 0.0 if level_rate else HEADING_PRIOR]) ** 2
     P[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
     at = BIASES.start
     for block in blocks:
@@ -116,6 +126,8 @@ class StayingLog:
         Attitude of the base in the IMU at the ends of the intervals (an indexer's); the two are one when left out.
     form : {"velocity", "force"}
         Measure the mean velocity of each interval, or the velocity gained in it.
+    taken : (n,) array, optional
+        Errors to take off to begin with; the prior's mean when left out.
 
     Attributes
     ----------
@@ -140,11 +152,13 @@ class StayingLog:
         sways: bool = False,
         C_sb: Array | None = None,
         form: Form = "velocity",
+        taken: Array | None = None,
     ) -> None:
         self.record, self.C_n0_i, self.position, self.noise = record, C_n0_i, position, noise
         self.prior, self.interval, self.form, self.sways, self.C_sb = prior, interval, form, sways, C_sb
         self.rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
-        self.taken, self._turns = prior.mean.copy(), np.zeros((0, 3, MATRICES))
+        self.taken = (prior.mean if taken is None else taken).copy()
+        self._turns = np.zeros((0, 3, MATRICES))
         self.integrals = self._integrated() if integrals is None else integrals
 
     @property
@@ -168,6 +182,8 @@ class StayingLog:
         if "arm" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)
             system = with_arm(system, rows, self.taken[groups["arm"]])
+        if "rate" in groups:
+            system = with_level_rate(system, self.integrals, lat, alt)
         return replace(system, x0=self.prior.mean - self.taken, P0=P0)
 
     def correct(self, x: Array) -> None:
@@ -178,7 +194,9 @@ class StayingLog:
         if matrices is not None:
             back = back - np.einsum("kij,j->i", self._turns, x[matrices])
         self.C_n0_i = dcm_from_rotation_vector(back) @ self.C_n0_i
-        behind = slice(BIASES.start, len(self.taken))
+        # The level rate is no error of a sensor that could be taken off: it stays, and the attitude is right at the end.
+        rate = self.prior.groups.get("rate")
+        behind = slice(BIASES.start, len(self.taken) if rate is None else rate.start)
         self.taken[behind] += x[behind]
         self.integrals = self._integrated()
 

@@ -82,10 +82,7 @@ class StaticModel:
         T = integrals.intervals[:, None, None]
         C_mean = C_n0_i @ integrals.C_mean  # (1/T) int C_n0_b
         C_late = C_n0_i @ integrals.C_late  # (1/T^2) int s C_n0_b
-        v, p = -gravity_velocity(integrals.time, lat, alt), -gravity_position(integrals.time, lat, alt)
-        v_mean = np.diff(p, axis=0) / integrals.intervals[:, None]
-        f = skew(np.diff(v, axis=0) / integrals.intervals[:, None])  # mean of -g_n0 over the interval
-        f_late = skew(v[1:] - v_mean)  # (1/T) int s f ds
+        f, f_late = gravity_force(integrals, lat, alt)
         ff = f @ np.swapaxes(f, 1, 2)
         eye = np.eye(3)
         q_g, q_a = self.gyro_random_walk**2, self.accel_random_walk**2
@@ -141,6 +138,13 @@ def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: 
     """(K, 3) mean velocity over each interval that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
     p = integrals.position @ C_n0_i.T + gravity_position(integrals.time, lat, alt)
     return np.diff(p, axis=0) / integrals.intervals[:, None]
+
+
+def gravity_force(integrals: InertialIntegrals, lat: float, alt: float) -> tuple[Array, Array]:
+    """``[f x]`` (K, 3, 3) of the mean of ``f = -g_n0`` over each interval, m/s^2, and of ``(1/T) int s f ds``, m/s."""
+    v, p = -gravity_velocity(integrals.time, lat, alt), -gravity_position(integrals.time, lat, alt)
+    v_mean = np.diff(p, axis=0) / integrals.intervals[:, None]
+    return skew(np.diff(v, axis=0) / integrals.intervals[:, None]), skew(v[1:] - v_mean)
 
 
 def grown(system: LinearSystem, n: int) -> dict[str, Array]:

@@ -48,6 +48,8 @@ TURN_ANGLE = np.radians(3.0)  # net angle from which a turn is called rotating
 TURN_SHARE = 0.4  # of the RMS rate that is net rotation; a sway of 15 s period has at most 0.33
 MOVING_ACCELERATION = 0.08  # m/s^2 over one second; tilt error, bias and people in the car stay below 0.05
 LEAST_GAIN = 0.04  # m/s^2 over WINDOW: waves that come and go within it leave less, a start of .4 m/s more
+NOISY_BIAS = 200.0  # sqrt(Hz): the same of a noisier one, in its noise ...
+LARGEST_BIAS = 1.0  # m/s^2: ... at the most
 SWAY_ACCELERATION = 0.2  # m/s^2 over WINDOW: a rocking base with less gains no speed
 MOVING_PAUSE = 60  # s between two accelerations, without rest, that counts as moving too (cruising)
 TURNED_BIAS = 0.5  # m/s^2 for a radian: level error and bias of a cheap sensor that a turn shows as acceleration
@@ -206,11 +208,12 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     noise = angle_noise[:, None] * np.sqrt(min(WINDOW, seconds) / 15.0)  # detrended random walk: N^2 T / 15
     active = np.any(wander > np.hypot(STILL_ANGLE, NOISE_FACTOR * noise), axis=0)
     around = wander.max(axis=0)[offset(seconds, seconds - wander.shape[1] + 1)]
+    biased = np.clip(NOISY_BIAS * np.linalg.norm(force_noise), TURNED_BIAS, LARGEST_BIAS)
     kind = _classify(
         rate,
         active=_in_every_window(active, seconds),
         sways=around * np.sqrt(2.0) > SWAY_ANGLE,
-        accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * np.linalg.norm(force_noise)) + TURNED_BIAS * turned,
+        accelerates=motion > np.hypot(MOVING_ACCELERATION, 3.0 * np.linalg.norm(force_noise)) + biased * turned,
         gains=gain > LEAST_GAIN,
         gains_speed=gain > SWAY_ACCELERATION,
         rate_noise=float(np.linalg.norm(angle_noise)),

@@ -22,6 +22,7 @@ STILL_ANGLE = 3.0 * ARCSEC
 SEEN_TURN = np.radians(2.0)  # of gravity in body axes within WINDOW: accelerometers that shake still see it
 QUARTER_TURN = np.radians(90.0)
 UNTURNED = 0.1  # part of the turn that gyros show, below which gravity has not turned at all
+MISALIGNED = 0.1  # rad: of the gyros and of a turntable's axis, at the most
 LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, whatever the sensor
 
 
@@ -122,8 +123,8 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
 def bias_by_gravity(rate: Array, force: Array) -> Array | None:
     """(3,) mean rate of gyros that turn while gravity does not: a bias, however large; None where gravity may have turned.
 
-    A body that turned by the part of that rate across gravity would see gravity's direction turn. (A turn about the vertical
-    leaves gravity where it is: that part is a bias only in company of the other.)
+    A body that turned by the part of that rate across gravity would see gravity's direction turn. A turn about the vertical
+    leaves gravity where it is: that part is a bias only in company of the other, which is more than a misalignment of it.
 
     Parameters
     ----------
@@ -133,7 +134,10 @@ def bias_by_gravity(rate: Array, force: Array) -> Array | None:
     mean = rate.mean(axis=1)
     up = force / np.maximum(np.linalg.norm(force, axis=0), 1e-9)
     vertical = up.mean(axis=1)
-    across = float(np.linalg.norm(mean - vertical * (mean @ vertical) / (vertical @ vertical)))
+    along = vertical * (mean @ vertical) / (vertical @ vertical)
+    across = float(np.linalg.norm(mean - along))
+    if across < MISALIGNED * float(np.linalg.norm(along)):
+        return None
     lag = min(WINDOW, max(1, int(QUARTER_TURN / max(across, 1e-9))))
     if across * lag < SEEN_TURN or rate.shape[1] < 2 * lag:
         return None

@@ -122,7 +122,8 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     if squares[shift] < min(0.98 * best**2, 0.5 * given**2):
         delay, small = _lowest(squares, shift)
         return Tilt(given, unturned, math.sqrt(small), IDENTITY, delay, 0.0, abs(delay) * bench.rate(theta))
-    late, sigma = bench.late(theta)
+    # Gyros that leave more than if they were at rest turn something else than gravity: no small delay is what is wrong.
+    late, sigma = bench.late(theta) if given < unturned else (0.0, 0.0)
     return Tilt(given, unturned, best, axes, late, sigma, abs(late) * bench.rate(theta))
 
 

@@ -1,0 +1,113 @@
+"""Level of an IMU that turns about in its own log, and whose gyros do not see the earth turn: a cheap one on a turntable.
+
+What a turn shows as motion is the gyros' scale factor and misalignment, the accelerometers', and the arm from the axis of the
+turns to the IMU: one per cent of a turn of 20 deg/s is a rate of .2 deg/s. So they are states, as an indexer's are. Gyros like
+these carry no attitude through the log before their errors are known: the log is linearised over its first seconds, and then
+over twice as many each time, about what the shorter part has shown.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.check import BLIND_RATE, LogCheck
+from truenorth.alignment.fine import MAX_NOISE_PASSES, FineAlignment
+from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, noise_of, usual
+from truenorth.alignment.task import Task, filter_interval, level_of
+from truenorth.core.earth import EARTH_RATE
+from truenorth.estimate.base_motion import VelocityNoise, white_variance
+from truenorth.estimate.batch import Filtered, in_sigmas, settle
+from truenorth.estimate.staying import StayingLog, prior_of
+from truenorth.filters import LinearSystem
+from truenorth.models.static import StaticModel, mean_velocity
+from truenorth.quality.signals import white_noise
+from truenorth.records.specs import ImuSpec
+
+Array = NDArray[np.float64]
+
+FIRST = 8.0  # s, the shortest part; gyros that are off by .3 deg/s have turned by 2.4 deg in it
+LEVELLED = 1.0  # s, whose mean specific force levels to begin with
+ARM = 1.0  # m, one sigma along each axis: from the axis of the turns to the IMU
+VERTICAL = 10.0  # m/s, what is taken to disturb it
+LEVEL = slice(0, 2)
+ROUND, LAST = 4, 16  # passes over a part, and over the whole
+
+
+def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
+    """Whether the IMU turns in its log, and its gyros are too poor to see the earth turn."""
+    if task.motion.overall != "rotating":
+        return False
+    bias = spec.gyro_bias if spec else usual("gyro", "bias", float(np.max(task.motion.angle_noise)))
+    return bias > BLIND_RATE
+
+
+def infer_turning(task: Task) -> ImuSpec:
+    """Specification of an IMU that turns: by its noise, and by gravity, whose size the accelerometers show at any attitude."""
+    walks = white_noise(task.record)
+    gyro_walk, accel_walk = float(walks[:3].max()), float(walks[3:].max())
+    size = np.linalg.norm(task.motion.specific_force, axis=1)
+    none = np.zeros(0)
+    check = LogCheck(none, none, float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size)))
+    inferred = infer_spec(check, StaticModel(gyro_walk, accel_walk))
+    # With no rate to check, one sigma above the usual: the mean over all that a bias might be has the longest of tails.
+    more: dict[str, Any] = {"gyro_bias": math.exp(GYRO_WIDTH) * usual("gyro", "bias", gyro_walk)}
+    more |= {
+        f"{sensor}_{what}": usual(sensor, what, walk)
+        for sensor, walk in (("gyro", gyro_walk), ("accel", accel_walk))
+        for what in ("bias_instability", "scale_factor", "misalignment")
+    }
+    return replace(inferred, **more)
+
+
+def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
+    """Attitude (heading by convention), biases, scale factors, misalignments and arm from a whole log.
+
+    Parameters
+    ----------
+    task : Task
+    spec : ImuSpec
+    rows_at : (M,) int array
+        Rows after which the integrated attitude is wanted.
+
+    Returns
+    -------
+    FineAlignment
+    """
+    record, lat, alt = task.record, task.position.lat, task.position.alt
+    rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large
+    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=ARM, level_rate=rate)
+    begin = record.time[0] - record.interval
+    C, taken = level_of(record.between(None, begin + LEVELLED).accel.mean(axis=0)), prior.mean
+    length = FIRST
+    while True:
+        whole = length >= record.duration
+        part = record if whole else record.between(None, begin + length)
+        log = StayingLog(
+            part,
+            C,
+            task.position,
+            noise_of(spec),
+            prior,
+            task.interval if whole else filter_interval(part),
+            rows_at if whole else None,
+            taken=taken,
+        )
+        R = white_variance(mean_velocity(log.integrals, C, lat, alt))
+        everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
+        noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+        last = settle(log, partial(_by_level, noise), in_sigmas(LEVEL), most=LAST if whole else ROUND)
+        if whole:
+            return FineAlignment.of(log, last, prior.sensors, np.sqrt(noise.R[0]))
+        log.correct(last.found.end)
+        C, taken, length = log.C_n0_i, log.taken, 2.0 * length
+
+
+def _by_level(noise: VelocityNoise, system: LinearSystem) -> Filtered:
+    """Filtered without the vertical: it carries no attitude, and what tilts of degrees do to it is of second order."""
+    return noise(replace(system, R=system.R + np.diag([0.0, 0.0, VERTICAL**2])))
