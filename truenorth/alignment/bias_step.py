@@ -1,7 +1,8 @@
-"""Did a bias change on the way? The same likelihood ratio test as for a base that leaves, of steps of the six biases.
+"""Did a bias change on the way? The same likelihood ratio test as for a base that leaves, of steps and ramps of the six biases.
 
-A bias that steps at an epoch moves the errors of attitude and velocity as the model says, ``d_k = Phi_k d_(k-1) + G_k s``, and is
-seen as ``H_k d_k``. The filter follows with what it estimates; what is left between both is the error of the answer.
+A bias that steps at an epoch, or grows from it on, moves the errors of attitude and velocity as the model says,
+``d_k = Phi_k d_(k-1) + G_k s``, and is seen as ``H_k d_k``. The filter follows with what it estimates; what is left between both
+is the error of the answer.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import find_touch
 from truenorth.models.static import BA, BG, PHI
-from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -25,35 +26,37 @@ SENSORS = slice(BG.start, BA.stop)
 
 
 def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
-    """The step of a bias that matches the innovations best, if chance is ruled out, with the error it leaves."""
+    """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves."""
     Phi, H = fine.system.Phi, fine.system.H
     count, n = len(fine.estimates.innovation), fine.system.states
-    first = [round(onset * count) for onset in ONSETS]
-    d = np.zeros((n, len(first) * 6))
-    signature = np.empty((count, H.shape[-2], d.shape[1]))
+    first = np.array([round(onset * count) for onset in ONSETS])
+    # Columns: steps, then ramps that are one at the end, of each of the six biases from each onset on.
+    d = np.zeros((n, 2, len(first), 6))
+    signature = np.empty((count, H.shape[-2], d[0].size))
     for k in range(count):
-        d = Phi[min(k, len(Phi) - 1)] @ d
-        for i, at in enumerate(first):
-            if k == at:
-                d[SENSORS, 6 * i : 6 * i + 6] = np.eye(6)
-        signature[k] = H[min(k, len(H) - 1)] @ d
+        size = np.stack([(k >= first).astype(float), np.clip((k - first) / (count - first), 0.0, 1.0)])
+        d[SENSORS] = np.eye(6)[:, None, None, :] * size[..., None]
+        d = np.tensordot(Phi[min(k, len(Phi) - 1)], d, axes=1)
+        signature[k] = H[min(k, len(H) - 1)] @ d.reshape(n, -1)
+    left_by = d.reshape(n, -1)[PHI]
     ratio, size, x = matched(fine, signature)
     best = int(np.argmax(ratio))
-    if ratio[best] <= limit("drift"):
+    if ratio[best] <= limit("hint"):
         return []
-    left = np.where(ratio > limit("drift"), np.abs((d[PHI] - x[PHI]) * size), 0.0)
+    left = np.where(ratio > limit("hint"), np.abs((left_by - x[PHI]) * size), 0.0)
     heading, level = float(left[2].max()), float(np.hypot(left[0], left[1]).max())
     axis, sensor = best % 3, "gyro" if best % 6 < 3 else "accel"
     figures: dict[str, Figure] = {
         "axis": "xyz"[axis],
-        "onset": ONSETS[best // 6] * float(fine.integrals.time[-1]),
+        "onset": ONSETS[best // 6 % len(ONSETS)] * float(fine.integrals.time[-1]),
         "size": abs(float(size[best])),
         "ratio": float(ratio[best]),
-        "chance": limit("drift"),
+        "chance": limit("hint"),
         "heading": heading,
         "level": level,
     }
-    return [Evidence(f"bias.{sensor}_steps", figures, "bounded", Effect(heading, level), ("still_part",))]
+    kind: Kind = "bounded" if ratio[best] > limit("drift") else "known"  # what may be chance is added to sigma
+    return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 
 def turn_evidence(task: Task) -> list[Evidence]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.models.static import PHI
-from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -45,6 +45,11 @@ class Drift:
 
     @property
     def found(self) -> bool:
+        """Whether it is likelier than chance."""
+        return self.ratio > limit("hint")
+
+    @property
+    def sure(self) -> bool:
         """Whether chance is ruled out."""
         return self.ratio > limit("drift")
 
@@ -55,13 +60,12 @@ class Drift:
             "onset": self.onset,
             "velocity": abs(self.velocity),
             "ratio": self.ratio,
-            "chance": limit("drift"),
+            "chance": limit("hint"),
             "heading": self.heading,
             "level": self.level,
         }
-        return Evidence(
-            f"drift.{self.kind}", figures, "bounded", Effect(self.heading, self.level), remedies=("still_part",)
-        )
+        kind: Kind = "bounded" if self.sure else "known"  # what may be chance is added to sigma
+        return Evidence(f"drift.{self.kind}", figures, kind, Effect(self.heading, self.level), remedies=("still_part",))
 
 
 def detect_drift(fine: FineAlignment) -> Drift:
@@ -84,7 +88,7 @@ def detect_drift(fine: FineAlignment) -> Drift:
     ratio, size, x = matched(fine, signature)
     best = int(np.argmax(ratio))
     kind, axis_name, start = names[best]
-    turned = np.where(ratio > limit("drift"), np.abs(x[PHI] * size), 0.0)  # (3, 12): E, N, U
+    turned = np.where(ratio > limit("hint"), np.abs(x[PHI] * size), 0.0)  # (3, 12): E, N, U
     heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
     return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 

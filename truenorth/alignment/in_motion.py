@@ -34,12 +34,13 @@ from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
+from truenorth.estimate.rivals import misfit, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.gnss import gnss_evidence
-from truenorth.quality.record_evidence import sampling_evidence
+from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -225,16 +226,28 @@ def align_in_motion(
     answer = _answer(task, track, method, why, spread)
     more = [item for log in (odometer, gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
-    more += [] if gnss is None else gnss_evidence(gnss)
-    more += sampling_evidence(task.record, turns=True)
+    more += _seen(task, track, guess, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)
+
+
+def _seen(task: _Task, track: Track, guess: Guess, *, gated: bool) -> list[Evidence]:
+    """What the receiver, the log itself and biases that wander say."""
+    found = [] if task.gnss is None else gnss_evidence(task.gnss)
+    found += moving_evidence(task.record)
+    return found + wandering_evidence(
+        lambda model: replace(task, model=model).run(guess, gated=gated),
+        track,
+        task.model,
+        task.spec,
+        task.record.duration,
+    )
 
 
 def _cost_at(task: _Task, lat: float) -> float:
     """Minus twice the log-likelihood of the log at a latitude."""
     task = replace(task, position=Position(lat, horizontal_sigma=0.0))
     try:
-        return _cost(task.run(task.by_the_earth(), gated=False))
+        return misfit(task.run(task.by_the_earth(), gated=False).residuals)
     except DataError:  # so far off that the filter breaks down
         return math.inf
 
@@ -278,7 +291,7 @@ def _task(
         position = _first_fix(record, gnss) if _has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
-    spec = imu_spec(imu).with_random_walks(record.interval)
+    spec = imu_spec(imu).seen_in(record)
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)
@@ -342,20 +355,13 @@ def _best_of_bank(task: _Task, guesses: Sequence[Guess], tell: Callable[[str], N
         tell(f"heading {number + 1} of {len(guesses)}")
         track = task.run(guess, gated=False, until=until)
         tracks.append(track)
-        costs.append(_cost(track))
+        costs.append(misfit(track.residuals))
     cost = np.array(costs)
     weight = np.exp(-0.5 * (cost - cost.min()))
     weight /= weight.sum()
     best = int(np.argmin(cost))
     off = [_turn_between(track.C_nb[-1], tracks[best].C_nb[-1]) for track in tracks]
     return best, tracks[best], float(np.sqrt(np.sum(weight * np.square(off))))
-
-
-def _cost(track: Track) -> float:
-    """Minus twice the log-likelihood of a pass, but for a constant."""
-    return sum(
-        float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma))) for r in track.residuals
-    )
 
 
 def _turn_between(C: Array, D: Array) -> float:

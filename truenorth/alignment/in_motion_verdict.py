@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from truenorth.alignment.result import NOT_ESTIMATED, Alignment
 from truenorth.alignment.verdict import claimed, judged
+from truenorth.estimate.rivals import counted_once
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.track import Track
@@ -16,7 +17,7 @@ def judge_moving(answer: Alignment, track: Track, limit: float, more: list[Evide
     if by_motion:
         needs = ("manoeuvre_gnss" if any("GNSS" in r.name for r in track.residuals) else "north",)
     evidence = [*_wheel(answer), *innovation_evidence(track.residuals, claimed(answer), by_motion=by_motion), *more]
-    return judged(answer, evidence, limit, waiting=not by_motion, remedies=needs)
+    return judged(answer, counted_once(evidence), limit, waiting=not by_motion, remedies=needs)
 
 
 def _wheel(answer: Alignment) -> list[Evidence]:

@@ -100,7 +100,7 @@ def align_positions(
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     if not arm_sigma >= 0.0:
         raise UsageError(f"arm_sigma {arm_sigma:g} m; expected zero or more")
-    spec = None if imu is None else imu_spec(imu).with_random_walks(record.interval)
+    spec = None if imu is None else imu_spec(imu).seen_in(record)
     if calibration is not None:
         record = calibration.apply(record)
     task = make_task(bridged(record), position, None)

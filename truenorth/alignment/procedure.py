@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
+from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import bias_step_evidence, turn_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
@@ -33,6 +34,7 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.models.static import STATES, StaticModel
 from truenorth.models.static_force import gained_velocity
+from truenorth.quality.density import specification_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
@@ -97,7 +99,7 @@ def align_base(
         raise UsageError(f"method {method!r} is not known; choose one of {', '.join(get_args(Method))}")
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
-    spec = None if imu is None else imu_spec(imu).with_random_walks(record.interval)
+    spec = None if imu is None else imu_spec(imu).seen_in(record)
     if calibration is not None:
         record = calibration.apply(record)
     record = bridged(record)
@@ -136,6 +138,7 @@ def align_base(
     evidence = record_evidence(task.record, task.motion) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task)
+    evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     return judged(answer, evidence, heading_limit)
 
 
@@ -249,7 +252,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
     answer = answer_of(task, fine, used, where, P, sways)
-    steps = bias_step_evidence(fine)
+    steps = [*bias_step_evidence(fine), *bad_stretches(fine, task.record)]
     return _Found(answer, check, fine.settled, detect_drift(fine), "" if sways else form, steps)
 
 
@@ -302,7 +305,7 @@ def _rocks_all_along(motion: MotionSummary) -> bool:
 
 def _explained(motion: MotionSummary, found: _Found) -> bool:
     """Whether a lever arm and bounded motion explain all that the base does: what moves by its arm goes nowhere."""
-    leaves = found.drift is not None and found.drift.found
+    leaves = found.drift is not None and found.drift.sure
     small = float(np.max(found.answer.disturbance[:2])) < STAYS
     return _rocks_all_along(motion) and found.settled and small and not leaves
 

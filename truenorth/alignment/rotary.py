@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
@@ -32,7 +33,7 @@ from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
-from truenorth.quality.encoder import encoder_evidence
+from truenorth.quality.encoder import encoder_evidence, zero_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -91,7 +92,7 @@ def align_rotary(
         Too short a record.
     """
     tell = progress or (lambda stage: None)
-    spec = imu_spec(imu).with_random_walks(record.interval)
+    spec = imu_spec(imu).seen_in(record)
     record = bridged(record)
     if record.duration < SHORTEST:
         raise AlignmentError(
@@ -128,12 +129,14 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), the base may sway: its own motion is fitted to the log",
     )
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
-    evidence += base_speed(answer) + bias_step_evidence(fine)
+    evidence += base_speed(answer) + bias_step_evidence(fine) + bad_stretches(fine, record)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
     given = readings.pop("given")
     evidence = encoder_evidence(record, given, readings) + record_evidence(record, task.motion, given) + evidence
+    if len(axes) == 2:
+        evidence += zero_evidence(record, given, _inner(encoder, axes))
     return judged(answer, evidence + notes(encoder.notes), heading_limit)
 
 
@@ -149,6 +152,12 @@ def _orders(count: int) -> dict[str, Array]:
 def _reading(encoder: EncoderRecord, axes: Sequence[str], order: Array) -> Callable[[Array], Array]:
     """``C_sb`` (K, 3, 3) at times, by the angles in an order."""
     return lambda time: np.swapaxes(C_bs_from_angles(axes, angles_at(encoder, time, axes) @ order.T), -1, -2)
+
+
+def _inner(encoder: EncoderRecord, axes: Sequence[str]) -> Callable[[Array], Array]:
+    """Direction (K, 3) of the inner axis in the body at times."""
+    e = np.eye(3)["xyz".index(axes[1])]
+    return lambda time: C_bs_from_angles(axes[:1], angles_at(encoder, time, axes)[:, :1]) @ e
 
 
 def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:

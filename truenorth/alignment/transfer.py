@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from typing import Any, Literal, get_args
 
@@ -22,8 +23,9 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors, TransferModel
 from truenorth.errors.master import master_errors as errors_of
+from truenorth.estimate.rivals import wandering_evidence
 from truenorth.quality.gnss import master_evidence
-from truenorth.quality.record_evidence import sampling_evidence
+from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
@@ -122,7 +124,7 @@ def align_transfer(
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and what == "velocity":
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
-    spec = imu_spec("industrial" if imu is None else imu).with_random_walks(slave.interval)
+    spec = imu_spec("industrial" if imu is None else imu).seen_in(slave)
     where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
     if calibration is not None:
         slave = calibration.apply(slave)
@@ -152,7 +154,8 @@ def align_transfer(
         )
     matched = Matching(*noise, gate=GATE)
     track = transfer_filter(part, master, model, start, matched, linear=linear)
-    seen = _seen(slave, master, model, C_mb)
+    again = partial(transfer_filter, part, master, start=start, matching=matched, linear=linear)
+    seen = _seen(slave, master, model, C_mb) + wandering_evidence(again, track, model, spec, part.duration)
     answer = assemble_transfer(
         part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, seen
     )
@@ -201,7 +204,7 @@ def _seen(slave: ImuRecord, master: MasterRecord, model: TransferModel, C_mb: Ar
     return [
         *([] if parted is None else [parted]),
         *master_evidence(master, slow),
-        *sampling_evidence(slave, turns=True),
+        *moving_evidence(slave),
     ]
 
 

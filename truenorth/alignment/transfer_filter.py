@@ -93,6 +93,7 @@ class TransferTrack:
     verdict: Integers  # (K, 2): `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`
     # (6,): variance of what in the innovations is an error of the master's own, which does not change from row to row
     slow: Array
+    residuals: tuple[Residuals, ...]  # the innovations source by source
 
     @property
     def last_P(self) -> Array:
@@ -284,6 +285,7 @@ def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStar
         nis=nis,
         verdict=verdict,
         slow=_slow(track, model),
+        residuals=tuple(said),
     )
 
 

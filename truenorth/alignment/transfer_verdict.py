@@ -11,6 +11,7 @@ from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.memory import USED
+from truenorth.estimate.rivals import counted_once
 from truenorth.state.evidence import Evidence, contradiction, note, notes
 from truenorth.state.limits import limit
 
@@ -43,7 +44,7 @@ def judge_transfer(
         )
     evidence += [note("transfer.open", states=words) for words in transfer.open]
     needs = "match_velocity" if transfer.matching == "attitude" else "manoeuvre"
-    return judged(answer, evidence, heading_limit, waiting=False, remedies=(needs,))
+    return judged(answer, counted_once(evidence), heading_limit, waiting=False, remedies=(needs,))
 
 
 def _rejected(transfer: Transfer) -> list[Evidence]:

@@ -17,6 +17,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
+from truenorth.estimate.rivals import counted_once, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import second_look, slow_errors
@@ -27,7 +28,7 @@ from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
-from truenorth.quality.record_evidence import sampling_evidence
+from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import ImuRecord, Late, Trajectory
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
@@ -126,7 +127,7 @@ def navigate(
     record = _from_start(record if calibration is None else calibration.apply(record), begin)
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
-    noise = spec.with_random_walks(record.interval)
+    noise = spec.seen_in(record)
     said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop("velocity", None) if damping is not None else None
@@ -147,8 +148,8 @@ def navigate(
     track = plan.run(aiding, smooth=smooth)
     evidence = [*_seen(plan, track, given, found), *why, *said]
     if check_clocks and aiding:
-        tell("checking clocks and mountings")
-        evidence += second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, _looked_at(given))
+        tell("checking biases, clocks and mountings")
+        evidence += _rivals(plan, track, given, noise, smooth)
     result = Navigation(
         status="navigated",
         evidence=(),
@@ -162,7 +163,7 @@ def navigate(
         late=late,
     )
     if damping is None:
-        return judged_navigation(result, evidence)
+        return judged_navigation(result, counted_once(evidence))
     from truenorth.damping.navigation import damp_navigation
 
     tell(f"damping: {damping.method}")
@@ -195,7 +196,7 @@ class _Plan:
 
 def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
     """What the measurements and the log show; `found`: the odometer sits as an alignment on the move has found."""
-    evidence = innovation_evidence(track.residuals, last_sigma(track)) + sampling_evidence(plan.record, turns=True)
+    evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = _record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
     if found:
@@ -203,6 +204,19 @@ def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> l
     if "baro" in given and plan.altitude != "baro":
         evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
     return [*evidence, *slow_errors(track, _looked_at(given)["gnss"])]
+
+
+def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
+    """What other biases, clocks and mountings explain better."""
+    aiding = plan.sources(given)
+    found = wandering_evidence(
+        lambda model: replace(plan, model=model).run(aiding, smooth=smooth),
+        track,
+        plan.model,
+        spec,
+        plan.record.duration,
+    )
+    return found + second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, _looked_at(given))
 
 
 def _by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:

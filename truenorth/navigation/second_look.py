@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Role
-from truenorth.core.attitude import rotation_vector_from_dcm
-from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.estimate.rivals import moved
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.mounting import FALSE_REJECTION, Mounting
 from truenorth.state.track import Track
@@ -103,22 +102,6 @@ def second_look(
     whole = moved(first, track)
     share = Effect(*(size / math.sqrt(len(against)) for _, size in whole.items()))
     return [replace(item, kind="known", effect=share) for item in against] + found
-
-
-def moved(first: Track, other: Track) -> Effect:
-    """By how much two tracks differ: the RMS, in sigmas of the first, of the later half, as sizes at the last epoch."""
-    half = slice(len(first.time) // 2, None)
-    turn = np.abs(rotation_vector_from_dcm(first.C_nb[half] @ np.swapaxes(other.C_nb[half], 1, 2)))
-    lat, _, alt = first.position[half].T
-    dlat, dlon, dalt = (first.position[half] - other.position[half]).T
-    R_M, R_N = radii(lat)
-    dp = np.stack([dlon * (R_N + alt) * np.cos(lat), dlat * (R_M + alt), dalt], axis=1)
-    off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[half]), np.abs(dp)], axis=1)
-    sigma = first.sigma[half, :9]
-    known = sigma > 0.0
-    ratio = np.sqrt(np.mean(np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2, axis=0))
-    size = ratio * first.sigma[-1, :9]
-    return Effect(float(size[2]), float(size[:2].max()), float(size[3:6].max()), float(size[6:9].max()))
 
 
 def _contradicted(track: Track) -> float:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.quality.density import burst_evidence
 from truenorth.quality.plausibility import check_plausibility
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
 from truenorth.quality.tilt import check_tilt
 from truenorth.records import ImuRecord
-from truenorth.state.evidence import Evidence, contradiction, note
+from truenorth.state.evidence import Effect, Evidence, contradiction, note
 
 Array = NDArray[np.float64]
 
@@ -45,6 +47,11 @@ def record_evidence(
     return found if tilt is None else found + tilt.evidence()
 
 
+def moving_evidence(record: ImuRecord) -> list[Evidence]:
+    """Evidence of a record on the move."""
+    return sampling_evidence(record, turns=True) + burst_evidence(record)
+
+
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     """Evidence of faults of clock, logging and range; `turns`: whether the base turns."""
     _, findings = check_sampling(record)
@@ -52,9 +59,31 @@ def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     for finding in findings:
         if finding.code in ALWAYS or (turns and finding.code in TURNING and finding.severity != "note"):
             found.append(_error(finding))
+        elif finding.code == "jitter":
+            found.append(_jitter(record, finding))
         elif finding.severity == "warning":
             found.append(note(f"record.{finding.code}", text=finding.message))
     return found
+
+
+def _jitter(record: ImuRecord, finding: Finding) -> Evidence:
+    """The turn, and the gain of velocity, within the time by which the stamp of the answer's epoch may be off.
+
+    Of increments gravity counts in the gain: it is taken off over the time that the stamps say.
+    """
+    increments = record.kind == "increments"
+    unit = record.interval if increments else 1.0
+    w, a = (
+        _size(record.gyro) / unit,
+        _size(record.accel if increments else record.accel - record.accel.mean(axis=0)) / unit,
+    )
+    effect = Effect(heading=w * record.jitter, level=w * record.jitter, velocity=a * record.jitter)
+    return Evidence("record.jitter", {"text": finding.message}, "known", effect)
+
+
+def _size(values: Array) -> float:
+    """RMS of the norm of vectors (N, 3)."""
+    return math.sqrt(float(np.mean(np.sum(values**2, axis=1))))
 
 
 def _error(finding: Finding) -> Evidence:

@@ -52,6 +52,7 @@ class Sampling:
     gap_lengths: Array  # (g,) s
     repeated_rows: int  # rows equal to the row before in all six channels
     longest_runs: NDArray[np.intp]  # (6,): longest run of one value in each channel, rows
+    longest_at: NDArray[np.intp]  # (6,): its first row
     saturated_rows: NDArray[np.intp]  # (6,): rows at a clipped extreme of each channel; 0 where nothing is clipped
 
 
@@ -68,10 +69,10 @@ def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
     data = np.ascontiguousarray(np.hstack([record.gyro, record.accel]).T)
     same = data[:, 1:] == data[:, :-1]
     repeated = _repeated(record, same, findings)
-    runs = _frozen(record, data, same, findings)
+    runs, at = _frozen(record, data, same, findings)
     saturated = _saturated(record, data, findings)
     gaps = record.gaps
-    sampling = Sampling(jitter_rms, jitter_max, record.time[gaps], record.steps[gaps], repeated, runs, saturated)
+    sampling = Sampling(jitter_rms, jitter_max, record.time[gaps], record.steps[gaps], repeated, runs, at, saturated)
     return sampling, findings
 
 
@@ -133,17 +134,19 @@ def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding
     return repeated
 
 
-def _frozen(record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: list[Finding]) -> NDArray[np.intp]:
-    """Longest run of each channel; a finding where chance does not explain it."""
+def _frozen(
+    record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: list[Finding]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Longest run of each channel and where it begins; a finding where chance does not explain it."""
     chance = np.minimum(_chance_of_repeat(same), 0.98)
     by_chance = np.log(len(record)) / -np.log(np.maximum(chance, 1e-3))
-    runs = np.empty(6, dtype=np.intp)
+    runs, at = np.empty(6, dtype=np.intp), np.empty(6, dtype=np.intp)
     for channel, name in enumerate(COLUMNS[record.kind]):
         changes = np.concatenate([[0], np.flatnonzero(~same[channel]) + 1, [len(record)]])
         lengths = np.diff(changes)
         longest = int(np.argmax(lengths))
         runs[channel] = lengths[longest]
-        first = int(changes[longest])
+        first = at[channel] = int(changes[longest])
         limit = max(10.0, FROZEN_TIME / record.interval, FROZEN_FACTOR * by_chance[channel])
         if runs[channel] == len(record):
             dead = _is_dead(data, channel)
@@ -165,7 +168,7 @@ def _frozen(record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: l
                     "or the log was stuck; leave this stretch out",
                 )
             )
-    return runs
+    return runs, at
 
 
 def _is_dead(data: Array, channel: int) -> bool:

@@ -4,14 +4,15 @@ Carried by the right gyros into axes that do not turn, the specific force of a b
 arm's ``(w' x + w x w x) r``, and the base's own accelerations, whose mean is zero. Wrong gyros leave gravity swinging in these
 axes. Each reading of the columns (48 signed orders, times shifts of the gyros against the accelerometers) is tried: over short
 pieces, so that biases and the earth do not matter, a constant and a slope are taken off, then the best arm for all, and what is
-left is compared.
+left is compared. Where the columns as given stand, a small delay of all gyros and a scale factor of each are fitted: of a scale
+error ``k`` the tilt swings by ``k`` times the sway. A base that sways with one period hides it in the arm, ``k g / w^2``.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import permutations, product
 
 import numpy as np
@@ -36,6 +37,8 @@ PLAIN = (
 CLEARER = 3.0  # times smaller squares that another reading must leave
 EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may leave at most
 SURE = 10.0  # sigmas of a small delay: of few pieces, in each of which the base's own motion is alike
+CLEAR = 7.0  # sigmas of a scale factor: of Student's t with six degrees of freedom one in two thousand is beyond
+LEAST_SCALE = 0.005  # no gyro of a specification has a larger error
 LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
 IDENTITY = "+x +y +z"
 
@@ -58,6 +61,10 @@ class Tilt:
         By which the gyros are late with the columns as given, and its one-sigma.
     tilt : float, rad
         RMS of the tilt that such a delay makes.
+    scale, scale_sigma : (3,) arrays
+        Errors of the gyros' scale factors, and their one-sigmas.
+    turned : (3,) array, rad
+        RMS of the turns about each axis in a piece.
     """
 
     given: float
@@ -67,6 +74,9 @@ class Tilt:
     delay: float
     delay_sigma: float
     tilt: float
+    scale: Array = field(default_factory=lambda: np.zeros(3))
+    scale_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
+    turned: Array = field(default_factory=lambda: np.zeros(3))
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -82,9 +92,15 @@ class Tilt:
         late = "tilt.gyros_late" if self.delay > 0.0 else "tilt.gyros_early"
         if explains:
             return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
-        if abs(self.delay) < max(LEAST_DELAY, SURE * self.delay_sigma):
-            return []
-        return [Evidence(late, figures, "bounded", Effect(level=self.tilt), ("common_clock",))]
+        found = []
+        if abs(self.delay) >= max(LEAST_DELAY, SURE * self.delay_sigma):
+            found.append(Evidence(late, figures, "bounded", Effect(level=self.tilt), ("common_clock",)))
+        off = np.abs(self.scale)
+        for i in np.flatnonzero(off >= np.maximum(LEAST_SCALE, CLEAR * self.scale_sigma)):
+            size = float(off[i] * self.turned[i])
+            figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
+            found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
+        return found
 
 
 def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) -> Tilt | None:
@@ -106,7 +122,8 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     theta, force, interval, middle = cells
     bench = _Bench(force, interval, None if C_sb is None else C_sb(middle.ravel()).reshape(*middle.shape, 3, 3))
     turned = np.cumsum(theta - theta.mean(axis=1, keepdims=True), axis=1)
-    if math.sqrt(float(np.mean(np.sum(turned**2, axis=2)))) < LEAST_TURN:
+    turns = np.sqrt(np.mean(turned**2, axis=(0, 1)))
+    if float(np.linalg.norm(turns)) < LEAST_TURN:
         return None
     unturned, given = bench.left(np.zeros_like(theta)), bench.left(theta)
     best, axes, delay = given, IDENTITY, 0.0
@@ -122,9 +139,13 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     if squares[shift] < min(0.98 * best**2, 0.5 * given**2):
         delay, small = _lowest(squares, shift)
         return Tilt(given, unturned, math.sqrt(small), IDENTITY, delay, 0.0, abs(delay) * bench.rate(theta))
-    # Gyros that leave more than if they were at rest turn something else than gravity: no small delay is what is wrong.
-    late, sigma = bench.late(theta) if given < unturned else (0.0, 0.0)
-    return Tilt(given, unturned, best, axes, late, sigma, abs(late) * bench.rate(theta))
+    if given >= unturned:
+        # Gyros that leave more than if they were at rest turn something else than gravity: no small error is what is wrong.
+        return Tilt(given, unturned, best, axes, 0.0, 0.0, 0.0)
+    little, sigma = bench.small(theta)
+    late = float(little[0])
+    tilt = abs(late) * bench.rate(theta)
+    return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, little[1:], sigma[1:], turns)
 
 
 READINGS = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
@@ -176,20 +197,27 @@ class _Bench:
         flat, _ = self._carried(theta)
         return math.sqrt(_left(flat[:, 0], flat[:, 1:]) / len(flat))
 
-    def late(self, theta: Array) -> tuple[float, float]:
-        """A small delay of the gyros, and its one-sigma from the scatter of pieces, the base's own motion in it."""
+    def small(self, theta: Array) -> tuple[Array, Array]:
+        """(4,) a small delay of the gyros, s, and errors of their scale factors, with one-sigmas from the scatter of pieces.
+
+        The base's own motion is in that scatter.
+        """
         flat, C = self._carried(theta)
         up = (C @ self.force[..., None])[..., 0]
         rate = (C @ (theta / self.interval)[..., None])[..., 0]
-        lag = self._freed(np.cross(rate - rate.mean(axis=1, keepdims=True), up)).ravel()
-        A = np.column_stack([lag, flat[:, 1:]])
+        turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
+        angle = np.cumsum(turns, axis=1) - 0.5 * turns
+        columns = [np.cross(rate - rate.mean(axis=1, keepdims=True), up)]
+        columns += [np.cross(angle[..., i], up) for i in range(3)]
+        A = np.column_stack([*(self._freed(column).ravel() for column in columns), flat[:, 1:]])
         scale = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
         A = A / scale
         inverse = np.linalg.pinv(A.T @ A, rcond=1e-9)
         x = inverse @ (A.T @ flat[:, 0])
-        scores = np.einsum("pnk,pn->pk", A.reshape(len(theta), -1, 4), (flat[:, 0] - A @ x).reshape(len(theta), -1))
-        covariance = inverse @ (scores.T @ scores) @ inverse * len(scores) / max(1, len(scores) - 2)
-        return -float(x[0] / scale[0]), float(math.sqrt(max(covariance[0, 0], 0.0)) / scale[0])
+        pieces = len(theta)
+        scores = np.einsum("pnk,pn->pk", A.reshape(pieces, -1, A.shape[1]), (flat[:, 0] - A @ x).reshape(pieces, -1))
+        covariance = inverse @ (scores.T @ scores) @ inverse * pieces / max(1, pieces - 2)
+        return -x[:4] / scale[:4], np.sqrt(np.maximum(np.diag(covariance)[:4], 0.0)) / scale[:4]
 
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""

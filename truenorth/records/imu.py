@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -74,6 +75,24 @@ class ImuRecord(Record):
                     f"{self.source}: row {row + 1}, column {names[i]}: {values[row, i]:g}; no such sensor measures more than "
                     f"{limit * scale:g}: check the units, or repair the row"
                 )
+
+    @property
+    def jitter(self) -> float:
+        """RMS scatter of the time stamps about an even clock, s; gaps left out."""
+        steps = np.delete(self.steps, self.gaps) - self.interval
+        return math.sqrt(float(np.mean(steps**2)) / 2.0)
+
+    @property
+    def stamp_walks(self) -> tuple[float, float]:
+        """Random walks of angle and velocity, rad/sqrt(s) and m/s/sqrt(s), that scattered stamps of rates make.
+
+        Of the sum of ``x_k (d_k - d_(k-1))``, whose ``d`` are errors of stamps, ``d_k (x_k - x_(k+1))`` are left.
+        """
+        if self.kind == "increments":
+            return 0.0, 0.0
+        density = self.jitter / math.sqrt(self.interval)
+        gyro, accel = (float(np.sqrt(np.mean(np.diff(x, axis=0) ** 2, axis=0)).max()) for x in (self.gyro, self.accel))
+        return density * gyro, density * accel
 
     @classmethod
     def of(cls, table: Any) -> ImuRecord:

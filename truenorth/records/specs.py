@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
+
+if TYPE_CHECKING:
+    from truenorth.records.imu import ImuRecord
 
 Places = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
@@ -153,6 +156,16 @@ class ImuSpec:
             accel_random_walk=math.hypot(self.accel_random_walk, self.accel_sample_noise * root),
             gyro_sample_noise=0.0,
             accel_sample_noise=0.0,
+        )
+
+    def seen_in(self, record: ImuRecord) -> ImuSpec:
+        """What a filter sees in a record: the noise of samples, and what its scattered time stamps make of its motion."""
+        spec = self.with_random_walks(record.interval)
+        gyro, accel = record.stamp_walks
+        return replace(
+            spec,
+            gyro_random_walk=math.hypot(spec.gyro_random_walk, gyro),
+            accel_random_walk=math.hypot(spec.accel_random_walk, accel),
         )
 
     def to_mapping(self) -> dict[str, Any]:

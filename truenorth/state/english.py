@@ -20,6 +20,9 @@ TITLES = {
     "master": "The master contradicts itself",
     "gnss": "GNSS positions and velocities contradict each other",
     "table": "The table was touched",
+    "noise": "The sensors are noisy for a while",
+    "rival": "The sensors are not as their specification says",
+    "specification": "The specification is not that of these sensors",
     "innovations": "The measurements contradict the track",
     "second_look": "The measurements contradict how their sensors sit",
     "transfer": "Master and slave contradict each other",
@@ -107,6 +110,9 @@ SENTENCES = {
     ),
     "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
     "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
+    "tilt.scale": (
+        "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers"
+    ),
     "bias.gyro": (
         "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu}) allows {allowed:deg/h|} deg/h"
     ),
@@ -121,6 +127,31 @@ SENTENCES = {
         "the {axis} accelerometer's bias changes by about {size:ug|} ug near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
         "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "rival.gyro_wanders": (
+        "gyro biases that change by some {size:deg/h|} deg/h over the log fit the measurements better than those of the "
+        "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
+        "by {level:angle}"
+    ),
+    "rival.accel_wanders": (
+        "accelerometer biases that change by some {size:ug|} ug over the log fit the measurements better than those of the "
+        "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
+        "by {level:angle}"
+    ),
+    "noise.gyro_stretch": (
+        "the gyros are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
+    ),
+    "noise.accel_stretch": (
+        "the accelerometers are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
+    ),
+    "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
+    "specification.gyro_noise": (
+        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu}) says {said:deg/sqrt(h)|}: "
+        "it is another sensor's, and so may be what it says of biases"
+    ),
+    "specification.accel_noise": (
+        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu}) says "
+        "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
+    ),
     "bias.vertical_steps": (
         "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
         "{heading:angle}"
@@ -133,6 +164,10 @@ SENTENCES = {
     "encoder.drifts": (
         "with these angles of the indexer the base turns by {net:deg|.0f} deg from the first third of the log to the last "
         "({rate:deg/s|.2g} deg/s RMS): no base that stays does"
+    ),
+    "encoder.zero": (
+        "the zero of the inner axis' angle is off by {off:deg|+.2f} ± {sigma:deg|.2f} deg: the base would wobble as the outer axis "
+        "turns"
     ),
     "gnss.turned": (
         "the GNSS velocities are turned by {angle:deg|+.2f} ± {sigma:deg|.2f} deg against the changes of its positions"

@@ -31,6 +31,16 @@ LIMITS: dict[str, Limit] = {
     "drift": Limit(
         25.0, "1", "likelihood ratio, chi-square with 1 degree of freedom, 12 signatures: 1e-5 false alarms"
     ),
+    "hint": Limit(
+        12.0,
+        "1",
+        "the same, of which chance gives as much in 5e-4 of signatures: its effect is added to sigma, no more",
+    ),
+    "rival": Limit(
+        10.0,
+        "1",
+        "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 148, by Markov's inequality",
+    ),
     # ---- measurements of aiding sensors and masters
     "rejected": Limit(
         0.2, "1", "of a sensor's measurements; a sound one loses 1e-4 to the gate, a poor road some per cent"

@@ -1,0 +1,200 @@
+"""Do the sensors stay as the specification says? The same log once more with biases that wander, and which of the two it fits.
+
+A bias that steps or drifts, a scale factor, a delay between sensors or a velocity that is slowly led astray: each looks to the
+filter like biases that change faster than the specification allows. So it runs again with rivals, whose biases walk over the
+log by as much as some of their own sigmas. Twice the logarithm of the likelihood ratio of a rival says whether the log fits it
+better: by chance it exceeds c in less than exp(-c / 2) of sound logs, whatever the rival is (Markov's inequality). What the
+answer moves by, and what the rival is less sure of, is the effect.
+
+Source: R. Mehra and J. Peschon, "An innovations approach to fault detection and diagnosis in dynamic systems", Automatica 7 (1971).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.core.earth import radii
+from truenorth.core.errors import DataError
+from truenorth.quality.innovations import whiteness
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import NO_EFFECT, Effect, Evidence, Figure
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals
+
+Array = NDArray[np.float64]
+
+# By how many of its sigmas a bias walks over the log. Up the ladder as long as the log does not rule a walk out: larger ones
+# are ruled out more.
+LADDERS = {"gyro": (1.0, 5.0, 30.0, 200.0), "accel": (0.3, 1.5, 8.0)}
+RULED_OUT = -3.0  # twice the logarithm of a likelihood ratio
+FEWEST = 20  # measurements of each sort that a comparison needs
+
+
+class Along(Protocol):
+    """What of a track is compared."""
+
+    @property
+    def C_nb(self) -> Array:
+        """(K, 3, 3) attitudes."""
+
+    @property
+    def v_n(self) -> Array:
+        """(K, 3) m/s."""
+
+    @property
+    def position(self) -> Array:
+        """(K, 3) latitude, longitude (rad), height (m)."""
+
+    @property
+    def sigma(self) -> Array:
+        """(K, n) one-sigma of the errors, attitude, velocity and position first."""
+
+    @property
+    def residuals(self) -> tuple[Residuals, ...]:
+        """Of each source."""
+
+
+class Walking(Protocol):
+    """A model whose biases walk."""
+
+    @property
+    def gyro_rate_walk(self) -> float:
+        """rad/s/sqrt(s)."""
+
+    @property
+    def accel_rate_walk(self) -> float:
+        """m/s^2/sqrt(s)."""
+
+
+M = TypeVar("M", bound=Walking)
+
+
+def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: ImuSpec, span: float) -> list[Evidence]:
+    """Whether biases that wander explain the measurements better, and what that does to the answer.
+
+    Parameters
+    ----------
+    run : callable
+        The same log with another model.
+    first : track
+        Of the model itself.
+    model : InsModel or TransferModel
+    spec : ImuSpec
+        Its biases are the measure of the walks.
+    span : float, s
+        Length of the log.
+
+    Returns
+    -------
+    list of Evidence
+        None, or one: of the rival that fits best, with the largest effect of those that fit better than chance explains.
+    """
+    if not any(int(np.sum(r.rows > 0)) >= FEWEST for r in first.residuals):
+        return []
+    found: list[tuple[float, str, float, Effect]] = []
+    for sensor, ladder in LADDERS.items():
+        sigma, name = math.sqrt(float(spec.bias_variance[0 if sensor == "gyro" else 3])), f"{sensor}_rate_walk"
+        for size in ladder:
+            walk = math.hypot(getattr(model, name), size * sigma / math.sqrt(span))
+            try:
+                rival = run(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
+            except DataError:  # the filter broke down: no explanation
+                break
+            ratio = _ratio(first.residuals, rival.residuals)
+            if ratio > limit("rival"):
+                found.append((ratio, sensor, size * sigma, _effect(first, rival)))
+            elif ratio < RULED_OUT:
+                break
+    if not found:
+        return []
+    ratio, sensor, size, _ = max(found, key=lambda item: item[0])
+    effect = NO_EFFECT
+    for *_, other in found:
+        effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(effect.items(), other.items(), strict=True)))
+    figures: dict[str, Figure] = {
+        "size": size,
+        "ratio": ratio,
+        "chance": limit("rival"),
+        "heading": effect.heading,
+        "level": effect.level,
+    }
+    return [Evidence(f"rival.{sensor}_wanders", figures, "known", effect, ("specification",))]
+
+
+def counted_once(evidence: Sequence[Evidence]) -> list[Evidence]:
+    """The same evidence, rivals with what coloured innovations do not add to sigma already: both see the same.
+
+    Where the model is contradicted, rivals of it say nothing more and are left out.
+    """
+    if any(item.kind == "unknown" for item in evidence):
+        return [item for item in evidence if not item.key.startswith("rival.")]
+    added = NO_EFFECT
+    for item in evidence:
+        if item.key == "innovations.coloured":
+            added = added.joined(item.effect)
+
+    def rest(effect: Effect) -> Effect:
+        pairs = zip(effect.items(), added.items(), strict=True)
+        return Effect(*(math.sqrt(max(e**2 - a**2, 0.0)) for (_, e), (_, a) in pairs))
+
+    return [replace(e, effect=rest(e.effect)) if e.key.startswith("rival.") else e for e in evidence]
+
+
+def misfit(residuals: Iterable[Residuals]) -> float:
+    """Minus twice the log-likelihood of measurements, but for a constant."""
+    return sum(float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma))) for r in residuals)
+
+
+def _ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> float:
+    """Twice the logarithm of the likelihood ratio, of each source as far as its measurements are independent.
+
+    Measurements that both take count: outliers choose no model. A source whose innovations are ``f`` times as large as they
+    should be, or hang together so that a mean errs by ``f`` times as much, carries a share ``1 / f^2`` of its information.
+    """
+    total = 0.0
+    others = {r.name: r for r in rival}
+    for r in first:
+        other = others[r.name]
+        if len(other.time) != len(r.time):
+            continue
+        both = r.used & other.used & (r.rows > 0)
+        if not both.any():
+            continue
+        narrower = 2.0 * (np.nansum(np.log(r.sigma[both])) - np.nansum(np.log(other.sigma[both])))
+        e = r.innovation[both] / r.sigma[both]
+        share = whiteness(e[:, np.isfinite(e).all(axis=0)]).growth ** 2
+        total += float(r.nis[both].sum() - other.nis[both].sum() + narrower) / share
+    return total
+
+
+def moved(first: Along, other: Along) -> Effect:
+    """By how much two tracks differ: the RMS, in sigmas of the first, of the later half, as sizes at the last epoch."""
+    half = slice(len(first.C_nb) // 2, None)
+    turn = np.abs(rotation_vector_from_dcm(first.C_nb[half] @ np.swapaxes(other.C_nb[half], 1, 2)))
+    lat, _, alt = first.position[half].T
+    dlat, dlon, dalt = (first.position[half] - other.position[half]).T
+    R_M, R_N = radii(lat)
+    dp = np.stack([dlon * (R_N + alt) * np.cos(lat), dlat * (R_M + alt), dalt], axis=1)
+    off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[half]), np.abs(dp)], axis=1)
+    sigma = first.sigma[half, :9]
+    known = sigma > 0.0
+    ratio = np.sqrt(np.mean(np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2, axis=0))
+    return _of_states(ratio * first.sigma[-1, :9])
+
+
+def _effect(first: Along, rival: Along) -> Effect:
+    """What the answer moves by, and by what the rival is less sure."""
+    more = np.sqrt(np.maximum(rival.sigma[-1, :9] ** 2 - first.sigma[-1, :9] ** 2, 0.0))
+    return moved(first, rival).joined(_of_states(more))
+
+
+def _of_states(size: Array) -> Effect:
+    """Sizes (9,) of attitude, velocity and position, the larger of each."""
+    return Effect(float(size[2]), float(size[:2].max()), float(size[3:6].max()), float(size[6:9].max()))

@@ -1,0 +1,123 @@
+"""How noisy are the sensors, stretch by stretch? White noise told from the base's own motion, while it sways or turns.
+
+Sixth differences of means over ``m`` rows leave of a smooth motion of period ``T`` only ``(2 pi m dt / T)^6``, of white noise of
+density ``N`` a variance of ``924 N^2 / (m dt)``. A vibration is larger at one ``m`` than at another, white noise alike at
+all: only stretches and channels that look white over all of them are given a figure.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
+from truenorth.quality.regimes import MotionSummary
+from truenorth.quality.signals import white_noise
+from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Effect, Evidence, Figure
+
+Array = NDArray[np.float64]
+
+STRETCH = 8.0  # s
+ROWS = (1, 2, 4)  # over which means are taken
+ORDER, GAIN = 6, 924.0  # of the differences, and their squares' sum
+FEWEST = 30  # differences in a stretch
+ALIKE = 1.5  # largest over smallest of the densities that pass for one
+BURST = 3.0  # times the usual density: a stretch of its own
+LOUD = 4.0  # times the specification, beyond which it is another sensor's
+
+
+def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
+    """Edges (S+1,) of stretches, s, and the density (S, 6) of white noise in them, rad/sqrt(s) and m/s/sqrt(s).
+
+    NaN where the channel does not look white; no stretch at all where rows are too few or missing.
+    """
+    dt = record.interval
+    rows = round(STRETCH / dt)
+    count = len(record) // max(rows, 1)
+    if rows < (FEWEST + ORDER) * ROWS[-1] or count < 3 or record.gaps.size:
+        return np.zeros(0), np.zeros((0, 6))
+    data = np.hstack([record.gyro, record.accel])[: count * rows].reshape(count, rows, 6)
+    if record.kind == "increments":
+        data = data / dt
+    found = []
+    for m in ROWS:
+        cells = data[:, : rows // m * m].reshape(count, rows // m, m, 6).mean(axis=2)
+        rough = np.diff(cells, n=ORDER, axis=1)
+        found.append(np.sqrt(np.mean(rough**2, axis=1) * m * dt / GAIN))
+    density = np.array(found)  # (len(ROWS), S, 6)
+    low, high = density.min(axis=0), density.max(axis=0)
+    start = float(record.time[0]) - dt
+    edges = np.append(start, record.time[rows - 1 : count * rows : rows])
+    return edges, np.where(
+        (low > 0.0) & (high < ALIKE * low), np.exp(np.log(np.maximum(density, 1e-300)).mean(axis=0)), np.nan
+    )
+
+
+def bursts(record: ImuRecord) -> tuple[Array, Array]:
+    """Edges (S+1,) of stretches, s, and by what density (S, 6) they exceed the usual one of the log; zero as a rule."""
+    edges, density = noise_densities(record)
+    if not len(density):
+        return edges, density
+    known = np.where(np.isfinite(density), density, np.inf)
+    usual = np.sort(known, axis=0)[: max(1, len(known) // 2)].max(
+        axis=0
+    )  # the median, what is not white on its upper side
+    louder = np.isfinite(known) & (known > BURST * usual)
+    return edges, np.where(
+        louder,
+        np.sqrt(np.maximum(np.where(louder, known, 0.0) ** 2 - np.where(np.isfinite(usual), usual, 0.0) ** 2, 0.0)),
+        0.0,
+    )
+
+
+def burst_evidence(record: ImuRecord) -> list[Evidence]:
+    """Noise for a while, on the move: the random walk that it adds to attitude, or to velocity, where no aid takes it back."""
+    edges, extra = bursts(record)
+    found = []
+    for name, channels in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
+        loud = np.flatnonzero(extra[:, channels].any(axis=1))
+        if loud.size:
+            walked = math.sqrt(float(np.diff(edges)[loud] @ extra[loud, channels].max(axis=1) ** 2))
+            effect = Effect(heading=walked, level=walked) if name == "gyro" else Effect(velocity=walked)
+            figures: dict[str, Figure] = {"begin": float(edges[loud[0]]), "end": float(edges[loud[-1] + 1])}
+            found.append(Evidence(f"noise.{name}_stretch", figures | {"heading": effect.heading}, "known", effect))
+    return found
+
+
+def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSpec, lat: float) -> list[Evidence]:
+    """Whether sensors at rest are noisier than their specification by more than any sensor is: it is not theirs then.
+
+    At rest alone: while the base moves, only what is faster than its motion can be told from it, and there a sound sensor has
+    noise that is none of its random walk (the dither of a ring laser, quantisation).
+
+    Parameters
+    ----------
+    record : ImuRecord
+    motion : MotionSummary
+        Of the same record.
+    spec : ImuSpec
+        With its random walks as a filter takes them.
+    lat : float, rad
+    """
+    if motion.overall != "still":
+        return []
+    noise = white_noise(record)
+    bias = np.sqrt(spec.bias_variance)
+    found = []
+    for name, channels, said in (
+        ("gyro", slice(0, 3), spec.gyro_random_walk),
+        ("accel", slice(3, 6), spec.accel_random_walk),
+    ):
+        loud = float(noise[channels].max())
+        if said > 0.0 and loud > LOUD * said:  # what the specification says of biases is not theirs, either
+            size = loud / said * float(bias[channels.start])
+            effect = Effect(level=size / GRAVITY_EQUATOR)
+            if name == "gyro":
+                effect = Effect(heading=size / max(EARTH_RATE * math.cos(lat), 1e-12))
+            said_of: dict[str, Figure] = {"noise": loud, "said": said, "imu": spec.name}
+            found.append(Evidence(f"specification.{name}_noise", said_of, "bounded", effect, ("specification",)))
+    return found
