@@ -6,8 +6,9 @@ from typer.testing import CliRunner
 
 from tests.runs import few_and_all
 from truenorth.campaign.fault_benches import BENCHES
-from truenorth.campaign.fault_kinds import FAULTS, faults_of
-from truenorth.campaign.faults import SOUND, Trial, run_faults, table
+from truenorth.campaign.fault_limits import UNSEEN
+from truenorth.campaign.fault_pages import keeper, page, read_trials
+from truenorth.campaign.faults import FAULTS, SOUND, Trial, faults_of, run_faults, table
 from truenorth.cli import app
 from truenorth.core.errors import UsageError
 from truenorth.quality.encoder import encoder_evidence
@@ -23,21 +24,8 @@ ONCE_SILENT = {
     "gnss": ("grid north", "clock rate"),
     "transfer": ("accel axes exchanged", "master's V_E and V_N exchanged", "turned master", "clock rate"),
     "navigate": ("grid north", "damaged start", "late GNSS"),
-    "still": ("accel bias step or ramp", "dead sensor"),
+    "still": ("accel bias step", "dead sensor", "clipped gyro"),
 }
-# What a log cannot show, and why; see docs/faults.md.
-CANNOT_BE_SEEN = {
-    ("still", "gyro axes exchanged"),
-    ("still", "gyro sign"),
-    ("still", "accel axes exchanged"),
-    ("still", "accel sign"),
-    ("swaying", "wrong latitude"),
-    ("rotary", "wrong latitude"),
-    ("rotary", "encoder zero"),
-    ("transfer", "gyro axes exchanged"),
-    ("transfer", "gyro sign"),
-}
-MARGINAL = 15.0  # sigmas: steps of a bias, and delays of some tens of milliseconds, just below what innovations show
 
 
 def silent(trials: list[Trial]) -> list[Trial]:
@@ -59,10 +47,8 @@ def test_a_sound_log_is_left_alone(procedure):
 @pytest.mark.slow
 @pytest.mark.parametrize("procedure", BENCHES)
 def test_the_whole_campaign(procedure):
-    """Ten draws of every fault: silent are those alone that a log cannot show, or that are hardly wrong."""
-    found = silent(run_faults([procedure], runs=10, seed=SEED + 1))
-    assert [t for t in found if t.outcome == "crash"] == []
-    assert [t for t in found if (t.procedure, t.fault) not in CANNOT_BE_SEEN and t.worst > MARGINAL] == []
+    """Three draws of every fault: silent are those alone that a log cannot show."""
+    assert silent(run_faults([procedure], runs=3, seed=SEED + 1)) == []
 
 
 @pytest.mark.parametrize("procedure", ["swaying", "rotary"])
@@ -127,6 +113,47 @@ def test_velocities_turned_against_positions(degrees):
         assert abs(found[0].figures["angle"] - angle) < 3.0 * found[0].figures["sigma"] + 1e-3
 
 
+def test_an_inner_angle_whose_zero_is_off_wobbles():
+    """Found to a tenth of a degree; a sound one is left alone."""
+    from dataclasses import replace
+
+    from truenorth.alignment.rotary import _inner, _reading
+    from truenorth.quality.encoder import zero_evidence
+
+    for run in range(3):
+        inputs, _ = BENCHES["rotary"].draw(SEED, run)
+        for off in (0.0, 2.0):
+            angles = inputs["encoder"].angles + np.radians([0.0, off])
+            encoder = replace(inputs["encoder"], angles=angles)
+            reading = _reading(encoder, ("z", "x"), np.eye(2))
+            found = zero_evidence(inputs["record"], reading, _inner(encoder, ("z", "x")))
+            assert bool(found) == (off != 0.0)
+            if found:
+                assert np.degrees(found[0].figures["off"]) == pytest.approx(off, abs=0.3)
+
+
+def test_noise_of_each_stretch_is_told_from_sway():
+    """To a twentieth, though the sway's differences are thousands of times larger; a louder stretch is found where it is."""
+    from dataclasses import replace
+
+    from truenorth.quality.density import bursts, noise_densities
+
+    inputs, _ = BENCHES["swaying"].draw(SEED, 0)
+    record, spec = inputs["record"], inputs["imu"].seen_in(inputs["record"])
+    _, density = noise_densities(record)
+    said = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3)
+    assert np.nanmedian(density, axis=0) == pytest.approx(said, rel=0.05)
+    assert not bursts(record)[1].any()
+    rows = (record.time > 100.0) & (record.time < 130.0)
+    loud = 30.0 * spec.gyro_random_walk * np.sqrt(record.interval)
+    noise = np.random.default_rng(4).standard_normal(record.gyro.shape) * rows[:, None] * loud
+    edges, extra = bursts(replace(record, gyro=record.gyro + noise))
+    found = edges[1:][extra[:, :3].any(axis=1)]
+    assert extra[:, :3].max() == pytest.approx(30.0 * spec.gyro_random_walk, rel=0.2)
+    assert 100.0 <= found.min() <= 116.0
+    assert 130.0 <= found.max() <= 142.0
+
+
 def test_exchanged_velocities_fit_no_turn():
     time = np.arange(0.0, 400.0)
     v_n = np.stack([20 * np.sin(time / 60), 20 * np.cos(time / 60), 0 * time], axis=1)
@@ -155,21 +182,36 @@ def test_every_fault_has_a_procedure_that_meets_it():
     assert met == {fault.name for fault in FAULTS}
 
 
-def test_the_command(tmp_path):
-    arguments = ["faults", "--procedure", "still", "--fault", "none", "--fault", "gyro in deg/s", "--runs", "1"]
-    result = CliRunner().invoke(app, [*arguments, "-o", str(tmp_path)])
+def test_the_command_goes_on_where_it_was(tmp_path):
+    """Trials that a folder holds are not done again, a line that was cut off is, and the page counts them all."""
+    arguments = ["faults", "--procedure", "still", "--fault", "none", "--runs", "1", "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, [*arguments, "--fault", "gyro in another unit"])
     assert result.exit_code == 0, result.output
-    assert (
-        (tmp_path / "faults.csv")
-        .read_text()
-        .splitlines()[0]
-        .startswith("procedure,fault,refused,flagged,harmless,silent")
-    )
-    assert len((tmp_path / "trials.csv").read_text().splitlines()) == 3
+    whole = read_trials(tmp_path / "trials.csv")
+    assert [t.fault for t in whole] == ["none", "gyro in another unit"]
+    lines = (tmp_path / "trials.csv").read_text().splitlines()
+    marked = lines[1].replace("harmless", "refused")
+    (tmp_path / "trials.csv").write_text("\n".join([lines[0], marked, lines[2][:9]]))
+    assert CliRunner().invoke(app, [*arguments, "--fault", "gyro in another unit"]).exit_code == 0
+    again = read_trials(tmp_path / "trials.csv")
+    assert [t.outcome for t in again] == ["refused", whole[1].outcome]
+    assert "| still |" in (tmp_path / "faults.md").read_text()
+    assert (tmp_path / "faults.csv").read_text().startswith("procedure,fault,refused,flagged,harmless,unseen,silent")
+
+
+def test_the_page_compares_with_an_earlier_version(tmp_path):
+    now = [Trial("still", "gyro sign", 1, k, "", outcome, 5.0, "") for k, outcome in enumerate(("flagged", "silent"))]
+    before = [Trial("still", "gyro sign", 1, 0, "", "silent", 9.0, "")]
+    keeper(tmp_path / "trials.csv", before)
+    text = page([*now, Trial("still", SOUND, 1, 0, "", "flagged", 1.0, "why")], read_trials(tmp_path / "trials.csv"))
+    assert "| still |  | 1 |  |  | 1 |  | 1 of 1 |" in text
+    assert "Sound logs: 1, of which 1 were not accepted. still (seed 1, run 0): flagged, why" in text
+    assert "| still | gyro sign | 1 of 2 | 5.0 |" in text
+    assert all(item.why in text for item in UNSEEN)
 
 
 def test_names_that_are_not_known():
-    with pytest.raises(UsageError, match="choose of still, swaying"):
+    with pytest.raises(UsageError, match="choose of still, unspecified"):
         run_faults(["flying"])
     with pytest.raises(UsageError, match="fault 'rust'"):
         run_faults(faults=["rust"])
@@ -177,7 +219,7 @@ def test_names_that_are_not_known():
 
 def test_the_table_counts():
     rows = table(
-        [Trial("still", "x", k, "", outcome, 9.0, "") for k, outcome in enumerate(("silent", "flagged", "silent"))]
+        [Trial("still", "x", 0, k, "", outcome, 9.0, "") for k, outcome in enumerate(("silent", "flagged", "silent"))]
     )
     assert rows == [
         {
@@ -186,6 +228,7 @@ def test_the_table_counts():
             "refused": 0,
             "flagged": 1,
             "harmless": 0,
+            "unseen": 0,
             "silent": 2,
             "crash": 0,
             "worst": 9.0,

@@ -12,12 +12,16 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Gnss, Indexer, Master, Odometer
 from truenorth.alignment import align
+from truenorth.alignment.in_motion import WHEEL as ON_WHEEL
+from truenorth.alignment.in_motion import usual_antenna
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.transfer import DELAY_SIGMA, LEVER_ARM_SIGMA, MOUNTING_SIGMA
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.navigation import navigate
 from truenorth.navigation.result import Navigation
 from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -37,6 +41,7 @@ DRIVE = [
 ]
 SHAKE = [{"kind": "vibration", "sines": [{"frequency": "12 Hz", "acceleration": ["5 mg", "5 mg", "8 mg"]}]}]
 WHEEL = {"rate": "10 Hz", "output": "speed", "noise": "0.02 m/s", "scale_sigma": "1 %", "mounting_sigma": "0.5 deg"}
+STAYING = ("still", "unspecified", "swaying", "rotary")
 RECEIVER = {"rate": "1 Hz", "position_noise": "1 m", "velocity_noise": "0.05 m/s"}
 
 
@@ -47,6 +52,8 @@ class Bench:
     name: str
     scenario: Callable[[np.random.Generator], Mapping[str, Any]]  # draws one
     align: Callable[[Inputs], Alignment | Navigation]  # inputs to an alignment or a navigation
+    sits: Callable[[Inputs], Mounting] | None = None  # what is said of how the aid sits
+    turns: bool = False  # whether the angles of that mounting count
 
     def draw(self, seed: int, run: int) -> tuple[Inputs, Truth]:
         """A sound log of its own motion and errors, and its truth."""
@@ -61,6 +68,13 @@ class Bench:
         inputs |= {key: aid.record for key, aid in _aiding(built, seed, run).items()}
         if self.name == "navigate":
             inputs["start"] = _start(rng, begin, simulated, built)
+        if self.name in STAYING:
+            inputs["attitude"] = lambda time: body.states(np.asarray(time)).C_nb
+        if self.name == "unspecified":
+            del inputs["imu"]
+        if self.sits is not None:
+            inputs["mounting"] = self.sits(inputs)
+            inputs |= {"turned": inputs["mounting"]} if self.turns else {}
         return inputs, lambda time: body.states(np.array(time))
 
 
@@ -166,38 +180,78 @@ def _flight(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _transfer(i: Inputs) -> Alignment:
-    return align(i["record"], imu=i["imu"], aid=[Master(i["master"], matching="velocity")])
+def _unspecified(rng: np.random.Generator) -> dict[str, Any]:
+    """At rest, of an IMU of which nothing is said: its biases over a decade."""
+    bias = math.exp(rng.uniform(math.log(0.02), math.log(0.3)))
+    gyro = {"bias": f"{bias:.4f} deg/h", "random_walk": f"{0.05 * bias:.5f} deg/sqrt(h)"}
+    accel = {"bias": f"{2000.0 * bias:.1f} ug", "random_walk": f"{500.0 * bias:.1f} ug/sqrt(Hz)"}
+    return _still(rng) | {"name": "unspecified", "imu": {"name": "drawn", "gyro": gyro, "accel": accel}}
 
 
+def _at_rest(i: Inputs) -> Alignment:
+    return align(i["record"], i["place"], i.get("imu"))
+
+
+def _turned_about(i: Inputs) -> Alignment:
+    arm = i["mounting"].lever_arm if i["mounting"].lever_arm.any() else None
+    return align(i["record"], i["place"], i["imu"], aid=Indexer(i["encoder"], lever_arm=arm))
+
+
+def _on_wheels(i: Inputs) -> Alignment:
+    return align(i["record"], i["place"], i["imu"], aid=Odometer(i["odometer"], i["mounting"]))
+
+
+def _by_gnss(i: Inputs) -> Alignment:
+    return align(i["record"], i["place"], i["imu"], aid=Gnss(i["gnss"], i["mounting"]))
+
+
+def _onward(i: Inputs) -> Navigation:
+    return navigate(i["record"], i["start"], imu=i["imu"], aid=Gnss(i["gnss"], i["mounting"]))
+
+
+def _velocity(i: Inputs) -> Alignment:
+    return align(i["record"], imu=i["imu"], aid=[Master(i["master"], i["mounting"], matching="velocity")])
+
+
+def _attitude(i: Inputs) -> Alignment:
+    return align(i["record"], imu=i["imu"], aid=[Master(i["master"], i["mounting"], matching="both")])
+
+
+ON_MASTER = Mounting(lever_arm_sigma=LEVER_ARM_SIGMA, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
 BENCHES: dict[str, Bench] = {
     bench.name: bench
     for bench in (
-        Bench("still", _still, lambda i: align(i["record"], i["place"], i["imu"])),
-        Bench("swaying", _swaying, lambda i: align(i["record"], i["place"], i["imu"])),
-        Bench("rotary", _rotary, lambda i: align(i["record"], i["place"], i["imu"], aid=Indexer(i["encoder"]))),
+        Bench("still", _still, _at_rest),
+        Bench("unspecified", _unspecified, _at_rest),
+        Bench("swaying", _swaying, _at_rest),
+        Bench("rotary", _rotary, _turned_about, lambda i: Mounting()),
         Bench(
             "odometer",
             lambda rng: _drive(rng, "navigation") | {"odometer": WHEEL},
-            lambda i: align(i["record"], i["place"], i["imu"], aid=Odometer(i["odometer"])),
+            _on_wheels,
+            lambda i: ON_WHEEL,
+            turns=True,
         ),
         Bench(
             "gnss",
             lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER},
-            lambda i: align(i["record"], i["place"], i["imu"], aid=Gnss(i["gnss"])),
+            _by_gnss,
+            lambda i: usual_antenna(i["gnss"]),
         ),
-        Bench("transfer", _flight, _transfer),
+        Bench("transfer", _flight, _velocity, lambda i: ON_MASTER),
+        Bench("attitude", _flight, _attitude, lambda i: ON_MASTER, turns=True),
         Bench(
             "navigate",
             lambda rng: _drive(rng, "tactical") | {"gnss": RECEIVER},
-            lambda i: navigate(i["record"], i["start"], imu=i["imu"], aid=Gnss(i["gnss"])),
+            _onward,
+            lambda i: Mounting(),
         ),
     )
 }
 
 
-def misses(answer: Alignment | Navigation, truth: Truth) -> dict[str, float]:
-    """Errors of what the answer gives, in its own sigmas."""
+def misses(answer: Alignment | Navigation, truth: Truth) -> dict[str, Array]:
+    """Errors of what the answer gives, in its own sigmas: of each output its components, with their signs."""
     if isinstance(answer, Navigation):
         track = answer.track
         at = truth(float(track.time[-1]))
@@ -205,16 +259,9 @@ def misses(answer: Alignment | Navigation, truth: Truth) -> dict[str, float]:
         lat, lon, alt = track.position[-1]
         east = (lon - float(at.lon) + math.pi) % (2.0 * math.pi) - math.pi
         dp = [east * METRES_PER_RADIAN * math.cos(lat), (lat - float(at.lat)) * METRES_PER_RADIAN, alt - float(at.alt)]
-        off = np.abs(np.concatenate([phi, track.v_n[-1] - at.v_n, dp])) / np.maximum(track.sigma[-1, :9], 1e-12)
+        off = np.concatenate([phi, track.v_n[-1] - at.v_n, dp]) / np.maximum(track.sigma[-1, :9], 1e-12)
         off[[5, 8]] = 0.0 if answer.altitude == "fixed" else off[[5, 8]]
-        return {
-            "level": float(off[:2].max()),
-            "heading": float(off[2]),
-            "velocity": float(off[3:6].max()),
-            "position": float(off[6:].max()),
-        }
+        return {"level": off[:2], "heading": off[2:3], "velocity": off[3:6], "position": off[6:]}
     at = truth(answer.time)
-    phi = np.abs(rotation_vector_from_dcm(answer.C_nb @ at.C_nb.T))
-    off = phi / np.sqrt(np.diag(answer.phi_covariance))
-    found = {"level": float(off[:2].max())}
-    return found | ({"heading": float(off[2])} if answer.heading_known else {})
+    off = -rotation_vector_from_dcm(answer.C_nb @ at.C_nb.T) / np.sqrt(np.diag(answer.phi_covariance))
+    return {"level": off[:2]} | ({"heading": off[2:]} if answer.heading_known else {})

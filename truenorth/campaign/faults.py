@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from itertools import product
 from typing import Any, Literal, NamedTuple
 from zlib import crc32
 
 import numpy as np
 
+from truenorth.campaign.fault import Fault
+from truenorth.campaign.fault_aids import AID_FAULTS
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
-from truenorth.campaign.fault_kinds import FAULTS, Fault, faults_of
+from truenorth.campaign.fault_imu import IMU_FAULTS
+from truenorth.campaign.fault_limits import unseen
 from truenorth.core.errors import TruenorthError, UsageError
 
-Outcome = Literal["refused", "flagged", "harmless", "silent", "crash"]
+Outcome = Literal["refused", "flagged", "harmless", "unseen", "silent", "crash"]
+FAULTS: tuple[Fault, ...] = (*IMU_FAULTS, *AID_FAULTS)
 SOUND = "none"
 HARMLESS = 3.0  # sigmas
+OF_THE_FAULT = (
+    1.0  # sigma, by which a fault moves an answer at least where it is to blame: the rest is the log's own chance
+)
 BY_CHANCE = 4.0  # sigmas: a sound answer is that far off once in 16,000
 GOOD = ("aligned", "level_only", "navigated")
 
@@ -25,10 +34,12 @@ class Trial(NamedTuple):
 
     procedure: str
     fault: str
+    seed: int
     run: int
     size: str  # what was drawn
-    # ``refused``: an error with a message; ``flagged``: no good status, or a warning; ``harmless``: within three sigmas;
-    # ``silent``: a good status, and wrong; ``crash``: anything else
+    # ``refused``: an error with a message; ``flagged``: no good status, or a warning; ``harmless``: within three sigmas, or the
+    # fault has no share in it; ``unseen``: a good status, and wrong, for a reason of :mod:`truenorth.campaign.fault_limits`;
+    # ``silent``: the same without one; ``crash``: anything else
     outcome: Outcome
     worst: float  # the largest error in its sigma, of any output
     reason: str
@@ -40,6 +51,8 @@ def run_faults(
     *,
     runs: int = 3,
     seed: int = 0,
+    done: Sequence[Trial] = (),
+    keep: Callable[[Trial], None] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> list[Trial]:
     """Try faults on procedures, and each procedure without any.
@@ -51,6 +64,10 @@ def run_faults(
     runs : int
         Of each pair, every one with its own motion, errors and size of the fault.
     seed : int
+    done : sequence of Trial
+        Of an earlier call: they are taken as they are.
+    keep : callable, optional
+        Called with each new trial.
     progress : callable, optional
         Called with a word about each pair.
 
@@ -64,64 +81,98 @@ def run_faults(
         for name in names:
             if name not in all_of:
                 raise UsageError(f"{what} {name!r} is not known; choose of {', '.join(all_of)}")
-    return list(_trials(procedures or tuple(BENCHES), faults or known, runs, seed, progress or (lambda word: None)))
+    had = {(t.procedure, t.fault, t.seed, t.run): t for t in done}
+    tell, save = progress or (lambda word: None), keep or (lambda trial: None)
+    result = []
+    for name, run in product(procedures or tuple(BENCHES), range(runs)):
+        draw = None
+        for fault in faults or known:
+            trial = had.get((name, fault, seed, run))
+            if trial is None:
+                draw = draw or _Draw(BENCHES[name], seed, run)
+                tell(f"{name} {run + 1}: {'sound' if fault == SOUND else fault}")
+                trial = draw.trial(fault)
+                if trial is not None:
+                    save(trial)
+            result += [] if trial is None else [trial]
+    return result
 
 
-def _trials(
-    procedures: Sequence[str], faults: Sequence[str], runs: int, seed: int, tell: Callable[[str], None]
-) -> Iterator[Trial]:
-    for name in procedures:
-        bench = BENCHES[name]
-        for run in range(runs):
-            inputs, truth = bench.draw(seed, run)
-            if SOUND in faults:
-                tell(f"{name} {run + 1}: sound")
-                yield _tried(bench, SOUND, run, "", inputs, truth)
-            for fault in faults_of(inputs):
-                if fault.name in faults:
-                    tell(f"{name} {run + 1}: {fault.name}")
-                    yield _spoilt(bench, fault, run, seed, inputs, truth)
+def faults_of(inputs: Mapping[str, Any]) -> list[Fault]:
+    """Those that can happen to these inputs."""
+    return [fault for fault in FAULTS if fault.needs in inputs]
 
 
-def _spoilt(bench: Bench, fault: Fault, run: int, seed: int, inputs: dict[str, Any], truth: Any) -> Trial:
-    rng = np.random.default_rng([seed, run, crc32(fault.name.encode())])
-    try:
-        spoilt, size = fault.apply(inputs, rng)
-    except TruenorthError as error:  # no record can hold it
-        return Trial(bench.name, fault.name, run, "", "refused", math.nan, str(error))
-    return _tried(bench, fault.name, run, size, spoilt, truth)
+class _Draw:
+    """One sound log of a procedure, and what faults make of it."""
+
+    def __init__(self, bench: Bench, seed: int, run: int) -> None:
+        self.bench, self.seed, self.run = bench, seed, run
+        self.inputs, self.truth = bench.draw(seed, run)
+
+    @cached_property
+    def sound(self) -> dict[str, Any]:
+        """Errors of the answer without a fault, in its sigmas; none where it is refused."""
+        try:
+            return misses(self.bench.align(self.inputs), self.truth)
+        except TruenorthError:
+            return {}
+
+    def trial(self, name: str) -> Trial | None:
+        """One fault; None where it cannot happen."""
+        if name == SOUND:
+            return self._tried(SOUND, "", self.inputs)
+        fault = next((fault for fault in faults_of(self.inputs) if fault.name == name), None)
+        if fault is None:
+            return None
+        rng = np.random.default_rng([self.seed, self.run, crc32(f"{self.bench.name} {name}".encode())])
+        try:
+            spoilt, size = fault.apply(self.inputs, rng)
+        except TruenorthError as error:  # no record can hold it
+            return self._ended(name, "", "refused", str(error))
+        return self._tried(name, size, spoilt)
+
+    def _tried(self, fault: str, size: str, inputs: dict[str, Any]) -> Trial:
+        try:
+            answer = self.bench.align(inputs)
+        except TruenorthError as error:
+            return self._ended(fault, size, "refused", str(error))
+        except Exception as error:
+            return self._ended(fault, size, "crash", f"{type(error).__name__}: {error}")
+        off = misses(answer, self.truth)
+        worst = max(float(np.abs(x).max()) for x in off.values())
+        warned = next((item.key for item in answer.evidence if item.urgent), None)
+        reason = answer.reasons[0] if answer.reasons else ""
+        if answer.status not in GOOD:
+            return self._ended(fault, size, "flagged", reason, worst)
+        if fault == SOUND:
+            return self._ended(fault, size, "harmless" if worst <= BY_CHANCE else "silent", reason, worst)
+        if warned is not None:
+            return self._ended(fault, size, "flagged", warned, worst)
+        if not any(self._to_blame(name, x) for name, x in off.items()):
+            return self._ended(fault, size, "harmless", reason, worst)
+        known = unseen(self.bench.name, fault, size)
+        return self._ended(fault, size, "silent" if known is None else "unseen", reason, worst)
+
+    def _to_blame(self, name: str, off: Any) -> bool:
+        """Whether an output is beyond three sigmas, and would not be but for the fault."""
+        moved = np.abs(off - self.sound.get(name, 0.0))
+        return bool(np.any((np.abs(off) > HARMLESS) & (moved > OF_THE_FAULT)))
+
+    def _ended(self, fault: str, size: str, outcome: Outcome, reason: str, worst: float = math.nan) -> Trial:
+        return Trial(self.bench.name, fault, self.seed, self.run, size, outcome, worst, reason)
 
 
-def _tried(bench: Bench, fault: str, run: int, size: str, inputs: dict[str, Any], truth: Any) -> Trial:
-    try:
-        answer = bench.align(inputs)
-    except TruenorthError as error:
-        return Trial(bench.name, fault, run, size, "refused", math.nan, str(error))
-    except Exception as error:
-        return Trial(bench.name, fault, run, size, "crash", math.nan, f"{type(error).__name__}: {error}")
-    off = misses(answer, truth)
-    worst = max(off.values())
-    reason = answer.reasons[0] if answer.reasons else ""
-    warned = [item for item in answer.evidence if item.urgent]
-    if answer.status not in GOOD or (warned and fault != SOUND):
-        return Trial(
-            bench.name, fault, run, size, "flagged", worst, reason if answer.status not in GOOD else warned[0].key
-        )
-    outcome: Outcome = "harmless" if worst <= (BY_CHANCE if fault == SOUND else HARMLESS) else "silent"
-    return Trial(bench.name, fault, run, size, outcome, worst, f"{reason} {off}")
+OUTCOMES: tuple[Outcome, ...] = ("refused", "flagged", "harmless", "unseen", "silent", "crash")
 
 
-OUTCOMES: tuple[Outcome, ...] = ("refused", "flagged", "harmless", "silent", "crash")
-
-
-def table(trials: Sequence[Trial]) -> list[dict[str, Any]]:
-    """One row a procedure and fault: how many ended how, and the largest error that passed in silence, in sigmas."""
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
+def table(trials: Sequence[Trial], by: tuple[str, ...] = ("procedure", "fault")) -> list[dict[str, Any]]:
+    """One row a procedure and fault (or one of them): how many ended how, and the largest error in silence, in sigmas."""
+    rows: dict[tuple[str, ...], dict[str, Any]] = {}
     for trial in trials:
-        row = rows.setdefault(
-            (trial.procedure, trial.fault),
-            {"procedure": trial.procedure, "fault": trial.fault} | dict.fromkeys(OUTCOMES, 0) | {"worst": 0.0},
-        )
+        key = tuple(str(getattr(trial, name)) for name in by)
+        empty = dict(zip(by, key, strict=True)) | dict.fromkeys(OUTCOMES, 0) | {"worst": 0.0}
+        row = rows.setdefault(key, empty)
         row[trial.outcome] += 1
         if trial.outcome == "silent":
             row["worst"] = max(row["worst"], trial.worst)

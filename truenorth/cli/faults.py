@@ -30,17 +30,24 @@ def faults(
     ] = None,
     runs: Annotated[int, option("Of each procedure with each fault.", min=1, panel="Trials")] = 3,
     seed: Annotated[int, option("Of motions, errors, and sizes of the faults.", min=0, panel="Trials")] = 0,
-    output: Annotated[Path | None, option("Folder for faults.csv and trials.csv.", "-o", "--output")] = None,
+    output: Annotated[
+        Path | None, option("Folder for trials and tables; trials that it holds are not done again.", "-o", "--output")
+    ] = None,
+    before: Annotated[Path | None, option("trials.csv of an earlier version, for a column of faults.md.")] = None,
 ) -> None:
     """Try faults of logs, clocks, places and specifications on every procedure, with drawn sizes."""
     import pandas as pd
     from rich.table import Table
 
+    from truenorth.campaign.fault_pages import keeper, page, read_trials
     from truenorth.campaign.faults import OUTCOMES, run_faults, table
     from truenorth.core.atomic import atomic_path, writable_folder
 
+    folder = None if output is None else writable_folder(output)
+    done = [] if folder is None else read_trials(folder / "trials.csv")
+    keep = None if folder is None else keeper(folder / "trials.csv", done)
     with stages(False) as tell:
-        trials = run_faults(procedure or (), fault or (), runs=runs, seed=seed, progress=tell)
+        trials = run_faults(procedure or (), fault or (), runs=runs, seed=seed, done=done, keep=keep, progress=tell)
     rows = table(trials)
     console = make_console()
     shown = Table(box=None, pad_edge=False)
@@ -50,11 +57,12 @@ def faults(
         worst = f"{row['worst']:.1f}" if row["silent"] else ""
         shown.add_row(row["procedure"], row["fault"], *(str(row[name] or "") for name in OUTCOMES), worst)
     console.print(shown)
-    if output is not None:
-        folder = writable_folder(output)
-        for name, frame in (("faults.csv", pd.DataFrame(rows)), ("trials.csv", pd.DataFrame(trials))):
-            with atomic_path(folder / name) as path:
-                frame.to_csv(path, index=False)
-            console.print(f"wrote {folder / name}", soft_wrap=True)
+    if folder is not None:
+        whole = read_trials(folder / "trials.csv")
+        with atomic_path(folder / "faults.csv") as path:
+            pd.DataFrame(table(whole)).to_csv(path, index=False)
+        with atomic_path(folder / "faults.md") as path:
+            path.write_text(page(whole, [] if before is None else read_trials(before)), encoding="utf-8")
+        console.print(f"wrote trials.csv, faults.csv and faults.md to {folder}", soft_wrap=True)
     if any(row["silent"] or row["crash"] for row in rows):
         raise typer.Exit(1)
