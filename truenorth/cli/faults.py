@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truenorth.cli.console import make_console, stages
+from truenorth.cli.console import make_console, print_written, stages
 from truenorth.cli.options import command, option
 
 # The \b keeps the lines as they are, ready to be copied.
@@ -63,6 +63,6 @@ def faults(
             pd.DataFrame(table(whole)).to_csv(path, index=False)
         with atomic_path(folder / "faults.md") as path:
             path.write_text(page(whole, [] if before is None else read_trials(before)), encoding="utf-8")
-        console.print(f"wrote trials.csv, faults.csv and faults.md to {folder}", soft_wrap=True)
+        print_written(folder / name for name in ("trials.csv", "faults.csv", "faults.md"))
     if any(row["silent"] or row["crash"] for row in rows):
         raise typer.Exit(1)
