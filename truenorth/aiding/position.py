@@ -7,7 +7,7 @@ tau (the measurement shows the antenna as it was tau before its time stamp):
     position   z = dp - tau dv + (C l) x phi - C dl + v dtau - dbias
     velocity   z = dv + u x phi + C (eps x l) - C (w x dl) + a dtau,   u = C (w x l)
 
-Rows are in ENU. A velocity is told in the axes at the true place; those at the computed place are turned against them
+Rows are in ENU. A velocity is measured in the axes at the true place; those at the computed place are turned against them
 by the convergence of the meridians, ``tan L dp_E/R`` about up.
 
 Source: P. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd ed. (2013), sec.

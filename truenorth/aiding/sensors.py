@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 POSITION_SIGMA = np.array([3.0, 3.0, 5.0])  # m, of a fix whose receiver says nothing; times the dilution of precision
 USER_RANGE = 2.0  # m, of one range, where only dilutions of precision are given
 VELOCITY_SIGMA = np.array([0.1, 0.1, 0.2])  # m/s
-ODOMETER_SIGMA = 0.05  # m/s, beside the pulses' size
+ODOMETER_SIGMA = 0.05  # m/s, besides the pulses' size
 LOG_SIGMA = 0.1  # m/s
 BARO_SIGMA, BARO_DRIFT, BARO_TIME = 1.0, 10.0, 3600.0  # m, m, s: noise, weather
 FASTEST = 10.0  # Hz: faster odometers are averaged, since their errors are not new ten times a second
@@ -99,7 +99,7 @@ def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:
     ----------
     mounting : Mounting
         Lever arm: to the wheel, the rear axle where nothing steers it.
-        Its noise is that of the speed beside the size of the pulses.
+        Its noise is that of the speed besides the size of the pulses.
     """
     sigma, slip = ODOMETER_SIGMA if mounting.noise is None else mounting.noise, mounting.slip
     block = max(1, round(record.rate / FASTEST))

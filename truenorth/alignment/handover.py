@@ -1,4 +1,4 @@
-"""What an alignment hands to navigation: how the errors of attitude and of what acts as a bias hang together.
+"""What an alignment hands to navigation: how the errors of attitude and of what acts as a bias are correlated.
 
 Heading error and east gyro bias of an alignment at rest cancel each other, and so do tilt and accelerometer bias: what
 is left of them in navigation is far less than either. The fine filter knows both with their covariance.

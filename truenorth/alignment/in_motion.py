@@ -326,7 +326,7 @@ def _with_floors(gnss: GnssRecord) -> GnssRecord:
 def usual_antenna(gnss: GnssRecord | None) -> Mounting:
     """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes.
 
-    By how much: what the receiver says of a fix; it is right about the size, and silent about how its errors hang together.
+    By how much: what the receiver says of a fix; it is right about the size, and silent about how its errors are correlated.
     """
     told = None if gnss is None or gnss.position_sigma is None else gnss.position_sigma[:, :2]
     told = None if told is None else told[np.isfinite(told)]

@@ -121,7 +121,7 @@ def backtracked(record: ImuRecord, track: Track) -> Array:
 def path_to_the_end(track: Track) -> Array:
     """(K, 3) latitude, longitude (rad) and height (m), led back from the end of a track by its velocity.
 
-    Where the place was unknown at first, the positions told move by what is learnt of it, and the vehicle did not.
+    Where the place was unknown at first, the positions found move by what is learnt of it, and the vehicle did not.
     """
     lat, lon, alt = track.position[-1]
     R_M, R_N = radii(lat)
@@ -133,7 +133,7 @@ def path_to_the_end(track: Track) -> Array:
 
 
 def departures(record: ImuRecord, track: Track) -> Array:
-    """(K, 3) phi of the attitude told at each epoch, against what the end of the track and the gyros say of that epoch, rad."""
+    """(K, 3) phi of the attitude found at each epoch, against what the end of the track and the gyros say of that epoch, rad."""
     rows = np.searchsorted(record.time, track.time - 0.5 * record.interval)
     rows[1:] += 1
     dtheta, dvel = increments(record)

@@ -4,7 +4,7 @@ Each axis by itself. The number of oscillators and their order are chosen by Sch
 take a piece of white noise for an oscillator: the density at zero frequency would be claimed too low. Frequencies and damping are
 searched with the debiased Whittle likelihood: the expected periodogram of a tapered series is computed from the model's
 autocovariance, so that lines narrower than the resolution, and their leakage, are what they are. The best is then
-polished with the exact likelihood, with a smooth trend and the sensors' random walks beside it.
+polished with the exact likelihood, with a smooth trend and the sensors' random walks besides it.
 
 Sources: G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6, 1978; A. M. Sykulski, S. C. Olhede et al., The
 debiased Whittle likelihood, Biometrika 106 (2), 2019.
@@ -24,7 +24,7 @@ from truenorth.models.swaying import MOST_OSCILLATORS
 Array = NDArray[np.float64]
 
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 0.7
-QUIETEST = 1e-7  # m/s: white motion of a base of stone
+QUIETEST = 1e-7  # m/s: white motion of a base that does not move
 PEAK_WIDTH = 4  # bins on either side of a peak that belong to it
 LINE = 1e-8  # damping with which the search for a line begins
 SCORINGS, TRIALS, POLISHES = 25, 6, 12  # iterations at most

@@ -30,7 +30,7 @@ LOWEST_BIN = 3  # slower than this is the trend's
 
 @dataclass(frozen=True)
 class Walks:
-    """Random walks that reach the velocity beside the base's motion: of the accelerometers, and of the gyros through gravity."""
+    """Random walks that reach the velocity besides the base's motion: of the accelerometers, and of the gyros through gravity."""
 
     velocity: float  # m/s/sqrt(s)
     tilt: float  # m/s^2/sqrt(s); random walk of angle times gravity

@@ -1,4 +1,4 @@
-"""What an alignment on the move knows beside attitude: velocity, place, and how the wheel sits."""
+"""What an alignment on the move knows besides attitude: velocity, place, and how the wheel sits."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Moving:
     distance : float, m
         Travelled.
     heading_from : str
-        "the earth's rate" or "motion": what told the heading.
+        "the earth's rate" or "motion": what showed the heading.
     rejected : mapping of sensor to (rejected, all) measurements
     wheel : Wheel or None
     vehicle_heading, vehicle_heading_sigma : float, rad
@@ -140,7 +140,7 @@ def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[
     forward = C_nb @ C_mb[1]
     variance = P[PHI, PHI][2, 2]
     if wheel is not None:
-        # Heading and mounting yaw hang together: the error of the vehicle's heading is phi_U and what is left of the yaw.
+        # Heading and mounting yaw are correlated: the error of the vehicle's heading is phi_U and what is left of the yaw.
         angles = track.layout.slice_of("odometer mounting")
         if angles is not None:
             full = track.P[-1]

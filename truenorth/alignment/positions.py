@@ -77,7 +77,7 @@ def align_positions(
         Specification; its scale factors and misalignments are the prior of the matrices. Inferred from the log without one.
     arm_sigma : float, m
         How far the IMU may sit from where the table's axes meet. At a constant rate its centripetal force is an accelerometer
-        bias to all eyes: ``rate^2 arm``.
+        bias as far as anyone can see: ``rate^2 arm``.
     calibration, heading_limit, progress
         As of :func:`truenorth.align`.
 

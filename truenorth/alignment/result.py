@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Status = Literal["aligned", "level_only", "not_converged", "not_observable", "inconsistent"]
 
 NOT_ESTIMATED = 0.9  # a bias whose sigma stays above this part of its prior has not been estimated
-NEAR_VERTICAL = np.radians(85.0)  # beyond this pitch heading and roll are told only together
+NEAR_VERTICAL = np.radians(85.0)  # beyond this pitch only the combination of heading and roll is known
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class Alignment(Shown):
 
     @cached_property
     def convergence(self) -> tuple[Array, Array]:
-        """Heading, pitch and roll at the answer's epoch as each earlier epoch would have told them, and their sigmas.
+        """Heading, pitch and roll at the answer's epoch as each earlier epoch would have given them, and their sigmas.
 
         (K, 3) arrays, rad: the base's own motion is taken out, so that convergence is seen on a swaying ship too.
         """
@@ -213,7 +213,7 @@ class Alignment(Shown):
 
     @property
     def near_vertical(self) -> bool:
-        """Whether pitch is so near +-90 deg that heading and roll are told only together."""
+        """Whether pitch is so near +-90 deg that only the combination of heading and roll is known."""
         return bool(abs(self.pitch) > NEAR_VERTICAL)
 
     @cached_property
@@ -230,12 +230,12 @@ class Alignment(Shown):
 
     @property
     def gyro_bias_estimated(self) -> NDArray[np.bool_]:
-        """(3,) whether the data told this bias, or only the specification does."""
+        """(3,) whether the data showed this bias, or only the specification does."""
         return self.gyro_bias_sigma < NOT_ESTIMATED * self.gyro_bias_prior
 
     @property
     def accel_bias_estimated(self) -> NDArray[np.bool_]:
-        """(3,) whether the data told this bias, or only the specification does."""
+        """(3,) whether the data showed this bias, or only the specification does."""
         return self.accel_bias_sigma < NOT_ESTIMATED * self.accel_bias_prior
 
     def in_brief(self) -> dict[str, str]:

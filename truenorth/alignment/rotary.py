@@ -1,11 +1,11 @@
 """`align_rotary`: attitude of the body that carries an IMU on an indexer (a rotary SINS).
 
 The IMU's own attitude is found as that of any IMU on a base that sways: in the inertial frame its turning is motion like any
-other, and it turns the biases about, so that they average out or can be told. The encoder ties the IMU to the body, at the epoch
-of the answer and wherever the body's lever arm moves the IMU.
+other, and it turns the biases about, so that they average out or can be estimated. The encoder ties the IMU to the body, at the
+epoch of the answer and wherever the body's lever arm moves the IMU.
 
 Without an encoder the angles can be read from the gyros where the body is still: it turns with the earth alone, and what the
-gyros show beside that is the indexer.
+gyros show besides that is the indexer.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def align_rotary(
     Raises
     ------
     UsageError
-        Axes that do not fit the angles, or a lever arm that is none.
+        Axes that do not fit the angles, or a lever arm that is not three finite numbers.
     DataError
         The encoder's log does not cover the record, or a body without encoder that is not still.
     AlignmentError
@@ -209,7 +209,7 @@ def angles_from_gyros(
     -------
     angles : (K+1, A) array, rad
     off_axis : float, rad
-        Largest turn that is none about these axes.
+        Largest turn that is not about these axes.
     """
     # The body stays as it is in n: C_n0_b(t) = C_n0_n(t) C_n0_i, and C_bs = C_b_n0 C_n0_i C_is.
     C_n0_b = earth_rotation(integrals.time, lat) @ C_n0_i
@@ -239,7 +239,7 @@ def _still_body(task: Task, fine: FineAlignment, axes: Sequence[str]) -> Array:
     _, off = angles_from_gyros(fine.integrals, C_n0_i, lat, axes)
     if off > OFF_AXIS:
         raise DataError(
-            f"{task.record.source}: the gyros show turns of {np.degrees(off):.2f} deg that are none about the axes "
+            f"{task.record.source}: the gyros show turns of {np.degrees(off):.2f} deg that are not about the axes "
             f"{','.join(axes)}; angles can be read from the gyros where the body is still and the axes are these: give the "
             "encoder's log"
         )

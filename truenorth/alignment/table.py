@@ -44,7 +44,7 @@ class TurntableErrors:
 
     positions: tuple[TablePosition, ...]
     touch: Touch | None  # a step of the specific force that no turn explains
-    gyro_matrix: Array  # (3: ``w_hat = (I + M) w + bias``: scale factors on the diagonal, misalignments beside it
+    gyro_matrix: Array  # (3: ``w_hat = (I + M) w + bias``: scale factors on the diagonal, misalignments off it
     gyro_matrix_sigma: Array  # 3)
     accel_matrix: Array  # (3
     accel_matrix_sigma: Array  # 3)

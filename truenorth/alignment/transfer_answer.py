@@ -41,7 +41,7 @@ MOST_EPOCHS = 400  # of the linear system that says what is told apart
 MOST_ROWS = 5000  # of the history
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
-TIED = 0.95  # correlation of two states beyond which one is not told without the other
+TIED = 0.95  # correlation of two states beyond which one is not known without the other
 
 WORDS = {
     "dv_E": "velocity error east",
@@ -246,7 +246,7 @@ def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
         told = [names[i] for i in sorted(group) if names[i] not in quiet]
         if len(told) > 1:
             listed = f"{', '.join(told[:-1])} and {told[-1]}"
-            found.append(f"{listed} are told together far better than each alone (correlation above {TIED})")
+            found.append(f"{listed} are known together far better than each alone (correlation above {TIED})")
     return tuple(found)
 
 

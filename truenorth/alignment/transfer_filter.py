@@ -82,7 +82,7 @@ class TransferTrack:
     C_nb: Array  # (K, 3, 3)
     v_n: Array  # (K
     position: Array  # 3)
-    # (K, n): what is assumed in the places of the states: biases, delay and lever arm beside the known ones, flexure
+    # (K, n): what is assumed in the places of the states: biases, delay and lever arm besides the known ones, flexure
     aux: Array
     C_mb: Array  # (K, 3, 3)
     sigma: Array  # (K, n)

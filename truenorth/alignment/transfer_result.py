@@ -1,4 +1,4 @@
-"""What a transfer alignment tells beside the slave's attitude and biases: delay, lever arm, mounting, and what stays open."""
+"""What a transfer alignment tells besides the slave's attitude and biases: delay, lever arm, mounting, and what stays open."""
 
 from __future__ import annotations
 
@@ -68,17 +68,17 @@ class Transfer:
 
     @property
     def delay_estimated(self) -> bool:
-        """Whether the data told the delay."""
+        """Whether the data showed the delay."""
         return self.delay_sigma < NOT_ESTIMATED * self.delay_prior
 
     @property
     def lever_arm_estimated(self) -> NDArray[np.bool_]:
-        """(3,) whether the data told this component."""
+        """(3,) whether the data showed this component."""
         return self.lever_arm_sigma < NOT_ESTIMATED * self.lever_arm_prior
 
     @property
     def mounting_estimated(self) -> NDArray[np.bool_]:
-        """(3,) whether the data told this angle."""
+        """(3,) whether the data showed this angle."""
         return self.mounting_sigma < NOT_ESTIMATED * self.mounting_prior
 
     def summary(self) -> dict[str, Any]:

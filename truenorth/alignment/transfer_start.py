@@ -33,7 +33,7 @@ FIRST = 1.0  # s over which those are taken
 
 @dataclass(frozen=True)
 class Assumed:
-    """What is assumed of the master, one-sigma beside it; a sigma of 0: known, no state."""
+    """What is assumed of the master, with its one-sigma; a sigma of 0: known, no state."""
 
     lever_arm: Array  # (3,) m: master to slave, slave axes
     lever_arm_sigma: float  # m

@@ -1,9 +1,9 @@
-"""What of a state vector can be told and what cannot, in words: ``r_forward + 200 m/s * tau``.
+"""What of a state vector can be observed and what cannot, in words: ``r_forward + 200 m/s * tau``.
 
 A null space says in numbers which changes of the state no measurement sees. Read are its complement's rows, the
 combinations that *are* seen, brought to reduced echelon form: each is led by a state of its own and else holds only
 the states that cannot be told apart from others, so that it is as short as it can be. States come in the caller's order:
-the first are told in terms of the last.
+the first are given in terms of the last.
 """
 
 from __future__ import annotations

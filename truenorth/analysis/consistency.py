@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Consistency:
-    """A chi-square statistic averaged over runs, beside the band it must keep to.
+    """A chi-square statistic averaged over runs, with the band it must keep to.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Consistency:
     level : float
         Probability of the band.
     inside : float
-        Share of epochs inside; about `level` for a consistent estimator (epochs of one run hang together, so that
+        Share of epochs inside; about `level` for a consistent estimator (epochs of one run are correlated, so that
         the share itself scatters more than a binomial).
     """
 

@@ -2,7 +2,7 @@
 
 *Rank* asks whether a direction of the state is seen at all, however weakly: it knows no noise. *Degrees* ask how much
 of a prior uncertainty the measurements, with their noise, take away. Both are found with states in units of their prior
-sigmas, so that rad/s beside metres do no harm.
+sigmas, so that rad/s next to metres do no harm.
 
 Sources: D. Goshen-Meskin, I. Y. Bar-Itzhack, Observability analysis of piece-wise constant systems, IEEE Trans.
 Aerospace and Electronic Systems 28, 1992 (total and stripped matrix); F. M. Ham, R. G. Brown, Observability, eigenvalues,
@@ -173,7 +173,7 @@ def observable_rows(F: Array, H: Array, rounding: float = 0.0) -> Array:
     seen = np.zeros((0, F.shape[0]))
     front, size = H, np.abs(H)
     while len(front):
-        # A row counts by what is new in it, beside what its terms are made of.
+        # A row counts by what is new in it, besides what its terms are made of.
         reach = np.linalg.norm(size, axis=1)
         front = (front / np.where(reach > 0.0, reach, 1.0)[:, None])[reach > 0.0]
         rows: list[Array] = []

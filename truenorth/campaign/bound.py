@@ -1,7 +1,7 @@
 """The posterior Cramer-Rao bound of aligning a case: what no method can beat on average.
 
 On a base at rest, attitude and biases enter the velocity linearly and all noise is Gaussian: the bound is the covariance of
-the Kalman filter that is told the truth about the noise and linearised about the truth (P. Tichavsky, C. H. Muravchik, A.
+the Kalman filter that knows the truth about the noise and linearised about the truth (P. Tichavsky, C. H. Muravchik, A.
 Nehorai, Posterior Cramer-Rao bounds for discrete-time nonlinear filtering, IEEE Trans. Signal Process. 46, 1998, eq. 21, which
 is then the information filter). Where the base sways no bound is given: that filter takes its velocity for white noise, and a
 method that finds the sway's spectrum has less than a fifth of its error (`swaying` at a quay, two minutes).

@@ -188,7 +188,7 @@ def on_cluster(plan: Plan, blocks: Sequence[Block], scheduler: str) -> Iterator[
         results = as_completed(list(under_way), loop=client.loop, with_results=True)
         try:
             for future, result in results:
-                if future.cancelled():  # what is told in place of a table
+                if future.cancelled():  # what is said in place of a table
                     raise CommClosedError("the connection is lost")
                 block = under_way.pop(future)
                 if left:

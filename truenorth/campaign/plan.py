@@ -266,5 +266,5 @@ def read_plan(source: str | PathLike[str] | Mapping[str, Any] | Plan) -> Plan:
                 f"{plan._source}: methods: {method.name!r} aligns in motion without a specification, and a log on the move "
                 "cannot be asked for it; expected imu: simulated, a preset or a file"
             )
-    plan.cases  # noqa: B018  # built now, so that mistakes are told before the work
+    plan.cases  # noqa: B018  # built now, so that mistakes are found before the work
     return plan

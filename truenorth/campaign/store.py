@@ -124,7 +124,7 @@ def opened(folder: str | os.PathLike[str], plan: Plan, *, resume: bool = True) -
 
 
 def versions() -> dict[str, str]:
-    """What the numbers come from beside the plan: with all of it alike they are the same to the bit."""
+    """What the numbers come from besides the plan: with all of it alike they are the same to the bit."""
     import numba
     import scipy
 

@@ -90,7 +90,7 @@ def main() -> None:
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still told
+        if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still printed
             stream.reconfigure(errors="replace")
     try:
         words = sys.argv[1:]

@@ -53,7 +53,8 @@ def advise(
     attitude_noise: Annotated[
         float | None,
         option(
-            "Of the master's attitude, arcmin, where that is matched beside its velocity.", panel="Transfer alignment"
+            "Of the master's attitude, arcmin, where that is matched as well as its velocity.",
+            panel="Transfer alignment",
         ),
     ] = None,
     output: Annotated[Path | None, option("Folder for advice.json and advice.png.", "-o", "--output")] = None,

@@ -1,4 +1,4 @@
-"""What a command may write over: never its own inputs, and no folder that holds a result of another kind, unless told to."""
+"""What a command may write over: never its own inputs, and no folder that holds a result of another kind, unless asked to."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def inspect(
     lat: Annotated[float | None, option("Latitude, deg: lets the earth's rate be checked.")] = None,
     plot: Annotated[Path | None, option("Write a figure (.png, .svg, .pdf).", panel="Files")] = None,
     layout: Annotated[
-        bool, option("Write what the log was taken for as LOG.yaml beside it.", "--write-layout", panel="Files")
+        bool, option("Write what the log was taken for as LOG.yaml next to it.", "--write-layout", panel="Files")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -99,7 +99,7 @@ def _message(model: type[BaseModel], content: Any, problem: Any, where: str) -> 
 
 
 def _locate(model: type[BaseModel], content: Any, loc: tuple[int | str, ...]) -> tuple[str, list[str], Any]:
-    """Path of a key as a person writes it, the keys known beside it, and its field, if there is one.
+    """Path of a key as a person writes it, the keys known next to it, and its field, if there is one.
 
     The library's location holds the tag of each union that it went through; the path of a person does not.
     """

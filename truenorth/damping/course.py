@@ -1,4 +1,4 @@
-"""What an undamped INS said, epoch by epoch, and the reference velocity beside it: what all damping methods take."""
+"""What an undamped INS said, epoch by epoch, and the reference velocity with it: what all damping methods take."""
 
 from __future__ import annotations
 

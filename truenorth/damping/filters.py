@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 BLOCK = 3600  # epochs linearised at a time: some 20 MB
 FRESH = 300  # epochs for which a filter that re-linearises does so
-SETTLING = 30.0  # s, in which filter 1 finds the velocity error from what it was told at the switch
+SETTLING = 30.0  # s, in which filter 1 finds the velocity error from what it was given at the switch
 
 
 @dataclass(frozen=True)

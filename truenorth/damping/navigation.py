@@ -74,7 +74,7 @@ def damp_navigation(
         Uneven epochs; a log that does not overlap; a switch after the end.
     """
     if result.residuals or result.smoothed:
-        raise UsageError("damping corrects a free INS; expected no aiding sensor, no stops and no smoothing beside it")
+        raise UsageError("damping corrects a free INS; expected no aiding sensor, no stops and no smoothing besides it")
     if result.altitude != "fixed":
         raise UsageError(f"damping with altitude {result.altitude!r}; expected 'fixed': the height is held at sea")
     if velocity is None and damper.needs_reference:
@@ -230,7 +230,7 @@ def _even(track: Track) -> Track:
 
 
 def _corrected(track: Track, damped: Course, sigma: Array, start: int, estimate: Estimate | None) -> Track:
-    """The track with the errors taken off and the bands that are left; correlations are not told."""
+    """The track with the errors taken off and the bands that are left; correlations are not known."""
     P, sensors = track.P.copy(), track.sensors.copy()
     variance = np.einsum("kii->ki", P)[start:].copy()
     variance[:, LEVEL] = np.concatenate([sigma[:, PHI], sigma[:, DV], sigma[:, DP]], axis=1) ** 2

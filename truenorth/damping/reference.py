@@ -31,7 +31,7 @@ OUTLIER = 6.0  # sigmas of one measurement
 JUMP = 8.0  # sigmas of the lines' difference
 CURVATURE = 0.03  # m/s by which healthy lines may miss each other, or a healthy value its median: waves, curvature
 LEAST_NOISE = 1e-4  # m/s
-GAP = 60.0  # s, from which a gap is told
+GAP = 60.0  # s, from which a gap is named
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 PADDING = 8  # of the transform, so that a peak's place is finer than a bin
 SCHULER_BAND = (60.0 * 60.0, 120.0 * 60.0)  # s
 EARTH_BAND = (18.0 * 3600.0, 30.0 * 3600.0)  # s
-LEAST_CYCLES = 1.5  # of a line that can be told from a trend
+LEAST_CYCLES = 1.5  # of a line that can be separated from a trend
 
 
 class Spectrum(NamedTuple):

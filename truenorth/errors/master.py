@@ -219,7 +219,7 @@ class TransferModel:
             Of groups that are not there, ignored.
         C_nb : (3, 3) array, optional
             The slave's attitude was handed over from the master through the assumed mounting: ``phi = C_nm mu + C theta`` and
-            the master's own error, beside what `phi` says; its velocity with the master's. Without it they are independent.
+            the master's own error, besides what `phi` says; its velocity with the master's. Without it they are independent.
         C_mb : (3, 3) array, optional
             The assumed mounting; the unit matrix when left out.
         """

@@ -16,7 +16,7 @@ def convergence(C_nw: Array, v_n: Array, position: Array, n: int) -> Array:
     """(K, n, n) from errors along w to errors along ENU.
 
     Turned into these axes; and since ENU at the computed place is turned against ENU at the true one by the convergence
-    of the meridians, ``c = tan L dp_E/(R_N + h)``: ``phi_U`` grows by it, and velocity is told in axes turned by it.
+    of the meridians, ``c = tan L dp_E/(R_N + h)``: ``phi_U`` grows by it, and velocity is measured in axes turned by it.
     """
     J = np.zeros((len(C_nw), n, n))
     J[:] = np.eye(n)
@@ -24,7 +24,7 @@ def convergence(C_nw: Array, v_n: Array, position: Array, n: int) -> Array:
         J[:, group, group] = C_nw
     lat, alt = position[:, 0], position[:, 2]
     rate = np.tan(np.clip(lat, -POLE, POLE)) / (radii(lat)[1] + alt)
-    c = rate[:, None] * C_nw[:, 0, :]  # told by dp along w
+    c = rate[:, None] * C_nw[:, 0, :]  # given by dp along w
     J[:, PHI.stop - 1, DP] = c
     J[:, DV.start, DP] = c * v_n[:, 1:2]
     J[:, DV.start + 1, DP] = -c * v_n[:, :1]

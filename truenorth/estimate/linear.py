@@ -48,7 +48,7 @@ def rows_along(motion: MotionStates, sources: list[Aiding], model: InsModel) -> 
 
 
 def _now(motion: MotionStates) -> Array:
-    """(K, n) what rows are told, w along east, north, up."""
+    """(K, n) what rows are given, w along east, north, up."""
     now = np.zeros((len(motion.time), NOW_LENGTH))
     w_ie = earth_rate_n(motion.lat)
     now[:, :4], now[:, 4:7], now[:, 11] = quaternion_from_dcm(motion.C_nb), motion.v_n, motion.alt

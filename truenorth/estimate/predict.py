@@ -86,7 +86,7 @@ def take_sample(
 
 @compiled
 def describe(m: Memory, model: Model, now: Any) -> None:
-    """Fill in what rows and columns are told of this epoch, but for what is needed of it sample by sample."""
+    """Fill in what rows and columns are given of this epoch, but for what is needed of it sample by sample."""
     s, C = m.s, m.sums.C_now
     for j in range(24):
         now[j] = s[j]

@@ -42,7 +42,7 @@ def plot_alignment(result: Alignment) -> Figure:
 
         for i, (ax, course) in enumerate(zip(convergence, angles)):
             _converge(ax, h.time, course, COLOURS[i])
-        convergence[0].set_title("Attitude as told at each time, ±1σ (dark: floor)")
+        convergence[0].set_title("Attitude as known at each time, ±1σ (dark: floor)")
         _sigmas(sigmas, h.time, angles)
         _biases(gyro, h.time, h.gyro_bias / DEG_PER_HOUR, h.gyro_bias_sigma / DEG_PER_HOUR)
         gyro.set_title("Gyro bias, ±1σ")

@@ -47,7 +47,7 @@ def plot_campaign(campaign: Campaign) -> dict[str, Figure]:
 
 
 def plot_convergence(campaign: Campaign) -> Figure:
-    """Magnitude of the heading error over the length of the log: median and percentile fans, beside the claimed sigma."""
+    """Magnitude of the heading error over the length of the log: median and percentile fans, compared with the claimed sigma."""
     cases = list(campaign.case_names.items())[:MOST_CASES]
     columns = min(3, len(cases))
     rows = -(-len(cases) // columns)

@@ -29,7 +29,7 @@ class Course:
     ----------
     name : str
     value, sigma, floor : (K,) arrays, rad
-        As told at each epoch, its one-sigma, and the part of that which waiting does not improve.
+        As known at each epoch, its one-sigma, and the part of that which waiting does not improve.
     """
 
     name: str

@@ -174,7 +174,7 @@ def fading(
     kind : "single", "noise", "multiple" or "improved"
         Known as SAKF on P, SAKF on R, MAKF and IMAKF.
     rho : float
-        Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
+        Weight of the past in V, where the newest innovation has 1; the memory is ``1 + rho`` epochs.
     cap : float
         Largest factor.
 

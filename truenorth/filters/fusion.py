@@ -235,7 +235,7 @@ def federated(
 ) -> Federated:
     """Federated filter (Carlson): local filters, each with a share of the common information, and a master.
 
-    Filter i has ``P0 / share_i`` and ``Q / share_i``: what is common to all is told by no one twice, and the fusion adds
+    Filter i has ``P0 / share_i`` and ``Q / share_i``: what is common to all is counted by no one twice, and the fusion adds
     information as if they were independent. With a reset after every epoch the result is that of one central filter;
     resets that are rarer, or none, cost precision, and the P given is an upper bound.
 

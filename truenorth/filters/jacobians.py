@@ -46,9 +46,9 @@ def check_jacobians(
         Its `P0` sets the scale of each state; a state with no variance is moved by 1e-6 of itself (or of 1).
     generator : numpy.random.Generator
     points : int
-        States to be drawn, beside `x0` itself.
+        States to be drawn, besides `x0` itself.
     tolerance : float
-        Largest error allowed, in the measure of :class:`JacobianCheck`, beside what rounding explains.
+        Largest error allowed, in the measure of :class:`JacobianCheck`, besides what rounding explains.
     nonlinear : sequence of int, optional
         Also test that the columns of all other states do not change with these other states: that the model is
         conditionally linear, as the filters with `nonlinear` need it.

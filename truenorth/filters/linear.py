@@ -33,7 +33,7 @@ from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
 
 
 def room(size: Size, rows: int, options: Any) -> Any:
-    """Arrays that a filter works in; the Kalman filter needs none beside the workspace."""
+    """Arrays that a filter works in; the Kalman filter needs none besides the workspace."""
     return 0
 
 

@@ -75,7 +75,7 @@ class Guarded(Running, total=False):
 
 
 class Options(NamedTuple):
-    """What a filter does beside the plain recursion."""
+    """What a filter does besides the plain recursion."""
 
     tracking: bool
     softening: float

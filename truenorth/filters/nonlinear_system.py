@@ -92,7 +92,7 @@ class NonlinearSystem(System):
     x0 : (..., s) array
     P0 : (..., n, n) array
     p : (..., K, q) array, optional
-        Parameters of each epoch: what the functions need to know beside the state (intervals, rates, known inputs).
+        Parameters of each epoch: what the functions need to know besides the state (intervals, rates, known inputs).
     transition_jacobian : matrix function, optional
         ``df/dx``, (n, n); for the extended filters, and for all that treat a part of the states as linear.
     measurement_jacobian : matrix function, optional

@@ -403,7 +403,7 @@ def particle(
         From an earlier call with the same options, to go on from; its `memory` is the particles. Chunks give the bits
         of one batch if they are given the same generators, which remember where they stand.
     generators : numpy.random.Generator or sequence of them
-        One for each run, in the order of the run axes; a run does not depend on how many there are beside it.
+        One for each run, in the order of the run axes; a run does not depend on how many there are besides it.
     particles : int
     nonlinear : sequence of int, optional
         The states to be drawn; all of them, if not given. The model must be linear in the others once these are given.

@@ -24,7 +24,7 @@ from truenorth.filters.system import Runs
 LOG_2PI = float(np.log(2.0 * np.pi))
 ROUNDING = 1e-13  # of a variance
 PLAIN_RANGE = 1e13  # of an innovation's variance over its noise: beyond it the plain form leaves rounding in P
-JOSEPH_RANGE = 1e12  # of the same: beyond it Joseph's form is checked, as P may not hold what the row told
+JOSEPH_RANGE = 1e12  # of the same: beyond it Joseph's form is checked, as P may not hold what the row showed
 
 SOUND, NO_INNOVATION_VARIANCE, NOT_POSITIVE, NO_FILTER, NOT_FINITE = range(5)
 
@@ -241,7 +241,7 @@ def settle(size: Size, w: Workspace) -> None:
 
 @compiled(forceinline=True)
 def holds(size: Size, w: Workspace, row: int, variance: float, noise: float) -> bool:
-    """Whether P holds what a row told: ``h P h'`` after it is ``noise (1 - noise / variance)``, to a half.
+    """Whether P holds what a row showed: ``h P h'`` after it is ``noise (1 - noise / variance)``, to a half.
 
     A row that reads off one state of a huge variance leaves a small number in P; one that reads the sum of two such
     states leaves huge ones, whose rounding may be larger than the noise.
@@ -310,7 +310,7 @@ def keep(out: Histories, run: int, epoch: int, last: int, w: Workspace) -> None:
 
 @compiled(forceinline=True)
 def conclude(out: Histories, run: int, epoch: int, failure: int, nis: float, log_likelihood: float) -> bool:
-    """Note what an update told; whether the run can go on."""
+    """Note what an update did; whether the run can go on."""
     out.log_likelihood[run] += log_likelihood
     if out.nis.shape[1] > 0:
         out.nis[run, epoch] = nis

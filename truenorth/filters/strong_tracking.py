@@ -60,7 +60,7 @@ def strong_tracking(
         beta, at least 1: how much larger than expected the measurement noise may look before the factor fires; at 1
         the filter is the fading filter of kind "single".
     rho : float
-        Weight of the past in V beside 1 for the newest innovation; the memory is ``1 + rho`` epochs.
+        Weight of the past in V, where the newest innovation has 1; the memory is ``1 + rho`` epochs.
     cap : float
         Largest factor.
 

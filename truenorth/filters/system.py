@@ -92,7 +92,7 @@ class FilterState:
     log_likelihood : (...) array
         Of all measurements up to here.
     memory : (..., a) array
-        What an adaptive filter remembers beside; of length 0 for others.
+        What an adaptive filter remembers besides; of length 0 for others.
     """
 
     x: Array

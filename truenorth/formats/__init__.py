@@ -68,7 +68,7 @@ def read_imu(
 
     What the log and the call do not say is found by the names of its columns, and by its numbers: what a clock does, what
     gravity is, how far the gyros turn it. Where that leaves two readings, the reader asks: it raises `UnsureError`, which names
-    both. The record's ``taken_for`` holds what was found, and why. A small YAML file beside the log (``LOG.yaml`` for
+    both. The record's ``taken_for`` holds what was found, and why. A small YAML file next to the log (``LOG.yaml`` for
     ``LOG.csv``) may hold the same options; those of the call win.
 
     Parameters

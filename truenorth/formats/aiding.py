@@ -1,7 +1,7 @@
 """Readers of aiding logs: odometer, velocity log, GNSS receiver, master INS, trajectory, height, encoder.
 
 CSV (comma, semicolon, tab or blanks), Parquet, npz and mat files of named columns. Rows that are late by no more than
-`LONGEST_LATE` are put in order and counted. A YAML file beside the log (``LOG.yaml``
+`LONGEST_LATE` are put in order and counted. A YAML file next to the log (``LOG.yaml``
 for ``LOG.csv``) may hold the same options as the call; those of the call win.
 """
 
@@ -105,7 +105,7 @@ def read_odometer(
     ----------
     path : path
     format : {"csv", "parquet", "npz", "mat"}, optional
-        Told by the suffix when left out.
+        By the suffix when left out.
     columns : mapping or str, optional
         Our names to the log's, such as ``"time=odo_t,speed=odo_speed"``.
     units : mapping or str, optional
@@ -113,7 +113,7 @@ def read_odometer(
     pulse_size : float or str, optional
         Metres a pulse, or text with a unit, such as ``"2 cm"``; wins over a column ``pulse_size``.
     signed : bool, optional
-        Whether reverse driving is negative; told by the names when left out, and true without a word.
+        Whether reverse driving is negative; by the names when left out, and true where they do not say.
 
     Raises
     ------

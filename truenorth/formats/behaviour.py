@@ -90,7 +90,7 @@ def accel_readings(
     Parameters
     ----------
     interval : float, s
-        NaN where it is not known: then increments cannot be told.
+        NaN where it is not known: then increments cannot be recognised.
     kinds : sequence of {"rates", "increments"}
     units : sequence of str, optional
         Those that are possible; the usual ones of `kinds` when left out.
@@ -111,7 +111,7 @@ def accel_readings(
 
 @dataclass(frozen=True)
 class GyroFacts:
-    """What the gyros show, in their own unit a second, beside the accelerometers' turning of gravity."""
+    """What the gyros show, in their own unit a second, compared with the accelerometers' turning of gravity."""
 
     turning: Turning
     mean: float

@@ -308,7 +308,7 @@ def _scatter(columns: Columns, name: str) -> float | None:
 
 
 def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names: Sequence[str]) -> None:
-    """Take the only column that increases steadily for the clock; a row counter is none."""
+    """Take the only column that increases steadily for the clock; a row counter is not a clock."""
     found = []
     for name in names[:MOST_COLUMNS]:
         scatter = _scatter(columns, name)
@@ -339,7 +339,7 @@ def _clock_by_behaviour(columns: Columns, layout: Layout, choice: Choice, names:
 
 
 def _by_behaviour(columns: Columns, layout: Layout) -> Choice:
-    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three beside them."""
+    """Of columns whose names do not tell: a clock increases, accelerometers show gravity, gyros are the three next to them."""
     source = columns.path.name
     numbers = {}
     for name in columns.names[:MOST_COLUMNS]:

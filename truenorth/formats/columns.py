@@ -57,7 +57,7 @@ class Columns:
         Raises
         ------
         DataError
-            A cell that is none of them.
+            A cell that is neither.
         """
         import pyarrow as pa
 

@@ -50,7 +50,7 @@ def layout_of(guesses: Sequence[Guess]) -> dict[str, Any]:
 
 
 def write_layout(record: ImuRecord, path: str | PathLike[str]) -> Path:
-    """Write what a reader took a log for as ``LOG.yaml`` beside it, which the reader then obeys.
+    """Write what a reader took a log for as ``LOG.yaml`` next to it, which the reader then obeys.
 
     Raises
     ------

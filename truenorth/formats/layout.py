@@ -1,4 +1,4 @@
-"""How a log is to be read: by the options of the call, and by a small YAML file beside the log."""
+"""How a log is to be read: by the options of the call, and by a small YAML file next to the log."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Layout:
     units: Mapping[str, str] = field(default_factory=dict)
     axes: str | None = None  # where x, y and z point, such as ``"FRD"``; None leaves it to the format
     rate: float | None = None  # Hz; for a log without time
-    kind: Kind | None = None  # told by the names of the columns when left out
+    kind: Kind | None = None  # by the names of the columns when left out
     topic: str | None = None  # of a ROS bag with several IMUs
 
 
 def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:
-    """The layout in ``LOG.yaml`` beside ``LOG.csv``, where that exists, with the options of the call on top.
+    """The layout in ``LOG.yaml`` next to ``LOG.csv``, where that exists, with the options of the call on top.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def layout_for(path: Path, given: Mapping[str, Any]) -> Layout:
 def options_for(
     path: Path, given: Mapping[str, Any], checked: Callable[[Mapping[Any, Any]], dict[str, Any]]
 ) -> dict[str, Any]:
-    """The options in the YAML file beside a log with those of the call, where they are not None, on top.
+    """The options in the YAML file next to a log with those of the call, where they are not None, on top.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; ``imu`` of PSINS without being told.
+"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; ``imu`` of PSINS without being asked.
 
 SciPy's reader follows pointers of the file without a check, and ends the interpreter on some damaged ones: it runs in a
 process of its own.

@@ -51,7 +51,7 @@ def _advice(found: Found, name: str) -> str:
     beside = found.source.rpartition(".")[0] + ".yaml"
 
     def options(text: str) -> str:
-        return f"put {text} into a file {beside} beside the log, or give it to the reader"
+        return f"put {text} into a file {beside} next to the log, or give it to the reader"
 
     if _in_radians(found, name):
         if farthest <= LIMIT["lat"] and other <= LIMIT["lon"]:

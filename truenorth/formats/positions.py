@@ -31,7 +31,7 @@ def columns_of_positions(path: Path, asked: bool = False) -> Columns | None:
     Raises
     ------
     DataError
-        The file is not KF-GINS's though the caller `asked` for that, or its times are none.
+        The file is not KF-GINS's though the caller `asked` for that, or its times are no times.
     """
     table = open_table(path)
     header = next(

@@ -92,7 +92,7 @@ class Found:
         found = ", ".join(self.labels.values())
         return DataError(
             f"{self.source}: expected {wanted}; understood only {found}: name the columns, in the call or a YAML "
-            "file beside the log"
+            "file next to the log"
         )
 
 
@@ -170,7 +170,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
     if "time" not in labels:
         raise DataError(
             f"{source}: no column of time among {', '.join(columns.names) or '(none)'}; expected time in seconds: name it, in the "
-            "call or a YAML file beside the log"
+            "call or a YAML file next to the log"
         )
     factors = {ours: claim[0][1] for ours, claim in claims.items()}
     time, said = columns.clock(labels["time"])

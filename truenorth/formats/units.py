@@ -20,7 +20,7 @@ WRITTEN = {
 
 @lru_cache(maxsize=1024)
 def unit_in(text: str) -> str | None:
-    """A unit as a header writes it, in our spelling; None where it is none."""
+    """A unit as a header writes it, in our spelling; None where it is not a unit."""
     plain = text.strip().replace("per", "/").strip()
     plain = WRITTEN.get(plain.casefold().replace("-", "_"), plain)
     plain = re.sub(r"(?<=[A-Za-z\d²°])[ .](?=[A-Za-z])", "*", plain)  # rad s^-1
@@ -34,7 +34,7 @@ def unit_in(text: str) -> str | None:
 
 
 def split(name: str) -> tuple[str, str | None]:
-    """A header cell without its unit in brackets, and that unit; the index of an array is none."""
+    """A header cell without its unit in brackets, and that unit; the index of an array is not a unit."""
     match = BRACKETS.fullmatch(name.strip())
     if match is None or match[2].isdigit() or not match[1]:
         return name, None

@@ -94,7 +94,7 @@ class Decoder:
         Raises
         ------
         DataError
-            A header that lacks a column, or text that is none.
+            A header that lacks a column, or text that is no header.
         """
         for other in self.others:
             other(data)

@@ -6,7 +6,7 @@ that a filter which knows it takes no slow change of velocity for sway. Two kind
     order 1   x''  = -w^2 x  - 2 zeta w x'  + n,                                             output x'
     order 2   x1'' = -w^2 x1 - 2 zeta w x1' + n,   x2'' = -w^2 x2 - 2 zeta w x2' + x1',      output x2'
 
-the second for narrow-band swell, whose spectrum falls faster beside its peak. Without damping it is a sinusoid of unknown
+the second for narrow-band swell, whose spectrum falls faster on both sides of its peak. Without damping it is a sinusoid of unknown
 amplitude and phase.
 
 Source: T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, 2011, sec. 8.2.6 (linear approximations of

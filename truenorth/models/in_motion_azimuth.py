@@ -16,7 +16,7 @@ and over an interval of length T the INS's displacement against that of the odom
     z = int v_hat dt - u = int dv dt + (M - I) u - dK Rz u
 
 The velocity v is not known where azimuth is not: that of the odometer, ``M u/T``, takes its place. ``int dv dt`` ties two
-epochs; it is told by the state at the end, ``T (dv - (I - M) W - ...)`` with the force weighted by the time elapsed,
+epochs; it is given by the state at the end, ``T (dv - (I - M) W - ...)`` with the force weighted by the time elapsed,
 ``W = int (s - t0)/T f_hat ds``: exact but for the noise of the accelerometers within one interval, a micrometre.
 
 Given ``phi_U`` all is linear: the reduced quadrature filters need nodes in that one state.

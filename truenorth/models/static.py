@@ -104,7 +104,7 @@ class StaticModel:
         Q[:, BG, BG] = self.gyro_rate_walk**2 * T * eye
         Q[:, BA, BA] = self.accel_rate_walk**2 * T * eye
 
-        # Mean velocity error, told by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
+        # Mean velocity error, given by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
         # phi(t) = phi_k + int_t^k C eps; averaged, the force counts with its elapsed part s/T of the interval.
         H = np.zeros((count, 3, STATES))
         H[:, :, DV] = eye

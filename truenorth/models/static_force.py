@@ -7,7 +7,7 @@ The same twelve states; the velocity error is no part of the measurement:
 On a base that does not move beyond the noise of its accelerometers it tells what the velocity tells, and asks nothing of where
 the velocity began; on one that does, the base's motion comes in differentiated, and the velocity form is the better.
 
-Source: system 4, "Kalman filters for static alignment": its eight states beside its ten.
+Source: system 4, "Kalman filters for static alignment": its eight states compared with its ten.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def force_system(
     LinearSystem
         Whose R holds the variance of the quietest base only.
     """
-    # z = J x_{k-1} + w_dv, and x_{k-1} = Phi^-1 (x_k - w): told by the state after the interval, as the filter has it.
+    # z = J x_{k-1} + w_dv, and x_{k-1} = Phi^-1 (x_k - w): given by the state after the interval, as the filter has it.
     J = core.Phi[:, DV].copy()
     J[:, :, DV] -= np.eye(3)
     back = J @ np.linalg.inv(core.Phi)

@@ -122,7 +122,7 @@ def _beyond(track: Track, name: str, role: Role) -> bool:
 
 
 def slow_errors(track: Track, antenna: Mounting) -> list[Evidence]:
-    """A warning where innovations of GNSS positions hang together from row to row, though they are taken for white noise.
+    """A warning where innovations of GNSS positions are correlated from row to row, though they are taken for white noise.
 
     Of white ones the mean correlation over the first lags is zero, to one over the root of the number of products; a
     receiver's multipath and atmosphere last for minutes, and the filter then believes their mean.

@@ -1,4 +1,4 @@
-"""From an alignment to the start of navigation: its attitude, biases and covariance, and how they hang together."""
+"""From an alignment to the start of navigation: its attitude, biases and covariance, and how they are correlated."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def moving_start(
     position: Position,
     spec: ImuSpec,
 ) -> Start:
-    """Of an alignment on the move, which knows velocity and how all errors hang together."""
+    """Of an alignment on the move, which knows velocity and the correlations of all errors."""
     whole = WholeBiases(
         np.repeat([spec.gyro_bias**2 + spec.gyro_turn_on_bias**2, spec.accel_bias**2 + spec.accel_turn_on_bias**2], 3)
     )
@@ -157,7 +157,7 @@ def moving_start(
 def _found_wheel(summary: Mapping[str, Any]) -> Mounting | None:
     """How an alignment on the move says the odometer sits and counts; None: it had none.
 
-    The scale's prior holds all of the error found, not only what is left of it: an odometer is told as it counts. What the
+    The scale's prior holds all of the error found, not only what is left of it: an odometer is taken as it counts. What the
     alignment knows of heading and the mounting's yaw together is left out.
     """
     if "odometer_scale" not in summary:

@@ -20,7 +20,7 @@ DISTURBED_VELOCITY = 0.03  # m/s, of one that people, wind or an engine shake
 STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
 STANDING_PULSES = 1.5  # pulses in a row of an odometer: no more is standing
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
-STILL_RATE = 1e-6  # rad/s, of its rotation, beside what the gyros show of themselves
+STILL_RATE = 1e-6  # rad/s, of its rotation, besides what the gyros show of themselves
 
 
 def stops_in(record: ImuRecord) -> tuple[Array, Array]:
@@ -73,7 +73,7 @@ def _near(at: Array, times: Array) -> NDArray[np.intp]:
 
 
 def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array, NDArray[np.bool_]]:
-    """When a sensor told a speed, and whether it was motion."""
+    """When a sensor gave a speed, and whether it was motion."""
     if isinstance(log, OdometerRecord):
         pulse = 0.0 if log.pulse_size is None else STANDING_PULSES * log.pulse_size / log.interval
         return log.time - 0.5 * log.steps, np.abs(log.speed) > max(STANDING, pulse)

@@ -1,4 +1,4 @@
-"""Whether a log of places and the place that the alignment was told are of one journey; and if not, what went wrong."""
+"""Whether a log of places and the place that was given to the alignment are of one journey; and if not, what went wrong."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Innovations of any filter as evidence: how many were rejected, whether they are as large as sigma says, and white.
 
 Where the model is right, innovations are white and as large as their sigma. Where they are ``f`` times as large, so are the
-errors. Where they hang together over many rows, of correlations ``r_1, r_2, ...``, so many rows carry the information of fewer,
+errors. Where they are correlated over many rows, of correlations ``r_1, r_2, ...``, so many rows carry the information of fewer,
 and a mean of them errs by ``g = sqrt(1 + 2 sum r_k)`` times as much as it says. Both together are by how much sigma must grow:
 that of velocity and position. Attitude shows in changes of velocity over a manoeuvre, of a period ``T``, and what is slower
 cancels: there ``g = sqrt(1 + 2 sum r_k cos(2 pi t_k / T))``, the density of the innovations at that period.

@@ -1,4 +1,4 @@
-"""Likely mistakes of units and axes, told from gravity, the earth's rate, and their agreement with each other.
+"""Likely mistakes of units and axes, seen from gravity, the earth's rate, and their agreement with each other.
 
 A claim is made only where the data leave no other reading: gravity is 9.8 m/s^2 everywhere on earth, and its
 direction in body axes turns as ``du/dt = -w x u`` whatever the mounting, so turning data show the gyros' unit
@@ -28,7 +28,7 @@ CONTRADICTS = 4.0  # times as much left unexplained as by another reading: the a
 SCALE_TOLERANCE = 0.35
 RATE_RESOLVED = 0.05  # relative sigma of the mean rate, to compare it with the earth's
 RATE_SHARP = 0.01  # the same, to tell a unit by it
-# A cheap gyro's bias imitates any rate: a unit is told only where, converted, the noise is a gyrocompass's.
+# A cheap gyro's bias imitates any rate: a unit is named only where, converted, the noise is a gyrocompass's.
 GYROCOMPASS_NOISE = 0.03 * np.pi / 180.0 / 60.0  # rad/sqrt(s), norm of three axes: 0.03 deg/sqrt(h)
 AXES = "xyz"
 

@@ -93,7 +93,7 @@ class MotionSummary:
     kind : (m,) array of int
         Index into `KINDS`.
     rate : (m, 3) array, rad/s
-        Mean angular rate of each second, body axes, constant bias taken out where it could be told.
+        Mean angular rate of each second, body axes, constant bias taken out where it could be found.
     specific_force : (m, 3) array, m/s^2
         Mean specific force of each second, body axes.
     acceleration : (m,) array, m/s^2

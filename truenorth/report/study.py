@@ -1,4 +1,4 @@
-"""The page of a reproduced study: the paper's figures beside ours, drawings, claims with their verdicts, every figure."""
+"""The page of a reproduced study: the paper's figures next to ours, drawings, claims with their verdicts, every figure."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def _integrals(q: float, tau: float, variance: float, T: float, count: int, rng:
     apart = math.sqrt(q * float(weights @ (g1 - g0) ** 2))  # beta - alpha
     alpha, beta = 0.5 * (total - apart), 0.5 * (total + apart)
     first = variance * float(_ramp(np.array(T), tau)) ** 2 + q * float(weights @ g1**2)
-    before = math.sqrt(first - alpha**2)  # what the first integral has beside its share in the second
+    before = math.sqrt(first - alpha**2)  # what the first integral has besides its share in the second
     x = np.empty((count, 3))
     _recur(rng.standard_normal((count + 1, 3)), math.exp(-T / tau), alpha, beta, before, x)
     return x

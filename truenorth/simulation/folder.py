@@ -54,7 +54,7 @@ def save_run(
     target = writable_folder(folder)
     aiding = scenario.simulate_aiding(seed=seed, run=run)
     records = {key: log.record for key, log in aiding.items()}
-    if scenario.indexer is not None:  # truth is the IMU's; beside it that of the body in which it turns
+    if scenario.indexer is not None:  # truth is the IMU's; next to it that of the body in which it turns
         body = scenario.build_motion(seed, run)
         records["truth_body"] = body.states(simulation.record.time).trajectory()
     names = [f"imu.{suffix}", f"truth.{suffix}", "scenario.yaml", "summary.json"]

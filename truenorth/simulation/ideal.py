@@ -44,7 +44,7 @@ class IdealLog:
 
     @cached_property
     def leverage(self) -> Array:
-        """(N, 3, 3) 1/s: velocity increment sensed at a place of the IMU beside that in its centre, per metre."""
+        """(N, 3, 3) 1/s: velocity increment sensed at a place of the IMU compared with that in its centre, per metre."""
         return leverage(self.motion, self.edges)
 
     @cached_property

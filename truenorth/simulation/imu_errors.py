@@ -109,7 +109,7 @@ def temperature(spec: ImuSpec, interval: float, count: int) -> Array:
 
 
 def size_effect(leverage: Array, spec: ImuSpec) -> Array:
-    """What accelerometers sense beside one in the centre, each by its own place, (N, 3) of the leverage (N, 3, 3)."""
+    """What accelerometers sense compared with one in the centre, each by its own place, (N, 3) of the leverage (N, 3, 3)."""
     return np.einsum("kij,ij->ki", leverage, np.asarray(spec.accel_positions))
 
 

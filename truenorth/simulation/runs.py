@@ -1,4 +1,4 @@
-"""Simulated logs beside their truth: one, or many that share a motion."""
+"""Simulated logs with their truth: one, or many that share a motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Simulation(Shown):
-    """A simulated log beside its truth.
+    """A simulated log with its truth.
 
     Attributes
     ----------

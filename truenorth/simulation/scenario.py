@@ -292,7 +292,7 @@ def shipped() -> dict[str, str]:
 def _checked(content: Mapping[str, Any], source: str, folder: Path) -> Scenario:
     scenario = validated(Scenario, dict(content), source)
     scenario._folder, scenario._source = folder, source
-    # Read now, so that mistakes are told before the work.
+    # Read now, so that mistakes are found before the work.
     try:
         scenario.imu_spec  # noqa: B018
     except TruenorthError as error:

@@ -1,4 +1,4 @@
-"""Sensors of a scenario beside the IMU: aiding sensors, an indexer with its encoder, flexure; as a file describes them."""
+"""Sensors of a scenario besides the IMU: aiding sensors, an indexer with its encoder, flexure; as a file describes them."""
 
 from __future__ import annotations
 

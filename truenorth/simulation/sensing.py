@@ -29,7 +29,7 @@ def increments(moving: Moving, edges: Array) -> tuple[Array, Array]:
 def leverage(moving: Moving, edges: Array) -> Array:
     """Integrals of ``[dw x] + [w x]^2`` between successive `edges` (N+1,), as (N, 3, 3) 1/s.
 
-    Times a place r from the centre of the IMU it is what an accelerometer there senses beside one in the centre.
+    Times a place r from the centre of the IMU it is what an accelerometer there senses compared with one in the centre.
     """
     return integrals(moving, edges, lambda at: acceleration_gain(at).reshape(*at.time.shape, 9), 9).reshape(-1, 3, 3)
 

@@ -1,4 +1,4 @@
-"""What compiled rows and columns are told of the vehicle at one epoch: one vector of numbers, by the places in it."""
+"""What compiled rows and columns are given of the vehicle at one epoch: one vector of numbers, by the places in it."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ _radii_at = compiled(earth.radii_at, inline="always")
 
 @dataclass(frozen=True)
 class Memory:
-    """What the algorithm remembers of the samples it has seen, beside the motion itself."""
+    """What the algorithm remembers of the samples it has seen, besides the motion itself."""
 
     # (3,) m/s^2: mean of ``dv_n/dt`` over the last update: extrapolates velocity to the middle of the next
     acceleration: Array = field(default_factory=lambda: np.zeros(3))

@@ -101,7 +101,7 @@ def _topic(reader: AnyReader, wanted: str | None, part: str, source: str) -> str
         raise DataError(f"{source}: no topic with {' or '.join(kinds) or part} messages; found {others}")
     if wanted is None and len(topics) > 1:
         raise UsageError(
-            f"{source}: several topics: {found}; choose one: topic, in the call or in a YAML file beside it"
+            f"{source}: several topics: {found}; choose one: topic, in the call or in a YAML file next to it"
         )
     if wanted is not None and wanted not in topics:
         raise UsageError(f"{source}: no such topic {wanted!r}; found {found}")

@@ -23,7 +23,7 @@ SWITCH = 2.5 * HOUR
 WINDOW = 5.0  # s, the paper's T
 R2, TUNED_R2 = 0.001, 1e-4  # m/s^2: the paper's, and that of the fusion tuned like the 15 states
 FUSION = Fusion()
-REFERENCE_PRIOR = 0.5  # m/s, of the 15-state filter beside the paper's P0
+REFERENCE_PRIOR = 0.5  # m/s, of the 15-state filter, next to the paper's P0
 LONG_REFERENCE_PRIOR = 0.3  # m/s, of its long-run tuning
 NETWORK = Loop(second_order(0.5))
 AZIMUTH = Loop(second_order(0.5), azimuth_damping=0.5)
@@ -56,7 +56,7 @@ class Case:
 
 
 def filters_of(voyage: Voyage, course: Course, *, raw: bool = True) -> dict[str, Filter]:
-    """The paper's filters and the two 15-state ones, for a course that has a log of this voyage beside it."""
+    """The paper's filters and the two 15-state ones, for a course that has a log of this voyage."""
     start = round(SWITCH / course.interval)
     noise = LOG_NOISE / np.sqrt(course.interval)
     P0, paper = paper_prior(course, start), MarineModel.of_paper()

@@ -1,4 +1,4 @@
-"""Many voyages: bias and start errors with random signs, a new log each time; and errors drawn from what a filter is told."""
+"""Many voyages: bias and start errors with random signs, a new log each time; and errors drawn from what a filter is given."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from truenorth.records.specs import ImuSpec
 Array = NDArray[np.float64]
 
 SPEC = ImuSpec(
-    gyro_random_walk=LONG.gyro_random_walk, accel_random_walk=LONG.accel_random_walk, name="what the filter is told"
+    gyro_random_walk=LONG.gyro_random_walk, accel_random_walk=LONG.accel_random_walk, name="what the filter is given"
 )
 COMPARED = ("filter1", "filter2", "fused", "fused_tuned", "augmented", "augmented_long")
 
@@ -78,7 +78,7 @@ def _fused_over_sigma(voyage: Voyage, case: Case) -> Array:
 def consistency(voyage: Voyage, runs: int, seed: int, progress: Callable[[str], None]) -> tuple[Array, Array]:
     """NEES over 15 of the long-run filter at the end, and its heading error over sigma, (N,) each.
 
-    Errors, biases and the log's error are drawn from what the filter is told, the IMU has its random walks.
+    Errors, biases and the log's error are drawn from what the filter is given, the IMU has its random walks.
     """
     squares, heading = [], []
     for run in range(runs):

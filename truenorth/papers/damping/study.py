@@ -1,4 +1,4 @@
-"""`truenorth reproduce damping`: the double filter beside networks and a 15-state filter, and what of its claims holds."""
+"""`truenorth reproduce damping`: the double filter compared with networks and a 15-state filter, and what of its claims holds."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
 
-ODOMETER_NOISE, SIDEWAYS = 0.02, 0.05  # m/s, beside the pulses; a wheel's slide on a hard road
+ODOMETER_NOISE, SIDEWAYS = 0.02, 0.05  # m/s, besides the pulses; a wheel's slide on a hard road
 INTERVAL = 0.5  # s
 
 

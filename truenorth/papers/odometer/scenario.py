@@ -99,7 +99,7 @@ class Drives:
 
     @property
     def position(self) -> Position:
-        """At the start, known well: what the filters of the study are told."""
+        """At the start, known well: what the filters of the study are given."""
         return Position(*self.place)
 
     @property

@@ -1,4 +1,4 @@
-"""`truenorth reproduce odometer`: the paper's model with its filters, invariant errors beside them, and what holds."""
+"""`truenorth reproduce odometer`: the paper's model with its filters, invariant errors next to them, and what holds."""
 
 from __future__ import annotations
 

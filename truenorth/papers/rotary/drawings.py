@@ -1,4 +1,4 @@
-"""Figures of the study: modulated biases, coarse errors by run, convergence of the filters, and errors beside sigmas."""
+"""Figures of the study: modulated biases, coarse errors by run, convergence of the filters, and errors compared with sigmas."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
             "convergence": "RMS over the runs. Above from the paper's mean coarse error, in the middle from its largest, below "
             "with the lever arm's velocity at the start left in, as its text has it.",
             "open_choices": "What the paper does not state, changed one by one: heading RMS at 600 s; dashed: our choice.",
-            "honesty": "RMS of heading over the runs beside the sigma that the filter claims; grey: .85 to 1.2.",
+            "honesty": "RMS of heading over the runs compared with the sigma that the filter claims; grey: .85 to 1.2.",
         },
         [*_remarks(found, table), *(str(sweep) for sweep in sweeps)],
     )

@@ -53,7 +53,7 @@ def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
 
 
 def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Errors], runs: int) -> Figure:
-    """RMS of heading and level over time in every case, beside the claimed sigma."""
+    """RMS of heading and level over time in every case, compared with the claimed sigma."""
     cases = list(dict.fromkeys(case for case, _ in found))
     with style():
         figure = new_figure(3.0 * len(cases) + 0.6, 6.5)

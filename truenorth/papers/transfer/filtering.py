@@ -38,7 +38,7 @@ HANDED_OVER = 1e-7  # rad: what the one-shot hand-over of an attitude adds to th
 
 @dataclass(frozen=True)
 class Method:
-    """Which states a filter has and what it is told.
+    """Which states a filter has and what it is given.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ def errors_of(
     workers : int
         Threads, which share the runs; the numbers do not depend on it.
     known_delay : float, s
-        Told to all methods.
+        Given to all methods.
     """
 
     def one(number: int) -> list[list[Array]]:
