@@ -94,7 +94,7 @@ def _write(output: Path, found: Inspection, like: str | None) -> list[Path]:
     from truenorth.core.atomic import atomic_path, writable_folder
     from truenorth.figures.noise import plot_noise
     from truenorth.quality.noise import noise_from_log
-    from truenorth.records.specs import write_kalibr
+    from truenorth.records.kalibr import write_kalibr
 
     folder = writable_folder(output)
     record, rest = found.record, found.noise_from

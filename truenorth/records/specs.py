@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
+from truenorth.records.presets import PRESETS
 
 if TYPE_CHECKING:
     from truenorth.records.imu import ImuRecord
@@ -274,74 +275,6 @@ def _field(group: str, key: str) -> str:
     return f"{group}_{key}" if group else key
 
 
-PRESETS: dict[str, dict[str, Any]] = {
-    "navigation": {
-        "gyro": {
-            "bias": "0.01 deg/h",
-            "random_walk": "0.001 deg/sqrt(h)",
-            "bias_instability": "0.001 deg/h",
-            "scale_factor": "5 ppm",
-            "misalignment": "2 arcsec",
-        },
-        "accel": {
-            "bias": "50 ug",
-            "random_walk": "10 ug/sqrt(Hz)",
-            "bias_instability": "5 ug",
-            "scale_factor": "50 ppm",
-            "misalignment": "5 arcsec",
-        },
-    },
-    "tactical": {
-        "gyro": {
-            "bias": "1 deg/h",
-            "random_walk": "0.05 deg/sqrt(h)",
-            "bias_instability": "0.3 deg/h",
-            "scale_factor": "150 ppm",
-            "misalignment": "60 arcsec",
-        },
-        "accel": {
-            "bias": "1 mg",
-            "random_walk": "50 ug/sqrt(Hz)",
-            "bias_instability": "50 ug",
-            "scale_factor": "300 ppm",
-            "misalignment": "60 arcsec",
-        },
-    },
-    "industrial": {
-        "gyro": {
-            "bias": "100 deg/h",
-            "random_walk": "0.3 deg/sqrt(h)",
-            "bias_instability": "5 deg/h",
-            "scale_factor": "1000 ppm",
-            "misalignment": "3 arcmin",
-        },
-        "accel": {
-            "bias": "8 mg",
-            "random_walk": "100 ug/sqrt(Hz)",
-            "bias_instability": "100 ug",
-            "scale_factor": "1000 ppm",
-            "misalignment": "3 arcmin",
-        },
-    },
-    "consumer": {
-        "gyro": {
-            "bias": "1000 deg/h",
-            "random_walk": "1 deg/sqrt(h)",
-            "bias_instability": "30 deg/h",
-            "scale_factor": "1 %",
-            "misalignment": "30 arcmin",
-        },
-        "accel": {
-            "bias": "30 mg",
-            "random_walk": "300 ug/sqrt(Hz)",
-            "bias_instability": "300 ug",
-            "scale_factor": "1 %",
-            "misalignment": "30 arcmin",
-        },
-    },
-}
-
-
 def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSpec:
     """A specification from a preset's name, a YAML file, a mapping, or as it is.
 
@@ -387,34 +320,6 @@ def _from_kalibr(content: Mapping[Any, Any], where: str, name: str) -> ImuSpec:
             raise DataError(f"{where}: {theirs}: {value!r}; expected a number in SI, zero or more")
         values[ours] = float(value)
     return ImuSpec(**values)
-
-
-def write_kalibr(spec: ImuSpec, rate: float, path: str | PathLike[str]) -> None:
-    """Write the four densities that Kalibr takes, for samples at a rate (Hz).
-
-    A bias that wanders as a Gauss-Markov process (sigma b, correlation time T) drives its random walk by ``b sqrt(2 / T)``.
-
-    Raises
-    ------
-    UsageError
-        The file cannot be written.
-    """
-    import yaml
-
-    from truenorth.core.atomic import atomic_path
-
-    whole = spec.with_random_walks(1.0 / rate)
-    drive = math.sqrt(2.0 / spec.correlation_time)
-    content: dict[str, Any] = {}
-    for theirs, ours in KALIBR.items():
-        value = getattr(whole, ours)
-        if ours.endswith("rate_random_walk"):
-            sensor = ours.partition("_")[0]
-            value = math.hypot(value, getattr(spec, f"{sensor}_bias_instability") * drive)
-        content[theirs] = float(value)
-    content |= {"rostopic": "/imu", "update_rate": float(rate)}
-    with atomic_path(path) as temporary:
-        temporary.write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")
 
 
 def _from_mapping(content: Any, where: str, name: str) -> ImuSpec:
