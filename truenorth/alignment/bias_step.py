@@ -7,6 +7,8 @@ is the error of the answer.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,8 @@ from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import find_touch
+from truenorth.core.compiled import compiled
+from truenorth.filters.gains import times
 from truenorth.models.static import BA, BG, PHI
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -30,20 +34,14 @@ def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
     Phi, H = fine.system.Phi, fine.system.H
     count, n = len(fine.estimates.innovation), fine.system.states
     first = np.array([round(onset * count) for onset in ONSETS])
-    # Columns: steps, then ramps that are one at the end, of each of the six biases from each onset on.
-    d = np.zeros((n, 2, len(first), 6))
-    signature = np.empty((count, H.shape[-2], d[0].size))
-    for k in range(count):
-        size = np.stack([(k >= first).astype(float), np.clip((k - first) / (count - first), 0.0, 1.0)])
-        d[SENSORS] = np.eye(6)[:, None, None, :] * size[..., None]
-        d = np.tensordot(Phi[min(k, len(Phi) - 1)], d, axes=1)
-        signature[k] = H[min(k, len(H) - 1)] @ d.reshape(n, -1)
-    left_by = d.reshape(n, -1)[PHI]
+    d = np.zeros((n, 2 * len(first) * 6))
+    signature = np.empty((count, H.shape[-2], d.shape[1]))
+    _begin(np.ascontiguousarray(Phi), np.ascontiguousarray(H), first, SENSORS.start, d, signature)
     ratio, size, x = matched(fine, signature)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []
-    left = np.where(ratio > limit("hint"), np.abs((left_by - x[PHI]) * size), 0.0)
+    left = np.where(ratio > limit("hint"), np.abs((d[PHI] - x[PHI]) * size), 0.0)
     heading, level = float(left[2].max()), float(np.hypot(left[0], left[1]).max())
     axis, sensor = best % 3, "gyro" if best % 6 < 3 else "accel"
     figures: dict[str, Figure] = {
@@ -57,6 +55,28 @@ def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
     }
     kind: Kind = "bounded" if ratio[best] > limit("drift") else "known"  # what may be chance is added to sigma
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
+
+
+@compiled
+def _begin(Phi: Any, H: Any, first: Any, sensors: int, d: Any, signature: Any) -> None:
+    """Measurements (K, m, 12 S) and last state (n, 12 S) of biases that change from the epochs `first` (S,) on.
+
+    Columns: steps of size one, then ramps that are one at the end, of each of the six biases from each onset.
+    """
+    count, before = signature.shape[0], np.zeros_like(d)
+    for k in range(count):
+        before[:] = d
+        for kind in range(2):
+            for i in range(len(first)):
+                size = 1.0 if k >= first[i] else 0.0
+                if kind == 1:
+                    size = max(0.0, (k - first[i]) / (count - first[i]))
+                for j in range(6):
+                    column = 6 * (len(first) * kind + i) + j
+                    before[sensors : sensors + 6, column] = 0.0
+                    before[sensors + j, column] = size
+        times(Phi[min(k, len(Phi) - 1)], before, d)
+        times(H[min(k, len(H) - 1)], d, signature[k])
 
 
 def turn_evidence(task: Task) -> list[Evidence]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
+from truenorth.filters.gains import through
 from truenorth.models.static import PHI
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -105,13 +106,7 @@ def matched(fine: FineAlignment, signature: Array) -> tuple[Array, Array, Array]
     x : (n, S) array
         What the filter estimates in the end of a signature of size one.
     """
-    gain, _, step = fine.gains
-    H_Phi = fine.system.H @ fine.system.Phi
-    expected = np.empty_like(signature)
-    x = np.zeros((step.shape[1], signature.shape[2]))
-    for k in range(len(signature)):
-        expected[k] = signature[k] - H_Phi[k] @ x
-        x = step[k] @ x + gain[k] @ signature[k]
+    expected, x = through(fine.system, fine.gains, signature)
     weighted = np.linalg.solve(fine.estimates.innovation_covariance, expected)
     match = np.einsum("kis,ki->s", weighted, fine.estimates.innovation)
     energy = np.maximum(np.einsum("kis,kis->s", weighted, expected), 1e-300)

@@ -6,10 +6,11 @@ cause can be followed by itself.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.filters.stack import Array
 from truenorth.filters.system import Estimates, LinearSystem
@@ -78,8 +79,60 @@ def initial_part(step: Array, P0: Array) -> Array:
         Initial covariance, or a part of it.
     """
     response = np.empty(step.shape)
-    e = np.eye(len(P0))
-    for k, step_k in enumerate(step):
-        e = step_k @ e
-        response[k] = e
+    _products(np.ascontiguousarray(step), response)
     return response @ P0 @ np.swapaxes(response, -1, -2)
+
+
+def through(system: LinearSystem, gains: Gains, signature: Array) -> tuple[Array, Array]:
+    """What a filter makes of signatures in its measurements.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    gains : Gains
+        Of :func:`filter_gains`.
+    signature : (K, m, S) array
+
+    Returns
+    -------
+    innovation : (K, m, S) array
+    x : (n, S) array
+        The state at the last epoch.
+    """
+    innovation, x = np.empty_like(signature), np.zeros((system.states, signature.shape[2]))
+    arrays = (system.H @ system.Phi, gains.gain, gains.step, signature)
+    _through(*(np.ascontiguousarray(a) for a in arrays), innovation, x, np.empty_like(x))
+    return innovation, x
+
+
+@compiled
+def _products(step: Any, response: Any) -> None:
+    """``response[k] = step[k] ... step[1] step[0]``, (K, n, n)."""
+    response[0] = step[0]
+    for k in range(1, step.shape[0]):
+        times(step[k], response[k - 1], response[k])
+
+
+@compiled
+def _through(H_Phi: Any, gain: Any, step: Any, signature: Any, innovation: Any, x: Any, work: Any) -> None:
+    for k in range(signature.shape[0]):
+        times(H_Phi[k], x, innovation[k])
+        for i in range(signature.shape[1]):
+            for s in range(signature.shape[2]):
+                innovation[k, i, s] = signature[k, i, s] - innovation[k, i, s]
+        times(step[k], x, work)
+        times(gain[k], signature[k], x)
+        for i in range(x.shape[0]):
+            for s in range(x.shape[1]):
+                x[i, s] += work[i, s]
+
+
+@compiled
+def times(A: Any, B: Any, C: Any) -> None:
+    """``C = A B`` of any shapes; `C` is neither."""
+    for i in range(A.shape[0]):
+        for j in range(B.shape[1]):
+            C[i, j] = 0.0
+        for k in range(A.shape[1]):
+            for j in range(B.shape[1]):
+                C[i, j] += A[i, k] * B[k, j]

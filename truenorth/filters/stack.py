@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.compiled import compiled
 from truenorth.core.errors import DataError, UsageError
 
 Array = NDArray[np.float64]
@@ -16,6 +17,7 @@ S = TypeVar("S", bound="System")
 
 ASYMMETRY = 1e-9  # of a covariance, relative to the two variances; more is a mistake, less is rounding
 NEGATIVE = 1e-9  # of a covariance's smallest pivot, relative to its variance: rounding
+SOUND, NEGATIVE_VARIANCE, ASYMMETRIC, NEGATIVE_MINOR, NEGATIVE_PIVOT = range(5)  # what a covariance can be
 
 
 class System:
@@ -165,45 +167,72 @@ def _check_finite(owner: str, name: str, axes: str, a: Array) -> None:
 
 def _check_covariance(owner: str, name: str, axes: str, a: Array) -> None:
     """Symmetric and positive semidefinite, each matrix of the stack; `Q` by its variances and 2x2 minors only."""
-    d = np.diagonal(a, axis1=-2, axis2=-1)
-    if (d < 0.0).any():
-        index = tuple(int(i) for i in np.argwhere(d < 0.0)[0])
-        raise DataError(
-            f"{owner}: {name} has the variance {d[index]} at {_where(axes, (*index, index[-1]))}, "
-            "expected a positive semidefinite matrix"
-        )
-    i, j = np.tril_indices(a.shape[-1], -1)
-    lower, upper = a[..., i, j], a[..., j, i]
-    if not (lower.any() or upper.any()):
+    n = a.shape[-1]
+    fault, k, i, j, value = _first_fault(np.ascontiguousarray(a).reshape(-1, n, n), name != "Q", np.empty((n, n)))
+    if fault == SOUND:
         return
-    scale = np.sqrt(d[..., i] * d[..., j])
-    for bad, text in (
-        (np.abs(lower - upper) > ASYMMETRY * scale, "is not symmetric"),
-        (np.abs(lower) > (1.0 + NEGATIVE) * scale, "is not positive semidefinite"),
-    ):
-        if bad.any():
-            at = tuple(int(k) for k in np.argwhere(bad)[0])
-            index = (*at[:-1], int(i[at[-1]]), int(j[at[-1]]))
-            mirrored = (*index[:-2], index[-1], index[-2])
-            raise DataError(
-                f"{owner}: {name} {text} at {_where(axes, index)}: {a[index]} there, {a[mirrored]} in its "
-                f"mirror image, variances {a[(*index[:-1], index[-2])]} and {a[(*index[:-2], index[-1], index[-1])]}"
-            )
-    if name != "Q":
-        _check_pivots(owner, name, axes, a, d)
+    before = tuple(int(x) for x in np.unravel_index(k, a.shape[:-2]))
+    here, mirrored = (*before, i, j), (*before, j, i)
+    place = _where(axes, here)
+    if fault == NEGATIVE_VARIANCE:
+        raise DataError(f"{owner}: {name} has the variance {value} at {place}, expected a positive semidefinite matrix")
+    if fault == NEGATIVE_PIVOT:
+        raise DataError(
+            f"{owner}: {name} is not positive semidefinite at {place}: "
+            f"given the rows before it, a variance of {value} of the given one is left"
+        )
+    text = "is not symmetric" if fault == ASYMMETRIC else "is not positive semidefinite"
+    raise DataError(
+        f"{owner}: {name} {text} at {place}: {a[here]} there, {a[mirrored]} in its "
+        f"mirror image, variances {a[(*before, i, i)]} and {a[(*before, j, j)]}"
+    )
 
 
-def _check_pivots(owner: str, name: str, axes: str, a: Array, d: Array) -> None:
-    """No negative pivot in ``L D L'`` of the correlation matrix, for the whole stack at once."""
-    sigma = np.sqrt(np.where(d > 0.0, d, 1.0))
-    A = a / (sigma[..., :, None] * sigma[..., None, :])
-    for j in range(a.shape[-1]):
-        pivot = A[..., j, j]
-        if (pivot < -NEGATIVE * (j + 1)).any():
-            index = tuple(int(k) for k in np.argwhere(pivot < -NEGATIVE * (j + 1))[0])
-            raise DataError(
-                f"{owner}: {name} is not positive semidefinite at {_where(axes, (*index, j, j))}: "
-                f"given the rows before it, a variance of {pivot[index]} of the given one is left"
-            )
-        column = A[..., j + 1 :, j] / np.where(pivot > NEGATIVE, pivot, np.inf)[..., None]
-        A[..., j + 1 :, j + 1 :] -= column[..., :, None] * A[..., None, j, j + 1 :]
+@compiled
+def _first_fault(a: Any, pivots: bool, work: Any) -> Any:
+    """Fault, matrix, row, column and figure of the first that is found in (M, n, n) symmetric matrices.
+
+    Variances, then both halves, then minors of two rows, then (with `pivots`) those of ``L D L'`` of the correlation
+    matrix, which need (n, n) `work`.
+    """
+    count, n = a.shape[0], a.shape[1]
+    for k in range(count):
+        for i in range(n):
+            if a[k, i, i] < 0.0:
+                return NEGATIVE_VARIANCE, k, i, i, a[k, i, i]
+    for fault in (ASYMMETRIC, NEGATIVE_MINOR):
+        for k in range(count):
+            for i in range(n):
+                for j in range(i):
+                    scale = np.sqrt(a[k, i, i] * a[k, j, j])
+                    if fault == ASYMMETRIC:
+                        bad = abs(a[k, i, j] - a[k, j, i]) > ASYMMETRY * scale
+                    else:
+                        bad = abs(a[k, i, j]) > (1.0 + NEGATIVE) * scale
+                    if bad:
+                        return fault, k, i, j, a[k, i, j]
+    if pivots:
+        for k in range(count):
+            row = _negative_pivot(a[k], work)
+            if row >= 0:
+                return NEGATIVE_PIVOT, k, row, row, work[row, row]
+    return SOUND, 0, 0, 0, 0.0
+
+
+@compiled
+def _negative_pivot(P: Any, A: Any) -> int:
+    """Row of the first negative pivot of the correlation matrix of `P`, which stands in `A` then; -1 without one."""
+    n = P.shape[0]
+    for i in range(n):
+        for j in range(n):
+            scale = np.sqrt((P[i, i] if P[i, i] > 0.0 else 1.0) * (P[j, j] if P[j, j] > 0.0 else 1.0))
+            A[i, j] = P[i, j] / scale
+    for j in range(n):
+        if A[j, j] < -NEGATIVE * (j + 1):
+            return j
+        if A[j, j] > NEGATIVE:
+            for i in range(j + 1, n):
+                share = A[i, j] / A[j, j]
+                for m in range(j + 1, n):
+                    A[i, m] -= share * A[j, m]
+    return -1

@@ -1,14 +1,17 @@
 """Signals that tell motion from noise: even-rate means, white noise, wander of the angle, acceleration.
 
-NumPy only, a few passes over the samples.
+A few passes over the samples.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from truenorth.core.compiled import compiled
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -66,22 +69,42 @@ def white_noise(record: ImuRecord) -> Array:
     duration, rows = 20.0, len(record)
     least = np.full(6, np.inf)
     scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
-    data = np.hstack([record.gyro, record.accel])
-    # Means of all lengths from one running sum; about the first row, so that gravity does not eat its digits.
-    total = np.vstack([np.zeros(6), np.cumsum(data - data[:1], axis=0)])
+    total = np.empty((rows + 1, 6))
+    _running_sums(record.gyro, record.accel, total)
     for tau in (0.02, 0.1, 0.5, 1.0, 2.0):
         m = max(1, round(tau / record.interval))
         count = rows // m
         if count < 4:
             break
-        means = np.diff(total[: count * m + 1 : m], axis=0) / m
-        squares = np.square(np.diff(means, axis=0)) / 2.0
-        group = min(len(squares), max(3, round(duration / (m * record.interval))))
-        groups = len(squares) // group
-        variance = squares[: groups * group].reshape(groups, group, 6).mean(axis=1)
+        group = min(count - 1, max(3, round(duration / (m * record.interval))))
+        variance = np.empty(((count - 1) // group, 6))
+        _allan_variances(total, m, group, variance)
         quiet = np.quantile(variance, 0.25, axis=0)
         least = np.minimum(least, scale * np.sqrt(quiet * m * record.interval))
     return np.where(np.isfinite(least), least, 0.0)
+
+
+@compiled
+def _running_sums(gyro: Any, accel: Any, total: Any) -> None:
+    """Sums (N + 1, 6) of all rows so far, about the first, so that gravity does not eat their digits."""
+    total[0] = 0.0
+    for k in range(gyro.shape[0]):
+        for i in range(3):
+            total[k + 1, i] = total[k, i] + (gyro[k, i] - gyro[0, i])
+            total[k + 1, i + 3] = total[k, i + 3] + (accel[k, i] - accel[0, i])
+
+
+@compiled
+def _allan_variances(total: Any, m: int, group: int, variance: Any) -> None:
+    """Half the mean square of differences of means of `m` rows one behind the other, by groups (G, 6) of differences."""
+    for g in range(variance.shape[0]):
+        variance[g] = 0.0
+        for k in range(g * group * m, (g + 1) * group * m, m):
+            for i in range(6):
+                change = (total[k + 2 * m, i] - 2.0 * total[k + m, i] + total[k, i]) / m
+                variance[g, i] += change * change
+        for i in range(6):
+            variance[g, i] /= 2.0 * group
 
 
 def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
