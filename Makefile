@@ -31,8 +31,11 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# The libraries that we are compared with have an environment of their own.
 bench: $(WARM)
-	$(BIN)/python -m benchmarks
+	test -x .peers/bin/python || $(PYTHON) -m venv .peers
+	$(BIN)/uv pip install -q --python .peers/bin/python -r benchmarks/peers.txt -e .
+	.peers/bin/python -m benchmarks
 
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build -q
@@ -65,4 +68,4 @@ $(WARM): $(READY)
 	touch $@
 
 clean:
-	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf .venv .peers build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,4 +1,4 @@
-"""Speed of the Kalman filter beside filterpy and simdkalman, on the same system in the same run.
+"""Speed of the linear filters; other libraries on the same work: ``python -m benchmarks peers``.
 
 15 states, a 3-row measurement every tenth step, prediction at every step. Run: ``python -m benchmarks.bench_filters``.
 """
@@ -40,38 +40,8 @@ def best(call: Callable[[], object], steps: int, repeats: int = REPEATS) -> floa
     return 1e6 * seconds(call, repeats) / steps
 
 
-def by_filterpy(s: LinearSystem) -> np.ndarray:
-    from filterpy.kalman import KalmanFilter
-
-    f = KalmanFilter(dim_x=STATES, dim_z=ROWS)
-    f.x, f.P, f.F, f.Q, f.H, f.R = s.x0[:, None].copy(), s.P0.copy(), s.Phi[0], s.Q[0], s.H[0], s.R[0]
-    for z in s.z:
-        f.predict()
-        if not np.isnan(z[0]):
-            f.update(z[:, None])
-    return f.x[:, 0]
-
-
-def by_simdkalman(s: LinearSystem) -> np.ndarray:
-    import simdkalman
-
-    f = simdkalman.KalmanFilter(s.Phi[0], s.Q[0], s.H[0], s.R[0])
-    # Its initial value stands at the first measurement, ours before it.
-    x, P = s.Phi[0] @ s.x0, s.Phi[0] @ s.P0 @ s.Phi[0].T + s.Q[0]
-    result = f.compute(
-        np.atleast_3d(s.z), 0, initial_value=x, initial_covariance=P, filtered=True, smoothed=False, likelihoods=False
-    )
-    return result.filtered.states.mean[:, -1]
-
-
 def main() -> None:
-    one, few = system(20_000), system(1_000)
-    many, few_many = system(2_000, (RUNS,)), system(200, (RUNS,))
-
-    x = kalman(few).x[-1]
-    np.testing.assert_allclose(by_filterpy(few), x, rtol=1e-8, atol=1e-10)
-    x = kalman(few_many).x[:, -1]
-    np.testing.assert_allclose(by_simdkalman(few_many), x, rtol=1e-8, atol=1e-10)
+    one, many = system(20_000), system(2_000, (RUNS,))
 
     print(f"  {STATES} states, {ROWS} rows every {EVERY}th step; us a step (a run and step where there are many runs)")
     ours = {
@@ -91,8 +61,6 @@ def main() -> None:
         "Joseph": best(lambda: kalman(every), every.epochs),
     }
     show("one run, update at each step", update)
-    theirs = best(lambda: by_filterpy(few), few.epochs, 5)
-    print(f"  {'one run, filterpy, Joseph':44s}{theirs:8.3f}  {theirs / ours['Joseph']:.0f} times ours")
 
     steps = RUNS * many.epochs
     show(f"{RUNS} runs, 1 thread", {"plain": best(lambda: kalman(many, joseph=False), steps, 5)})
@@ -101,8 +69,6 @@ def main() -> None:
         "Joseph": best(lambda: kalman(many, workers=CORES), steps),
     }
     show(f"{RUNS} runs, {CORES} threads", shared, LIMIT_MANY)
-    theirs = best(lambda: by_simdkalman(few_many), RUNS * few_many.epochs, 2)
-    print(f"  {f'{RUNS} runs, simdkalman':44s}{theirs:8.3f}  {theirs / shared['plain']:.0f} times ours")
 
 
 def show(title: str, figures: dict[str, float], limit: float | None = None) -> None:
