@@ -21,7 +21,10 @@ import truenorth
 
 NEW = Path(__file__).parents[1]
 WHERE = ["--lat", "40", "--lon", "118", "--imu", "navigation"]
-EDITED = "core/attitude.py"  # holds compiled functions, and most others call one of them
+EDITED = (
+    "core/attitude.py",
+    "attitude.py",
+)  # where it stood or stands; holds compiled functions, and most others call one of them
 PROGRAM = "from truenorth.cli import main; main()"
 STEPS = """
 import json, time
@@ -40,17 +43,38 @@ for _ in range(9):
     took.append(time.process_time() - begun)
 print(json.dumps(min(took[1:]) / K * 1e6))
 """
+CAMPAIGN = """
+import json, time
+from benchmarks.bench_campaign import PLAN
+from truenorth.campaign.aligning import align_runs
+from truenorth.campaign.plan import read_plan
+plan = read_plan(PLAN)
+align_runs(plan, plan.cases[0], range(2))
+begun = time.process_time()
+align_runs(plan, plan.cases[0], range(2, 22))
+print(json.dumps((time.process_time() - begun) / 20 * 1000))
+"""
 
 
-def spent(checkout: Path, arguments: list[str], cache: Path | None = None, package: Path | None = None) -> float:
-    """Processor time of one process, s; with the kernels of a cache of its own, where one is given."""
+def spent(
+    checkout: Path, command: list[str], folder: Path, cache: Path | None = None, package: Path | None = None
+) -> float:
+    """Processor time of a command of Python, s; with the kernels of a cache of its own, where one is given."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     environment |= {"PYTHONPATH": str(package or checkout)} | ({} if cache is None else {"NUMBA_CACHE_DIR": str(cache)})
     before = os.times()
-    command = [str(checkout / ".venv/bin/python"), "-c", PROGRAM, *arguments]
-    subprocess.run(command, env=environment, cwd=package or checkout, check=True, capture_output=True)
+    subprocess.run(
+        [str(checkout / ".venv/bin/python"), *command], env=environment, cwd=folder, check=True, capture_output=True
+    )
     after = os.times()
     return after.children_user + after.children_system - before.children_user - before.children_system
+
+
+def said(checkout: Path, program: str) -> float:
+    """The figure that a program prints."""
+    python = str(checkout / ".venv/bin/python")
+    done = subprocess.run([python, "-c", program], cwd=checkout, check=True, capture_output=True, text=True)
+    return float(json.loads(done.stdout))
 
 
 def main() -> None:
@@ -73,14 +97,24 @@ def main() -> None:
             rounds = [[measure(checkout) for checkout in (old, NEW)] for _ in range(times)]
             return list(np.min(rounds, axis=0))
 
+        command = ["-c", PROGRAM, "align", str(log), *WHERE]
+
         def align(checkout: Path) -> float:
-            return spent(checkout, ["align", str(log), *WHERE])
+            return spent(checkout, command, folder)
 
         def first(checkout: Path) -> float:
-            return spent(checkout, ["align", str(log), *WHERE], caches[checkout])
+            return spent(checkout, command, folder, caches[checkout])
 
         def with_report(checkout: Path) -> float:
-            return spent(checkout, ["align", str(log), *WHERE, "-o", str(out(checkout))])
+            return spent(checkout, [*command, "-o", str(out(checkout))], folder)
+
+        def demo(checkout: Path, cache: Path | None = None) -> float:
+            place = folder / f"demo {'new' if checkout is NEW else 'old'}"
+            place.mkdir(exist_ok=True)
+            return spent(checkout, [str(checkout / "examples/demo.py")], place, cache)
+
+        def first_demo(checkout: Path) -> float:
+            return demo(checkout, folder / f"demo cache {'new' if checkout is NEW else 'old'}")
 
         def out(checkout: Path) -> Path:
             return folder / f"result {'new' if checkout is NEW else 'old'}"
@@ -88,15 +122,11 @@ def main() -> None:
         def after_an_edit(checkout: Path) -> float:
             copy = folder / f"copy {'new' if checkout is NEW else 'old'}"
             shutil.copytree(checkout / "truenorth", copy / "truenorth", ignore=shutil.ignore_patterns("__pycache__"))
-            spent(checkout, ["align", str(log), *WHERE], caches[checkout], copy)  # bytecode, and this copy's kernels
-            with (copy / "truenorth" / EDITED).open("a") as file:
+            edited = next(copy / "truenorth" / name for name in EDITED if (copy / "truenorth" / name).exists())
+            spent(checkout, command, copy, caches[checkout], copy)  # bytecode, and this copy's kernels
+            with edited.open("a") as file:
                 file.write("\n# An edit.\n")
-            return spent(checkout, ["align", str(log), *WHERE], caches[checkout], copy)
-
-        def step(checkout: Path) -> float:
-            python = str(checkout / ".venv/bin/python")
-            done = subprocess.run([python, "-c", STEPS], cwd=checkout, check=True, capture_output=True, text=True)
-            return json.loads(done.stdout)
+            return spent(checkout, command, copy, caches[checkout], copy)
 
         def sizes() -> list[float]:
             return [(out(checkout) / "report.html").stat().st_size / 1e6 for checkout in (old, NEW)]
@@ -106,10 +136,17 @@ def main() -> None:
             ("`align` of 600 s, compiled, s", lambda: both(align, repeats)),
             ("the same with report, s", lambda: both(with_report, repeats)),
             ("size of the report, MB", sizes),
-            ("15-state step, covariance at every sample, us", lambda: both(step, repeats)),
+            (
+                "15-state step, update and covariance at every sample, us",
+                lambda: both(lambda c: said(c, STEPS), repeats),
+            ),
+            ("1000 static alignments of 600 s at 100 Hz, one worker, s", lambda: both(lambda c: said(c, CAMPAIGN), 2)),
+            ("the demo, compiled, s", lambda: both(demo, repeats)),
+            ("the demo, nothing compiled, s", lambda: both(first_demo, 1)),
             ("first `align`, nothing compiled, s", lambda: both(first, 1)),
-            (f"`align` after a comment was added to {EDITED}, s", lambda: both(after_an_edit, 1)),
+            (f"`align` after a comment was added to {EDITED[0]}, s", lambda: both(after_an_edit, 1)),
         ]
+        both(demo, 1)  # what is not compiled yet
         print("| what | before | now | ratio |\n| --- | ---: | ---: | ---: |", flush=True)
         for what, measured in rows:
             before, now = measured()
