@@ -52,10 +52,13 @@ if TYPE_CHECKING:
     )
     from truenorth.advice import advise, advise_manoeuvre
     from truenorth.aiding.aids import Barometer, Gnss, Indexer, Master, Odometer, Positions, VelocityLog
+    from truenorth.aiding.fixes import AzimuthFix, Fixes, PositionFix
     from truenorth.alignment import Alignment, Recipe, Request, align, register_recipe
     from truenorth.campaign import run_campaign
     from truenorth.core.errors import AlignmentError, DataError, TruenorthError, UsageError
     from truenorth.core.position import Position
+    from truenorth.errors.deflection import Deflection
+    from truenorth.errors.log import LogErrors
     from truenorth.formats import (
         read_encoder,
         read_gnss,
@@ -89,15 +92,19 @@ if TYPE_CHECKING:
 _HOMES = {
     "Alignment": "alignment",
     "AlignmentError": "core.errors",
+    "AzimuthFix": "aiding.fixes",
     "Barometer": "aiding.aids",
     "Calibration": "records.calibration",
     "DataError": "core.errors",
+    "Deflection": "errors.deflection",
+    "Fixes": "aiding.fixes",
     "Gnss": "aiding.aids",
     "GnssRecord": "records",
     "HeightRecord": "records",
     "ImuRecord": "records",
     "ImuSpec": "records.specs",
     "Indexer": "aiding.aids",
+    "LogErrors": "errors.log",
     "Master": "aiding.aids",
     "MasterRecord": "records",
     "Mounting": "navigation",
@@ -105,6 +112,7 @@ _HOMES = {
     "Odometer": "aiding.aids",
     "OdometerRecord": "records",
     "Position": "core.position",
+    "PositionFix": "aiding.fixes",
     "Positions": "aiding.aids",
     "Recipe": "alignment",
     "Request": "alignment",
@@ -145,15 +153,19 @@ _HOMES = {
 __all__ = [
     "Alignment",
     "AlignmentError",
+    "AzimuthFix",
     "Barometer",
     "Calibration",
     "DataError",
+    "Deflection",
+    "Fixes",
     "Gnss",
     "GnssRecord",
     "HeightRecord",
     "ImuRecord",
     "ImuSpec",
     "Indexer",
+    "LogErrors",
     "Master",
     "MasterRecord",
     "Mounting",
@@ -161,6 +173,7 @@ __all__ = [
     "Odometer",
     "OdometerRecord",
     "Position",
+    "PositionFix",
     "Positions",
     "Recipe",
     "Request",

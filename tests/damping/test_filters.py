@@ -11,6 +11,7 @@ from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.prior import carried_prior, paper_prior
+from truenorth.errors.log import LogErrors
 from truenorth.models.marine import BA, BG, DP, DV, PHI, REF, MarineModel
 from truenorth.simulation import simulate
 from truenorth.strapdown.level import NavigationState, mechanise
@@ -140,8 +141,8 @@ def test_the_augmented_filter_is_honest():
     """
     runs = 30
     ideal, truth = ideal_and_truth(hours=24.0)
-    model = MarineModel(**WALKS, with_reference=True)
-    P0 = carried_prior(truth, START, model, np.diag(SIGMA**2), 0.3)
+    model = MarineModel(**WALKS, groups=LogErrors(0.3).groups())
+    P0 = carried_prior(truth, START, model, np.diag(SIGMA**2))
     spec = _spec()
     nees = {hours: [] for hours in (4, 8, 24)}
     for run in range(runs):
@@ -201,4 +202,4 @@ def test_what_is_refused(linear):
     with pytest.raises(UsageError, match="start at epoch"):
         run_filters(course, ref, start=10**6, kinds={"filter1": Filter(PAPER, P0, 0.05)})
     with pytest.raises(UsageError, match=r"expected \(15, 15\)"):
-        Filter(MarineModel(0.0, 0.0, with_reference=True), P0, 0.05)
+        Filter(MarineModel(0.0, 0.0, groups=LogErrors(0.3).groups()), P0, 0.05)

@@ -6,6 +6,7 @@ import pytest
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
 from truenorth.core.errors import DataError
 from truenorth.damping.reference import cleaned, reference_of
+from truenorth.errors.log import LogErrors
 from truenorth.models.marine import BA, BG, MarineModel
 from truenorth.records import VelocityRecord
 from truenorth.state.wording import sentences
@@ -76,7 +77,7 @@ def test_a_log_in_body_axes_is_turned(course):
     part = truth.between(0, 199)
     time = np.arange(0.0, 398.0, 0.1)
     body = VelocityRecord(time, np.tile([0.0, 12.0, np.nan], (len(time), 1)), "body")
-    found = reference_of(part, body)
+    found = reference_of(part, body, LogErrors())
     heading = np.radians(51.3401917)
     np.testing.assert_allclose(
         np.nanmean(found.velocity, axis=0), 12.0 * np.array([np.sin(heading), np.cos(heading)]), rtol=1e-3
@@ -87,9 +88,9 @@ def test_what_is_refused(course):
     _, free = course
     far = np.arange(1e6, 1e6 + 100.0)
     with pytest.raises(DataError, match="no overlap"):
-        reference_of(free, VelocityRecord(far, np.ones((100, 3)), "navigation"))
+        reference_of(free, VelocityRecord(far, np.ones((100, 3)), "navigation"), LogErrors())
     near = np.arange(100.0)
     with pytest.raises(DataError, match="VE or VN is missing"):
-        reference_of(free, VelocityRecord(near, np.tile([1.0, np.nan, 0.0], (100, 1)), "navigation"))
+        reference_of(free, VelocityRecord(near, np.tile([1.0, np.nan, 0.0], (100, 1)), "navigation"), LogErrors())
     with pytest.raises(DataError, match="v_forward is missing"):
-        reference_of(free, VelocityRecord(near, np.tile([1.0, np.nan, 0.0], (100, 1)), "body"))
+        reference_of(free, VelocityRecord(near, np.tile([1.0, np.nan, 0.0], (100, 1)), "body"), LogErrors())

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
+from truenorth.errors.log import LogErrors, log_errors
 from truenorth.errors.master import MasterErrors
 from truenorth.records import EncoderRecord, GnssRecord, HeightRecord, MasterRecord, OdometerRecord, VelocityRecord
 from truenorth.records.flexure import FlexureSpec
@@ -102,14 +103,18 @@ class VelocityLog(_Mounted):
     ----------
     record : VelocityRecord
     mounting : Mounting, optional
+    errors : LogErrors or {"reference", "em", "doppler-water", "doppler-bottom"}, optional
+        Its slow errors. Left out, damping takes those that are usual for a log in its axes, and aiding what the mounting says.
     """
 
     record: VelocityRecord
+    errors: LogErrors | str | None = None
     key: ClassVar[str] = "velocity"
 
     def sources(self, altitude: str) -> list[Aiding]:
         """Velocities, in body or navigation axes."""
-        return from_velocity(self.record, self.mounting or Mounting())
+        none = LogErrors() if self.errors is None else log_errors(self.errors, self.record.frame)
+        return from_velocity(self.record, self.mounting or Mounting(), none)
 
 
 @dataclass(frozen=True)

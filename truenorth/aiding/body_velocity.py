@@ -8,6 +8,8 @@ x]) C_mb assumed``; that about the forward axis cannot be seen from forward moti
     dy/dt = (1 + k) C_mb (C' a - w x C' v): the axes turn as well, in a steady turn nothing changes
     z = y_hat - y = (1 + k) C_mb (C' dv - C' v x phi + eps x l - w x dl) - y/(1+k) dk - y x dmu - dbias + dy/dt dtau
 
+A log in the water shows the velocity against it: a drift d, east and north, adds ``(1 + k) C_mb C' d`` to y.
+
 A wheel does not slide sideways nor leave the road: components 0 of y are measurements too (non-holonomic constraint).
 
 Source: P. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd ed. (2013), sec.
@@ -26,6 +28,7 @@ from truenorth.aiding.row import (
     AT_BIAS,
     AT_LAG,
     AT_MOUNT,
+    AT_OWN,
     AT_SCALE,
     MOUNT,
     Row,
@@ -36,7 +39,7 @@ from truenorth.aiding.row import (
 )
 from truenorth.core.attitude import cross, quaternion_from_rotation_vector, rotate, times_back
 from truenorth.core.compiled import compiled
-from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
+from truenorth.state.now import NOW_C, NOW_NORTH, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 
 _PHI, _DV, _BG = 0, 3, 9
 
@@ -117,6 +120,19 @@ def body_velocity_row(
                 H[i, at_lag] += M * (change[k] - swing[k])
 
 
+@compiled
+def _drift(now: Any, C_mb: Any, gain: float, at: int, assumed: Any, H: Any, z: Any) -> None:
+    """Add a drift east and north, which the hull turns."""
+    s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+    C = matrix_of(now, NOW_C)
+    for j in range(2):
+        along = times_back(C, (c, -s, 0.0)) if j == 0 else times_back(C, (s, c, 0.0))
+        for i in range(3):
+            shown = gain * (C_mb[i, 0] * along[0] + C_mb[i, 1] * along[1] + C_mb[i, 2] * along[2])
+            z[i] += shown * assumed[at + j]
+            H[i, at + j] = -shown
+
+
 @row
 def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     arm = with_state(figures, ARM, assumed, at[AT_ARM])
@@ -149,6 +165,10 @@ def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any,
         H,
         z,
     )
+    if at[AT_OWN] >= 0:
+        _drift(now, C_mb, 1.0 + state_of(assumed, at[AT_SCALE]), at[AT_OWN], assumed, H, z)
 
 
-BODY_VELOCITY = Row("body velocity", _body_velocity, {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1})
+BODY_VELOCITY = Row(
+    "body velocity", _body_velocity, {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1, "own": 2}
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.aiding.source import Aiding, Role, state
 from truenorth.core.errors import UsageError
 from truenorth.errors.group import Group
+from truenorth.errors.log import DRIFT, NAME, LogErrors
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
 from truenorth.records.gnss_frames import check_frames
 from truenorth.state.mounting import Mounting
@@ -22,6 +24,7 @@ USER_RANGE = 2.0  # m, of one range, where only dilutions of precision are given
 VELOCITY_SIGMA = np.array([0.1, 0.1, 0.2])  # m/s
 ODOMETER_SIGMA = 0.05  # m/s, besides the pulses' size
 LOG_SIGMA = 0.1  # m/s
+DRIFT_TIME = 3.0 * 3600.0  # s, of a log's drift where nobody knows it: between tides and eddies
 BARO_SIGMA, BARO_DRIFT, BARO_TIME = 1.0, 10.0, 3600.0  # m, m, s: noise, weather
 FASTEST = 10.0  # Hz: faster odometers are averaged, since their errors are not new ten times a second
 
@@ -132,33 +135,46 @@ def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:
     ]
 
 
-def from_velocity(record: VelocityRecord, mounting: Mounting) -> list[Aiding]:
-    """A Doppler or electromagnetic log, or any reference velocity."""
+def from_velocity(record: VelocityRecord, mounting: Mounting, errors: LogErrors) -> list[Aiding]:
+    """A Doppler or electromagnetic log, or any reference velocity.
+
+    Parameters
+    ----------
+    record : VelocityRecord
+    mounting : Mounting
+    errors : LogErrors
+        Its slow errors; the larger of these and those of the mounting count. A drift whose time nobody knows lasts `DRIFT_TIME`.
+
+    Raises
+    ------
+    UsageError
+        Errors that turn with the hull, of a log that has been turned to east and north.
+    """
     noise = LOG_SIGMA if mounting.noise is None else mounting.noise
     sigma = _or_default(record.sigma, np.full(3, noise), len(record))
-    time = record.time - mounting.latency
-    if record.frame == "navigation":
-        states = states_of(mounting, "velocity log", "lever arm", "lag")
-        return [
-            Aiding(
-                "velocity log",
-                "velocity",
-                time,
-                record.velocity,
-                sigma,
-                mounting.lever_arm,
-                states=states,
-                gate=mounting.gate,
-            )
-        ]
-    states = states_of(mounting, "velocity log", "lever arm", "scale", "mounting", "lag")
-    if mounting.bias_sigma > 0.0:
-        states |= state("velocity log", "bias", np.full(3, mounting.bias_sigma), mounting.bias_time)
+    body = record.frame == "body"
+    if not body and (errors.scale or errors.mounting or errors.bias):
+        raise UsageError(
+            f"{record.source}: a scale, mounting or bias of a log that has been turned to east and north; expected a drift "
+            "alone, or a log in body axes"
+        )
+    known = replace(
+        mounting,
+        scale_sigma=max(mounting.scale_sigma, errors.scale),
+        angle_sigma=max(mounting.angle_sigma, errors.mounting),
+        bias_sigma=max(mounting.bias_sigma, errors.bias),
+    )
+    states = states_of(known, NAME, "lever arm", *(("scale", "mounting") if body else ()), "lag")
+    if body and known.bias_sigma > 0.0:
+        states |= state(NAME, "bias", np.full(3, known.bias_sigma), known.bias_time)
+    if errors.drift > 0.0:
+        time = DRIFT_TIME if errors.drift_time is None else errors.drift_time
+        states["own"] = Group(DRIFT, np.full(2, errors.drift), time, unit="m/s")
     return [
         Aiding(
-            "velocity log",
-            "body velocity",
-            time,
+            NAME,
+            "body velocity" if body else "velocity",
+            record.time - mounting.latency,
             record.velocity,
             sigma,
             mounting.lever_arm,

@@ -1,4 +1,7 @@
-"""Velocity of an antenna or of a log that knows north, as a row of the closed loop; see :mod:`truenorth.aiding.position`."""
+"""Velocity of an antenna or of a log that knows north, as a row of the closed loop; see :mod:`truenorth.aiding.position`.
+
+Its own states are a drift east and north (:mod:`truenorth.errors.log`): ``z = v_hat + d - measured``.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,26 @@ import math
 from typing import Any
 
 from truenorth.aiding.position import into_north
-from truenorth.aiding.row import ARM, AT_ARM, AT_LAG, Row, lag_now, row, with_state
+from truenorth.aiding.row import ARM, AT_ARM, AT_LAG, AT_OWN, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
+
+
+@compiled
+def convergence_of_meridians(s: Any, sine: float, cosine: float) -> float:
+    """By how much north turns a metre eastwards, ``tan L/(R_N + h)``, rad/m; 0 at a pole."""
+    axis = earth_axis(s)
+    Kxx, Kxy, Kyy = curvature(axis, s[11])
+    east = cosine * cosine * Kxx - 2.0 * sine * cosine * Kxy + sine * sine * Kyy
+    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    turn = 0.0
+    if level > 0.0:
+        turn = axis[2] / level * east
+    return turn
 
 
 @compiled
@@ -35,14 +51,7 @@ def velocity_row(
         C[2, 0] * u_b[0] + C[2, 1] * u_b[1] + C[2, 2] * u_b[2],
     )
     sine, cosine = azimuth(s)
-    axis = earth_axis(s)
-    Kxx, Kxy, Kyy = curvature(axis, s[11])
-    # Curvature along east, and with it the convergence of the meridians a metre eastwards.
-    east = cosine * cosine * Kxx - 2.0 * sine * cosine * Kxy + sine * sine * Kyy
-    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
-    convergence = 0.0
-    if level > 0.0:
-        convergence = axis[2] / level * east
+    convergence = convergence_of_meridians(s, sine, cosine)
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
         c = cross(u, e)
@@ -71,6 +80,10 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     lag = lag_now(now, assumed, at[AT_LAG])
     C, w_b, push = matrix_of(now, NOW_C), vector_of(now, NOW_TURN), vector_of(now, NOW_PUSH)
     velocity_row(now, C, w_b, push, arm, lag, at[AT_ARM], at[AT_LAG], measured, H, z)
+    if at[AT_OWN] >= 0:
+        for j in range(2):
+            z[j] += assumed[at[AT_OWN] + j]
+            H[j, at[AT_OWN] + j] = -1.0
 
 
-VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1})
+VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "own": 2})

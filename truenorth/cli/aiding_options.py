@@ -11,6 +11,10 @@ from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from truenorth.aiding.fixes import Fixes
+    from truenorth.errors.log import LogErrors
     from truenorth.records.flexure import FlexureSpec
     from truenorth.state.mounting import Mounting
 
@@ -217,6 +221,24 @@ class Sensors:
     gnss: Annotated[Path | None, option("GNSS log: CSV, Parquet, NMEA, ...")] = None
     odometer: Annotated[Path | None, option("Odometer log.")] = None
     velocity: Annotated[Path | None, option("Log of a Doppler or speed log, or of a reference velocity.")] = None
+    log_kind: Annotated[
+        str | None,
+        option("Kind of the velocity log: reference, em, doppler-water or doppler-bottom; sets its slow errors."),
+    ] = None
+    log_drift: Annotated[
+        str | None, option("Its drift east and north, such as a current, and how long it lasts: '0.5 m/s, 3 h'.")
+    ] = None
+    log_scale: Annotated[str | None, option("Its scale error, one sigma: '0.5 %'.")] = None
+    log_mounting: Annotated[str | None, option("Its error of mounting about the vertical: '0.3 deg'.")] = None
+    log_bias: Annotated[str | None, option("Its bias along the hull's axes: '0.1 m/s'.")] = None
+    fix: Annotated[
+        list[str] | None,
+        option("Position fix: time, lat, lon, one sigma: '21600,20.1,115.3,100' (s, deg, m); repeat for more."),
+    ] = None
+    azimuth: Annotated[
+        list[str] | None,
+        option("Azimuth reset: time, heading, one sigma: '21600,45.2,0.05' (s, deg); repeat for more."),
+    ] = None
     baro: Annotated[Path | None, option("Log of a barometer.")] = None
     aid: Annotated[
         list[str] | None, option("Log of a plug-in's sensor, as NAME=FILE; more than one by repeating it.")
@@ -267,6 +289,29 @@ class Sensors:
             antenna = replace(antenna, bias_sigma=sigma, bias_time=time)
         return replace(antenna, latency=self.latency)
 
+    def log_errors(self, frame: str) -> LogErrors | None:
+        """Of the velocity log: those of its kind, and what is given of them; None: nothing is said."""
+        from dataclasses import replace
+
+        from truenorth.core.units import parse
+        from truenorth.errors.log import LogErrors, log_errors
+
+        given: dict[str, float | None] = {}
+        for name, text, dimension in (
+            ("scale", self.log_scale, "ratio"),
+            ("mounting", self.log_mounting, "angle"),
+            ("bias", self.log_bias, "speed"),
+        ):
+            if text is not None:
+                given[name] = parse(text, dimension)
+        if self.log_drift is not None:
+            size, _, time = self.log_drift.partition(",")
+            given["drift"] = parse(size, "speed")
+            given["drift_time"] = None if not time.strip() else parse(time, "time")
+        if self.log_kind is None and not given:
+            return None
+        return replace(LogErrors() if self.log_kind is None else log_errors(self.log_kind, frame), **given)  # type: ignore[arg-type]
+
     def wheel(self) -> Mounting:
         """Of the odometer, and of a velocity log."""
         return self._mounted(self.wheel_arm, "--wheel-arm", self.mounting, self.parts - {"latency"})
@@ -292,9 +337,12 @@ class Sensors:
             aids.append(Odometer(read_odometer(self.odometer).shifted(self.offset), sits))
         if self.velocity is not None:
             log = replace(wheel, lever_arm_sigma=0.0)
-            aids.append(VelocityLog(read_velocity(self.velocity).shifted(self.offset), log))
+            record = read_velocity(self.velocity).shifted(self.offset)
+            aids.append(VelocityLog(record, log, self.log_errors(record.frame)))
         if self.baro is not None:
             aids.append(Barometer(read_height(self.baro).shifted(self.offset), loop=self.baro_loop))
+        if self.fix or self.azimuth:
+            aids.append(_fixes(self.fix or (), self.azimuth or ()))
         for text in self.aid or ():
             name, _, file = text.partition("=")
             if not file:
@@ -337,3 +385,17 @@ def _flexure(text: str) -> FlexureSpec:
     if not comma:
         raise UsageError(f"--flexure {text!r}: expected an angle and a time, such as '3 arcmin,5 s'")
     return FlexureSpec(sigma=(parse(first, "angle"),) * 3, correlation_time=parse(second, "time"))
+
+
+def _fixes(places: Sequence[str], headings: Sequence[str]) -> Fixes:
+    from truenorth.aiding.fixes import AzimuthFix, Fixes, PositionFix
+
+    def place(text: str) -> PositionFix:
+        time, lat, lon, sigma = numbers_of(text, "--fix", 4, "time, latitude, longitude and one sigma in s, deg and m")
+        return PositionFix(time, math.radians(lat), math.radians(lon), sigma)
+
+    def heading(text: str) -> AzimuthFix:
+        time, heading, sigma = numbers_of(text, "--azimuth", 3, "time, heading and one sigma in s and deg")
+        return AzimuthFix(time, math.radians(heading), math.radians(sigma))
+
+    return Fixes(tuple(map(place, places)), tuple(map(heading, headings)))

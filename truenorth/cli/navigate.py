@@ -19,6 +19,7 @@ from truenorth.cli.remedies import reasons_of
 
 if TYPE_CHECKING:
     from truenorth.damping.options import Damper
+    from truenorth.errors.deflection import Deflection
     from truenorth.navigation import Navigation
     from truenorth.records import ImuRecord
     from truenorth.state.state import Start
@@ -57,7 +58,7 @@ class Damping:
     azimuth_damping: Annotated[float, option("Ratio for the 24 h oscillation (external); 0: none.")] = 0.0
     damping_start: Annotated[float, option("Seconds after the start, when it is switched on.")] = 0.0
     damping_ramp: Annotated[float, option("Seconds in which a network is switched on.")] = 0.0
-    log_error: Annotated[float, option("One-sigma constant error of the reference velocity, m/s.")] = 0.3
+    damping_switching: Annotated[bool, option("Internal damping is switched off in manoeuvres.")] = True
 
     def damper(self) -> Damper | None:
         """The method; None: no damping."""
@@ -72,7 +73,7 @@ class Damping:
             azimuth=self.azimuth_damping,
             start=self.damping_start,
             ramp=self.damping_ramp,
-            reference_sigma=self.log_error,
+            switching=self.damping_switching,
         )
 
 
@@ -149,6 +150,9 @@ def navigate(
     ] = None,
     smooth: Annotated[bool, option("Estimate each epoch from the whole log.", "--smooth")] = False,
     imu: Annotated[str | None, option("Specification; the alignment's own without it.")] = None,
+    deflection: Annotated[
+        str | None, option("The vertical is deflected under way: '6 arcsec, 20 km', one sigma and over which distance.")
+    ] = None,
     every: Annotated[float | None, option("Seconds between rows of the track.")] = None,
     calibration: Annotated[Path | None, option("YAML file of known errors of the IMU, taken off first.")] = None,
     output: Annotated[
@@ -190,7 +194,7 @@ def navigate(
             smooth=smooth,
             imu=imu or known.imu_of(start),
             scale_factors="scale_factors" in sensors.parts,
-            errors=sensors.error or (),
+            errors=(*(sensors.error or ()), *_deflection(deflection).groups),
             calibration=None if calibration is None else Calibration.from_file(calibration),
             output=every,
             damping=damper,
@@ -208,6 +212,19 @@ def navigate(
         print_navigation(result, paths)
     if result.status != "navigated":
         raise typer.Exit(4)
+
+
+def _deflection(text: str | None) -> Deflection:
+    from truenorth.core.errors import UsageError
+    from truenorth.core.units import parse
+    from truenorth.errors.deflection import Deflection
+
+    if text is None:
+        return Deflection(0.0)
+    first, comma, second = text.partition(",")
+    if not comma:
+        raise UsageError(f"--deflection {text!r}: expected an angle and a distance, such as '6 arcsec, 20 km'")
+    return Deflection(parse(first, "angle"), parse(second, "length"))
 
 
 def _stops(zupt: str | None) -> Any:

@@ -35,7 +35,7 @@ OPTIONS = {
     "transfer.mounting": "--mounting",
     "transfer_geometry": "--axes, --lever-arm, --mounting, --delay",
     "flexure": "--flexure",
-    "log_error": "--log-error",
+    "log_error": "--log-drift",
 }
 
 

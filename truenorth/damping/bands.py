@@ -1,93 +1,167 @@
-"""Error bands: what a damped INS may be off by, its networks' own dynamics and a constant error of the reference included."""
+"""Error bands: what a damped INS may be off by, with the log's own errors, whether its method knows of them or not.
+
+A network and a Kalman filter without the log's errors are estimators with a model that is not the whole truth. What they are
+off by follows from the covariance of all that plays a part: the errors of the undamped INS and of the log, as the whole model
+has them, and what the estimator makes of them with its own gains. For the filters, with ``A_i = (I - K_i H_i) Phi_i`` and the
+change of what filter 1 smooths over a step for filter 2,
+
+    e+ = Phi e + w,    x1+ = A_1 x1 + K_1 (H e+ + n),    x2+ = A_2 x2 + K_2 (x1+ - x1)_v/T
+
+and the bands are those of ``x1 - e``, ``x2 - e``, or of both by the fusion's weights: what the two have in common counts.
+
+Source: R. Brown, P. Hwang, *Introduction to Random Signals and Applied Kalman Filtering*, 4th ed. (2012), sec. 5.7 (suboptimal
+filters); J. Farrell, M. Barth, *The Global Positioning System and Inertial Navigation* (1999), sec. 4.10 (covariance analysis).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.course import Course
+from truenorth.damping.filters import BLOCK, Filter
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
-from truenorth.models.marine import MOTION, STATES, MarineModel
+from truenorth.models.marine import DV, MOTION
 
 Array = NDArray[np.float64]
 
 
-def network_sigma(
-    course: Course,
-    loop: Loop,
-    P0: Array,
-    model: MarineModel,
-    *,
-    start: int = 0,
-    reference_noise: float = 0.0,
-    reference_sigma: float = 0.0,
-) -> Array:
-    """(K+1-start, 7) one-sigma of the errors of an INS with this loop, from an epoch on.
+class Bands(NamedTuple):
+    """One-sigma of what is left: errors (K+1, 7), and what INS and log then differ by (K+1, 2), m/s."""
 
-    Covariance of errors, network states, biases and the reference's constant error together, through the closed loop.
+    errors: Array
+    residual: Array
+
+
+def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: bool) -> Bands:
+    """Of an INS with this loop: errors, network states, biases and errors of the log together.
 
     Parameters
     ----------
-    P0 : (13, 13) array
-        Of the undamped errors and biases at the start.
-    model : MarineModel
-        Of the noise.
-    start : int
-        Epoch of the switch.
-    reference_noise : float, m/s
-        White, of each epoch; 0 for internal damping.
-    reference_sigma : float, m/s
-        One-sigma of the reference's constant error, east and north.
+    course : Course
+        From the switch on.
+    loop : Loop
+    whole : Filter
+        All errors of INS and log: model, covariance at the switch, white noise of an epoch of the log.
+    mu : (K+1,) array
+        How far it is damped at the epochs.
+    log : bool
+        It is fed with the log; else damping is internal.
     """
-    part = course.between(start, course.epochs)
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
-    coarse = part.every(stride)
+    coarse = course.every(stride)
+    model, P0 = whole.model, whole.P0
     F, _ = coarse.linearise(model)
-    M, N = loop.matrices(F, coarse.position[1:, 0], np.ones(coarse.epochs))
-    n = M.shape[1]
-    biases = STATES - MOTION.stop
-    whole = np.zeros((coarse.epochs, n + biases + 2, n + biases + 2))
-    whole[:, :n, :n] = M
-    whole[:, MOTION, n : n + biases] = F[:, MOTION, MOTION.stop : STATES]
-    whole[:, n : n + biases, n : n + biases] = F[:, MOTION.stop : STATES, MOTION.stop : STATES]
-    whole[:, :n, n + biases :] = N
-    inputs = np.zeros((coarse.epochs, n + biases + 2, 2))
-    inputs[:, :n] = N
-    Phi, Gamma = transition_and_input(whole, inputs, coarse.interval)
-    P = np.zeros(whole.shape[1:])
-    motion = np.arange(MOTION.stop)
-    slow = np.arange(n, n + biases)
-    placed = np.concatenate([motion, slow])
+    M, N = loop.matrices(F, coarse.position[1:, 0], np.interp(coarse.time[1:], course.time, mu))
+    n, first = M.shape[1], MOTION.stop
+    count = n + model.states - first
+    A, inputs = np.zeros((coarse.epochs, count, count)), np.zeros((coarse.epochs, count, 2))
+    A[:, :n, :n], inputs[:, :n] = M, N
+    A[:, MOTION, n:] = F[:, MOTION, first:]
+    A[:, n:, n:] = F[:, first:, first:]
+    placed = np.concatenate([np.arange(first), np.arange(n, count)])  # the model's states
+    H = np.zeros((coarse.epochs, 2, count))
+    H[:, :, placed] = whole.rows(coarse)  # dv - d: what is shown by the INS less what the log adds
+    if log:
+        added = H.copy()
+        added[:, :, DV] = 0.0
+        A -= inputs @ added
+    Phi, Gamma = transition_and_input(A, inputs, coarse.interval)
+    P = np.zeros((count, count))
     P[np.ix_(placed, placed)] = P0
-    P[n + biases :, n + biases :] = reference_sigma**2 * np.eye(2)
-    noise = np.zeros(len(P))
-    noise[motion], noise[slow] = model.noise[MOTION], model.noise[MOTION.stop : STATES]
-    Q = np.diag(noise * coarse.interval)
-    white = reference_noise**2 * course.interval / coarse.interval
-    out = np.empty((coarse.epochs + 1, MOTION.stop))
-    out[0] = np.diagonal(P)[MOTION]
+    Q = np.zeros((coarse.epochs, count, count))
+    Q[:, placed[:, None], placed] = model.noise_of(coarse.interval, 0.5 * (coarse.v_n[1:] + coarse.v_n[:-1]))
+    white = whole.sigma**2 * course.interval / coarse.interval * log
+    errors, residual = np.empty((coarse.epochs + 1, first)), np.empty((coarse.epochs + 1, 2))
+    errors[0], residual[0] = np.diagonal(P)[MOTION], np.diagonal(H[0] @ P @ H[0].T)
     for k in range(coarse.epochs):
-        P = Phi[k] @ P @ Phi[k].T + Q + white * Gamma[k] @ Gamma[k].T
-        out[k + 1] = np.diagonal(P)[MOTION]
-    sigma = np.sqrt(np.maximum(out, 0.0))
-    return np.stack([np.interp(part.time, coarse.time, column) for column in sigma.T], axis=1)
+        P = Phi[k] @ P @ Phi[k].T + Q[k] + white * Gamma[k] @ Gamma[k].T
+        errors[k + 1], residual[k + 1] = np.diagonal(P)[MOTION], np.diagonal(H[k] @ P @ H[k].T)
+    return _spread(course, coarse, errors, residual + whole.sigma**2)
 
 
-def constant_error_sigma(estimate: Callable[[Array], Array], reference: Array, sigma: float, x: Array) -> Array:
-    """(K, 7) what a constant error of the reference of this one-sigma does to an estimate.
+def filter_bands(
+    course: Course, whole: Filter, one: Filter, two: Filter | None = None, weight: Array | None = None
+) -> Bands:
+    """Of filter 1, or of filters 1 and 2 fused, that do not know all errors of the log.
 
     Parameters
     ----------
-    estimate : callable
-        (K+1, 2) reference to (K, 7) estimated errors.
-    reference : (K+1, 2) array, m/s
-    sigma : float, m/s
-    x : (K, 7) array
-        The estimate on this reference.
+    course : Course
+        From the switch on.
+    whole : Filter
+        All errors of INS and log, as in :func:`network_bands`.
+    one, two : Filter
+        As they run.
+    weight : (K+1, 7) array, optional
+        Of filter 1 in the fusion.
     """
-    if sigma == 0.0:
-        return np.zeros_like(x)
-    parts = [estimate(reference + sigma * axis) - x for axis in np.eye(2)]
-    return np.asarray(np.sqrt(sum(part**2 for part in parts)))
+    step = LONGEST_STEP if two is None else two.window
+    stride = max(1, int(step / course.interval + 1e-9))
+    coarse = course.every(stride)
+    n, m = whole.model.states, one.model.states
+    count = n + m + (0 if two is None else m)
+    e, x1, x2 = slice(0, n), slice(n, n + m), slice(n + m, count)
+    v1 = slice(x1.start + DV.start, x1.start + DV.stop)
+    joint, P1 = np.zeros((count, count)), one.P0
+    joint[e, e] = whole.P0
+    P2 = None if two is None else two.P0
+    R1 = one.sigma**2 / stride * np.eye(2)
+    share = np.ones((coarse.epochs + 1, MOTION.stop))
+    if weight is not None:
+        share = np.stack([np.interp(coarse.time, course.time, w) for w in weight.T], axis=1)
+    errors, residual = np.empty((coarse.epochs + 1, MOTION.stop)), np.empty((coarse.epochs + 1, 2))
+    errors[0], residual[0] = np.diagonal(whole.P0)[MOTION], whole.sigma**2
+    for begin in range(0, coarse.epochs, BLOCK):
+        part = coarse.between(begin, min(begin + BLOCK, coarse.epochs))
+        mean = 0.5 * (part.v_n[1:] + part.v_n[:-1])
+        _, Phi = part.linearise(whole.model)
+        Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), whole.rows(part)
+        F1, Phi1 = part.linearise(one.model)
+        Q1, H1 = one.model.noise_of(part.interval, mean)[0], one.rows(part)
+        for k in range(part.epochs):
+            A, G = np.zeros((count, count)), np.zeros((count, 2))
+            K1, P1 = _gain(P1, Phi1[k], Q1, H1[k], R1)
+            A[e, e] = Phi[k]
+            A[x1, e], A[x1, x1] = K1 @ H[k] @ Phi[k], Phi1[k] - K1 @ H1[k] @ Phi1[k]
+            B = np.zeros((count, n))  # of the noise that drives the errors
+            B[e], B[x1], G[x1] = np.eye(n), K1 @ H[k], K1
+            if two is not None and P2 is not None:
+                H2 = F1[k, DV, : two.model.states]
+                K2, P2 = _gain(P2, Phi1[k], Q1, H2, two.sigma**2 / (stride if two.overlap else 1) * np.eye(2))
+                A[x2, x2] = Phi1[k] - K2 @ H2 @ Phi1[k]
+                A[x2] += K2 @ A[v1] / part.interval
+                A[x2, v1] -= K2 / part.interval
+                B[x2], G[x2] = K2 @ B[v1] / part.interval, K2 @ G[v1] / part.interval
+            joint = A @ joint @ A.T + B @ Q[k] @ B.T + G @ R1 @ G.T
+            row = begin + k + 1
+            off = np.zeros((MOTION.stop, count))
+            off[:, MOTION] = -np.eye(MOTION.stop)
+            off[:, x1.start : x1.start + MOTION.stop] = np.diag(share[row])
+            if two is not None:
+                off[:, x2.start : x2.start + MOTION.stop] = np.diag(1.0 - share[row])
+            errors[row] = np.sum((off @ joint) * off, axis=1)
+            seen = off[DV].copy()
+            seen[:, e] = -H[k]  # x - (dv - d): the residual's slow part
+            residual[row] = np.sum((seen @ joint) * seen, axis=1) + whole.sigma**2
+    return _spread(course, coarse, errors, residual)
+
+
+def _gain(P: Array, Phi: Array, Q: Array, H: Array, R: Array) -> tuple[Array, Array]:
+    """Of a filter's next update, and its covariance after it."""
+    P = Phi @ P @ Phi.T + Q
+    K = np.asarray(np.linalg.solve(H @ P @ H.T + R, H @ P).T, dtype=np.float64)
+    left = np.eye(len(P)) - K @ H
+    return K, left @ P @ left.T + K @ R @ K.T
+
+
+def _spread(course: Course, coarse: Course, errors: Array, residual: Array) -> Bands:
+    """Roots of these variances, at all epochs of the course."""
+
+    def at_all(variance: Array) -> Array:
+        sigma: Array = np.sqrt(np.maximum(variance, 0.0))
+        return np.stack([np.interp(course.time, coarse.time, column) for column in sigma.T], axis=1)
+
+    return Bands(at_all(errors), at_all(residual))

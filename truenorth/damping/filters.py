@@ -6,7 +6,7 @@ All estimate the errors of one undamped INS, open loop (output correction), on t
 - *filter 2*: ``z = ((v_INS - v_ref)(t) - (v_INS - v_ref)(t - T))/T``, in which a constant error of the reference cancels; its
   ``H`` is the mean of rows DV of F over T, since ``(dv(t) - dv(t - T))/T`` is the mean of ``dv'``. The reference is filter 1's
   smoothed velocity (the paper's), or the raw one;
-- *augmented*: filter 1 with the reference's constant error as two more states.
+- *augmented*: filter 1 with the errors of the log as further states (:mod:`truenorth.errors.log`).
 
 Windows of filter 2 overlap where it is updated more often than every T, and its noise is then not white; the paper's R takes
 no notice. What that and the common noise of both filters cost is measured in the study (:mod:`truenorth.papers.damping`).
@@ -19,14 +19,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
-from truenorth.filters import FilterState, LinearSystem, gated, kalman
-from truenorth.models.marine import DV, MOTION, REF, MarineModel
+from truenorth.errors.log import log_rows
+from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
+from truenorth.models.marine import DP, DV, MOTION, PHI, STATES, MarineModel
 
 Array = NDArray[np.float64]
 
@@ -48,6 +50,12 @@ class Estimate:
         At the last epoch.
     used : (K+1-start, 2) array
         1 for a measurement taken, 0 for one rejected by the gate, NaN for none.
+    innovation, innovation_sigma : (K+1-start, 2) arrays or None
+        NaN where there is no measurement; None: of a fusion.
+    likelihood : float
+        Logarithm of that of all measurements.
+    weight : (K+1-start, n) array or None
+        Of filter 1, in a fusion.
     """
 
     start: int
@@ -55,11 +63,22 @@ class Estimate:
     sigma: Array
     P: Array
     used: Array = field(repr=False)
+    innovation: Array | None = field(default=None, repr=False)
+    innovation_sigma: Array | None = field(default=None, repr=False)
+    likelihood: float = 0.0
+    weight: Array | None = field(default=None, repr=False)
 
     @property
     def rejected(self) -> int:
         """Measurements that the gate kept out."""
         return int(np.sum(self.used == 0.0))
+
+
+class FixRows(NamedTuple):
+    """Fixes at the epochs from the switch on: place error east, north (m), heading error (rad), (K+1-start, 3), NaN where none."""
+
+    z: Array
+    sigma: Array
 
 
 @dataclass(frozen=True)
@@ -69,7 +88,7 @@ class Filter:
     Attributes
     ----------
     model : MarineModel
-        With two states of the reference: the augmented filter.
+        With groups of the log: the augmented filter.
     P0 : (n, n) array
         Covariance of the errors at the switch.
     sigma : float
@@ -84,6 +103,10 @@ class Filter:
         to second order; else about the computed course, as the paper does.
     gate : float, optional
         Probability with which a good measurement passes a chi-square gate; no gate when left out.
+    fixes : FixRows or None
+        Places and headings from outside.
+    turned : bool
+        The log is in body axes, and the INS's own heading has turned it: its error shows as ``phi x v``.
     """
 
     model: MarineModel
@@ -93,6 +116,8 @@ class Filter:
     overlap: bool = True
     relinearise: bool = False
     gate: float | None = None
+    turned: bool = False
+    fixes: FixRows | None = None
 
     def __post_init__(self) -> None:
         n = self.model.states
@@ -102,6 +127,16 @@ class Filter:
             raise UsageError(
                 f"sigma {self.sigma:g}, window {self.window:g} s; expected sigma above zero, no negative window"
             )
+
+    def rows(self, course: Course) -> Array:
+        """(K, 2, n) what of its states ``v_INS - v_log`` shows, at the epochs of a course after the first."""
+        v, C = course.v_n[1:], course.C_nb[1:]
+        H = np.zeros((len(v), 2, self.model.states))
+        H[:, :, DV] = np.eye(2)
+        H[:, :, STATES:] = -log_rows(self.model.groups, C, v)
+        if self.turned:
+            H[:, 0, PHI.stop - 1], H[:, 1, PHI.stop - 1] = -v[:, 1], v[:, 0]
+        return H
 
     def lag(self, interval: float) -> int:
         """Epochs from the beginning of a window to its end; 0 without a window."""
@@ -116,6 +151,7 @@ class _Stream:
         count, n = course.epochs + 1 - start, kind.model.states
         self.x, self.sigma, self.used = np.zeros((count, n)), np.empty((count, n)), np.full((count, 2), np.nan)
         self.sigma[0] = np.sqrt(np.diagonal(kind.P0))
+        self.innovation, self.innovation_sigma = np.full((count, 2), np.nan), np.full((count, 2), np.nan)
         self.state: FilterState | None = None
         self.rows = np.zeros((0, 2, n))
         self.done = 1
@@ -135,10 +171,7 @@ class _Stream:
         F, Phi = part.linearise(self.kind.model) if linear is None else linear
         n, K = self.kind.model.states, len(Phi)
         if self.lag == 0:
-            H = np.zeros((1, 2, n))
-            H[:, :, DV] = np.eye(2)
-            if self.kind.model.with_reference:
-                H[:, :, REF] = -np.eye(2)
+            H = self.kind.rows(part)
         else:
             rows = np.concatenate([self.rows, F[:, DV, :n]])
             total = np.concatenate([np.zeros((1, 2, n)), np.cumsum(rows, axis=0)])
@@ -146,28 +179,57 @@ class _Stream:
             H = (total[len(self.rows) + 1 :] - total[np.maximum(first, 0)]) / self.lag
             z = np.where((first >= 0)[:, None], z, np.nan)
             self.rows = rows[-self.lag :]
+        z, H, R = self._with_fixes(part, z, H)
         system = LinearSystem(
             Phi=Phi[:, :n, :n],
-            Q=np.diag(self.kind.model.noise * self.interval)[None],
+            Q=self.kind.model.noise_of(self.interval, 0.5 * (part.v_n[1:] + part.v_n[:-1])),
             H=H,
-            R=self.kind.sigma**2 * np.eye(2)[None],
+            R=R,
             z=z,
             x0=np.zeros(n),
             P0=self.kind.P0,
         )
         place = slice(self.done, self.done + K)
         if self.kind.gate is None:
-            found = kalman(system, self.state, history="sigma", innovations=False)
-            self.used[place] = np.where(np.isnan(system.z), np.nan, 1.0)
+            found = kalman(system, self.state, history="sigma")
+            self.used[place] = np.where(np.isnan(system.z[:, :2]), np.nan, 1.0)
         else:
             found = gated(system, self.state, probability=self.kind.gate, history="sigma")
-            self.used[place] = found.adaptation
+            self.used[place] = found.adaptation[:, :2]
         self.x[place], self.sigma[place] = found.x, found.sigma
+        self._innovate(place, found)
         self.state, self.done = found.state, self.done + K
+
+    def _with_fixes(self, part: Course, z: Array, H: Array) -> tuple[Array, Array, Array]:
+        """Rows of place (east, north, m) and heading behind those of the velocity, where there are fixes in this part."""
+        R = self.kind.sigma**2 * np.eye(2)[None]
+        fixes, own = self.kind.fixes, slice(self.done, self.done + part.epochs)
+        if fixes is None or not np.isfinite(fixes.z[own]).any():
+            return z, H, R
+        rows = np.zeros((3, self.kind.model.states))
+        rows[:2, DP], rows[2, PHI.stop - 1] = np.eye(2), 1.0
+        R = np.zeros((part.epochs, 5, 5))
+        R[:, :2, :2] = self.kind.sigma**2 * np.eye(2)
+        R[:, range(2, 5), range(2, 5)] = fixes.sigma[own] ** 2
+        H = np.concatenate([H, np.broadcast_to(rows, (part.epochs, *rows.shape))], axis=1)
+        return np.concatenate([z, fixes.z[own]], axis=1), H, R
+
+    def _innovate(self, place: slice, found: Estimates) -> None:
+        variance, nu = np.diagonal(found.innovation_covariance, axis1=1, axis2=2)[:, :2], found.innovation[:, :2]
+        self.innovation[place], self.innovation_sigma[place] = nu, np.where(np.isfinite(nu), np.sqrt(variance), np.nan)
 
     def estimate(self, start: int) -> Estimate:
         assert self.state is not None  # there is one block at least
-        return Estimate(start, self.x, self.sigma, self.state.P, self.used)
+        return Estimate(
+            start,
+            self.x,
+            self.sigma,
+            self.state.P,
+            self.used,
+            self.innovation,
+            self.innovation_sigma,
+            float(self.state.log_likelihood),
+        )
 
 
 def run_filters(
@@ -291,4 +353,4 @@ class Fusion:
         weight = np.divide(of_two, whole, out=np.full(whole.shape, 0.5), where=whole > 0.0)
         variance = weight * of_one
         x = weight * one.x + (1.0 - weight) * two.x
-        return Estimate(one.start, x, np.sqrt(variance), np.diag(variance[-1]), one.used)
+        return Estimate(one.start, x, np.sqrt(variance), np.diag(variance[-1]), one.used, weight=weight)

@@ -205,7 +205,8 @@ def network_correction(
     x0 : (7,) array, optional
         Errors known at the switch (of a Kalman filter): taken off there, so that nothing is left to swing.
     warm : bool
-        The network has listened before it was switched on; else its states begin at zero, the worst switch.
+        The network has listened before it was switched on, and of internal damping to the first velocity for long; else its
+        states begin at zero, the worst switch.
     mu : (K+1,) array, optional
         How far it is damped at each epoch of the course, 0 to 1, after the switch; see :mod:`truenorth.damping.adaptive`.
 
@@ -234,6 +235,9 @@ def network_correction(
     M, N = loop.matrices(F, coarse.position[1:, 0], damped)
     listening = np.full(len(on), True) if warm else on
     s = np.zeros(M.shape[1])
+    if warm and reference is None:  # settled on the first velocity: H(0) = 1 lets nothing of it through
+        A, B, _, _ = loop.network.realised()
+        s[MOTION.stop :] = np.outer(z[0], np.linalg.solve(A, B)).ravel()
     out = np.zeros((coarse.epochs + 1, MOTION.stop))
     steps, inputs = transition_and_input(M, N, coarse.interval)
     deaf = np.isnan(z).any(axis=1) | ~listening

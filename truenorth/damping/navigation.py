@@ -2,31 +2,43 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.fixes import Fixes
+from truenorth.core import earth
 from truenorth.core.errors import DataError, UsageError
-from truenorth.damping.bands import constant_error_sigma, network_sigma
+from truenorth.damping.bands import Bands, filter_bands, network_bands
 from truenorth.damping.course import Course
-from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
+from truenorth.damping.drift import likely_time
+from truenorth.damping.filters import Estimate, Filter, FixRows, Fusion, run_filters
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
-from truenorth.damping.reference import Reference, reference_of
-from truenorth.damping.result import Damping
+from truenorth.damping.reference import LEAST_NOISE, Reference, reference_of
+from truenorth.damping.result import Damping, LogHistory
 from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
-from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI, REF, STATES, MarineModel
-from truenorth.navigation.result import Navigation, judged_navigation
+from truenorth.damping.switching import Switching, switching
+from truenorth.errors.deflection import NAME as DEFLECTION
+from truenorth.errors.group import Group
+from truenorth.errors.log import LogErrors, log_errors, log_rows
+from truenorth.models.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI, STATES, MarineModel
+from truenorth.navigation.result import Navigation, judged_navigation, last_sigma
+from truenorth.quality.innovations import innovation_evidence, residual_evidence
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state import layout as ins
 from truenorth.state.evidence import Evidence, contradiction, note
 from truenorth.state.limits import limit
+from truenorth.state.track import Residuals
 
 if TYPE_CHECKING:
+    from truenorth.aiding.aids import VelocityLog
     from truenorth.state.mounting import Mounting
     from truenorth.state.track import Track
 
@@ -34,17 +46,19 @@ Array = NDArray[np.float64]
 
 GATE = 1.0 - 1e-6  # with which a good row passes: one in six days at 1 Hz is lost
 WINDOW = 5.0  # s, of filter 2
-CHANGE_SIGMA = 0.001  # m/s^2, of filter 2's measurement
+LEVELLED = "levelled velocity log"  # its residuals, east and north
+LEAST_WALK = 1e-5  # m/s/sqrt(s), of an IMU without noise
 SHORTEST = 16  # epochs of a spectrum
 LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of errors.ins: PHI, and the level parts of DV and DP
 
 
 def damp_navigation(
     result: Navigation,
-    velocity: VelocityRecord | None,
+    velocity: VelocityLog | None,
     spec: ImuSpec,
     damper: Damper,
-    mounting: Mounting | None = None,
+    others: Sequence[Group],
+    fixes: Fixes,
 ) -> Navigation:
     """Damp a free inertial navigation afterwards.
 
@@ -52,13 +66,15 @@ def damp_navigation(
     ----------
     result : Navigation
         Without aiding, its height held.
-    velocity : VelocityRecord, optional
-        Needed by all methods but ``none`` and ``internal``.
+    velocity : VelocityLog, optional
+        Needed by all methods but ``none`` and ``internal``. Of its mounting, the angles of a log in body axes and the latency.
     spec : ImuSpec
         Of the IMU: noise of the filters and of the bands.
     damper : Damper
-    mounting : Mounting, optional
-        Of the velocity log: the angles of one in body axes, and its latency.
+    others : sequence of Group
+        Further error states of the navigation; of these the deflection of the vertical is known here.
+    fixes : Fixes
+        From outside; method ``augmented`` takes them.
 
     Returns
     -------
@@ -79,6 +95,10 @@ def damp_navigation(
         raise UsageError(f"damping with altitude {result.altitude!r}; expected 'fixed': the height is held at sea")
     if velocity is None and damper.needs_reference:
         raise UsageError(f"damping {damper.method} needs a reference velocity; expected velocity=record")
+    if (fixes.positions or fixes.azimuths) and damper.method != "augmented":
+        raise UsageError(f"fixes with damping {damper.method}; expected damping augmented, whose filter can weigh them")
+    if strange := [group.name for group in others if group.name != DEFLECTION]:
+        raise UsageError(f"damping with error states {', '.join(strange)}; expected {DEFLECTION!r} alone")
     track = _even(result.track)
     course = Course(track.time, track.C_nb, track.v_n, track.position)
     if course.interval > LONGEST_STEP * 1.01:
@@ -91,48 +111,133 @@ def damp_navigation(
             f"damping begins {damper.start:g} s after {course.time[0]:.1f} s, the log ends at {course.time[-1]:.1f} s; expected an "
             "earlier start"
         )
-    reference = None if velocity is None else reference_of(course, _mounted(velocity, mounting))
-    P0 = track.P[start][np.ix_(OF_INS, OF_INS)]
-    x, sigma, estimate = _damped(course, reference, spec, damper, start, P0)
-    damped = course.corrected(x)
+    log = _Log(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity)
+    errors, evidence = _with_time(course, track, log, spec, others, start)
+    whole = replace(_whole(track, log, errors, spec, others, start), fixes=_fixes_on(course, fixes, start))
+    found = _damped(course, log.reference, spec, damper, start, whole, errors, track)
+    damped = course.corrected(found.x)
     seen = slice(start, None)
-    base = 0.0 if reference is None else reference.velocity[seen]
+    base = 0.0 if log.reference is None else log.reference.velocity[seen]
     spectra = [_spectrum(c.v_n[seen, :2] - base, course.interval) for c in (course, damped)]
-    loop = _loop(damper)
+    network = damper.method in ("none", "internal", "external")
     report = Damping(
         damper=damper,
         switch=float(course.time[start]),
-        reference=reference,
+        reference=log.reference,
         before=spectra[0],
         after=spectra[1],
         lines=_lines(course.v_n[seen, :2] - base, course.interval),
-        modes=tuple(eigenvalues(course, loop, course.epochs // 2)),
-        rejected=0 if estimate is None else estimate.rejected,
+        modes=tuple(eigenvalues(course, _loop(damper), course.epochs // 2)) if network else (),
+        rejected=0 if found.estimate is None else found.estimate.rejected,
         length=float(course.time[-1] - course.time[start]),
+        time=course.time[start:],
+        switching=found.switching,
+        log=_history(course, found.estimate, whole.model.groups) if damper.method == "augmented" else None,
+        weight=None if found.estimate is None else found.estimate.weight,
     )
-    if estimate is not None and damper.method == "augmented":
-        last, last_sigma = estimate.x[-1, REF], estimate.sigma[-1, REF]
-        report = replace(report, reference_error=last, reference_error_sigma=last_sigma)
-    evidence = list(result.evidence)
-    if reference is not None and damper.needs_reference:
-        evidence += _contradiction(course, reference, track.sigma[:, 3:5], damper, start)
-    evidence += [] if reference is None else reference.evidence()
-    if report.rejected:
-        evidence.append(note("log.rejected", count=report.rejected))
-    if damper.method == "internal":
-        evidence.append(note("damping.internal"))
-    track = track if damper.method == "none" else _corrected(track, damped, sigma, start, estimate)
+    residuals = _residuals(course, log, damped, found, start)
+    evidence = [*result.evidence, *evidence]
+    if log.reference is not None:
+        evidence += log.reference.evidence()
+        if damper.needs_reference:
+            evidence += _contradiction(course, log.reference, track.sigma[:, 3:5], log.errors, start)
+    evidence += [] if not report.rejected else [note("log.rejected", count=report.rejected)]
+    if found.switching is not None and found.switching.switches:
+        evidence.append(_switched(found.switching, course.time))
+    if damper.method != "none":
+        track = _corrected(track, damped, found, start)
+        track = replace(track, residuals=tuple(residuals))
+    if damper.method == "augmented":
+        evidence += innovation_evidence(residuals, last_sigma(track))
+    else:
+        evidence += residual_evidence(residuals, last_sigma(track), log.errors.time)
     return judged_navigation(replace(result, track=track, damping=report), evidence)
 
 
-def _contradiction(course: Course, reference: Reference, sigma: Array, damper: Damper, start: int) -> list[Evidence]:
+class _Log(NamedTuple):
+    """A speed log on a course: what it says, what it may be wrong by, and whether the INS has turned it."""
+
+    reference: Reference | None
+    errors: LogErrors
+    turned: bool
+
+
+class _Found(NamedTuple):
+    """Errors (K+1, 7), their bands from the switch on, the filter's estimate where it is one, switches where there are some."""
+
+    x: Array
+    bands: Bands | None
+    estimate: Estimate | None
+    switching: Switching | None
+
+
+def _log_on(course: Course, velocity: VelocityLog) -> _Log:
+    record = _mounted(velocity.record, velocity.mounting)
+    errors = log_errors(velocity.errors, record.frame)
+    return _Log(reference_of(course, record, errors), errors, record.frame == "body")
+
+
+def _fixes_on(course: Course, fixes: Fixes, start: int) -> FixRows | None:
+    """Fixes as errors of the course, at the nearest epochs after the switch."""
+    z, sigma = np.full((course.epochs + 1, 3), np.nan), np.ones((course.epochs + 1, 3))
+
+    def epoch(time: float) -> int:
+        k = round((time - course.time[0]) / course.interval)
+        if not start < k <= course.epochs:
+            raise DataError(
+                f"a fix at {time:.1f} s; damping runs from {course.time[start]:.1f} s to {course.time[-1]:.1f} s"
+            )
+        return k
+
+    for fix in fixes.positions:
+        k = epoch(fix.time)
+        lat, lon, alt = course.position[k]
+        R_M, R_N = earth.radii(lat)
+        apart = math.remainder(lon - fix.lon, 2.0 * math.pi)
+        z[k, :2], sigma[k, :2] = (apart * (R_N + alt) * math.cos(lat), (lat - fix.lat) * (R_M + alt)), fix.sigma
+    for turn in fixes.azimuths:
+        k = epoch(turn.time)
+        heading = math.atan2(course.C_nb[k, 0, 1], course.C_nb[k, 1, 1])
+        z[k, 2], sigma[k, 2] = math.remainder(heading - turn.heading, 2.0 * math.pi), turn.sigma
+    return FixRows(z[start:], sigma[start:]) if np.isfinite(z).any() else None
+
+
+def _with_time(
+    course: Course, track: Track, log: _Log, spec: ImuSpec, others: Sequence[Group], start: int
+) -> tuple[LogErrors, list[Evidence]]:
+    """Errors of the log; the time of a drift that nobody knows is found, and told."""
+    errors = log.errors
+    if log.reference is None or errors.drift == 0.0 or errors.drift_time is not None:
+        return errors, []
+    time = likely_time(course, log.reference.velocity, start, _whole(track, log, errors, spec, others, start))
+    told = note("log.constant") if math.isinf(time) else note("log.drifts", drift=errors.drift, hours=time / 3600.0)
+    return replace(errors, drift_time=time), [told]
+
+
+def _whole(track: Track, log: _Log, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
+    """All errors of INS and log at the switch."""
+    model = MarineModel.from_spec(spec, (*errors.groups(), *others))
+    places, rows = list(range(STATES)), list(OF_INS)
+    deflected, there = model.slice_of(DEFLECTION), track.layout.slice_of(DEFLECTION)
+    if deflected is not None and there is not None:
+        places += range(deflected.start, deflected.stop)
+        rows += range(there.start, there.stop)
+    P = model.prior(np.zeros((STATES, STATES)))
+    P[np.ix_(places, places)] = track.P[start][np.ix_(rows, rows)]
+    noise = LEAST_NOISE if log.reference is None else log.reference.noise
+    return Filter(model, P, noise, relinearise=True, turned=log.turned)
+
+
+def _contradiction(course: Course, reference: Reference, sigma: Array, errors: LogErrors, start: int) -> list[Evidence]:
     """That a log cannot be this vehicle's.
 
     For more than half of the log it differs from the free INS by more than both can be wrong. A log that is dead or in other
     units does; outliers, jumps and silences do not.
     """
     off = np.abs(course.v_n[start:, :2] - reference.velocity[start:])
-    expected = np.sqrt(sigma[start:] ** 2 + damper.reference_sigma**2 + reference.noise**2)
+    rows = log_rows(errors.groups(), course.C_nb[start:], course.v_n[start:])
+    own = np.concatenate([np.zeros(0), *(group.prior for group in errors.groups())])
+    expected = np.sqrt(sigma[start:] ** 2 + (rows**2 @ own**2) + reference.noise**2)
     there = np.isfinite(off).all(axis=1)
     if not there.any() or np.median((off / expected)[there].max(axis=1)) <= limit("log"):
         return []
@@ -165,52 +270,114 @@ def _loop(damper: Damper) -> Loop:
 
 
 def _damped(
-    course: Course, reference: Reference | None, spec: ImuSpec, damper: Damper, start: int, P0: Array
-) -> tuple[Array, Array, Estimate | None]:
-    """Errors (K+1, 7), what is left of them, one-sigma (K+1-start, 7), and the filter's estimate where it is one."""
-    x = np.zeros((course.epochs + 1, 7))
-    model = MarineModel.from_spec(spec, with_reference=damper.method == "augmented")
+    course: Course,
+    reference: Reference | None,
+    spec: ImuSpec,
+    damper: Damper,
+    start: int,
+    whole: Filter,
+    errors: LogErrors,
+    track: Track,
+) -> _Found:
+    x = np.zeros((course.epochs + 1, MOTION.stop))
+    rest = course.between(start, course.epochs)
     if damper.method == "none":
-        return x, np.zeros((0, 7)), None
+        return _Found(x, None, None, None)
     if damper.method in ("internal", "external"):
-        loop, at = _loop(damper), float(course.time[start])
-        used = None if damper.method == "internal" or reference is None else reference.velocity
-        x = network_correction(course, loop, used, start=at, ramp=damper.ramp)
-        noise = 0.0 if used is None or reference is None else reference.noise
-        constant = 0.0 if used is None else damper.reference_sigma
-        sigma = network_sigma(course, loop, P0, model, start=start, reference_noise=noise, reference_sigma=constant)
-        return x, sigma, None
+        return _by_network(course, rest, reference, damper, start, whole, track)
     assert reference is not None  # checked before
-    kinds = _kinds(damper, model, P0, reference.noise)
-
-    def found(velocity: Array) -> Estimate:
-        estimates = run_filters(course, velocity, start=start, kinds=kinds)
-        if damper.method != "double":
-            return next(iter(estimates.values()))
+    if damper.method == "augmented":
+        kinds = {"augmented": replace(whole, gate=GATE)}
+        estimate = run_filters(course, reference.velocity, start=start, kinds=kinds)["augmented"]
+        x[start:] = estimate.x[:, MOTION]
+        return _Found(x, None, estimate, None)
+    model = MarineModel.from_spec(spec)
+    one = Filter(model, whole.P0[:STATES, :STATES], reference.noise, relinearise=True)
+    two = None if damper.method == "kalman" else _change(one, errors, course.interval)
+    kinds = {"filter1": one} if two is None else {"filter1": one, "filter2": two}
+    estimates = run_filters(course, reference.velocity, start=start, kinds=kinds)
+    estimate = estimates["filter1"]
+    if two is not None:
         samples = max(1, round(3600.0 / course.interval))
-        return Fusion(samples=samples)(estimates["filter1"], estimates["filter2"], course.interval)
-
-    estimate = found(reference.velocity)
-    x[start:] = estimate.x[:, :7]
-    sigma = estimate.sigma[:, :7]
-    if damper.method != "augmented":
-        moved = constant_error_sigma(
-            lambda velocity: found(velocity).x[:, :7], reference.velocity, damper.reference_sigma, estimate.x[:, :7]
-        )
-        sigma = np.hypot(sigma, moved)
-    return x, sigma, estimate
+        fused = Fusion(samples=samples)(estimate, estimates["filter2"], course.interval)
+        estimate = replace(fused, innovation=estimate.innovation)
+    x[start:] = estimate.x[:, MOTION]
+    weight = None if estimate.weight is None else estimate.weight[:, MOTION]
+    return _Found(x, filter_bands(rest, whole, one, two, weight), estimate, None)
 
 
-def _kinds(damper: Damper, model: MarineModel, P0: Array, noise: float) -> dict[str, Filter]:
-    if damper.method == "double":
-        paper = MarineModel.of_paper()
-        return {"filter1": Filter(paper, P0, noise), "filter2": Filter(paper, P0, CHANGE_SIGMA, window=WINDOW)}
-    P = np.zeros((model.states, model.states))
-    P[:STATES, :STATES] = P0
-    if model.with_reference:
-        P[REF, REF] = damper.reference_sigma**2 * np.eye(2)
-        return {"augmented": Filter(model, P, noise, relinearise=True, gate=GATE)}
-    return {"filter1": Filter(model, P, noise, relinearise=True)}
+def _change(one: Filter, errors: LogErrors, interval: float) -> Filter:
+    """Filter 2, of changes of the velocity that filter 1 smooths.
+
+    What filter 1 takes in of noise changes its velocity as a random walk of the INS's own density ``q`` does, so that a change
+    over T has ``q/sqrt(T)``; a drift of the log adds its own density. Windows that overlap share it: each counts as one of so many.
+    """
+    q = math.hypot(one.model.accel_random_walk, errors.drift * math.sqrt(2.0 / errors.time))
+    return replace(one, sigma=max(q, LEAST_WALK) / math.sqrt(min(interval, WINDOW)), window=WINDOW)
+
+
+def _by_network(
+    course: Course,
+    rest: Course,
+    reference: Reference | None,
+    damper: Damper,
+    start: int,
+    whole: Filter,
+    track: Track,
+) -> _Found:
+    """A network's correction, its bands, and what manoeuvres add to those of internal damping."""
+    loop, at = _loop(damper), float(course.time[start])
+    internal = damper.method == "internal"
+    used = None if internal or reference is None else reference.velocity
+    sigma = np.sqrt(np.mean(track.sigma[:, 3:5] ** 2, axis=1))
+    found = switching(course, loop.network, sigma) if internal else None
+    mu = found.mu if found is not None and damper.switching else np.ones(course.epochs + 1)
+    x = network_correction(course, loop, used, start=at, ramp=damper.ramp, mu=mu)
+    bands = network_bands(rest, loop, whole, mu[start:], log=used is not None)
+    if found is not None:  # a manoeuvre's part alone, as if the rest of the velocity were known
+        still = course.v_n[:, :2] - found.manoeuvre
+        added = network_correction(course, loop, still, start=at, ramp=damper.ramp, mu=mu)
+        bands = bands._replace(errors=np.hypot(bands.errors, added[start:]))
+    return _Found(x, bands, None, found if damper.switching else None)
+
+
+def _switched(found: Switching, time: Array) -> Evidence:
+    """How often, for how long, and the worst reason for it."""
+    first = next(s for s in found.switches if not s.damped)
+    count = sum(not s.damped for s in found.switches)
+    share = float(np.mean(found.mu == 0.0) * (time[-1] - time[0]))
+    return note(
+        "damping.switched", count=count, undamped=share / 60.0, time=first.time, leak=first.leak, allowed=first.allowed
+    )
+
+
+def _history(course: Course, estimate: Estimate | None, groups: Sequence[Group]) -> LogHistory | None:
+    if estimate is None:
+        return None
+    names = tuple(group.name for group in groups for _ in group.prior)
+    units = tuple(group.unit for group in groups for _ in group.prior)
+    time = course.time[estimate.start :]
+    return LogHistory(time, names, units, estimate.x[:, STATES:], estimate.sigma[:, STATES:])
+
+
+def _residuals(course: Course, log: _Log, damped: Course, found: _Found, start: int) -> list[Residuals]:
+    """What INS and log differ by: innovations of the augmented filter, else what is left after the correction."""
+    if log.reference is None:
+        return []
+    estimate = found.estimate
+    if found.bands is not None:
+        off, sigma = (damped.v_n[start:, :2] - log.reference.velocity[start:]), found.bands.residual
+        used = np.ones(len(off), dtype=bool)
+    elif estimate is not None and estimate.innovation is not None and estimate.innovation_sigma is not None:
+        off, sigma = estimate.innovation, estimate.innovation_sigma
+        used = ~(estimate.used == 0.0).any(axis=1)
+    else:
+        return []
+    there = np.flatnonzero(np.isfinite(off).all(axis=1))
+    time = course.time[start:][there]
+    e, s = (np.column_stack([a[there], np.full(len(there), np.nan)]) for a in (off, sigma))
+    nis = np.nansum((e / s) ** 2, axis=1)
+    return [Residuals(LEVELLED, time, e, s, nis, used[there], 0, time, np.zeros(len(there), dtype=bool))]
 
 
 def _even(track: Track) -> Track:
@@ -229,15 +396,19 @@ def _even(track: Track) -> Track:
     return track
 
 
-def _corrected(track: Track, damped: Course, sigma: Array, start: int, estimate: Estimate | None) -> Track:
-    """The track with the errors taken off and the bands that are left; correlations are not known."""
-    P, sensors = track.P.copy(), track.sensors.copy()
+def _corrected(track: Track, damped: Course, found: _Found, start: int) -> Track:
+    """The track with the errors taken off and the bands that are left; correlations are not told."""
+    P, sensors, estimate = track.P.copy(), track.sensors.copy(), found.estimate
     variance = np.einsum("kii->ki", P)[start:].copy()
-    variance[:, LEVEL] = np.concatenate([sigma[:, PHI], sigma[:, DV], sigma[:, DP]], axis=1) ** 2
-    if estimate is not None:
+    if found.bands is not None:
+        sigma = found.bands.errors
+    else:
+        assert estimate is not None  # one of the two
+        sigma = estimate.sigma[:, MOTION]
         for own, there in ((BG, ins.BG), (BA, ins.BA)):
             sensors[start:, there] += estimate.x[:, own]
             variance[:, there] = estimate.sigma[:, own] ** 2
+    variance[:, LEVEL] = np.concatenate([sigma[:, PHI], sigma[:, DV], sigma[:, DP]], axis=1) ** 2
     P[start:] = 0.0
     states = np.arange(P.shape[1])
     P[start:, states, states] = variance

@@ -18,7 +18,7 @@ class Damper:
     ----------
     method : {"none", "internal", "external", "kalman", "double", "augmented"}
         None: the free INS, with its spectrum; a network without a reference; with one; filter 1; the paper's double filter;
-        fifteen states, which estimate the reference's constant error.
+        fifteen states and more, which estimate the errors of the log.
     ratio : float
         Damping ratio of the networks.
     azimuth : float
@@ -29,17 +29,17 @@ class Damper:
         Of the networks.
     ramp : float, s
         In which a network goes from undamped to damped; its bands are those of an abrupt switch.
-    reference_sigma : float, m/s
-        One-sigma constant error of the reference velocity (a log in a current; a wrong zero).
+    switching : bool
+        Internal damping is switched off in manoeuvres, see :mod:`truenorth.damping.switching`.
     """
 
     method: Method = "augmented"
     ratio: float = 0.5
     azimuth: float = 0.0
     start: float = 0.0
-    reference_sigma: float = 0.3
     ramp: float = 0.0
     order: Literal[1, 2] = 2
+    switching: bool = True
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
@@ -60,8 +60,6 @@ class Damper:
             raise UsageError(f"network of order {self.order}; expected 1 or 2")
         if not self.ramp >= 0.0:
             raise UsageError(f"damping with a ramp of {self.ramp:g} s; expected zero or more")
-        if not self.reference_sigma >= 0.0:
-            raise UsageError(f"constant log error {self.reference_sigma:g} m/s; expected zero or more")
 
     @property
     def needs_reference(self) -> bool:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from truenorth.damping.course import Course
 from truenorth.damping.filters import Filter
 from truenorth.damping.loop import Mode
-from truenorth.models.marine import DV, REF
+from truenorth.models.marine import DV
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # of an eigenvalue of one step: constants stay where they are, and their eigenvalue is 1
@@ -27,15 +27,10 @@ def filter_modes(course: Course, kind: Filter, P: Array, epoch: int = -1) -> lis
         Interval about which the dynamics are taken; a window of filter 2 is no longer than it.
     """
     first = epoch % course.epochs
-    F, Phi = course.between(first, first + 1).linearise(kind.model)
+    part = course.between(first, first + 1)
+    F, Phi = part.linearise(kind.model)
     n = kind.model.states
-    H = np.zeros((2, n))
-    if kind.window > 0.0:
-        H[:] = F[0, DV]
-    else:
-        H[:, DV] = np.eye(2)
-        if kind.model.with_reference:
-            H[:, REF] = -np.eye(2)
+    H = F[0, DV] if kind.window > 0.0 else kind.rows(part)[0]
     K = P @ H.T / kind.sigma**2
     values = np.linalg.eigvals((np.eye(n) - K @ H) @ Phi[0]).astype(np.complex128)
     rates = np.log(values) / course.interval

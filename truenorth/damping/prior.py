@@ -11,7 +11,7 @@ from truenorth.core import earth
 from truenorth.core.linalg import symmetric
 from truenorth.core.units import parse
 from truenorth.damping.course import Course
-from truenorth.models.marine import BA, BG, DP, DV, PHI, REF, STATES, MarineModel
+from truenorth.models.marine import BA, BG, DP, DV, PHI, STATES, MarineModel
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def paper_prior(course: Course, epoch: int) -> Array:
     return np.diag(sigma**2)
 
 
-def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array, reference_sigma: float = 0.0) -> Array:
+def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array) -> Array:
     """(n, n) covariance at an epoch, of errors that had `P0` at the beginning of the course.
 
     Parameters
@@ -41,15 +41,11 @@ def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array, ref
     epoch : int
         Of the switch.
     model : MarineModel
-        Its biases and noise, as they grow in the undamped INS.
+        Its biases, groups and noise, as they grow in the undamped INS.
     P0 : (13, 13) array
         At the beginning.
-    reference_sigma : float, m/s
-        Of the reference's constant error, for a model with these two states.
     """
-    n = model.states
-    P = np.zeros((n, n))
-    P[:STATES, :STATES] = P0
+    P = model.prior(P0)
     stride = max(1, int(10.0 / course.interval + 1e-9))
     head, rest = course.between(0, max(epoch, 1)).every(stride), epoch % stride
     parts = [head.between(0, epoch // stride)] if epoch >= stride else []
@@ -57,10 +53,7 @@ def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array, ref
         parts.append(course.between(epoch - rest, epoch))
     for part in parts:
         _, Phi = part.linearise(model)
-        Q = np.diag(model.noise * part.interval)
-        for step in Phi:
-            P = step @ P @ step.T + Q
-    P = symmetric(P)
-    if model.with_reference:
-        P[REF, REF] = reference_sigma**2 * np.eye(2)
-    return P
+        Q = model.noise_of(part.interval, 0.5 * (part.v_n[1:] + part.v_n[:-1]))
+        for step, noise in zip(Phi, np.broadcast_to(Q, Phi.shape), strict=True):
+            P = step @ P @ step.T + noise
+    return symmetric(P)

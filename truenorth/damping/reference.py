@@ -7,6 +7,7 @@ any filter sees it: no damping method has to survive it.
 - An *outlier* differs from the running median by more than noise can: left out.
 - A *jump* of the level, of either axis, is where straight lines through the minute before and the minute after do not meet:
   the log is held to its level before. Damping needs its changes, not its level; which of the two levels was right nobody knows.
+  What the log does all the time, such as to drift, and what may turn with the hull in a turn, is no jump.
 - A *gap* stays one: methods coast.
 """
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.damping.course import Course
+from truenorth.errors.log import LogErrors, log_rows
 from truenorth.records import VelocityRecord
 from truenorth.state.evidence import Evidence, note
 
@@ -32,6 +34,7 @@ JUMP = 8.0  # sigmas of the lines' difference
 CURVATURE = 0.03  # m/s by which healthy lines may miss each other, or a healthy value its median: waves, curvature
 LEAST_NOISE = 1e-4  # m/s
 GAP = 60.0  # s, from which a gap is named
+ALLOWED = 4.0  # sigmas of what slow errors change, that are no jump
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class Reference:
         return found + [note("log.silent", time=time, length=length) for time, length in self.gaps]
 
 
-def reference_of(course: Course, record: VelocityRecord) -> Reference:
+def reference_of(course: Course, record: VelocityRecord, errors: LogErrors) -> Reference:
     """Bring a velocity log onto a course.
 
     A log in body axes is turned by the course's attitude; one of forward speed alone is taken to make no leeway.
@@ -76,6 +79,8 @@ def reference_of(course: Course, record: VelocityRecord) -> Reference:
     ----------
     course : Course
     record : VelocityRecord
+    errors : LogErrors
+        Its slow errors.
 
     Raises
     ------
@@ -110,10 +115,27 @@ def reference_of(course: Course, record: VelocityRecord) -> Reference:
         known = record.sigma[inside][np.isfinite(record.sigma[inside])]
         if known.size:
             given = float(np.median(known) / np.sqrt(np.median(count[full])))
-    return cleaned(course, mean, record.source, given)
+    return cleaned(course, mean, record.source, given, change_of(course, errors))
 
 
-def cleaned(course: Course, velocity: Array, source: str = "reference", noise: float | None = None) -> Reference:
+def change_of(course: Course, errors: LogErrors) -> Array:
+    """(K+1,) one-sigma of what errors fixed to the hull change in two minutes about each epoch, of the worse axis, m/s."""
+    n = max(1, round(MINUTE / course.interval))
+    k = np.arange(course.epochs + 1)
+    before, after = np.maximum(k - n, 0), np.minimum(k + n, course.epochs)
+    groups = errors.groups()
+    rows = log_rows(groups, course.C_nb, course.v_n)
+    own = np.concatenate([np.zeros(0), *(group.prior for group in groups)])
+    return np.asarray(np.sqrt(((rows[after] - rows[before]) ** 2 @ own**2).max(axis=1)))
+
+
+def cleaned(
+    course: Course,
+    velocity: Array,
+    source: str = "reference",
+    noise: float | None = None,
+    change: Array | float = 0.0,
+) -> Reference:
     """Free a reference velocity (K+1, 2) on a course's epochs of outliers and jumps.
 
     Parameters
@@ -124,7 +146,10 @@ def cleaned(course: Course, velocity: Array, source: str = "reference", noise: f
     source : str
     noise : float, optional
         White noise of an epoch, if known; the larger of this and what the data show is used.
+    change : (K+1,) array or float, m/s
+        One-sigma of what slow errors change from a minute before to a minute after.
     """
+    allowed = ALLOWED * np.broadcast_to(np.asarray(change, dtype=np.float64), course.time.shape)
     rows = np.flatnonzero(np.isfinite(velocity).all(axis=1))
     n = max(FEWEST, round(MINUTE / course.interval)) | 1
     apart = max(SPLIT, 2.0 * course.interval) / course.interval
@@ -136,11 +161,12 @@ def cleaned(course: Course, velocity: Array, source: str = "reference", noise: f
     for part in np.split(rows, np.flatnonzero(np.diff(rows) > apart) + 1):
         good = np.ones(len(part), dtype=bool)
         for column in d[part].T:
-            good &= np.abs(column - _running_median(column, n)) <= OUTLIER * sigma + CURVATURE
+            off = np.abs(column - _running_median(column, n))
+            good &= off <= OUTLIER * max(sigma, _usual(off)) + CURVATURE + allowed[part]
         outliers += int(np.sum(~good))
         part = part[good]
         held = np.tile(level, (len(part), 1))
-        for k in _jumps(d[part], sigma, n):
+        for k in _jumps(d[part], sigma, n, allowed[part]):
             size = _step(d[part], k, n)
             held[k:] += size
             jumps.append((float(course.time[part[k]]), float(-size[0]), float(-size[1])))
@@ -155,6 +181,11 @@ def _white(x: Array) -> float:
     if len(x) < 10:
         return 0.0
     return float(1.4826 * np.median(np.abs(x[2:] - 2.0 * x[1:-1] + x[:-2])) / np.sqrt(6.0))
+
+
+def _usual(sizes: Array) -> float:
+    """One-sigma of the most of these sizes: what a log does all the time, such as to drift, is no fault of a moment."""
+    return float(1.4826 * np.median(sizes))
 
 
 def _running_median(x: Array, n: int) -> Array:
@@ -180,12 +211,14 @@ def _differences(d: Array, n: int) -> Array:
     return out
 
 
-def _jumps(d: Array, sigma: float, n: int) -> list[int]:
+def _jumps(d: Array, sigma: float, n: int, allowed: Array) -> list[int]:
     """Rows at which the level jumps, in order: the largest first found, none within a window of another."""
     if len(d) < 2 * n + 1:
         return []
-    limit = JUMP * sigma * np.sqrt(2.0 * np.sum(_end_weights(n) ** 2)) + CURVATURE
-    size = np.abs(_differences(d, n)).max(axis=1)
+    size = np.abs(_differences(d, n))
+    own = max(_usual(size[n : len(d) - n + 1].ravel()), sigma * float(np.sqrt(2.0 * np.sum(_end_weights(n) ** 2))))
+    size, limit = size.max(axis=1), JUMP * own + CURVATURE
+    size[: len(d)] -= allowed
     found: list[int] = []
     while size.max() > limit:
         k = int(np.argmax(size))

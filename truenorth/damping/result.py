@@ -12,8 +12,34 @@ from truenorth.damping.loop import Mode
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import Reference
 from truenorth.damping.spectrum import Spectrum
+from truenorth.damping.switching import Switching
+from truenorth.errors.log import DRIFT
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LogHistory:
+    """Errors of the speed log as the augmented filter found them, behind them the deflection of the vertical.
+
+    Attributes
+    ----------
+    time : (K,) array, s
+    names, units : tuples of str
+        Of each state; a name stands as often as its group has states.
+    x, sigma : (K, m) arrays
+    """
+
+    time: Array
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    x: Array
+    sigma: Array
+
+    def last(self, name: str) -> tuple[Array, Array]:
+        """Values and one-sigma at the end, empty where there is no such group."""
+        own = [i for i, n in enumerate(self.names) if n == name]
+        return self.x[-1, own], self.sigma[-1, own]
 
 
 @dataclass(frozen=True)
@@ -31,13 +57,19 @@ class Damping:
     lines : (float, float)
         Periods of the undamped Schuler lines, s; NaN in a short log.
     modes : tuple of Mode
-        Of the loop, for networks; of the undamped INS otherwise.
-    reference_error, reference_error_sigma : (2,) arrays or None, m/s
-        The reference's constant error east, north as the 15-state filter found it.
+        Of the loop of a network, or of the undamped INS; of a filter none.
     rejected : int
         Measurements that the filter's gate kept out.
     length : float, s
         From the switch to the end: what tells lines apart.
+    time : (K,) array, s
+        Of the epochs from the switch on.
+    switching : Switching or None
+        Of internal damping.
+    log : LogHistory or None
+        What the augmented filter found of the log.
+    weight : (K, n) array or None
+        Of filter 1 in the fusion, from the switch on.
     """
 
     damper: Damper
@@ -47,10 +79,22 @@ class Damping:
     after: Spectrum | None = field(repr=False)
     lines: tuple[float, float]
     modes: tuple[Mode, ...] = field(repr=False)
-    reference_error: Array | None = None
-    reference_error_sigma: Array | None = None
     rejected: int = 0
     length: float = np.inf
+    time: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    switching: Switching | None = field(default=None, repr=False)
+    log: LogHistory | None = field(default=None, repr=False)
+    weight: Array | None = field(default=None, repr=False)
+
+    @property
+    def reference_error(self) -> Array | None:
+        """(2,) drift of the log east, north at the end as the augmented filter found it, m/s; None: it has none."""
+        return None if self.log is None or DRIFT not in self.log.names else self.log.last(DRIFT)[0]
+
+    @property
+    def reference_error_sigma(self) -> Array | None:
+        """(2,) one-sigma of it, m/s."""
+        return None if self.log is None or DRIFT not in self.log.names else self.log.last(DRIFT)[1]
 
     def in_words(self) -> str:
         """One line: method, switch, the lines it had, and what the log's error was found to be."""
@@ -93,4 +137,9 @@ class Damping:
         if self.reference_error is not None and self.reference_error_sigma is not None:
             told["reference_error_m_s"] = self.reference_error.tolist()
             told["reference_error_sigma_m_s"] = self.reference_error_sigma.tolist()
+        if self.log is not None:
+            ends = {name: self.log.last(name) for name in self.log.names}
+            told["log"] = {name: {"value": x.tolist(), "sigma": e.tolist()} for name, (x, e) in ends.items()}
+        if self.switching is not None:
+            told["switches"] = [s._asdict() for s in self.switching.switches]
         return told

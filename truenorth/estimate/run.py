@@ -12,6 +12,8 @@ from truenorth.aiding import row
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.linalg import padded
+from truenorth.errors.deflection import NAME as DEFLECTION
+from truenorth.errors.deflection import at_rest
 from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart
 from truenorth.estimate import loop as kernel
@@ -76,6 +78,9 @@ def begin(
         P0 = model.prior(start.P)
     else:
         P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole)
+    deflected = model.layout.first_of(DEFLECTION)
+    if prior is None and start.plumb > 0.0 and deflected >= 0:
+        P0 = at_rest(P0, deflected, start.C_nb, start.lat, start.plumb)
     place = np.array([[start.lat, start.lon, start.alt]])
     J = convergence(np.eye(3)[None], s[None, wander.VELOCITY], place, n)[0]
     width = max([3, *(source.measured.shape[1] for source in setting.sources)])

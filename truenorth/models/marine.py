@@ -1,4 +1,4 @@
-"""Error model of a marine INS with its height held: 13 states, and two more where the reference velocity has an error of its own.
+"""Error model of a marine INS with its height held: 13 states, and groups behind them (errors of the speed log, the plumb line's).
 
 States, errors computed minus true:
 
@@ -9,11 +9,12 @@ States, errors computed minus true:
 | PHI | misalignment E, N, U, ``C_nb_hat = (I - [phi x]) C_nb`` | rad |
 | BA | accelerometer bias left, measured minus true, body axes | m/s^2 |
 | BG | gyro bias left, measured minus true, body axes | rad/s |
-| REF | constant error of the reference velocity east, north (15 states) | m/s |
+| REF | drift of the speed log east, north, the first of its groups (:mod:`truenorth.errors.log`) | m/s |
 
 It is the INS model of :mod:`truenorth.errors.ins` in ENU with altitude fixed, its rows of the vertical channel left out and
-its biases first-order Gauss-Markov processes. Against the paper's states, ``dp_N = (R_M + h) dL`` and
-``dp_E = (R_N + h) cos L dlon``: a metre has one meaning at every latitude (:func:`position_in_angles`).
+its biases first-order Gauss-Markov processes; a group is a constant or a first-order Gauss-Markov process. Against the paper's
+states, ``dp_N = (R_M + h) dL`` and ``dp_E = (R_N + h) cos L dlon``: a metre has one meaning at every latitude
+(:func:`position_in_angles`).
 
 Source: L. Zhao, J. Li, J. Cheng, "Double-filters external damping strapdown inertial navigation algorithm", J. Harbin
 Inst. Technol. 50 (3), 2018, eq. 1.
@@ -33,6 +34,10 @@ from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import padded
 from truenorth.core.units import parse
+from truenorth.errors.deflection import NAME as DEFLECTION
+from truenorth.errors.deflection import STANDARD_GRAVITY
+from truenorth.errors.dynamics import Dynamics, dynamics_of
+from truenorth.errors.group import Group
 from truenorth.errors.ins import error_dynamics, transition
 from truenorth.records.specs import ImuSpec
 from truenorth.state import layout as ins
@@ -63,20 +68,18 @@ class MarineModel:
     gyro_rate_walk: float = 0.0  # rad/s/sqrt(s)
     accel_time: float = math.inf  # s; correlation times of the biases; infinite: constants, or random walks
     gyro_time: float = math.inf  # s
-    reference_walk: float = 0.0  # m/s/sqrt(s); white noise that drives the reference's error
-    reference_time: float = math.inf  # s; its correlation time
-    with_reference: bool = False  # fifteen states rather than thirteen
+    groups: tuple[Group, ...] = ()  # behind the thirteen, those of the speed log first
 
     def __post_init__(self) -> None:
-        for name in ("accel_random_walk", "gyro_random_walk", "accel_rate_walk", "gyro_rate_walk", "reference_walk"):
+        for name in ("accel_random_walk", "gyro_random_walk", "accel_rate_walk", "gyro_rate_walk"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise UsageError(f"{name} is {getattr(self, name)}; expected zero or more")
-        for name in ("accel_time", "gyro_time", "reference_time"):
+        for name in ("accel_time", "gyro_time"):
             if not getattr(self, name) > 0.0:
                 raise UsageError(f"{name} is {getattr(self, name)} s; expected more than zero")
 
     @classmethod
-    def of_paper(cls, *, with_reference: bool = False) -> MarineModel:
+    def of_paper(cls) -> MarineModel:
         """The paper's ``Q``, taken per second, and the correlation time of 300 s that matches its figures."""
         g = parse("1 g", "acceleration")
         rate = parse("1 deg/h", "angular_rate")
@@ -88,11 +91,10 @@ class MarineModel:
             gyro_rate_walk=root * 0.001 * rate,
             accel_time=300.0,
             gyro_time=300.0,
-            with_reference=with_reference,
         )
 
     @classmethod
-    def from_spec(cls, spec: ImuSpec, *, reference_walk: float = 0.0, with_reference: bool = True) -> MarineModel:
+    def from_spec(cls, spec: ImuSpec, groups: tuple[Group, ...] = ()) -> MarineModel:
         """The model of a specification: constant biases that may walk.
 
         A bias instability, forgotten in minutes, does over hours what a random walk of density ``sigma sqrt(2 tau)`` does.
@@ -103,31 +105,58 @@ class MarineModel:
             gyro_random_walk=math.hypot(spec.gyro_random_walk, slow * spec.gyro_bias_instability),
             accel_rate_walk=spec.accel_rate_random_walk,
             gyro_rate_walk=spec.gyro_rate_random_walk,
-            reference_walk=reference_walk,
-            with_reference=with_reference,
+            groups=groups,
         )
 
     @property
     def states(self) -> int:
-        """Thirteen or fifteen."""
-        return REF.stop if self.with_reference else STATES
+        """Thirteen and those of the groups."""
+        return STATES + sum(len(group.prior) for group in self.groups)
+
+    def slice_of(self, name: str) -> slice | None:
+        """Where a group stands; None: it is not there."""
+        at = STATES
+        for group in self.groups:
+            if group.name == name:
+                return slice(at, at + len(group.prior))
+            at += len(group.prior)
+        return None
 
     @property
-    def decay(self) -> Array:
-        """(n,) inverse correlation time of each state, 1/s."""
-        rate = np.zeros(self.states)
-        rate[BA], rate[BG] = 1.0 / self.accel_time, 1.0 / self.gyro_time
-        rate[REF] = 1.0 / self.reference_time
-        return rate
+    def dynamics(self) -> Dynamics:
+        """How the groups run by themselves."""
+        return dynamics_of(self.groups, np.zeros(ins.STATES))
+
+    def prior(self, P0: Array) -> Array:
+        """(n, n) covariance: the given one of the thirteen, the groups' own behind it."""
+        P = np.zeros((self.states, self.states))
+        P[:STATES, :STATES] = P0
+        sigma = [group.prior for group in self.groups]
+        P[STATES:, STATES:] = np.diag(np.concatenate([np.zeros(0), *sigma]) ** 2)
+        return P
 
     @property
     def noise(self) -> Array:
-        """(n,) spectral density of the white noise that drives each state, its unit^2/s."""
+        """(n,) spectral density of the white noise that drives each state in time, its unit^2/s."""
         q = np.zeros(self.states)
         q[DV], q[PHI] = self.accel_random_walk**2, self.gyro_random_walk**2
         q[BA], q[BG] = self.accel_rate_walk**2, self.gyro_rate_walk**2
-        q[REF] = self.reference_walk**2
+        q[STATES:] = self.dynamics.noise[ins.STATES :]
         return q
+
+    def noise_of(self, T: float, v_n: ArrayLike) -> Array:
+        """(1, n, n), or (K, n, n) where a group runs along the way, covariance of the noise of K intervals of length T.
+
+        Parameters
+        ----------
+        T : float, s
+        v_n : (K, 3) array, m/s
+        """
+        wander = np.concatenate([np.zeros(STATES), self.dynamics.wander[ins.STATES :]])
+        density = self.noise[None]
+        if wander.any():
+            density = density + np.linalg.norm(np.asarray(v_n)[:, :2], axis=1)[:, None] * wander
+        return np.asarray(T * density[:, :, None] * np.eye(self.states))
 
     def linearise(
         self, T: ArrayLike, C_nb: ArrayLike, f_n: ArrayLike, v_n: ArrayLike, lat: ArrayLike, alt: ArrayLike
@@ -155,10 +184,15 @@ class MarineModel:
         n = self.states
         F, Phi = np.zeros((len(T), n, n)), np.zeros((len(T), n, n))
         _stack(padded(ins.STATES), T, C, f, v, axis, alt, decay, OF_INS, F, Phi)
-        if self.with_reference:
-            for i in range(REF.start, REF.stop):
-                F[:, i, i] = -1.0 / self.reference_time
-                Phi[:, i, i] = np.exp(-T / self.reference_time)
+        d = self.dynamics
+        rate = d.decay[ins.STATES :] + np.linalg.norm(v[:, :2], axis=1)[:, None] * d.along[ins.STATES :]
+        behind = np.arange(STATES, n)
+        F[:, behind, behind], Phi[:, behind, behind] = -rate, np.exp(-T[:, None] * rate)
+        deflected = self.slice_of(DEFLECTION)
+        if deflected is not None:
+            F[:, DV, deflected] = STANDARD_GRAVITY * np.eye(2)
+            Phi[:, DV, deflected] = T[:, None, None] * F[:, DV, deflected]
+            Phi[:, DP, deflected] = 0.5 * T[:, None, None] * Phi[:, DV, deflected]
         return F, Phi
 
 

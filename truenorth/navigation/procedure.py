@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
@@ -95,7 +96,8 @@ def navigate(
     scale_factors : bool
         Estimate the IMU's scale factors.
     errors : sequence of Group or str
-        Further error states of the INS, or names of plug-ins that make them.
+        Further error states of the INS, such as :class:`truenorth.errors.deflection.Deflection`'s, or names of plug-ins that make
+        them.
     calibration : Calibration, optional
         Known errors, taken off first.
     check_clocks : bool
@@ -130,7 +132,8 @@ def navigate(
     noise = spec.seen_in(record)
     said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
-    reference = given.pop("velocity", None) if damping is not None else None
+    reference = given.pop(VelocityLog.key, None) if damping is not None else None
+    fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     found = _sits_as_found(given, begin)
     height, why = kept_altitude(altitude, given)
     fixed, groups = height == "fixed", groups_of(errors, noise)
@@ -167,8 +170,7 @@ def navigate(
     from truenorth.damping.navigation import damp_navigation
 
     tell(f"damping: {damping.method}")
-    velocity, mounting = (None, None) if reference is None else (reference.record, reference.mounting)
-    return damp_navigation(replace(result, evidence=tuple(evidence)), velocity, noise, damping, mounting)
+    return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, groups, fixes)
 
 
 @dataclass(frozen=True)
@@ -351,7 +353,7 @@ def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitud
         return "gnss", []
     if "baro" in given:
         return "baro", []
-    if given.keys() - {"gnss"}:
+    if given.keys() - {"gnss", Fixes.key}:
         return "free", [note("height.free")]
     return "fixed", [note("height.fixed", "height_sensor")]
 

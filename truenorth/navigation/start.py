@@ -100,7 +100,9 @@ def _start(
     slow = np.repeat([spec.gyro_bias_instability, spec.accel_bias_instability], 3) ** 2
     whole = WholeBiases(np.maximum(joint.prior - slow, 0.0), duration)
     lat, lon, alt = position.lat, position.lon, position.alt
-    return Start(time, joint.C_nb, np.zeros(3), lat, lon, alt, gyro_bias, joint.accel_bias, positive(P), whole)
+    return Start(
+        time, joint.C_nb, np.zeros(3), lat, lon, alt, gyro_bias, joint.accel_bias, positive(P), whole, plumb=DEFLECTION
+    )
 
 
 def _by_static_limits(

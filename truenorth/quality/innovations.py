@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 FEWEST = 60  # components, from which size and colour are judged
 LAGS, MOST_LAGS = 5, 60
+SCHULER = 5064.0  # s
 MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 LEAST_CORRELATION = 0.05  # mean over the first lags
 # Sources of places: their errors last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
@@ -122,6 +123,34 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
             found += _growth(source, sigma, by_motion)
         if source.outside:
             found.append(note("innovations.outside", name=source.name, outside=source.outside))
+    return found
+
+
+def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float) -> list[Evidence]:
+    """What is left between an answer and its sources, where that is slow by the method's own nature: its size alone is judged.
+
+    Parameters
+    ----------
+    sources : iterable of Residuals
+    sigma : Effect
+        Of the answer.
+    memory : float, s
+        For which residuals hang together: so many of them are independent; a constant or Schuler's period at least.
+    """
+    found = []
+    for source in sources:
+        if len(source.time) < FEWEST:
+            continue
+        squares = (source.innovation / source.sigma) ** 2
+        size = math.sqrt(float(np.nanmean(squares)))
+        length = float(source.time[-1] - source.time[0])
+        apart = min(max(memory, SCHULER), length)
+        spread = math.sqrt(2.0 / max(2.0 * length / apart, 1.0))
+        if size**2 - 1.0 > limit("chance") * spread:
+            grows = math.sqrt(size**2 - 1.0)
+            effect = Effect(**{name: grows * own for name, own in sigma.items() if math.isfinite(own)})
+            figures: dict[str, Figure] = {"name": source.name, "size": size}
+            found.append(Evidence("innovations.left", figures, "known", effect))
     return found
 
 

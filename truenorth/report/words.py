@@ -7,6 +7,7 @@ WORDS = (
     "velocity log", "barometer", "zero velocity", "zero rotation", "odometer scale", "odometer mounting", "odometer lever arm",
     "odometer lag", "GNSS lever arm", "GNSS lag", "GNSS bias", "velocity log scale", "velocity log mounting",
     "velocity log lever arm", "velocity log lag", "velocity log bias", "barometer bias", "barometer lag",
+    "velocity log drift", "levelled velocity log", "deflection of the vertical", "position fix", "azimuth reset",
     "holds", "does not hold", "holds in part", "too few runs", "Aligned, with warnings", "Navigated, with warnings",
     "case", "method", "log, s", "runs", "failed", "RMS", "95 % interval", "median", "95th percentile", "Cramer-Rao bound",
     "RMS/bound", "claimed sigma", "RMS/sigma", "95 % band",

@@ -190,6 +190,9 @@ SENTENCES = {
         "{name}: innovations are {size:.2f} times as large as their sigma says and follow each other ({colour:.1f} times the error "
         "of white ones): sigma grows {growth:.1f} times"
     ),
+    "innovations.left": (
+        "{name}: what the answer leaves of it is {size:.2f} times as large as sigma says: sigma grows as much"
+    ),
     "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
     "innovations.wander": (
         "errors of the {name}s hang together from fix to fix (correlation {correlation:.2f}), they wander by {wander:.2g} m or "
@@ -245,7 +248,12 @@ SENTENCES = {
     ),
     "log.silent": "velocity log: silent for {length:.0f} s after {time:.0f} s; undamped in between",
     "log.rejected": "velocity log: {count} measurements rejected by the filter's gate",
-    "damping.internal": "internal damping: what the vehicle's own manoeuvres add is not in the bands",
+    "log.constant": "velocity log: its drift is most likely a constant",
+    "log.drifts": "velocity log: its drift of {drift:.2f} m/s most likely lasts {hours:.2g} h",
+    "damping.switched": (
+        "internal damping: switched off {count} times, {undamped:.0f} min in all, first at {time:.0f} s: a manoeuvre let "
+        "{leak:.2f} m/s into the loop, {allowed:.2f} m/s is allowed"
+    ),
     "heading.given": "heading {heading:.3f} deg ± {sigma:angle} is given",
     # ---- height
     "height.free": "height is carried on by velocity alone: no sensor of height is given",

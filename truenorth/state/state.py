@@ -39,8 +39,11 @@ class Start(State):
         The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
     wheel : Mounting or None
         How an alignment on the move found the odometer to sit and to count.
+    plumb : float, rad
+        One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
     """
 
     P: Array
     whole: WholeBiases | None = None
     wheel: Mounting | None = None
+    plumb: float = 0.0

@@ -14,7 +14,8 @@ from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import second_order
 from truenorth.damping.prior import carried_prior, paper_prior
-from truenorth.models.marine import DP, REF, STATES, MarineModel
+from truenorth.errors.log import LogErrors
+from truenorth.models.marine import DP, MarineModel
 from truenorth.papers.damping.truth import HOUR, LOG_NOISE, Voyage
 
 Array = NDArray[np.float64]
@@ -32,12 +33,12 @@ AZIMUTH = Loop(second_order(0.5), azimuth_damping=0.5)
 SHORT = MarineModel(
     accel_random_walk=parse("1 ug/sqrt(Hz)", "velocity_random_walk"),
     gyro_random_walk=parse("0.0001 deg/sqrt(h)", "angle_random_walk"),
-    with_reference=True,
+    groups=LogErrors(REFERENCE_PRIOR).groups(),
 )
 LONG = MarineModel(
     accel_random_walk=parse("10 ug/sqrt(Hz)", "velocity_random_walk"),
     gyro_random_walk=parse("0.001 deg/sqrt(h)", "angle_random_walk"),
-    with_reference=True,
+    groups=LogErrors(LONG_REFERENCE_PRIOR).groups(),
 )
 
 
@@ -60,14 +61,11 @@ def filters_of(voyage: Voyage, course: Course, *, raw: bool = True) -> dict[str,
     start = round(SWITCH / course.interval)
     noise = LOG_NOISE / np.sqrt(course.interval)
     P0, paper = paper_prior(course, start), MarineModel.of_paper()
-    wide = np.zeros((REF.stop, REF.stop))
-    wide[:STATES, :STATES] = P0
-    wide[REF, REF] = REFERENCE_PRIOR**2 * np.eye(2)
-    carried = carried_prior(course, start, LONG, np.diag(voyage.paper_errors() ** 2), LONG_REFERENCE_PRIOR)
+    carried = carried_prior(course, start, LONG, np.diag(voyage.paper_errors() ** 2))
     kinds = {
         "filter1": Filter(paper, P0, noise),
         "filter2": Filter(paper, P0, R2, window=WINDOW),
-        "augmented": Filter(SHORT, wide, noise, relinearise=True),
+        "augmented": Filter(SHORT, SHORT.prior(P0), noise, relinearise=True),
         "augmented_long": Filter(LONG, carried, noise, relinearise=True),
     }
     if raw:
@@ -104,7 +102,7 @@ def run_all(
 
 def tuned_fusion(voyage: Voyage, course: Course, reference: Array, workers: int) -> Estimate:
     """The fusion with what the long-run 15-state filter has: the same P0 and Q, and the R2 that suits them."""
-    start, model = round(SWITCH / course.interval), replace(LONG, with_reference=False)
+    start, model = round(SWITCH / course.interval), replace(LONG, groups=())
     P0 = carried_prior(course, start, model, np.diag(voyage.paper_errors() ** 2))
     kinds = {
         "filter1": Filter(model, P0, LOG_NOISE / np.sqrt(course.interval)),

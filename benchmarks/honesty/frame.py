@@ -1,0 +1,153 @@
+"""One frame for all cases of honesty: run, compare errors with their sigmas, count refusals, mark.
+
+A case is a name, the procedure it belongs to, and a function of seed and run that draws its world and gives an outcome: errors
+over sigma by output, and why it was refused, if it was. Sigma is honest where the RMS over the runs lies in .8 to 1.25; a run
+beyond four sigmas with a good status is a defect.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import TruenorthError
+
+Array = NDArray[np.float64]
+HONEST = (0.8, 1.25)
+DEFECT = 4.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one run.
+
+    Attributes
+    ----------
+    ratios : mapping of output to array
+        Errors over their sigmas.
+    refused : str
+        Why the answer has no good status; empty: it has one.
+    said : str
+        What the run has to say beyond that, for `--verbose`.
+    """
+
+    ratios: Mapping[str, Array] = field(default_factory=dict)
+    refused: str = ""
+    said: str = ""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A row of the table: ``run(seed, number)``, and what it is called.
+
+    Attributes
+    ----------
+    procedure, name : str
+    run : callable
+    goals : mapping of output to (low, high)
+        Where other limits than `HONEST` hold for a reason; (0, high): sigma may be careful.
+    """
+
+    procedure: str
+    name: str
+    run: Callable[[int, int], Outcome]
+    goals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Line:
+    """Of a case: RMS of error over sigma by output, refusals, the worst run with a good status, in sigmas."""
+
+    case: Case
+    runs: int
+    rms: Mapping[str, float]
+    refused: Sequence[str]
+    worst: float
+    worst_run: int
+    seconds: float
+
+    @property
+    def mark(self) -> str:
+        """``ok``; ``defect``: beyond four sigmas, status good; ``refused``: more than a tenth; ``small``, ``large``: sigma."""
+        goals = {name: self.case.goals.get(name, HONEST) for name in self.rms}
+        # A ratio of few runs scatters: 1/sqrt(2 N) of itself, three times of which is chance.
+        room = 3.0 / math.sqrt(2.0 * max(self.runs, 1))
+        if self.worst > DEFECT:
+            return "defect"
+        if len(self.refused) > 0.1 * self.runs:
+            return "refused"
+        if any(self.rms[name] > max(high, 1.0 + room) for name, (_, high) in goals.items()):
+            return "small"
+        if any(self.rms[name] < min(low, 1.0 - room) for name, (low, _) in goals.items()):
+            return "large"
+        return "ok"
+
+    def cells(self) -> list[str]:
+        """Of the table."""
+        rms = ", ".join(f"{name} {value:.2f}" for name, value in self.rms.items())
+        worst = f"{self.worst:.1f}" if self.worst else ""
+        return [self.case.procedure, self.case.name, str(self.runs), rms, str(len(self.refused)), worst, self.mark]
+
+
+HEADER = ["procedure", "case", "runs", "RMS of error over sigma", "refused", "worst, sigmas", "mark"]
+
+
+def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> Line:
+    """Run a case."""
+    found: dict[str, list[Array]] = {}
+    refused: list[str] = []
+    worst = (0.0, 0)
+    begun = time.perf_counter()
+    for run in range(runs):
+        try:
+            outcome = case.run(seed, run)
+        except TruenorthError as error:
+            outcome = Outcome(refused=str(error))
+        for name, ratio in outcome.ratios.items():
+            found.setdefault(name, []).append(np.ravel(ratio))
+        if outcome.refused:
+            refused.append(f"run {run}: {outcome.refused}")
+        else:
+            most = max(
+                (float(np.nanmax(np.abs(r))) for r in outcome.ratios.values() if np.isfinite(r).any()), default=0.0
+            )
+            worst = max(worst, (most, run))
+        if verbose:
+            shown = ", ".join(f"{name} {np.round(r, 2)}" for name, r in outcome.ratios.items())
+            print(f"    run {run}: {shown} {outcome.refused} {outcome.said}", flush=True)
+    rms = {name: float(np.sqrt(np.nanmean(np.concatenate(r) ** 2))) for name, r in found.items()}
+    return Line(case, runs, rms, tuple(refused), *worst, (time.perf_counter() - begun) / max(runs, 1))
+
+
+def as_markdown(lines: Sequence[Line]) -> str:
+    """The table for the documents."""
+    rows = [HEADER, ["---"] * len(HEADER), *(line.cells() for line in lines)]
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def main(cases: Sequence[Case], about: str = "RMS of error over sigma, refusals, and the worst run") -> None:
+    """Command line: ``--runs``, ``--seed``, ``--only`` part of a name or procedure, ``--markdown``, ``--verbose``."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", default="", help="cases with this in their procedure or name")
+    parser.add_argument("--markdown", action="store_true", help="the table as the documents have it")
+    parser.add_argument("--verbose", action="store_true")
+    given = parser.parse_args()
+    lines = []
+    for case in cases:
+        if given.only not in f"{case.procedure}: {case.name}":
+            continue
+        line = run_case(case, given.seed, given.runs, given.verbose)
+        lines.append(line)
+        print("  ".join([*line.cells(), f"{line.seconds:.1f} s each"]), flush=True)
+        for why in line.refused if given.verbose else line.refused[:2]:
+            print(f"    refused: {why}", flush=True)
+    if given.markdown:
+        print(as_markdown(lines))

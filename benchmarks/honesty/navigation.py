@@ -1,0 +1,86 @@
+"""Navigation, free and aided, with errors that a model may leave out: the plumb line's deflection, a current, a log's own errors.
+
+Run: ``python -m benchmarks.honesty.navigation --runs 20``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from benchmarks.honesty.frame import Case, Outcome, main
+from benchmarks.honesty.voyage import HOUR, SPEC, Voyage, voyage
+from truenorth.aiding.aids import Gnss, VelocityLog
+from truenorth.core.earth import radii
+from truenorth.errors.deflection import Deflection
+from truenorth.errors.log import LogErrors
+from truenorth.navigation import Mounting, navigate
+from truenorth.records import GnssRecord
+
+PLUMB = Deflection()
+NONE = Deflection(0.0)
+LOG = LogErrors(drift=0.5, drift_time=3.0 * HOUR, scale=0.005, mounting=math.radians(0.3), bias=0.1)
+
+
+def fixes(ship: Voyage, every: float = 60.0) -> Gnss:
+    """Positions with 3 m of white noise."""
+    k = np.arange(0, len(ship.truth.time), round(every / ship.truth.interval))[1:]
+    lat, lon, alt = ship.truth.position[k].T
+    R_M, R_N = radii(lat)
+    e, n, u = 3.0 * ship.rng.standard_normal((3, len(k)))
+    sigma = np.full((len(k), 3), 3.0)
+    record = GnssRecord(ship.truth.time[k], lat + n / R_M, lon + e / (R_N * np.cos(lat)), alt + u, position_sigma=sigma)
+    return Gnss(record, Mounting())
+
+
+def navigated(true: Deflection, assumed: Deflection, aided: str = "", hours: float = 12.0) -> Any:
+    """A run: free, or aided by GNSS, with a plumb line that is deflected."""
+
+    def run(seed: int, number: int) -> Outcome:
+        ship = voyage(seed, number, hours=hours, turns=bool(aided), deflection=true)
+        aid = [fixes(ship)] if aided else []
+        result = navigate(
+            ship.record,
+            ship.start,
+            aid=aid,
+            altitude="fixed",
+            imu=SPEC,
+            errors=assumed.groups,
+            interval=4.0,
+            output=60.0,
+            check_clocks=False,
+        )
+        return ship.outcome(result, tuple(hours * share for share in (0.4, 0.6, 0.8, 1.0)))
+
+    return run
+
+
+def with_log(true: LogErrors, assumed: LogErrors) -> Any:
+    """A run aided by a speed log in body axes."""
+
+    def run(seed: int, number: int) -> Outcome:
+        ship = voyage(seed, number, hours=12.0)
+        aid = VelocityLog(ship.log(true, "body"), Mounting(noise=0.05 / math.sqrt(ship.truth.interval)), assumed)
+        result = navigate(
+            ship.record, ship.start, aid=aid, altitude="fixed", imu=SPEC, interval=4.0, output=60.0, check_clocks=False
+        )
+        return ship.outcome(result, (3.0, 6.0, 9.0, 12.0))
+
+    return run
+
+
+CASES = (
+    Case("navigation, free", "plumb line straight", navigated(NONE, NONE)),
+    Case("navigation, free", "deflection 6 arcsec over 20 km, not modelled", navigated(PLUMB, NONE)),
+    Case("navigation, free", "deflection 6 arcsec over 20 km", navigated(PLUMB, PLUMB)),
+    Case("navigation, GNSS", "plumb line straight", navigated(NONE, NONE, "gnss", 6.0)),
+    Case("navigation, GNSS", "deflection 6 arcsec over 20 km, not modelled", navigated(PLUMB, NONE, "gnss", 6.0)),
+    Case("navigation, GNSS", "deflection 6 arcsec over 20 km", navigated(PLUMB, PLUMB, "gnss", 6.0)),
+    Case("navigation, speed log", "current, scale, mounting, bias", with_log(LOG, LOG)),
+    Case("navigation, speed log", "none of them", with_log(LogErrors(), LogErrors())),
+)
+
+if __name__ == "__main__":
+    main(CASES)

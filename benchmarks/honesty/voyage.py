@@ -1,0 +1,163 @@
+"""Voyages for the cases of damping and navigation: a ship at 20 deg N that turns hard, its IMU, its start, its log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.honesty.frame import Outcome
+from truenorth.core.position import Position
+from truenorth.core.units import parse
+from truenorth.damping.course import Course, errors_of
+from truenorth.errors.deflection import STANDARD_GRAVITY, Deflection
+from truenorth.errors.log import LogErrors, log_rows
+from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI
+from truenorth.navigation import Start
+from truenorth.records import ImuRecord, VelocityRecord
+from truenorth.records.specs import ImuSpec
+from truenorth.simulation import ideal_log, simulate
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import straight, turn
+from truenorth.simulation.processes import gauss_markov
+
+Array = NDArray[np.float64]
+HOUR, DEG = 3600.0, math.radians(1.0)
+SIGMA = np.zeros(13)
+SIGMA[DV], SIGMA[DP], SIGMA[PHI] = 0.1, 60.0, np.radians(np.array([0.5, 0.5, 5.0]) / 60.0)
+SPEC = ImuSpec(
+    gyro_bias=parse("0.005 deg/h", "angular_rate"),
+    accel_bias=parse("50 ug", "acceleration"),
+    gyro_random_walk=parse("0.001 deg/sqrt(h)", "angle_random_walk"),
+    accel_random_walk=parse("10 ug/sqrt(Hz)", "velocity_random_walk"),
+)
+INTERVAL = 4.0  # s, of the IMU: turns of 1 deg/s are smooth in it
+NOISE = 0.05  # m/s, of the log in a second
+
+
+def scaled(factor: float) -> ImuSpec:
+    """The IMU so many times worse."""
+    names = ("gyro_bias", "accel_bias", "gyro_random_walk", "accel_random_walk")
+    return replace(SPEC, **{name: factor * getattr(SPEC, name) for name in names})
+
+
+@cache
+def passage(hours: float, lat: float, turns: bool) -> tuple[Any, Course]:
+    """Ideal log and true course: 10 m/s, a turn of 60 to 170 deg at 1 deg/s every 20 to 80 minutes, or straight on."""
+    rng = np.random.default_rng([17, round(hours)])
+    legs, length = [], 0.0
+    while turns and length < hours * HOUR:
+        part = straight(rng.uniform(1200.0, 4800.0)) + turn(
+            rng.uniform(60.0, 170.0) * rng.choice([-1, 1]) * DEG, 1.0 * DEG
+        )
+        legs += part
+        length += sum(leg.duration for leg in part)
+    way = course(Position.from_degrees(lat, 115.0), legs, heading=0.9, speed=10.0)
+    ideal = ideal_log(way, rate=1.0 / INTERVAL, duration=hours * HOUR)
+    at = way.states(ideal.edges)
+    return ideal, Course(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+
+
+@dataclass(frozen=True)
+class Voyage:
+    """One voyage with drawn errors.
+
+    Attributes
+    ----------
+    record : ImuRecord
+    start : Start
+    truth : Course
+    rng : Generator
+        For its sensors.
+    """
+
+    record: ImuRecord
+    start: Start
+    truth: Course
+    rng: np.random.Generator
+
+    def log(self, errors: LogErrors, frame: str = "navigation") -> VelocityRecord:
+        """A speed log with errors drawn from these."""
+        rng, truth = self.rng, self.truth
+        v = truth.v_n.copy()
+        groups = errors.groups()
+        rows = log_rows(groups, truth.C_nb, truth.v_n)
+        at = 0
+        for group in groups:
+            m = len(group.prior)
+            if math.isfinite(group.correlation_time):
+                x = gauss_markov(group.sigma[0], group.correlation_time, truth.interval, len(v), rng, axes=m)
+            else:
+                x = np.broadcast_to(group.sigma * rng.standard_normal(m), (len(v), m))
+            v[:, :2] += np.einsum("kij,kj->ki", rows[:, :, at : at + m], x)
+            at += m
+        v[:, :2] += NOISE / math.sqrt(truth.interval) * rng.standard_normal((len(v), 2))
+        if frame == "body":
+            v = np.einsum("kij,ki->kj", truth.C_nb, v)
+        return VelocityRecord(truth.time, v, frame)  # type: ignore[arg-type]  # one of the two
+
+    def outcome(self, result: Any, hours: tuple[float, ...] = (6.0, 12.0, 18.0, 24.0)) -> Outcome:
+        """Errors of a navigation over its sigmas at some hours."""
+        found = Course(result.time, result.C_nb, result.v_n, result.position)
+        rows = np.round((found.time - self.truth.time[0]) / self.truth.interval).astype(int)
+        truth = Course(*(a[rows] for a in (self.truth.time, self.truth.C_nb, self.truth.v_n, self.truth.position)))
+        k = np.unique([int(np.argmin(np.abs(found.time - h * HOUR))) for h in hours])
+        e, s = errors_of(found, truth)[k], result.track.sigma[k]
+        sigma = np.concatenate([s[:, 3:5], s[:, 6:8], s[:, :3]], axis=1)
+        ratio = e / sigma
+        ratios = {"velocity": ratio[:, DV], "position": ratio[:, DP], "heading": ratio[:, 6], "level": ratio[:, 4:6]}
+        bad = "" if result.status == "navigated" else f"{result.status}: {result.reasons[0]}"
+        said = f"{np.round(e[-1, :4], 2)} {np.round(np.degrees(e[-1, 6]), 3)} sigma {np.round(sigma[-1, :4], 2)}"
+        return Outcome(ratios, bad, said)
+
+
+def voyage(
+    seed: int,
+    run: int,
+    *,
+    hours: float = 24.0,
+    lat: float = 20.0,
+    turns: bool = True,
+    spec: ImuSpec = SPEC,
+    deflection: Deflection | None = None,
+    sigmas: Mapping[int, float] | None = None,
+) -> Voyage:
+    """A voyage, errors drawn from the specification and `SIGMA`.
+
+    With a deflection the plumb line is deflected along the way; at the start the INS is levelled by it.
+    """
+    rng = np.random.default_rng([seed, run, 3])
+    ideal, truth = passage(hours, lat, turns)
+    sigma = SIGMA.copy()
+    sigma[BG], sigma[BA] = spec.gyro_bias, spec.accel_bias
+    x0 = sigma * rng.standard_normal(13)
+    walks = ImuSpec(gyro_random_walk=spec.gyro_random_walk, accel_random_walk=spec.accel_random_walk)
+    record = simulate(ideal, imu=walks, seed=seed, run=run, errors={"gyro_bias": x0[BG], "accel_bias": x0[BA]}).record
+    if deflection is not None:
+        xi = deflected_along(truth, deflection, rng)
+        mean = 0.5 * (xi[1:] + xi[:-1]) * STANDARD_GRAVITY
+        pushed = np.einsum("kij,ki->kj", truth.C_nb[1:, :2], mean)
+        record = replace(record, accel=record.accel + pushed * (1.0 if record.kind == "rates" else INTERVAL))
+    begin = truth.between(0, 1).corrected(-x0[:7])
+    P = np.zeros((15, 15))
+    P[np.ix_(OF_INS, OF_INS)] = np.diag(sigma**2)
+    lat0, lon0, alt0 = begin.position[0]
+    start = Start(0.0, begin.C_nb[0], begin.v_n[0], lat0, lon0, alt0, np.zeros(3), np.zeros(3), P)
+    return Voyage(record, start, truth, rng)
+
+
+def deflected_along(truth: Course, deflection: Deflection, rng: np.random.Generator) -> Array:
+    """(K+1, 2) deflection east, north, rad: Gauss-Markov over the distance gone."""
+    step = np.linalg.norm(truth.v_n[1:, :2], axis=1) * truth.interval
+    decay = np.exp(-step / deflection.distance)
+    xi = np.empty((len(truth.time), 2))
+    xi[0] = deflection.sigma * rng.standard_normal(2)
+    noise = deflection.sigma * np.sqrt(1.0 - decay**2)[:, None] * rng.standard_normal((len(step), 2))
+    for k in range(len(step)):
+        xi[k + 1] = decay[k] * xi[k] + noise[k]
+    return xi

@@ -1,0 +1,143 @@
+"""Errors of the log: what they show, whether bands hold them, and how fast a drift is."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.damping.marine_case import HOUR, ideal_and_truth
+from tests.damping.test_filters import SIGMA, WALKS, reference
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import UsageError
+from truenorth.damping.bands import filter_bands
+from truenorth.damping.drift import likely_time
+from truenorth.damping.filters import Filter, FixRows, run_filters
+from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
+from truenorth.models.marine import DP, PHI, MarineModel
+from truenorth.simulation.processes import gauss_markov
+
+
+def test_rows_are_what_a_log_shows():
+    """A log turned, scaled and biased on the hull, against the rows: exact but for the product of two errors."""
+    errors = LogErrors(drift=1.0, scale=1.0, mounting=1.0, bias=1.0)
+    heading, v_b = 0.7, np.array([0.4, 9.0, 0.0])
+    C = dcm_from_euler(heading, 0.0, 0.0)
+    d, k, mu, b = np.array([0.3, -0.2]), 1e-5, 2e-5, np.array([0.02, -0.01])
+    turned = dcm_from_euler(heading + mu, 0.0, 0.0)  # clockwise by mu
+    shown = (1.0 + k) * turned @ v_b + np.append(d, 0.0) + C @ np.append(b, 0.0)
+    rows = log_rows(errors.groups(), C, C @ v_b)
+    np.testing.assert_allclose(rows @ np.concatenate([d, [k, mu], b]), (shown - C @ v_b)[:2], atol=1e-8)
+
+
+def test_kinds_of_logs():
+    assert log_errors(None, "body") == LOGS["em"]
+    assert log_errors(None, "navigation") == LOGS["reference"]
+    assert log_errors("doppler-bottom", "body").drift == 0.0  # over the ground there is no current
+    assert [g.name for g in LOGS["doppler-bottom"].groups()][-1] == BIAS
+    with pytest.raises(UsageError, match="one of reference, em"):
+        log_errors("pitot", "body")
+    with pytest.raises(UsageError, match="zero or more"):
+        LogErrors(drift=-0.1)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return ideal_and_truth(hours=12.0)[1]
+
+
+def free(truth, model, rng):
+    """A course with errors of the linear model, drawn from `SIGMA`."""
+    x = SIGMA * rng.standard_normal(13)
+    _, Phi = truth.linearise(MarineModel(**WALKS))
+    noise = np.sqrt(model.noise * truth.interval)
+    states = [x]
+    for step in Phi:
+        states.append(step @ states[-1] + noise * rng.standard_normal(13))
+    return np.array(states), truth.corrected(-np.array(states)[:, :7])
+
+
+def test_bands_of_a_filter_that_knows_all_are_its_own(truth):
+    """The covariance of truth and filter together gives back the filter's, where their models are one."""
+    model = MarineModel(**WALKS)
+    kind = Filter(model, np.diag(SIGMA**2), 0.05)
+    found = run_filters(truth, reference(truth, 0.0), start=0, kinds={"one": kind})["one"]
+    bands = filter_bands(truth, kind, kind)
+    np.testing.assert_allclose(bands.errors[1:], found.sigma[1:, :7], rtol=1e-6)
+    fused = filter_bands(truth, kind, kind, replace(kind, sigma=1e-4, window=10.0), np.ones((len(truth.time), 7)))
+    np.testing.assert_allclose(fused.errors, bands.errors, rtol=1e-6)
+
+
+@pytest.mark.parametrize("time", [math.inf, 1.0 * HOUR])
+def test_bands_hold_what_a_filter_does_not_know(truth, time):
+    """A drift of .3 m/s that filter 1 knows nothing of: RMS over 20 voyages against the bands, 99.9 %."""
+    errors = LogErrors(0.3, time)
+    model, whole_model = MarineModel(**WALKS), MarineModel(**WALKS, groups=errors.groups())
+    kind = Filter(model, np.diag(SIGMA**2), 0.05)
+    bands = filter_bands(truth, Filter(whole_model, whole_model.prior(np.diag(SIGMA**2)), 0.05), kind)
+    ratios = []
+    for run in range(20):
+        rng = np.random.default_rng([5, run])
+        x, course = free(truth, model, rng)
+        constant = np.broadcast_to(0.3 * rng.standard_normal(2), (len(truth.time), 2))
+        drift = constant if math.isinf(time) else gauss_markov(0.3, time, truth.interval, len(truth.time), rng, axes=2)
+        found = run_filters(course, reference(truth, drift, seed=run), start=0, kinds={"one": kind})["one"]
+        ratios.append((found.x[-1, :7] - x[-1, :7]) / bands.errors[-1])
+    rms = np.sqrt(np.mean(np.array(ratios) ** 2, axis=0))
+    np.testing.assert_array_less(rms, 1 + 4.0 / math.sqrt(40))
+    np.testing.assert_array_less(1 - 4.0 / math.sqrt(40), rms)
+
+
+@pytest.mark.parametrize(("hours", "low", "high"), [(math.inf, 48.0, math.inf), (1.0, 0.37, 3.0), (6.0, 1.5, 24.0)])
+def test_the_time_of_a_drift_is_found(truth, hours, low, high):
+    rng = np.random.default_rng(8)
+    model = MarineModel(**WALKS, groups=LogErrors(0.5).groups())
+    _, course = free(truth, model, rng)
+    drift = np.array([0.5, -0.3])
+    if math.isfinite(hours):
+        drift = gauss_markov(0.5, hours * HOUR, truth.interval, len(truth.time), rng, axes=2)
+    kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
+    assert low * HOUR <= likely_time(course, reference(truth, drift), 0, kind) <= high * HOUR
+
+
+def test_two_fixes_calibrate_the_gyros(truth):
+    """Position and azimuth at two times give the drifts by ``psi_2 = A psi_1 - B eps``, and the filter finds them.
+
+    ``psi' = -w_in x psi - C eps`` with ``psi = phi - theta``; the tilt is left to the filter.
+    """
+    from scipy.linalg import expm
+
+    from truenorth.core.earth import earth_rate_n, radii, transport_rate_n
+
+    model = MarineModel(**WALKS)
+    x, course = free(truth, MarineModel(0.0, 0.0), np.random.default_rng(3))
+    first, second = round(2 * HOUR / 10), round(11 * HOUR / 10)
+    z, sigma = np.full((len(truth.time), 3), np.nan), np.ones((len(truth.time), 3))
+    for k in (first, second):
+        z[k], sigma[k] = x[k][[2, 3, 6]], [1.0, 1.0, np.radians(0.1 / 60)]
+    prior = SIGMA.copy()
+    prior[10:] *= 20.0  # the fixes tell, not the prior
+    kind = Filter(model, np.diag(prior**2), 0.05, fixes=FixRows(z, sigma))
+    silent = np.full((len(truth.time), 2), np.nan)
+    found = run_filters(course, silent, start=0, kinds={"free": kind})["free"]
+
+    def theta(k):
+        lat, _, alt = truth.position[k]
+        R_M, R_N = radii(lat)
+        return np.array([-x[k, 3] / (R_M + alt), x[k, 2] / (R_N + alt), x[k, 2] / (R_N + alt) * math.tan(lat)])
+
+    psi = [x[k, PHI] - theta(k) for k in (first, second)]
+    A, B = np.eye(3), np.zeros((3, 3))
+    for k in range(first, second):
+        lat, _, alt = truth.position[k]
+        w = earth_rate_n(lat) + transport_rate_n(lat, alt, truth.v_n[k])
+        cross = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        step = expm(-cross * truth.interval)
+        A, B = step @ A, step @ B + truth.interval * truth.C_nb[k]
+    eps = np.linalg.solve(B, A @ psi[0] - psi[1])
+    size = np.linalg.norm(x[0, 10:])
+    np.testing.assert_allclose(eps, x[0, 10:], atol=0.02 * size)  # the law, by the true errors
+    np.testing.assert_array_less(found.sigma[-1, 10:13], 0.3 * prior[10:])
+    np.testing.assert_array_less(np.abs(found.x[-1, 10:13] - x[-1, 10:]), 4.0 * found.sigma[-1, 10:13])
+    np.testing.assert_array_less(np.abs(found.x[second, DP] - x[second, DP]), 4.0)
+    assert np.abs(found.x[first - 1, DP] - x[first - 1, DP]).max() > 100.0  # before the fix it was off
