@@ -50,7 +50,7 @@ def free(truth, model, rng):
     """A course with errors of the linear model, drawn from `SIGMA`."""
     x = SIGMA * rng.standard_normal(13)
     _, Phi = truth.linearise(MarineModel(**WALKS))
-    noise = np.sqrt(model.noise * truth.interval)
+    noise = np.sqrt(model.noise[:13] * truth.interval)
     states = [x]
     for step in Phi:
         states.append(step @ states[-1] + noise * rng.standard_normal(13))
