@@ -65,4 +65,4 @@ def test_bad_options(logs):
     assert "--lat" in message()
     assert "expected 3 numbers" in message("--master", master, "--mounting", "1,2")
     assert "such as '3 arcmin,5 s'" in message("--master", master, "--flexure", "3 arcmin")
-    assert "choose one of" in message("--master", master, "--matching", "position")
+    assert "choose one of" in message("--master", master, "--matching", "place")

@@ -13,7 +13,7 @@ from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks
-from truenorth.alignment.transfer_system import system_of_motion, without_place
+from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
@@ -94,7 +94,7 @@ def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
     R = np.repeat([0.05**2, (2 * ARCMIN) ** 2], 3)
     system = system_of_motion(flight, model, start.P, R, SPAN - 0.1, step=0.1, C_mb=C_mb)
     expected = np.squeeze(kalman(system, history="sigma", innovations=False).sigma)
-    seen = without_place(model)
+    seen = seen_states(model)
     for at, tolerance in ((5.0, 0.02), (9.0, 0.02), (20.0, 0.005), (30.0, 0.005), (59.0, 0.005)):
         k, j = np.argmin(np.abs(track.time - at)), round(at / 0.1) - 1
         np.testing.assert_allclose(track.sigma[k][seen], expected[j], rtol=tolerance)

@@ -7,10 +7,11 @@ dataclass with a `key`, a `record` and a method `sources`, as :class:`Gnss` has;
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 from numpy.typing import ArrayLike
 
+from truenorth.aiding.matching import What
 from truenorth.aiding.sensors import from_gnss, from_height, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.errors.log import LogErrors, log_errors
@@ -149,23 +150,25 @@ class Master(_Mounted):
     mounting : Mounting, optional
         Lever arm from the IMU to the master, ``C_mb`` from the IMU's to the master's axes, and what they are uncertain by. Left
         out: arm and angles zero to 1 m and 3 deg, latency zero to 50 ms.
-    matching : {"auto", "velocity", "attitude", "both"}
+    matching : {"auto", "velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
     flexure : FlexureSpec, optional
         The IMU's seat bends.
     errors : MasterErrors or {"navigation", "tactical"}, optional
         The master's own slow errors; left out, it is taken for the truth, and sigma is relative to it.
-    velocity_noise, attitude_noise : float, optional, m/s and rad
+    velocity_noise, attitude_noise, position_noise, acceleration_noise : float, optional, m/s, rad, m and m/s^2
         White noise of the master's rows; fitted when left out.
     heading : float, rad, optional
         Of the IMU at the start, where the master has no attitude.
     """
 
     record: MasterRecord
-    matching: Literal["auto", "velocity", "attitude", "both"] = "auto"
+    matching: What = "auto"
     flexure: FlexureSpec | None = None
     errors: MasterErrors | str | None = None
     velocity_noise: float | None = None
     attitude_noise: float | None = None
+    position_noise: float | None = None
+    acceleration_noise: float | None = None
     heading: float | None = None
     key: ClassVar[str] = "master"
 

@@ -173,6 +173,8 @@ def by_master(r: Request) -> Alignment:
         master_errors=master.errors,
         velocity_noise=master.velocity_noise,
         attitude_noise=master.attitude_noise,
+        position_noise=master.position_noise,
+        acceleration_noise=master.acceleration_noise,
         position=r.place,
         heading=master.heading,
         calibration=r.calibration,

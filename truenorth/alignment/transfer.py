@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from os import PathLike
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.matching import FIRST_NOISE, Matched, Translation, What, first_noise, matched
 from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
@@ -21,7 +22,7 @@ from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over,
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import MasterErrors, TransferModel
+from truenorth.errors.master import DELAY, MasterErrors, TransferModel
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.rivals import wandering_evidence
 from truenorth.quality.gnss import master_evidence
@@ -33,12 +34,10 @@ from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
 
 Array = NDArray[np.float64]
-What = Literal["auto", "velocity", "attitude", "both"]
 
 LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, s, rad
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 GATE = 1e-6  # probability of rejecting a sound row
-VELOCITY_NOISE, ATTITUDE_NOISE = 0.1, math.radians(0.05)  # m/s, rad: to begin the fit with
 PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
 LEAST = 0.1  # of the noise to begin with: less is not believed
 SHORTEST = 5.0  # s
@@ -60,6 +59,8 @@ def align_transfer(
     master_errors: MasterErrors | str | None = None,
     velocity_noise: float | None = None,
     attitude_noise: float | None = None,
+    position_noise: float | None = None,
+    acceleration_noise: float | None = None,
     position: Position | None = None,
     heading: float | None = None,
     calibration: Calibration | None = None,
@@ -79,8 +80,10 @@ def align_transfer(
         At any rate and times, rows may be missing; attitude or velocity or both, position where there is one.
     imu : ImuSpec, str, path or mapping, optional
         Specification of the slave; the preset "industrial" when left out.
-    matching : {"auto", "velocity", "attitude", "both"}
-        What of the master is matched; all that it tells when left out.
+    matching : {"auto", "velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
+        What of the master is matched; velocity and attitude, as far as it tells them, when left out. Position is slower than
+        velocity and bears a constant error of the master's velocity (the sigma of velocity is against the master then);
+        acceleration needs its specific force and attitude.
     lever_arm : three floats, m
         From the master to the slave, slave axes (right, forward, up).
     lever_arm_sigma : float, m
@@ -96,7 +99,7 @@ def align_transfer(
     master_errors : MasterErrors or {"navigation", "tactical"}, optional
         The master's own slow errors: sigma then is absolute, and `relative_sigma` that against the master. Left out, the master is
         taken for the truth.
-    velocity_noise, attitude_noise : float, optional, m/s and rad
+    velocity_noise, attitude_noise, position_noise, acceleration_noise : float, optional, m/s, rad, m and m/s^2
         White noise of the master's rows; fitted to the innovations when left out.
     position : Position, optional
         Where the master tells none.
@@ -118,11 +121,11 @@ def align_transfer(
         Gaps in the slave's log; logs that have no time in common and whose motion does not bring them together.
     """
     tell = progress or (lambda stage: None)
-    what = _matching(matching, master)
+    what = matched(matching, master)
     arm = _three(lever_arm, "lever_arm", "metres: right, forward, up of the slave, from the master")
     angles = _three(mounting, "mounting", "radians: heading, pitch, roll of the slave seen from the master")
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
-    if flexure is not None and what == "velocity":
+    if flexure is not None and not what.attitude:
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
     spec = imu_spec("industrial" if imu is None else imu).seen_in(slave)
     where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
@@ -132,19 +135,20 @@ def align_transfer(
 
     tell("comparing the clocks")
     C_mb = np.asarray(dcm_from_euler(*angles))
-    if what == "attitude":
+    if what.translation is None:
         lever_arm_sigma = 0.0  # attitude does not see it
     assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     assumed, notes = common_clock(slave, master, assumed)
     notes = (*notes, *master.notes)
     bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
-    model = model_from_spec(
-        spec, assumed, what != "velocity", bend, DELAY_WALK, _matched(errors_of(master_errors), what)
-    )
-
-    noise = _noise(velocity_noise, attitude_noise, what)
-    fitted = [velocity_noise is None and what != "attitude", attitude_noise is None and what != "velocity"]
-    noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, position, tell)
+    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, _errors_in(errors_of(master_errors), what))
+    if what.translation == "position":
+        model = _against_wandering(model, errors_of(master_errors))
+    if what.translation == "acceleration":
+        model = replace(model, arm_considered=True)
+    given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
+    noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
+    noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, what.kind, position, tell)
     tell("aligning")
     part, start = hand_over(slave, master, model, spec, assumed, noise, position)
     if part.duration < SHORTEST:
@@ -152,9 +156,9 @@ def align_transfer(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
-    matched = Matching(*noise, gate=GATE)
-    track = transfer_filter(part, master, model, start, matched, linear=linear)
-    again = partial(transfer_filter, part, master, start=start, matching=matched, linear=linear)
+    rows = Matching(*noise, what.kind, GATE)
+    track = transfer_filter(part, master, model, start, rows, linear=linear)
+    again = partial(transfer_filter, part, master, start=start, matching=rows, linear=linear)
     seen = _seen(slave, master, model, C_mb) + wandering_evidence(again, track, model, spec, part.duration)
     answer = assemble_transfer(
         part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, seen
@@ -168,11 +172,19 @@ def _known_as_well_as(position: Position, answer: Alignment) -> Alignment:
     return replace(answer, position=replace(answer.position, **sigmas))
 
 
-def _matched(errors: MasterErrors, what: str) -> MasterErrors:
+def _errors_in(errors: MasterErrors, what: Matched) -> MasterErrors:
     """Of what is not matched, no states."""
-    if what == "velocity":
-        return replace(errors, attitude_drift=0.0, level=0.0, heading=0.0)
-    return replace(errors, velocity=0.0, velocity_drift=0.0) if what == "attitude" else errors
+    if what.translation != "velocity":
+        errors = replace(errors, velocity=0.0, velocity_drift=0.0)
+    if not what.attitude and what.translation != "acceleration":
+        errors = replace(errors, attitude_drift=0.0, level=0.0, heading=0.0)
+    return errors
+
+
+def _against_wandering(model: TransferModel, errors: MasterErrors) -> TransferModel:
+    """The model of a slave whose place and velocity are against a master whose own velocity error wanders."""
+    walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
+    return replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
 
 
 def _passes(
@@ -183,6 +195,7 @@ def _passes(
     assumed: Assumed,
     noise: tuple[float, float],
     fitted: Sequence[bool],
+    kind: Translation,
     position: Position | None,
     tell: Callable[[str], None],
 ) -> tuple[tuple[float, float], Linear | None]:
@@ -191,9 +204,12 @@ def _passes(
     for number in range(PASSES):
         tell(f"pass {number + 1}")
         part, start = hand_over(slave, master, model, spec, assumed, noise, position)
-        track = transfer_filter(part, master, model, start, Matching(*noise), linear=linear)
-        noise = _refitted(track, noise, fitted)
-        linear = _linear(part, master, track)
+        # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
+        velocity = kind == "acceleration" and number == 0
+        rows = Matching(FIRST_NOISE["velocity"], noise[1]) if velocity else Matching(*noise, kind)
+        track = transfer_filter(part, master, model, start, rows, linear=linear)
+        noise = noise if velocity else _refitted(track, noise, fitted, kind)
+        linear = _linear(part, master, model, track)
     return noise, linear
 
 
@@ -224,19 +240,6 @@ def _check_sigmas(
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
 
 
-def _matching(asked: What, master: MasterRecord) -> str:
-    if asked not in get_args(What):
-        raise UsageError(f"matching {asked!r} is not known; choose one of {', '.join(get_args(What))}")
-    has = {"velocity": master.v_n is not None, "attitude": master.C_nb is not None}
-    has["both"] = all(has.values())
-    if asked == "auto":
-        return "both" if has["both"] else "velocity" if has["velocity"] else "attitude"
-    if not has[asked]:
-        missing = "attitude" if has["velocity"] else "velocity"
-        raise UsageError(f"{master.source}: matching {asked!r} needs its {missing}, which it does not hold")
-    return asked
-
-
 def _three(values: Sequence[float], name: str, meaning: str) -> Array:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != (3,) or not np.all(np.isfinite(array)):
@@ -244,30 +247,24 @@ def _three(values: Sequence[float], name: str, meaning: str) -> Array:
     return array
 
 
-def _noise(velocity: float | None, attitude: float | None, what: str) -> tuple[float, float]:
-    for name, value in (("velocity_noise", velocity), ("attitude_noise", attitude)):
-        if value is not None and not 0.0 < value < math.inf:
-            raise UsageError(f"{name} is {value}; expected a positive one-sigma, or nothing: it is fitted then")
-    v = VELOCITY_NOISE if velocity is None else velocity
-    a = ATTITUDE_NOISE if attitude is None else attitude
-    return (math.inf if what == "attitude" else v), (math.inf if what == "velocity" else a)
-
-
-def _linear(slave: ImuRecord, master: MasterRecord, track: TransferTrack) -> Linear:
+def _linear(slave: ImuRecord, master: MasterRecord, model: TransferModel, track: TransferTrack) -> Linear:
     """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master tells its own."""
     C_nb = np.full((len(master), 3, 3), np.nan)
     C_nb[track.row] = final_attitudes(slave, track)
     C_nm = C_nb @ track.C_mb[-1].T
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
-    return Linear(C_nm, C_nb)
+    tau = model.slice_of(DELAY)
+    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.aux[-1][tau][0]))
 
 
-def _refitted(track: TransferTrack, noise: tuple[float, float], fitted: Sequence[bool]) -> tuple[float, float]:
+def _refitted(
+    track: TransferTrack, noise: tuple[float, float], fitted: Sequence[bool], first: Translation
+) -> tuple[float, float]:
     """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout."""
     later = slice(len(track.time) // 4, None)
     result = list(noise)
-    for kind, (sigma, least) in enumerate(zip(noise, (VELOCITY_NOISE, ATTITUDE_NOISE), strict=True)):
+    for kind, (sigma, least) in enumerate(zip(noise, (FIRST_NOISE[first], FIRST_NOISE["attitude"]), strict=True)):
         if not fitted[kind]:
             continue
         columns = slice(3 * kind, 3 * kind + 3)

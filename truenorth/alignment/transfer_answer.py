@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.matching import Matched
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
-from truenorth.alignment.transfer_system import system_along, without_place
+from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_verdict import judge_transfer
 from truenorth.analysis.observability import observability
 from truenorth.core.attitude import (
@@ -47,6 +48,9 @@ WORDS = {
     "dv_E": "velocity error east",
     "dv_N": "velocity error north",
     "dv_U": "velocity error up",
+    "dp_E": "position error east",
+    "dp_N": "position error north",
+    "dp_U": "position error up",
     "phi_E": "tilt about east",
     "phi_N": "tilt about north",
     "phi_U": "heading error",
@@ -77,7 +81,7 @@ def assemble_transfer(
     start: SlaveStart,
     track: TransferTrack,
     noise: tuple[float, float],
-    what: str,
+    what: Matched,
     notes: tuple[str, ...],
     heading_limit: float,
     of_master: list[Evidence],
@@ -92,7 +96,7 @@ def assemble_transfer(
     answer = Alignment(
         status="not_converged",
         evidence=(),
-        method=f"transfer, {'velocity and attitude' if what == 'both' else what} matching",
+        method=f"transfer, {what} matching",
         method_reason=f"{model.states} states, closed loop over {transfer.used} rows of {master.source}",
         time=float(track.time[-1]),
         C_nb=track.C_nb[-1],
@@ -124,7 +128,7 @@ def _transfer(
     start: SlaveStart,
     track: TransferTrack,
     noise: tuple[float, float],
-    what: str,
+    what: Matched,
     notes: tuple[str, ...],
 ) -> Transfer:
     sigma, aux = track.sigma[-1], track.aux[-1]
@@ -133,10 +137,11 @@ def _transfer(
     silences = tuple(
         f"the master is silent for {master.steps[k]:.1f} s after {master.time[k - 1]:.1f} s" for k in silent[:3]
     )
-    kinds = [kind for kind, matched in enumerate((what != "attitude", what != "velocity")) if matched]
-    verdict = track.verdict[:, kinds]
+    verdict = track.verdict[:, np.array([what.translation is not None, what.attitude])]
+    fitted = dict.fromkeys(("velocity", "position", "acceleration"), math.nan)
+    fitted[what.kind] = noise[0] if np.isfinite(noise[0]) else math.nan
     return Transfer(
-        matching=what,
+        matching=what.name,
         delay=assumed.delay + (0.0 if tau is None else float(aux[tau][0])),
         delay_sigma=0.0 if tau is None else float(sigma[tau][0]),
         delay_prior=assumed.delay_sigma,
@@ -146,16 +151,18 @@ def _transfer(
         mounting=_signed(np.array(euler_from_dcm(track.C_mb[-1]))),
         mounting_sigma=sigma_of_mounting(track.last_P, mount, track.C_mb[-1]),
         mounting_prior=np.full(3, 0.0 if mount is None else assumed.mounting_sigma),
-        velocity_noise=noise[0] if np.isfinite(noise[0]) else math.nan,
+        velocity_noise=fitted["velocity"],
         attitude_noise=noise[1] if np.isfinite(noise[1]) else math.nan,
         used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
         P=_fifteen(track.last_P, Position(0.0)),
         relative_sigma=_relative(track, model),
-        jumps=_jumps(track),
-        open=_open(slave, model, assumed, start, track, noise),
+        jumps=_jumps(track, what),
+        open=_open(slave, model, assumed, start, track, noise, what),
         notes=(*notes, *silences),
+        position_noise=fitted["position"],
+        acceleration_noise=fitted["acceleration"],
     )
 
 
@@ -181,11 +188,16 @@ def _signed(angles: Array) -> Array:
     return np.asarray((angles + np.pi) % (2 * np.pi) - np.pi)
 
 
-def _jumps(track: TransferTrack) -> tuple[str, ...]:
+def _jumps(track: TransferTrack, matched: Matched) -> tuple[str, ...]:
+    unit = "m" if matched.kind == "position" else "m/s"  # an acceleration is not taken up
     found = []
     for k, kind in np.argwhere(track.verdict == REOPENED):
         size = float(np.linalg.norm(track.innovation[k, 3 * kind : 3 * kind + 3]))
-        what = f"velocity jumped by {size:.2g} m/s" if kind == 0 else f"attitude jumped by {math.degrees(size):.2g} deg"
+        what = (
+            f"{matched.kind} jumped by {size:.2g} {unit}"
+            if kind == 0
+            else f"attitude jumped by {math.degrees(size):.2g} deg"
+        )
         found.append(f"the master's {what} shortly before {track.time[k]:.1f} s and stays so: taken up from there")
     return tuple(found)
 
@@ -197,6 +209,7 @@ def _open(
     start: SlaveStart,
     track: TransferTrack,
     noise: tuple[float, float],
+    what: Matched,
 ) -> tuple[str, ...]:
     """What the motion as it was could not tell apart, from the model along the track."""
     every = max(1, len(track.time) // MOST_EPOCHS)
@@ -217,14 +230,15 @@ def _open(
         mounting=assumed.mounting_sigma,
     )
     R = np.repeat([s**2 / every if np.isfinite(s) else np.inf for s in noise], 3)
-    system = system_along(middle, at, T, model, P0, R, assumed.lever_arm, assumed.C_mb)
-    seen = without_place(model)
+    system = system_along(middle, at, T, model, P0, R, assumed.lever_arm, assumed.C_mb, what.kind)
+    seen = seen_states(model, what.kind)
     names = [WORDS[model.names[i]] for i in seen]
     told = observability(system, names, [model.units[i] for i in seen])
-    if not np.isfinite(noise[0]):  # attitude alone: nothing of velocity and force is expected
-        quiet = {WORDS[f"dv_{axis}"] for axis in "ENU"} | {WORDS[f"nabla_{axis}"] for axis in "xyz"}
-    else:
-        quiet = set()
+    quiet = set()  # what nothing is expected of
+    if what.translation in (None, "acceleration"):
+        quiet |= {WORDS[f"dv_{axis}"] for axis in "ENU"}
+    if what.translation is None:
+        quiet |= {WORDS[f"nabla_{axis}"] for axis in "xyz"}
     unseen = [group.states[0] for group in told.hardly if len(group.states) == 1 and group.states[0] not in quiet]
     words = [str(group) for group in told.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
     if unseen:
@@ -274,8 +288,8 @@ def _states(slave: ImuRecord, track: TransferTrack, k: NDArray[np.intp]) -> tupl
     return states(middle, v, k[1:], w, f), states(track.C_nb[k[1:]], track.v_n[k[1:]], k[1:], w, f), T
 
 
-def _history(slave: ImuRecord, track: TransferTrack, what: str) -> History:
-    columns = slice(3, 6) if what == "attitude" else slice(0, 3)
+def _history(slave: ImuRecord, track: TransferTrack, what: Matched) -> History:
+    columns = slice(3, 6) if what.translation is None else slice(0, 3)
     present = np.flatnonzero(np.isfinite(track.innovation[:, columns]).all(axis=1))
     k = present[:: max(1, -(-len(present) // MOST_ROWS))]
     covariance, floor = misalignment_covariance(track.P[k])
@@ -292,7 +306,7 @@ def _history(slave: ImuRecord, track: TransferTrack, what: str) -> History:
         accel_bias_sigma=track.sigma[k, BA],
         innovation=track.innovation[k, columns],
         innovation_sigma=track.innovation_sigma[k, columns],
-        nis=track.nis[k, 1 if what == "attitude" else 0],
+        nis=track.nis[k, 1 if what.translation is None else 0],
     )
 
 

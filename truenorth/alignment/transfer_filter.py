@@ -8,6 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.master import MASTER_ATTITUDE, MASTER_VELOCITY
+from truenorth.aiding.master_acceleration import MASTER_ACCELERATION
+from truenorth.aiding.master_position import MASTER_POSITION
+from truenorth.aiding.matching import Translation
+from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
@@ -26,15 +30,17 @@ from truenorth.errors.master import (
 from truenorth.estimate.memory import ABSENT, REJECTED, REOPENED, USED
 from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord, MasterRecord
-from truenorth.state.layout import BA, BG, DV, PHI
+from truenorth.state.layout import BA, BG, DP, DV, PHI
 from truenorth.state.state import Start
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Track
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
-KINDS = ("master velocity", "master attitude")
+SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
+TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
 
 @dataclass(frozen=True)
@@ -58,18 +64,20 @@ class SlaveStart:
 class Matching:
     """What of the master is matched, and how much it is believed."""
 
-    velocity_sigma: float  # m/s; white noise of each row and axis; infinite: not matched
+    sigma: float  # of the translation, m/s, m or m/s^2; white noise of each row and axis; infinite: not matched
     attitude_sigma: float = float("inf")  # rad
+    translation: Translation = "velocity"  # what of it is matched
     gate: float = 0.0  # probability of rejecting a sound row; 0: none is rejected
     patience: float = 1.0  # s; rejections for so long are a jump: the state that takes it up is opened again
 
 
 @dataclass(frozen=True)
 class Linear:
-    """Attitudes of master and slave at the master's rows, (M, 3, 3), better known than the rows tell."""
+    """Attitudes of master and slave at the master's rows, (M, 3, 3), better known than the rows tell, and how late these are."""
 
     C_nm: Array
     C_nb: Array
+    delay: float = 0.0  # s; beyond the known one
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ class TransferTrack:
     C_mb: Array  # (K, 3, 3)
     sigma: Array  # (K, n)
     P: Array  # (K, n, n)
-    innovation: Array  # (K: velocity (m/s) and attitude (rad); NaN where absent
+    innovation: Array  # (K: velocity (m/s; or position, acceleration) and attitude (rad); NaN where absent
     innovation_sigma: Array  # 6)
     nis: Array  # (K, 2)
     verdict: Integers  # (K, 2): `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`
@@ -138,7 +146,7 @@ def transfer_filter(
         slave,
         at,
         model.ins,
-        master_aiding(master, model, start, matching, linear),
+        master_aiding(master, model, start, matching, linear, slave),
         interval=LONGEST_STEP,
         every=0,
         prior=(start.P, values),
@@ -152,64 +160,59 @@ def transfer_filter(
 
 
 def master_aiding(
-    master: MasterRecord, model: TransferModel, start: SlaveStart, matching: Matching, linear: Linear | None = None
+    master: MasterRecord,
+    model: TransferModel,
+    start: SlaveStart,
+    matching: Matching,
+    linear: Linear | None = None,
+    slave: ImuRecord | None = None,
 ) -> list[Aiding]:
-    """The master's rows as the loop takes them: its place, its velocity, its attitude; what is not matched is left out."""
-    count, groups = len(master), model.groups
+    """The master's rows as the loop takes them: its place, its translation, its attitude; what is not matched is left out."""
+    count, groups, kind = len(master), model.groups, matching.translation
     stamps = master.time - start.delay
-    has_v = master.v_n is not None and np.isfinite(matching.velocity_sigma)
-    has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
-    known_v = np.isfinite(master.v_n).all(axis=1) if has_v and master.v_n is not None else np.zeros(count, bool)
-    known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
     patience = max(2, round(matching.patience / master.interval))
     found, place = [], None
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
+    if place is not None and kind != "position":
         sigma = np.full((count, 3), PLACE_SIGMA)
         lag = _states(groups, {"lag": DELAY})
         found.append(
-            Aiding(
-                "master place",
-                "position",
-                stamps,
-                place,
-                sigma,
-                -start.arm,
-                states=lag,
-                retimed=True,
-                does="place",
-            )
+            Aiding("master place", "position", stamps, place, sigma, -start.arm, states=lag, retimed=True, does="place")
         )
-    if has_v and master.v_n is not None:
-        measured = np.full((count, 10), np.nan)
-        measured[:, :3] = master.v_n
-        measured[:, 3:6] = _acceleration(master, place)
-        if linear is not None:
-            measured[:, 6:] = _quaternions(linear.C_nb)
+    measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
+    if measured is not None and kind == "acceleration" and slave is not None:
+        measured[:, 3:] = _slopes(slave, stamps - (0.0 if linear is None else linear.delay))
+    has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
+    known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
+    if measured is not None:
+        row, opens, error = _ROWS[kind]
+        known = np.isfinite(measured[:, :3]).all(axis=1)
+        roles: dict[Role, str] = {"lag": DELAY, "lever arm": ARM}
         found.append(
             Aiding(
-                KINDS[0],
-                MASTER_VELOCITY,
+                row.name,
+                row,
                 stamps,
                 measured,
-                np.full((count, 3), matching.velocity_sigma),
+                np.full((count, 3), matching.sigma),
                 start.arm,
-                states=_states(groups, {"lag": DELAY, "lever arm": ARM, "bias": VELOCITY_ERROR}),
+                states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
                 retimed=True,
-                patience=patience,
-                opens=DV.start,
-                output=np.asarray(known_v & ~known_C),
+                patience=patience if opens is not None else 0,
+                opens=opens,
+                output=np.asarray(known & ~known_C),
             )
         )
     if has_C and master.C_nb is not None:
         measured = np.full((count, 8), np.nan)
         measured[:, :4] = _quaternions(master.C_nb)
         measured[:, 4:] = measured[:, :4] if linear is None else _quaternions(linear.C_nm)
-        roles: dict[Role, str] = {"lag": DELAY, "mounting": MOUNTING, "flexure": FLEXURE, "bias": ATTITUDE_ERROR}
+        roles = {"lag": DELAY, "mounting": MOUNTING, "flexure": FLEXURE, "bias": ATTITUDE_ERROR}
         found.append(
             Aiding(
-                KINDS[1],
+                MASTER_ATTITUDE.name,
                 MASTER_ATTITUDE,
                 stamps,
                 measured,
@@ -226,6 +229,33 @@ def master_aiding(
     return found
 
 
+# Row, the first state that takes up a jump, the group of the master's own error.
+_ROWS: dict[Translation, tuple[Row, int | None, str | None]] = {
+    "velocity": (MASTER_VELOCITY, DV.start, VELOCITY_ERROR),
+    "position": (MASTER_POSITION, DP.start, None),
+    "acceleration": (MASTER_ACCELERATION, None, ATTITUDE_ERROR),
+}
+
+
+def _translation(master: MasterRecord, kind: Translation, place: Array | None, linear: Linear | None) -> Array | None:
+    """(M, k) what the row of a translation is given; None where the master does not hold it."""
+    if kind == "position":
+        return place
+    if kind == "acceleration":
+        if master.C_nb is None or master.f_b is None:
+            return None
+        force = np.einsum("kij,kj->ki", master.C_nb, master.f_b)
+        return np.column_stack([force, np.full((len(master), 6), np.nan)])
+    if master.v_n is None:
+        return None
+    measured = np.full((len(master), 10), np.nan)
+    measured[:, :3] = master.v_n
+    measured[:, 3:6] = _acceleration(master, place)
+    if linear is not None:
+        measured[:, 6:] = _quaternions(linear.C_nb)
+    return measured
+
+
 def _states(groups: dict[str, Group], roles: dict[Role, str]) -> dict[Role, Group]:
     return {role: groups[name] for role, name in roles.items() if name in groups}
 
@@ -236,6 +266,18 @@ def _quaternions(C: Array) -> Array:
     known = np.isfinite(C).all(axis=(1, 2))
     found[known] = quaternion_from_dcm(C[known])
     return found
+
+
+def _slopes(slave: ImuRecord, times: Array) -> Array:
+    """(M, 6) derivatives of the slave's rate and specific force, from means over `SLOPE` before and after; NaN at the ends."""
+    edges = np.append(slave.time[0] - slave.steps[0], slave.time)
+    whole = np.vstack([np.zeros(6), np.cumsum(np.column_stack(increments(slave)), axis=0)])
+    before, now, after = (
+        np.column_stack([np.interp(times + shift, edges, column) for column in whole.T])
+        for shift in (-SLOPE, 0.0, SLOPE)
+    )
+    inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
+    return np.where(inside[:, None], (after - 2.0 * now + before) / SLOPE**2, np.nan)
 
 
 def _acceleration(master: MasterRecord, place: Array | None) -> Array:
@@ -250,17 +292,15 @@ def _acceleration(master: MasterRecord, place: Array | None) -> Array:
 
 def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStart) -> TransferTrack:
     """The loop's track and residuals, row by row of the master."""
-    residuals = {r.name: r for r in track.residuals}
-    said = [residuals[name] for name in KINDS if name in residuals]
+    kinds = {**{row.name: TRANSLATION for row, _, _ in _ROWS.values()}, MASTER_ATTITUDE.name: ATTITUDE}
+    said = [r for r in track.residuals if r.name in kinds]
     row = np.searchsorted(stamps, np.unique(np.concatenate([r.stamp for r in said])))
     count = len(row)
     assert count == len(track.time)  # each row is put out once
     innovation, sigma = np.full((2, count, 6), np.nan)
     nis, verdict = np.full((count, 2), np.nan), np.full((count, 2), ABSENT)
-    for kind, name in enumerate(KINDS):
-        if name not in residuals:
-            continue
-        r: Residuals = residuals[name]
+    for r in said:
+        kind = kinds[r.name]
         at = np.searchsorted(stamps[row], r.stamp)
         columns = slice(3 * kind, 3 * kind + 3)
         innovation[at, columns], sigma[at, columns], nis[at, kind] = r.innovation, r.sigma, r.nis

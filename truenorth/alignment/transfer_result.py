@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ class Transfer:
 
     Attributes
     ----------
-    matching : {"velocity", "attitude", "both"}
+    matching : {"velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
     delay, delay_sigma, delay_prior : float, s
         The master's stamps are late by this much.
     lever_arm, lever_arm_sigma, lever_arm_prior : (3,) arrays, m
@@ -27,7 +28,7 @@ class Transfer:
     mounting, mounting_sigma, mounting_prior : (3,) arrays, rad
         Heading, pitch and roll of the slave's axes seen from the master's; of the sigmas the first is that about the slave's z
         axis, the others those about x and y.
-    velocity_noise, attitude_noise : float, m/s and rad
+    velocity_noise, attitude_noise, position_noise, acceleration_noise : float, m/s, rad, m and m/s^2
         One-sigma white noise of the master's rows, as fitted or given; NaN where not matched.
     used, rejected : int
         Rows of the master.
@@ -65,6 +66,8 @@ class Transfer:
     jumps: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    position_noise: float = math.nan
+    acceleration_noise: float = math.nan
 
     @property
     def delay_estimated(self) -> bool:
@@ -100,6 +103,8 @@ class Transfer:
             "mounting_sigma_deg": np.degrees(self.mounting_sigma).tolist(),
             "mounting_estimated": self.mounting_estimated.tolist(),
             "master_velocity_noise_m_s": known(self.velocity_noise),
+            "master_position_noise_m": known(self.position_noise),
+            "master_acceleration_noise_m_s2": known(self.acceleration_noise),
             "master_attitude_noise_deg": known(float(np.degrees(self.attitude_noise))),
             "relative_sigma_deg": np.degrees(self.relative_sigma).tolist(),
             "master_rows_used": self.used,

@@ -15,7 +15,7 @@ from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import ATTITUDE_ERROR, MasterErrors, TransferModel, turn_noise
+from truenorth.errors.master import ATTITUDE_ERROR, PLACE_SIGMA, MasterErrors, TransferModel, turn_noise
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
@@ -199,6 +199,9 @@ def hand_over(
         tau=assumed.delay_sigma,
         arm=assumed.lever_arm_sigma,
         mounting=assumed.mounting_sigma,
+        dp=math.sqrt(
+            PLACE_SIGMA**2 + (float(np.linalg.norm(v)) * assumed.delay_sigma) ** 2 + assumed.lever_arm_sigma**2
+        ),
         C_nb=None if C_nm is None else C,
         C_mb=assumed.C_mb,
     )

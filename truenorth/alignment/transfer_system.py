@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.matching import Translation
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, master_aiding
-from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.errors.master import TransferModel
 from truenorth.estimate.linear import rows_along
 from truenorth.filters import LinearSystem
@@ -29,6 +27,7 @@ def system_of_motion(
     step: float = 0.5,
     start: float = 0.0,
     C_mb: Array | None = None,
+    translation: Translation = "velocity",
 ) -> LinearSystem:
     """The model along a known motion, measured every `step` (s).
 
@@ -38,13 +37,16 @@ def system_of_motion(
         Of the slave.
     P0 : (n, n) array
     R : (6,) array
-        Variances of velocity and attitude; infinite: not measured.
+        Variances of velocity (or what `translation` says) and attitude; infinite: not measured.
     stop, step, start : float, s
     C_mb : (3, 3) array, optional
         Slave to master axes; the unit matrix when left out.
+    translation : {"velocity", "position", "acceleration"}
+        What is matched.
     """
     t = start + step * (np.arange(round((stop - start) / step)) + 1.0)
-    return system_along(motion.states(t - 0.5 * step), motion.states(t), np.full(len(t), step), model, P0, R, C_mb=C_mb)
+    middle, T = motion.states(t - 0.5 * step), np.full(len(t), step)
+    return system_along(middle, motion.states(t), T, model, P0, R, C_mb=C_mb, translation=translation)
 
 
 def system_along(
@@ -56,13 +58,14 @@ def system_along(
     R: Array,
     arm: Array | None = None,
     C_mb: Array | None = None,
+    translation: Translation = "velocity",
 ) -> LinearSystem:
     """The model along a motion that is known at the middle and at the end of K intervals.
 
     Parameters
     ----------
     T : (K,) array, s
-    model, P0, R
+    model, P0, R, translation
         As :func:`system_of_motion`.
     arm : (3,) array, m, optional
         As assumed; none when left out.
@@ -73,9 +76,10 @@ def system_along(
     ins = model.ins
     Phi, Q = ins.linearise(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b)
     r = np.zeros(3) if arm is None else np.asarray(arm, dtype=np.float64)
-    _, H = rows_along(at, _master_of(at, model, r, np.eye(3) if C_mb is None else np.asarray(C_mb)), ins)
+    master = _master_of(at, model, r, np.eye(3) if C_mb is None else np.asarray(C_mb), translation)
+    _, H = rows_along(at, master, ins)
     matched = np.isfinite(R)
-    seen = without_place(model)
+    seen = seen_states(model, translation)
     both = np.ix_(seen, seen)
     return LinearSystem(
         Phi=np.ascontiguousarray(Phi[:, seen][:, :, seen]),
@@ -88,18 +92,18 @@ def system_along(
     )
 
 
-def without_place(model: TransferModel) -> NDArray[np.intp]:
-    """All states but those of the position error: the slave's place is the master's."""
-    return np.delete(np.arange(model.states), range(model.states)[DP])
+def seen_states(model: TransferModel, translation: Translation = "velocity") -> NDArray[np.intp]:
+    """All states but those of the position error, unless position is matched: else the slave's place is the master's."""
+    every = np.arange(model.states)
+    return every if translation == "position" else np.delete(every, DP)
 
 
-def _master_of(at: MotionStates, model: TransferModel, arm: Array, C_mb: Array) -> list[Aiding]:
+def _master_of(
+    at: MotionStates, model: TransferModel, arm: Array, C_mb: Array, translation: Translation
+) -> list[Aiding]:
     """A master that moves as the slave does at these epochs, with its own acceleration."""
-    w_ie, w_en = earth_rate_n(at.lat), transport_rate_n(at.lat, at.alt, at.v_n)
-    a_n = np.einsum("kij,kj->ki", at.C_nb, at.f_b) - np.cross(2 * w_ie + w_en, at.v_n) + gravity_n(at.lat, at.alt)
-    master = MasterRecord(at.time, C_nb=at.C_nb @ C_mb.T, v_n=at.v_n)
+    C_nm, f_m = at.C_nb @ C_mb.T, at.f_b @ C_mb.T
+    master = MasterRecord(at.time, C_nb=C_nm, v_n=at.v_n, lat=at.lat, lon=at.lon, alt=at.alt, f_b=f_m)
     start = SlaveStart(at.C_nb[0], at.v_n[0], 0.0, 0.0, 0.0, np.zeros((model.states, model.states)), C_mb=C_mb, arm=arm)
-    velocity, attitude = master_aiding(master, model, start, Matching(1.0, 1.0))
-    measured = velocity.measured.copy()
-    measured[:, 3:6] = a_n
-    return [replace(velocity, measured=measured), attitude]
+    found = master_aiding(master, model, start, Matching(1.0, 1.0, translation))
+    return [source for source in found if source.does == "measurement"]

@@ -33,7 +33,7 @@ def judge_transfer(
     evidence = list(of_master)
     evidence += _rejected(transfer)
     evidence += _misses(transfer, track, start)
-    lopsided = _lopsided(track)
+    lopsided = _lopsided(track, transfer)
     if lopsided:
         remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
         evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
@@ -69,14 +69,17 @@ def _misses(transfer: Transfer, track: TransferTrack, start: SlaveStart) -> list
     return found
 
 
-def _lopsided(track: TransferTrack) -> str:
+def _lopsided(track: TransferTrack, transfer: Transfer) -> str:
     """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row.
 
     Rows that were used, that is: those of a jump lie on one side too, until it is taken up.
     """
     later = slice(len(track.time) // 4, None)
     nu, verdict = (track.innovation / track.innovation_sigma)[later], track.verdict[later]
-    for kind, name in enumerate(("velocities", "attitudes")):
+    first = {"position": "positions", "acceleration": "accelerations"}.get(
+        transfer.matching.split("+")[0], "velocities"
+    )
+    for kind, name in enumerate((first, "attitudes")):
         rows = nu[verdict[:, kind] == USED, 3 * kind : 3 * kind + 3]
         if len(rows) < FEWEST:
             continue

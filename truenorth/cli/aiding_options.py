@@ -112,7 +112,9 @@ class ByMaster:
     ] = None
     master_columns: Annotated[str | None, option("Names of the columns in the master's log, as 'time=t,VE=ve'.")] = None
     master_units: Annotated[str | None, option("Units of its columns, as 'attitude=rad,position=rad'.")] = None
-    matching: Annotated[str, option("What is matched: auto, velocity, attitude or both.")] = "auto"
+    matching: Annotated[
+        str, option("What is matched: auto, velocity, attitude or both; position, acceleration, or either with +attitude.")
+    ] = "auto"
     delay: Annotated[
         str | None,
         option(

@@ -122,11 +122,11 @@ def print_transfer(console: Console, transfer: Transfer) -> None:
         f"delay, ms: {told('', s['delay_ms'], s['delay_sigma_ms'], s['delay_estimated']).strip()}", soft_wrap=True
     )
     for title, key, unit, names, blind in (
-        ("lever arm, m", "lever_arm", "m", ("right", "forward", "up"), "attitude"),
-        ("mounting, deg", "mounting", "deg", ("heading", "pitch", "roll"), "velocity"),
+        ("lever arm, m", "lever_arm", "m", ("right", "forward", "up"), ("attitude",)),
+        ("mounting, deg", "mounting", "deg", ("heading", "pitch", "roll"), ("velocity", "position", "acceleration")),
     ):
-        if s["matching"] == blind:
-            console.print(f"{title}: not seen by {blind} matching", soft_wrap=True)
+        if s["matching"] in blind:
+            console.print(f"{title}: not seen by {s['matching']} matching", soft_wrap=True)
             continue
         columns = (s[f"{key}_{unit}"], s[f"{key}_sigma_{unit}"], s[f"{key}_estimated"])
         parts = [told(*row) for row in zip(names, *columns, strict=True)]

@@ -122,6 +122,7 @@ class TransferModel:
     delay: bool = True  # groups for them
     lever_arm: bool = True
     mounting: bool = False
+    arm_considered: bool = False  # the arm counts in the covariance and is not estimated, where acceleration is matched
     delay_walk: float = 0.0  # s/sqrt(s); how the delay wanders, for a master whose clock runs at another rate
     # (3,) rad: of the seat's angles about right, forward, up; zeros: it does not bend, and there are no such states
     flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -142,7 +143,7 @@ class TransferModel:
         if self.delay:
             found.append(Group(DELAY, np.zeros(1), walk=self.delay_walk, unit="s"))
         if self.lever_arm:
-            found.append(Group(ARM, np.zeros(3), unit="m"))
+            found.append(Group(ARM, np.zeros(3), considered=self.arm_considered, unit="m"))
         if self.mounting:
             found.append(Group(MOUNTING, np.zeros(3), rotation=True, unit="rad"))
         if any(self.flexure_sigma):
@@ -206,6 +207,7 @@ class TransferModel:
         tau: float = 0.0,
         arm: ArrayLike = 0.0,
         mounting: ArrayLike = 0.0,
+        dp: ArrayLike = PLACE_SIGMA,
         C_nb: ArrayLike | None = None,
         C_mb: ArrayLike | None = None,
     ) -> Array:
@@ -217,6 +219,8 @@ class TransferModel:
         tau : float, s
         arm, mounting : one or (3,) sigmas, m and rad
             Of groups that are not there, ignored.
+        dp : one or (3,) sigmas, m
+            Of the place.
         C_nb : (3, 3) array, optional
             The slave's attitude was handed over from the master through the assumed mounting: ``phi = C_nm mu + C theta`` and
             the master's own error, besides what `phi` says; its velocity with the master's. Without it they are independent.
@@ -224,7 +228,7 @@ class TransferModel:
             The assumed mounting; the unit matrix when left out.
         """
         P = np.diag(np.concatenate([np.zeros(15), *(group.prior for group in self.groups.values())]) ** 2)
-        for part, value in ((DV, dv), (PHI, phi), (DP, PLACE_SIGMA), (BA, accel_bias), (BG, gyro_bias)):
+        for part, value in ((DV, dv), (PHI, phi), (DP, dp), (BA, accel_bias), (BG, gyro_bias)):
             P[part, part] = np.eye(3) * np.square(value)
         for name, sigma in ((DELAY, tau), (ARM, arm), (MOUNTING, mounting)):
             if (at := self.slice_of(name)) is not None:

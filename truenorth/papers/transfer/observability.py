@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truenorth.alignment.transfer_system import system_of_motion, without_place
+from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.analysis.observability import observability
 from truenorth.errors.master import ARM
 from truenorth.papers.transfer.filtering import METHODS, model_of, prior_of
@@ -38,7 +38,7 @@ def told_by(case: Case) -> Seen:
     P0[arm, arm] = EVEN_ARM**2 * np.eye(3)
     rows = VELOCITY_NOISE**2 * 0.1 / STEP  # of ten a second, in one
     R = np.array([rows] * 3 + [np.inf] * 3)
-    seen = without_place(model)
+    seen = seen_states(model)
     names, units = [model.names[i] for i in seen], [model.units[i] for i in seen]
     found = observability(system_of_motion(motion, model, P0, R, END, STEP), names, units)
     hardly = "; ".join(map(str, found.hardly))
