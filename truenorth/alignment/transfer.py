@@ -140,12 +140,7 @@ def align_transfer(
     assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     assumed, notes = common_clock(slave, master, assumed)
     notes = (*notes, *master.notes)
-    bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
-    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, _errors_in(errors_of(master_errors), what))
-    if what.translation == "position":
-        model = _against_wandering(model, errors_of(master_errors))
-    if what.translation == "acceleration":
-        model = replace(model, arm_considered=True)
+    model = _model(spec, assumed, what, flexure, errors_of(master_errors))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
     noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, what.kind, position, tell)
@@ -172,19 +167,21 @@ def _known_as_well_as(position: Position, answer: Alignment) -> Alignment:
     return replace(answer, position=replace(answer.position, **sigmas))
 
 
-def _errors_in(errors: MasterErrors, what: Matched) -> MasterErrors:
-    """Of what is not matched, no states."""
+def _model(
+    spec: ImuSpec, assumed: Assumed, what: Matched, flexure: FlexureSpec | None, errors: MasterErrors
+) -> TransferModel:
+    """States for what is matched; of the master's errors, those that act on it."""
+    of_rows = errors
     if what.translation != "velocity":
-        errors = replace(errors, velocity=0.0, velocity_drift=0.0)
+        of_rows = replace(of_rows, velocity=0.0, velocity_drift=0.0)
     if not what.attitude and what.translation != "acceleration":
-        errors = replace(errors, attitude_drift=0.0, level=0.0, heading=0.0)
-    return errors
-
-
-def _against_wandering(model: TransferModel, errors: MasterErrors) -> TransferModel:
-    """The model of a slave whose place and velocity are against a master whose own velocity error wanders."""
-    walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
-    return replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
+        of_rows = replace(of_rows, attitude_drift=0.0, level=0.0, heading=0.0)
+    bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
+    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows)
+    if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders
+        walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
+        model = replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
+    return replace(model, arm_considered=what.translation == "acceleration")
 
 
 def _passes(

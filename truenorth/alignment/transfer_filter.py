@@ -32,7 +32,7 @@ from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.layout import BA, BG, DP, DV, PHI
 from truenorth.state.state import Start
-from truenorth.state.track import Track
+from truenorth.state.track import Residuals, Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]

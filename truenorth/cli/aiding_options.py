@@ -113,7 +113,8 @@ class ByMaster:
     master_columns: Annotated[str | None, option("Names of the columns in the master's log, as 'time=t,VE=ve'.")] = None
     master_units: Annotated[str | None, option("Units of its columns, as 'attitude=rad,position=rad'.")] = None
     matching: Annotated[
-        str, option("What is matched: auto, velocity, attitude or both; position, acceleration, or either with +attitude.")
+        str,
+        option("What is matched: auto, velocity, attitude or both; position, acceleration, or either with +attitude."),
     ] = "auto"
     delay: Annotated[
         str | None,

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.matching import Translation
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, TransferTrack, transfer_filter
 from truenorth.analysis.consistency import nees
 from truenorth.core.attitude import misalignment
 from truenorth.errors.master import ARM, DELAY, TransferModel
 from truenorth.papers.transfer.truth import (
+    ACCELERATION_NOISE,
     ARM_SIGMA,
     ATTITUDE_NOISE,
     END,
     FLEXURE,
     HEADING,
     LEVEL,
+    POSITION_NOISE,
     TAU_SIGMA,
     VELOCITY_NOISE,
     Flights,
     Run,
+    extrapolated,
 )
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, PHI
@@ -31,6 +36,11 @@ from truenorth.state.layout import BA, BG, PHI
 Array = NDArray[np.float64]
 
 EPOCHS = np.arange(1.0, END + 0.5)  # s
+NOISE: dict[Translation, float] = {
+    "velocity": VELOCITY_NOISE,
+    "position": POSITION_NOISE,
+    "acceleration": ACCELERATION_NOISE,
+}
 NEAR = 0.06  # s: a row of the master that near stands for the epoch
 MISALIGNMENT = np.array([LEVEL, LEVEL, HEADING])
 HANDED_OVER = 1e-7  # rad: what the one-shot hand-over of an attitude adds to the mounting
@@ -45,17 +55,29 @@ class Method:
     delay, lever_arm : bool
     told : bool
         It knows the true delay and lever arm.
-    velocity, attitude : bool
+    translation : {"velocity", "position", "acceleration"} or None
+    attitude : bool
         What is matched; with attitude there are states of the mounting.
     flexure : bool
+    late : {"past", "ignored", "extrapolated"}
+        What is done about a known delay: rows are taken at the time at which they hold; or when they come, as they are or
+        carried on.
+    noise : float
+        Of the master's rows as believed, over the true one.
+    tau_sigma, arm_sigma : float, s and m
+        In P0.
     """
 
     delay: bool = False
     lever_arm: bool = False
     told: bool = False
-    velocity: bool = True
+    translation: Translation | None = "velocity"
     attitude: bool = False
     flexure: bool = False
+    late: Literal["past", "ignored", "extrapolated"] = "past"
+    noise: float = 1.0
+    tau_sigma: float = TAU_SIGMA
+    arm_sigma: float = ARM_SIGMA
 
 
 VELOCITY = {
@@ -67,7 +89,16 @@ VELOCITY = {
 METHODS = {
     **VELOCITY,
     **{f"{name}_att": replace(method, attitude=True) for name, method in VELOCITY.items()},
-    "attitude_only": Method(delay=True, velocity=False, attitude=True),
+    "attitude_only": Method(delay=True, translation=None, attitude=True),
+    **{
+        f"{kind}_{name}": replace(method, translation=kind)
+        for kind in ("position", "acceleration")
+        for name, method in VELOCITY.items()
+    },
+    "ignored": Method(late="ignored"),
+    "extrapolated": Method(late="extrapolated"),
+    "past_state": Method(),
+    "augmented": Method(delay=True, late="ignored", tau_sigma=5 * TAU_SIGMA),
     "flexure": Method(delay=True, lever_arm=True, attitude=True, flexure=True),
 }
 
@@ -86,6 +117,8 @@ class Errors:
     arm, arm_sigma : (runs, K, 3) arrays, m
     nees : (runs, K) array
         Of phi, over 3.
+    gyro_bias : (runs, K, 3) array, rad/s
+        The true ones.
     """
 
     phi: Array
@@ -99,6 +132,7 @@ class Errors:
     arm: Array
     arm_sigma: Array
     nees: Array
+    gyro_bias: Array
 
 
 def model_of(method: Method, spec: ImuSpec) -> TransferModel:
@@ -112,6 +146,7 @@ def model_of(method: Method, spec: ImuSpec) -> TransferModel:
         mounting=method.attitude,
         flexure_sigma=(pitch, roll, heading) if method.flexure else (0.0, 0.0, 0.0),
         flexure_beta=FLEXURE.beta,
+        arm_considered=method.translation == "acceleration",
     )
 
 
@@ -122,8 +157,8 @@ def prior_of(method: Method, model: TransferModel, spec: ImuSpec, C_nb: Array) -
         HANDED_OVER if method.attitude else C_nb_sigma(C_nb),
         spec.accel_bias,
         spec.gyro_bias,
-        tau=TAU_SIGMA,
-        arm=ARM_SIGMA,
+        tau=method.tau_sigma,
+        arm=method.arm_sigma,
         mounting=MISALIGNMENT,
         C_nb=C_nb if method.attitude else None,
     )
@@ -135,36 +170,35 @@ def C_nb_sigma(C_nb: Array) -> Array:
 
 
 def errors_of(
-    flights: Flights, methods: Sequence[str], runs: int, workers: int, known_delay: float = 0.0
+    flights: Flights, methods: Sequence[str] | Mapping[str, Method], runs: int, workers: int
 ) -> dict[str, Errors]:
     """Run methods on the same runs of a case.
 
     Parameters
     ----------
     flights : Flights
-    methods : sequence of str
-        Keys of `METHODS`.
+    methods : sequence of str, or mapping
+        Keys of `METHODS`, or methods by name.
     runs : int
     workers : int
         Threads, which share the runs; the numbers do not depend on it.
-    known_delay : float, s
-        Given to all methods.
     """
+    of = methods if isinstance(methods, Mapping) else {name: METHODS[name] for name in methods}
 
     def one(number: int) -> list[list[Array]]:
         run = flights(number)
-        return [_errors(run, METHODS[name], _track(flights, run, METHODS[name], known_delay)) for name in methods]
+        return [_errors(run, method, _track(flights, run, method)) for method in of.values()]
 
     one(0)  # compiles, and fills what the runs share, before the threads ask for it
     with ThreadPoolExecutor(workers) as pool:
         found = list(pool.map(one, range(runs)))
     return {
         name: Errors(*(np.stack([run[i][part] for run in found]) for part in range(len(found[0][i]))))
-        for i, name in enumerate(methods)
+        for i, name in enumerate(of)
     }
 
 
-def _track(flights: Flights, run: Run, method: Method, known_delay: float) -> TransferTrack:
+def _track(flights: Flights, run: Run, method: Method) -> TransferTrack:
     spec, at = flights.scenario.imu_spec, flights.start
     model = model_of(method, spec)
     start = SlaveStart(
@@ -175,10 +209,15 @@ def _track(flights: Flights, run: Run, method: Method, known_delay: float) -> Tr
         float(at.alt),
         prior_of(method, model, spec, at.C_nb),
         arm=run.arm if method.told else np.zeros(3),
-        delay=run.tau if method.told else known_delay,
+        delay=run.tau if method.told else flights.case.extra_delay if method.late == "past" else 0.0,
     )
-    matching = Matching(VELOCITY_NOISE if method.velocity else np.inf, ATTITUDE_NOISE if method.attitude else np.inf)
-    return transfer_filter(run.slave, run.master, model, start, matching)
+    kind = method.translation or "velocity"
+    sigma = np.inf if method.translation is None else method.noise * NOISE[kind]
+    matching = Matching(sigma, ATTITUDE_NOISE if method.attitude else np.inf, kind)
+    master = run.master if kind == "velocity" else run.felt
+    if method.late == "extrapolated":
+        master = extrapolated(master, flights.case.extra_delay)
+    return transfer_filter(run.slave, master, model, start, matching)
 
 
 def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
@@ -209,5 +248,6 @@ def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
         arm,
         arm_sigma,
         square,
+        np.broadcast_to(run.gyro_bias, (len(k), 3)),
     ]
     return [np.where(silent.reshape(-1, *[1] * (a.ndim - 1)), np.nan, a) for a in arrays]

@@ -77,4 +77,52 @@ RULES = (
         "Second-order Gauss-Markov states, velocity and attitude matching in a banked turn.",
         "related work",
     ),
+    Rule(
+        "In position and acceleration matching too the space-time error must be considered.",
+        (
+            paired("flat_turn position_states16 level@120-150 < 0.8 * flat_turn position_states12 level@120-150"),
+            paired(
+                "flat_turn acceleration_states16 level@120-150 < 0.8 * flat_turn acceleration_states12 level@120-150"
+            ),
+        ),
+        "Level in the turn with 12 and 16 states: position {flat_turn position_states12 level@120-150:.2f} and "
+        "{flat_turn position_states16 level@120-150:.2f}', acceleration {flat_turn acceleration_states12 level@120-150:.2f} and "
+        "{flat_turn acceleration_states16 level@120-150:.2f}'; heading at its end with 16: "
+        "{flat_turn position_states16 heading@150:.1f} and {flat_turn acceleration_states16 heading@150:.1f}', by velocity "
+        "{flat_turn states16 heading@150:.1f}'.",
+    ),
+    Rule(
+        "Velocity matching converges faster than position matching, acceleration matching faster than either.",
+        (
+            paired("flat_turn states16 heading@150 < flat_turn position_states16 heading@150"),
+            paired("flat_turn acceleration_states16 heading@150 < flat_turn states16 heading@150"),
+        ),
+        "By the noise that we took: .2 m/s, 1 m, .02 m/s^2, ten rows a second.",
+        "related work",
+    ),
+    Rule(
+        "A delay that is told can be compensated, and need not be a state.",
+        (interval("late_known past_state level@120-150 < 1.1 * late_known augmented level@120-150"),),
+        "200 ms, known: level in the turn {late_known past_state level@120-150:.2f}' by the state of the past time, "
+        "{late_known augmented level@120-150:.2f}' with the delay as a state of which nothing is known, "
+        "{late_known ignored level@120-150:.1f}' with nothing done.",
+    ),
+    Rule(
+        "Extrapolating what the master says compensates a known delay.",
+        (
+            paired("late_known extrapolated level@120-150 < 0.5 * late_known ignored level@120-150"),
+            interval("late_known extrapolated level@120-150 < 1.1 * late_known past_state level@120-150"),
+        ),
+        "The second condition: as well as the state of the past time. Level in the turn "
+        "{late_known extrapolated level@120-150:.2f}' along a line through the last second.",
+        "related work",
+    ),
+    Rule(
+        "Where the delay is known badly it must be a state.",
+        (paired("late_rough augmented level@120-150 < 0.8 * late_rough past_state level@120-150"),),
+        "30 of 230 ms not known: level in the turn {late_rough past_state level@120-150:.2f}' by the state of the past time, "
+        "{late_rough extrapolated level@120-150:.2f}' extrapolated, {late_rough augmented level@120-150:.2f}' with the delay as a "
+        "state.",
+        "related work",
+    ),
 )

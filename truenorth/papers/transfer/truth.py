@@ -14,6 +14,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import Moving
 from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, ideal_log, simulate, simulate_sensor
+from truenorth.simulation.gnss import moved
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
 
@@ -24,12 +25,14 @@ BEGIN, STOP, END = 120.0, 150.0, 200.0  # s: the paper's turn, and its end
 ARCMIN = math.radians(1.0 / 60.0)
 LEVEL, HEADING = math.radians(0.5), math.radians(1.0)
 VELOCITY_NOISE = 0.2  # m/s
+POSITION_NOISE, ACCELERATION_NOISE = 1.0, 0.02  # m and m/s^2; ours, of a master that is matched so
 ATTITUDE_NOISE = ARCMIN  # ours; the paper's master says no attitude
 TAU, ARM = 0.03, (1.0, 0.1, 0.2)  # the paper's; also sigmas, where they are drawn
 TAU_SIGMA, ARM_SIGMA = 0.05, 1.0  # as the filter believes
 FLEXURE = FlexureSpec(sigma=(6 * ARCMIN, 3 * ARCMIN, 3 * ARCMIN), correlation_time=5.0)  # heading, pitch, roll
 MORE = 1.0  # s of flight after the end, so that rows that come late still find the slave there
 STREAM = 300  # of what this study draws
+LINE = 1.0  # s of rows, through which a line extrapolates
 
 STRAIGHT = {"kind": "straight", "duration": f"{BEGIN} s"}
 MANOEUVRES: dict[str, list[dict[str, Any]]] = {
@@ -91,6 +94,7 @@ class Run:
     arm: Array  # (3,) m
     gyro_bias: Array  # (3,)
     accel_bias: Array  # (3,)
+    felt: MasterRecord  # the same master with noise of its place, and with its specific force
 
 
 class Flights:
@@ -120,7 +124,8 @@ class Flights:
             tau, arm = TAU_SIGMA * float(rng.standard_normal()), ARM_SIGMA * rng.standard_normal(3)
         ideal, C_start = self._moving(run)
         log = simulate(ideal, imu=self.scenario.imu_spec, seed=self.seed, run=run, scenario=case.number)
-        master = self._master(run, tau + case.extra_delay, arm, mounting)
+        felt = self._master(run, tau + case.extra_delay, arm, mounting)
+        master = replace(felt, lat=None, lon=None, alt=None, w_ib_b=None, f_b=None)
         C_nb = C_start @ dcm_from_rotation_vector(-mounting)
         return Run(
             log.record,
@@ -133,6 +138,7 @@ class Flights:
             arm,
             log.errors.gyro_bias,
             log.errors.accel_bias,
+            _noisy(felt, stream(self.seed, case.number, run, STREAM + 1)),
         )
 
     def _moving(self, run: int) -> tuple[IdealLog, Array]:
@@ -153,11 +159,37 @@ class Flights:
             lever_arm=(float(arm[0]), float(arm[1]), float(arm[2])),
             mounting=(heading, pitch, roll),
             attitude_noise=ATTITUDE_NOISE,
+            with_position=True,
+            with_sensors=True,
         )
         record = simulate_sensor(
             self.body, spec, duration=self.scenario.duration + MORE, seed=self.seed, run=run, scenario=self.case.number
         ).record
         if self.case.drop is not None:
             there = (record.time < self.case.drop[0]) | (record.time > self.case.drop[1])
-            record = MasterRecord(record.time[there], record.C_nb[there], record.v_n[there], source=record.source)  # type: ignore[index]
+            record = replace(
+                record,
+                **{
+                    name: getattr(record, name)[there]
+                    for name in ("time", "C_nb", "v_n", "lat", "lon", "alt", "w_ib_b", "f_b")
+                },
+            )
         return record
+
+
+def _noisy(master: MasterRecord, rng: np.random.Generator) -> MasterRecord:
+    """White noise of place and specific force."""
+    dp = POSITION_NOISE * rng.standard_normal((len(master), 3))
+    lat, lon, alt = moved(np.asarray(master.lat), np.asarray(master.lon), np.asarray(master.alt), dp)
+    f_b = np.asarray(master.f_b) + ACCELERATION_NOISE * rng.standard_normal((len(master), 3))
+    return replace(master, lat=lat, lon=lon, alt=alt, f_b=f_b)
+
+
+def extrapolated(master: MasterRecord, ahead: float) -> MasterRecord:
+    """What a simple receiver makes of a master that is late by `ahead` (s): velocity goes on along the line of the last second."""
+    assert master.v_n is not None
+    rows = round(LINE / master.interval)
+    t = master.interval * (np.arange(rows) - 0.5 * (rows - 1))
+    weights = 1.0 / rows + t * (t[-1] + ahead) / float(t @ t)
+    windows = np.lib.stride_tricks.sliding_window_view(master.v_n, rows, axis=0)
+    return replace(master[rows - 1 :], v_n=windows @ weights)
