@@ -14,7 +14,7 @@ FLOORS = [
     ["records"],
     ["formats"],
     ["state", "strapdown"],
-    ["errors", "aiding", "models"],
+    ["errors", "aiding"],
     ["estimate", "coarse", "quality"],
     ["alignment", "navigation", "damping"],
     ["advice"],

@@ -17,7 +17,7 @@ from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.errors.deflection import STANDARD_GRAVITY, Deflection
 from truenorth.errors.log import LogErrors, log_rows
-from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI
+from truenorth.errors.marine import BA, BG, DP, DV, OF_INS, PHI
 from truenorth.navigation import Start
 from truenorth.records import ImuRecord, VelocityRecord
 from truenorth.records.specs import ImuSpec

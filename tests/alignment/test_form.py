@@ -9,8 +9,7 @@ from truenorth.alignment import align
 from truenorth.alignment import procedure as steps_of_align
 from truenorth.alignment.form import WHITE, pick_form
 from truenorth.core.position import Position
-from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel
-from truenorth.models.static_force import force_system, gained_velocity
+from truenorth.errors.staying import BA, BG, DV, PHI, STATES, StaticModel, force_system, gained_velocity
 from truenorth.quality.regimes import motion_summary
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec

@@ -9,8 +9,8 @@ import scipy.linalg
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Series, Walks, motion_of, parameters
 from truenorth.alignment.windowed import sequential_fit, windowed_fit
+from truenorth.errors.sway import AxisMotion, Oscillator
 from truenorth.filters import LinearSystem
-from truenorth.models.disturbance import AxisMotion, Oscillator
 
 WALKS = Walks(1e-5, 1e-7)
 MOTIONS = {

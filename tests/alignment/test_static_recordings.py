@@ -7,9 +7,9 @@ from tests import recordings
 from truenorth.alignment import align
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.units import significant
+from truenorth.errors.large_azimuth import attitude_error, large_azimuth_system
+from truenorth.errors.stationary import StationaryModel
 from truenorth.filters import around_circle, extended, gaussian_sum
-from truenorth.models.large_azimuth import attitude_error, large_azimuth_system
-from truenorth.models.stationary import StationaryModel
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
 from truenorth.quality.noise import noise_coefficients
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -23,7 +23,7 @@ def _by_hypotheses(record, position, start, spec):
     """Gaussian sum of twelve extended filters around the circle."""
     integrals = integrate(record, 5.0)
     model = StationaryModel(position.lat, position.alt, spec.gyro_random_walk, spec.accel_random_walk)
-    sigmas = [0.01, 0.01, 1.0, *[spec.gyro_bias] * 3, *[spec.accel_bias] * 2, 1e-2, 1e-2]
+    sigmas = [0.01, 0.01, 1.0, 1e-2, 1e-2, *[spec.gyro_bias] * 3, *[spec.accel_bias] * 2]
     P0 = np.diag(np.square(sigmas))
     system = large_azimuth_system(model, [integrals], start[None], P0, 1e-8)
     found = gaussian_sum(extended, system, around_circle(np.zeros(10), P0, 2, 12))

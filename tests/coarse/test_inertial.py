@@ -16,7 +16,7 @@ from truenorth.coarse import (
 from truenorth.coarse.uncertainty import base_velocity
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.position import Position
-from truenorth.models.static import StaticModel
+from truenorth.errors.staying import StaticModel
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
 from truenorth.strapdown.inertial import integrate

@@ -6,8 +6,10 @@ from functools import cache
 import numpy as np
 
 from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import radii
 from truenorth.core.yaml_file import read_mapping
 from truenorth.damping.course import Course
+from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES
 from truenorth.simulation import simulate
 from truenorth.simulation.scenario import SHIPPED, read_scenario
 from truenorth.strapdown.level import NavigationState, mechanise
@@ -15,6 +17,14 @@ from truenorth.strapdown.level import NavigationState, mechanise
 HOUR = 3600.0
 DEG_PER_HOUR = np.radians(1.0) / HOUR
 MICRO_G = 9.80665e-6
+
+
+def paper_errors():
+    """(13,) of the INS after hours at sea: .1 m/s, .7' of level, 7.7' of heading, tens of metres, and its biases."""
+    x = np.zeros(STATES)
+    x[PHI], x[DV], x[DP] = np.radians(np.array([0.7, 0.7, 7.7]) / 60.0), 0.1, [43.0, 62.0]
+    x[BG], x[BA] = 0.005 * DEG_PER_HOUR, 50.0 * MICRO_G
+    return x
 
 
 @cache
@@ -34,15 +44,13 @@ def navigate(ideal, truth, x0, gyro_bias, accel_bias):
     """The course of a free INS that begins with errors `x0` (7,) and has these biases."""
     sim = simulate(ideal, errors={"gyro_bias": gyro_bias, "accel_bias": accel_bias})
     lat, lon, alt = truth.position[0]
-    from truenorth.core.earth import radii
-
     R_M, R_N = radii(lat)
     start = NavigationState.at(
-        dcm_from_rotation_vector(-x0[4:7]) @ truth.C_nb[0],
-        lat + x0[3] / (R_M + alt),
-        lon + x0[2] / ((R_N + alt) * np.cos(lat)),
+        dcm_from_rotation_vector(-x0[PHI]) @ truth.C_nb[0],
+        lat + x0[DP][1] / (R_M + alt),
+        lon + x0[DP][0] / ((R_N + alt) * np.cos(lat)),
         alt,
-        truth.v_n[0] + np.append(x0[:2], 0.0),
+        truth.v_n[0] + np.append(x0[DV], 0.0),
     )
     out = mechanise(sim.record, start, altitude="fixed")
 

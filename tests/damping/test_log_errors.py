@@ -14,7 +14,8 @@ from truenorth.damping.bands import filter_bands
 from truenorth.damping.drift import likely_time
 from truenorth.damping.filters import Filter, FixRows, run_filters
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
-from truenorth.models.marine import DP, PHI, MarineModel
+from truenorth.errors.marine import DP, PHI, MarineModel
+from truenorth.papers.damping.truth import drawn
 from truenorth.simulation.processes import gauss_markov
 
 
@@ -48,7 +49,7 @@ def truth():
 
 def free(truth, model, rng):
     """A course with errors of the linear model, drawn from `SIGMA`."""
-    x = SIGMA * rng.standard_normal(13)
+    x = SIGMA * drawn(rng.standard_normal(13))
     _, Phi = truth.linearise(MarineModel(**WALKS))
     noise = np.sqrt(model.noise[:13] * truth.interval)
     states = [x]

@@ -16,7 +16,7 @@ from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.damping.options import Damper
-from truenorth.models.marine import BA, BG, DP, DV, OF_INS, PHI
+from truenorth.errors.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
@@ -90,9 +90,9 @@ def test_every_method_calms_the_oscillation(ship, method):
     result = ship.navigate(Damper(method, azimuth=0.5 if method == "external" else 0.0), ship.log())
     left = ship.errors(result)
     late = result.time >= 6 * 3600.0
-    assert swing(left[late][:, :2]).max() < 0.2 * swing(free[late][:, :2]).max()
+    assert swing(left[late][:, DV]).max() < 0.2 * swing(free[late][:, DV]).max()
     t = result.track
-    sigma = np.concatenate([t.sigma[:, 3:5], t.sigma[:, 6:8], t.sigma[:, :3]], axis=1)
+    sigma = t.sigma[:, OF_INS[MOTION]]
     if method != "internal":  # whose own motion is not in its bands
         np.testing.assert_array_less(np.abs(left[late]), 4.5 * sigma[late])
 
@@ -106,7 +106,7 @@ def test_bands_of_the_network_are_its_scatter(runs):
         result = ship.navigate(Damper("external", azimuth=0.5), ship.log(0.3 * ship.rng.standard_normal(2)))
         t = result.track
         k = np.array([3000, 8000])
-        sigma = np.concatenate([t.sigma[k, 3:5], t.sigma[k, 6:8], t.sigma[k, :3]], axis=1)
+        sigma = t.sigma[np.ix_(k, OF_INS[MOTION])]
         ratios.append((ship.errors(result)[k] / sigma) ** 2)
     mean = np.mean(ratios, axis=0)
     assert np.sqrt(mean).max() < 1 + 4.7 / np.sqrt(2 * runs)  # the worst of 14 numbers, 4.7 sigma
@@ -136,9 +136,9 @@ def test_both_hemispheres_east_and_west(lat, heading):
         result = ship.navigate(Damper(method), ship.log())
         left = ship.errors(result)
         late = result.time >= 6 * 3600.0
-        assert swing(left[late][:, :2]).max() < 0.25 * swing(free[late][:, :2]).max()
+        assert swing(left[late][:, DV]).max() < 0.25 * swing(free[late][:, DV]).max()
         t = result.track
-        sigma = np.concatenate([t.sigma[:, 3:5], t.sigma[:, 6:8], t.sigma[:, :3]], axis=1)
+        sigma = t.sigma[:, OF_INS[MOTION]]
         assert (np.abs(left[late]) / sigma[late]).max() < 5.0
 
 
@@ -162,12 +162,12 @@ def test_a_sick_log(ship, method):
     one, two = ship.errors(good), ship.errors(bad)
     silent = (good.time > 50_000.0) & (good.time <= 57_200.0)
     sigma = bad.track.sigma[silent]
-    assert (np.abs(two[silent, :2]) / sigma[:, 3:5]).max() < 4.5  # it coasts, and knows how badly
-    assert np.abs(two[silent, :2]).max() < 3.0  # no worse than undamped
+    assert (np.abs(two[silent, DV]) / sigma[:, 3:5]).max() < 4.5  # it coasts, and knows how badly
+    assert np.abs(two[silent, DV]).max() < 3.0  # no worse than undamped
     after = good.time > 57_200.0 + 3 * 3600.0
-    assert np.abs(two[after, :2]).max() < np.abs(one[after, :2]).max() + 0.2
-    assert np.abs(two[after, 2:4]).max() < 2.0 * np.abs(one[after, 2:4]).max() + 3000.0
-    assert np.degrees(np.abs(two[after, 6]).max()) < np.degrees(np.abs(one[after, 6]).max()) + 0.1
+    assert np.abs(two[after, DV]).max() < np.abs(one[after, DV]).max() + 0.2
+    assert np.abs(two[after, DP]).max() < 2.0 * np.abs(one[after, DP]).max() + 3000.0
+    assert np.degrees(np.abs(two[after, PHI.stop - 1]).max()) < np.degrees(np.abs(one[after, PHI.stop - 1]).max()) + 0.1
 
 
 @pytest.mark.parametrize("method", ["external", "kalman"])
@@ -188,7 +188,7 @@ def test_a_switch_later_than_the_start(ship):
     np.testing.assert_array_equal(result.v_n[before], free.v_n[before])
     late = result.time >= 4 * 3600.0
     left, sigma = ship.errors(result)[late], result.track.sigma[late]
-    assert (np.abs(left[:, :2]) / sigma[:, 3:5]).max() < 4.5
+    assert (np.abs(left[:, DV]) / sigma[:, 3:5]).max() < 4.5
     assert result.damping.switch == pytest.approx(9000.0, abs=10.0)
 
 
@@ -243,7 +243,7 @@ def test_a_ramp_throws_the_switch_slowly(ship):
     apart = [np.abs(r.v_n - free.v_n)[early].max() for r in (slow, fast)]
     assert 0.0 < apart[0] < 0.5 * apart[1]
     late = slow.time > 12 * 3600.0
-    assert swing(ship.errors(slow)[late][:, :2]).max() < 0.2 * swing(ship.errors(free)[late][:, :2]).max()
+    assert swing(ship.errors(slow)[late][:, DV]).max() < 0.2 * swing(ship.errors(free)[late][:, DV]).max()
 
 
 def test_what_is_refused(ship):

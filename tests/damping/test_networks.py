@@ -5,16 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
+from tests.damping.marine_case import ideal_and_truth, paper_errors
 from truenorth.core import earth
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
 from truenorth.damping.loop import Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, SCHULER_RATE, Network, first_order, second_order
-from truenorth.models.marine import BA, BG, MOTION, MarineModel
+from truenorth.errors.marine import DP, DV, MOTION, PHI, MarineModel
 
 QUIET = MarineModel(0.0, 0.0)
-BEGIN = np.array([0.1, 0.1, 43.0, 62.0, *np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)])
 MADE = {"first": first_order, "second": second_order}
 
 
@@ -82,15 +81,14 @@ def test_damped_modes_everywhere(lat, v):
 def undamped(hours):
     """A ship's truth, its model, the errors at the start, and what they become in a free INS: those of the motion, its course."""
     _, truth = ideal_and_truth(hours=hours)
-    x = np.zeros(13)
-    x[:7], x[BG], x[BA] = BEGIN, 0.005 * DEG_PER_HOUR, 50 * MICRO_G
+    x = paper_errors()
     F, Phi = truth.linearise(QUIET)
     free = [x]
     for step in Phi:
         free.append(step @ free[-1])
     free = np.array(free)[:, MOTION]
     v = truth.v_n.copy()
-    v[:, :2] += free[:, :2]
+    v[:, :2] += free[:, DV]
     return truth, F, x, free, Course(truth.time, truth.C_nb, v, truth.position)
 
 
@@ -107,7 +105,7 @@ def test_the_correction_is_the_loop(make, azimuth):
     M, N = loop.matrices(F, truth.position[1:, 0], np.ones(len(F)))
     n = M.shape[1]
     u = np.zeros(n)
-    u[MOTION] = BEGIN
+    u[MOTION] = x[MOTION]
     drive = np.zeros((len(F), n))
     drive[:, MOTION] = F[:, MOTION, 7:] @ x[7:]
     drive += N @ error
@@ -134,7 +132,7 @@ def swing(**options):
     x0 = free[switch] if options.pop("corrected", False) else None
     reference = truth.v_n[:, :2] if options.pop("external", False) else None
     d = free - network_correction(course, Loop(second_order()), reference, start=9000.0, x0=x0, **options)
-    return np.abs(d[switch : switch + 1440, :2]).max(), np.abs(free[:, :2]).max()
+    return np.abs(d[switch : switch + 1440, DV]).max(), np.abs(free[:, DV]).max()
 
 
 def test_switching():
@@ -152,8 +150,8 @@ def test_a_constant_reference_error_ends_in_the_latitude():
     for lat in (50.0, -50.0):
         course = still_course(lat, epochs=30000)
         x = network_correction(course, Loop(second_order(), 0.7), course.v_n[:, :2] + np.array([0.0, -0.3]))
-        assert -x[-1, 3] == pytest.approx(2.0 * 0.7 * -0.3 / earth.EARTH_RATE, rel=0.01)
-        assert abs(x[-1, 6]) < 1e-7
+        assert -x[-1, DP.start + 1] == pytest.approx(2.0 * 0.7 * -0.3 / earth.EARTH_RATE, rel=0.01)
+        assert abs(x[-1, PHI.stop - 1]) < 1e-7
 
 
 def test_a_silent_reference_coasts():

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
+from tests.damping.marine_case import ideal_and_truth, paper_errors
 from truenorth.core.errors import DataError
 from truenorth.damping.reference import cleaned, reference_of
 from truenorth.errors.log import LogErrors
-from truenorth.models.marine import BA, BG, MarineModel
+from truenorth.errors.marine import MarineModel
 from truenorth.records import VelocityRecord
 from truenorth.state.wording import sentences
 
@@ -18,9 +18,7 @@ NOISE = 0.05
 def course():
     """A free INS with errors of 3 m/s, at 2 s over 12 h: the worst slopes that a healthy log can show."""
     _, truth = ideal_and_truth(interval=2.0, hours=12.0)
-    x = np.zeros(13)
-    x[:7] = [0.1, 0.1, 43.0, 62.0, *np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)]
-    x[BG], x[BA] = 0.005 * DEG_PER_HOUR, 50 * MICRO_G
+    x = paper_errors()
     _, Phi = truth.linearise(MarineModel(0.0, 0.0))
     states = [x]
     for step in Phi:

@@ -7,7 +7,7 @@ from tests.damping.test_networks import still_course
 from truenorth.core.errors import UsageError
 from truenorth.damping import Filter, carried_prior, earth_line, filter_modes, schuler_lines, spectrum
 from truenorth.damping.filters import run_filters
-from truenorth.models.marine import MarineModel
+from truenorth.errors.marine import MarineModel
 
 DAY = 86400.0
 

@@ -9,7 +9,7 @@ from truenorth.damping.loop import SCHULER_RATE
 from truenorth.damping.networks import second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.switching import HYSTERESIS, manoeuvred, switching
-from truenorth.models.marine import DV
+from truenorth.errors.marine import DV
 from truenorth.navigation import navigate
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from tests.runs import FEW
 from truenorth.cli import app
 from truenorth.core.errors import UsageError
-from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
+from truenorth.errors.stationary import BA, BG, DV, PHI, StationaryModel
 from truenorth.papers import reproduce
 from truenorth.papers.static.study import ACCEL_BIAS, GYRO_BIAS, LAT
 from truenorth.papers.static.truth import ARCMIN

@@ -24,9 +24,9 @@ from truenorth.core.earth import DEFLECTION
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import Shown
+from truenorth.errors.staying import BA, BG, DV, PHI, QUIETEST_BASE, StaticModel
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.models.static import BA, BG, DV, PHI, QUIETEST_BASE, StaticModel
 from truenorth.records.motion import Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps

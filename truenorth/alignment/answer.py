@@ -13,7 +13,7 @@ from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, radii
-from truenorth.models.static import STATES
+from truenorth.errors.staying import STATES
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import earth_rotation
 

@@ -28,7 +28,7 @@ from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import skew
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.models.in_motion_azimuth import BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.errors.in_motion_azimuth import BA, BG, DK, DP, DV, PHI, STATES
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import Layout

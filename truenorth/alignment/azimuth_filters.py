@@ -3,7 +3,7 @@
 Mechanised at the rate of the IMU, filtered and corrected once a second.
 
 Source: M. Wu, X. Tang, X. Huang, odometer-aided alignment on the move by a strong tracking Gauss-Hermite filter; the model is that
-of :mod:`truenorth.models.in_motion_azimuth`.
+of :mod:`truenorth.errors.in_motion_azimuth`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.azimuth_mechanisation import mechanise_interval
 from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
+from truenorth.errors import in_motion_azimuth as model
+from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
 from truenorth.filters import (
     Estimates,
     Gate,
@@ -28,8 +30,6 @@ from truenorth.filters import (
     unscented,
 )
 from truenorth.filters.system import FilterState
-from truenorth.models import in_motion_azimuth as model
-from truenorth.models.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown import wander
 
@@ -169,7 +169,7 @@ def run_loop(
         Judge each epoch by its normalised innovation squared.
     turned : bool
         Turn the covariance of velocity with a correction of the azimuth; see
-        :func:`truenorth.models.in_motion_azimuth.after_correction`.
+        :func:`truenorth.errors.in_motion_azimuth.after_correction`.
     keep_P : bool
         Keep the covariance of each epoch.
     """

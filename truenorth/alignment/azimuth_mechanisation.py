@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from truenorth.core import earth
 from truenorth.core.compiled import compiled
+from truenorth.errors.in_motion_azimuth import PARAMETERS
 from truenorth.estimate.predict import set_matrix
-from truenorth.models.in_motion_azimuth import PARAMETERS
 from truenorth.strapdown.wander import advance, curvature, earth_axis
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def mechanise_interval(
     s : (B, 24) array
         The state (:mod:`truenorth.strapdown.wander`); changed in place.
     p : (B, 28) array
-        Parameters of the error model (:mod:`truenorth.models.in_motion_azimuth`), filled in.
+        Parameters of the error model (:mod:`truenorth.errors.in_motion_azimuth`), filled in.
     z : (B, 3) array, m
         Displacement of the INS less that of the odometer; filled in.
     """

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.models.static import BG, DV, PHI
+from truenorth.errors.staying import BG, DV, PHI
 from truenorth.quality.density import bursts
 from truenorth.quality.sampling import check_sampling
 from truenorth.records import COLUMNS, ImuRecord

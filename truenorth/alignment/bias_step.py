@@ -17,8 +17,8 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import find_touch
 from truenorth.core.compiled import compiled
+from truenorth.errors.staying import BA, BG, PHI
 from truenorth.filters.gains import times
-from truenorth.models.static import BA, BG, PHI
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 

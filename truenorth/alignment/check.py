@@ -19,9 +19,9 @@ from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import Means
 from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.errors.staying import StaticModel, mean_velocity
 from truenorth.estimate.base_motion import white_variance
 from truenorth.filters import LinearSystem
-from truenorth.models.static import StaticModel, mean_velocity
 from truenorth.quality.regimes import MotionSummary
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
+from truenorth.errors.staying import PHI
 from truenorth.filters.gains import through
-from truenorth.models.static import PHI
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 

@@ -15,13 +15,22 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
+from truenorth.errors.staying import (
+    BA,
+    BG,
+    PHI,
+    QUIETEST_BASE,
+    STATES,
+    Form,
+    StaticModel,
+    gained_velocity,
+    mean_velocity,
+)
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import Estimates, LinearSystem
 from truenorth.filters.gains import Gains, filter_gains, initial_part
-from truenorth.models.static import BA, BG, PHI, QUIETEST_BASE, STATES, StaticModel, mean_velocity
-from truenorth.models.static_force import Form, gained_velocity
 from truenorth.records import ImuRecord
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 

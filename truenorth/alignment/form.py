@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.models.static_force import Form
+from truenorth.errors.staying import Form
 from truenorth.quality.regimes import MotionSummary
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION
-from truenorth.models.static import STATES
+from truenorth.errors.staying import STATES
 from truenorth.navigation.handover import Handover
 from truenorth.strapdown.inertial import earth_rotation
 

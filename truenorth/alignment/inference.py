@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import LogCheck
-from truenorth.models.static import StaticModel
+from truenorth.errors.staying import StaticModel
 from truenorth.quality.noise import noise_coefficients
 from truenorth.records import ImuRecord
 from truenorth.records.specs import PRESETS, ImuSpec, imu_spec

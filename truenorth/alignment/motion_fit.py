@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.motion_likelihood import LOWEST_BIN, Series, Walks, motion_of, parameters
-from truenorth.models.disturbance import AxisMotion, Oscillator
-from truenorth.models.swaying import MOST_OSCILLATORS
+from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, Oscillator
 
 Array = NDArray[np.float64]
 

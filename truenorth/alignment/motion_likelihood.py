@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.windowed import hann
 from truenorth.core.compiled import compiled
+from truenorth.errors.sway import AxisMotion, Oscillator, add_autocovariance, fill_blocks
 from truenorth.filters.scalar import restricted
-from truenorth.models.disturbance import AxisMotion, Oscillator, add_autocovariance, fill_blocks
 
 Array = NDArray[np.float64]
 Orders = NDArray[np.int64]

@@ -14,9 +14,9 @@ from dataclasses import astuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.staying import StaticModel
 from truenorth.estimate.base_motion import base_variance
 from truenorth.filters import LinearSystem, kalman
-from truenorth.models.static import StaticModel
 
 Array = NDArray[np.float64]
 

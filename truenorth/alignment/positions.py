@@ -1,6 +1,6 @@
 """`align_positions`: from the log of a turntable that takes an IMU from position to position to attitude, biases and a verdict.
 
-One filter goes through the whole log, turns included (:mod:`truenorth.models.matrices`), re-linearised until it stands still.
+One filter goes through the whole log, turns included (:mod:`truenorth.errors.matrices`), re-linearised until it stands still.
 The table's angles are not asked for: the gyros measure each turn, and their scale factors and misalignments are states.
 """
 
@@ -29,11 +29,11 @@ from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_fr
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.matrices import matrices_of
+from truenorth.errors.staying import PHI, StaticModel, mean_velocity
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import in_sigmas, settle
 from truenorth.estimate.staying import BIASES, Prior, StayingLog, prior_of
-from truenorth.models.matrices import matrices_of
-from truenorth.models.static import PHI, StaticModel, mean_velocity
 from truenorth.quality.noise import noise_coefficients
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord

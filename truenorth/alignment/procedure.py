@@ -32,8 +32,7 @@ from truenorth.coarse.uncertainty import base_velocity
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.models.static import STATES, StaticModel
-from truenorth.models.static_force import gained_velocity
+from truenorth.errors.staying import STATES, StaticModel, gained_velocity
 from truenorth.quality.density import specification_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.quality.regimes import MotionSummary

@@ -34,18 +34,17 @@ from truenorth.alignment.task import Task
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
+from truenorth.errors import stationary
+from truenorth.errors.stationary import StationaryModel
+from truenorth.errors.staying import PHI, StaticModel, gained_velocity, sampled_system, sampled_velocity
 from truenorth.estimate.base_motion import QUIETEST_BASE, white_variance
 from truenorth.estimate.batch import CONVERGED, ROUGHLY, Filtered, in_sigmas, settle
 from truenorth.estimate.staying import HEADING_PRIOR, LEVEL_PRIOR, VELOCITY_PRIOR, StayingLog, prior_of
 from truenorth.filters import Estimates, LinearSystem, fading, filter_gains, kalman
 from truenorth.filters.fading import Fading
 from truenorth.filters.gains import initial_part
-from truenorth.models import stationary
-from truenorth.models.static import DV, PHI, STATES, StaticModel
-from truenorth.models.static_force import gained_velocity
-from truenorth.models.stationary import StationaryModel
 from truenorth.records import ImuRecord
-from truenorth.strapdown.inertial import earth_rotation, gravity_velocity, integrate
+from truenorth.strapdown.inertial import earth_rotation, integrate
 from truenorth.strapdown.level import NavigationState, mechanise
 
 Array = NDArray[np.float64]
@@ -55,6 +54,7 @@ Published = Literal["kf", "sakf", "makf", "imakf", "states10", "states8"]
 FADING: dict[str, Fading | None] = {"kf": None, "sakf": "noise", "makf": "multiple", "imakf": "improved"}
 STATIONARY = {"states10": 10, "states8": 8}
 PASSES = 3
+BIASES = slice(stationary.BG.start, stationary.BA.stop)
 LEVEL_IMU = math.radians(5.0)  # a tilt up to which the two level accelerometers are those of the model
 
 
@@ -65,14 +65,9 @@ class SampledLog(StayingLog):
 
     def linearise(self) -> LinearSystem:
         """The static model with the size of what the base moves read from the log."""
-        core = super().linearise()
-        at = self.integrals.time[1:]
-        velocity = self.integrals.velocity[1:] @ self.C_n0_i.T
-        velocity += gravity_velocity(at, self.position.lat, self.position.alt)
+        velocity = sampled_velocity(self.integrals, self.C_n0_i, self.position.lat, self.position.alt)[1:]
         self.R = max(float(np.mean(white_variance(velocity))), QUIETEST_BASE**2)
-        H = np.zeros((1, 3, STATES))
-        H[0, :, DV] = np.eye(3)
-        return replace(core, H=H, R=self.R * np.eye(3)[None], S=None, z=velocity)
+        return sampled_system(super().linearise(), velocity, self.R)
 
 
 def faded_align(
@@ -149,9 +144,10 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
             f"{method} holds for a still base and an IMU level to {math.degrees(LEVEL_IMU):g} deg: choose another method"
         )
     walks = StationaryModel(lat, alt, model.gyro_random_walk, model.accel_random_walk)
-    used = [0, 1, 2, 3, 4]
-    P0 = np.diag([LEVEL_PRIOR**2] * 2 + [HEADING_PRIOR**2] + [0.0] * 5 + [VELOCITY_PRIOR**2] * 2)[:n, :n]
-    P0[3:8, 3:8] = P_bias[np.ix_(used, used)]
+    whole = np.diag([LEVEL_PRIOR**2] * 2 + [HEADING_PRIOR**2] + [VELOCITY_PRIOR**2] * 2 + [0.0] * 5)
+    whole[BIASES, BIASES] = P_bias[:5, :5]
+    kept = stationary.KEPT[n]
+    P0, biases = whole[np.ix_(kept, kept)], slice(n - 5, n)
     every = max(1, round(task.interval / task.record.interval))
     T = every * task.record.interval
     bias = np.zeros(6)
@@ -170,7 +166,7 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
         system = LinearSystem(Phi=Phi[None], Q=Q[None], H=H[None], R=R[None], z=z, x0=np.zeros(n), P0=P0)
         estimates = kalman(system, history="full")
         x, P = estimates.x[-1], estimates.P[-1]
-        bias = np.concatenate([x[stationary.BG], x[stationary.BA], [math.nan]])
+        bias = np.append(x[biases], math.nan)
         end = float(out.time[-1] - task.record.time[0] + task.record.steps[0])
         rows = np.array([task.epoch.row, len(out.time) * every - 1])
         inside = integrate(task.record, task.interval, bias[:3], np.zeros(3), rows)
@@ -180,10 +176,9 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
         if moved < CONVERGED:
             break
     P_floor = P0.copy()
-    P_floor[:3, :3] = 0.0
-    P_floor[8:, 8:] = 0.0
+    P_floor[: biases.start, : biases.start] = 0.0
     floor = initial_part(filter_gains(system, estimates).step, P_floor)[-1]
-    sigma = np.append(np.sqrt(np.diag(P)[3:8]), math.nan)
+    sigma = np.append(np.sqrt(np.diag(P)[biases]), math.nan)
     return Stationary(
         C_n0_i @ task.epoch.attitude(inside.C_ib_at[0]),
         C_n0_n @ P[:3, :3] @ C_n0_n.T,

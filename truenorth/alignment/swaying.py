@@ -20,12 +20,11 @@ from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.core.earth import normal_gravity
 from truenorth.core.position import Position
+from truenorth.errors.staying import PHI, QUIETEST_BASE, StaticModel
+from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.models.disturbance import AxisMotion
-from truenorth.models.static import PHI, QUIETEST_BASE, StaticModel
-from truenorth.models.swaying import MOST_OSCILLATORS, with_motion
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import InertialIntegrals

@@ -21,11 +21,11 @@ from truenorth.alignment.fine import MAX_NOISE_PASSES, FineAlignment
 from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, noise_of, usual
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.core.earth import EARTH_RATE
+from truenorth.errors.staying import StaticModel, mean_velocity
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
-from truenorth.models.static import StaticModel, mean_velocity
 from truenorth.quality.signals import white_noise
 from truenorth.records.specs import ImuSpec
 

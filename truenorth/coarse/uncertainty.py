@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.coarse.inertial import CoarseAttitude, latitude_gain
 from truenorth.core.attitude import skew
-from truenorth.models.static import StaticModel
+from truenorth.errors.staying import StaticModel
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
 
 Array = NDArray[np.float64]

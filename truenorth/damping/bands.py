@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from truenorth.damping.course import Course
 from truenorth.damping.filters import BLOCK, Filter
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
-from truenorth.models.marine import DV, MOTION
+from truenorth.errors.marine import DV, MOTION
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.errors import DataError
-from truenorth.models.marine import DV, PHI, MarineModel, position_in_angles
+from truenorth.errors.marine import DP, DV, PHI, MarineModel, position_in_angles
 
 Array = NDArray[np.float64]
 UNEVEN = 0.01  # share of the interval by which the time steps may differ
@@ -87,8 +87,8 @@ class Course:
         R_M, R_N = earth.radii(lat)
         position, v_n = self.position.copy(), self.v_n.copy()
         v_n[:, :2] -= x[..., DV]
-        position[:, 0] -= x[..., 3] / (R_M + alt)
-        position[:, 1] -= x[..., 2] / ((R_N + alt) * np.cos(lat))
+        position[:, 0] -= x[..., DP.start + 1] / (R_M + alt)
+        position[:, 1] -= x[..., DP.start] / ((R_N + alt) * np.cos(lat))
         C_nb = dcm_from_rotation_vector(x[..., PHI]) @ self.C_nb
         return Course(self.time, C_nb, v_n, position)
 
@@ -98,11 +98,11 @@ class Course:
 
 
 def errors_of(course: Course, truth: Course) -> Array:
-    """(K+1, 7) errors of velocity, position (m) and attitude of a course against the true one, in the model's states."""
+    """(K+1, 7) errors of attitude, velocity and position (m) of a course against the true one, in the model's states."""
     dv = course.v_n[:, :2] - truth.v_n[:, :2]
     lat, lon, alt = truth.position.T
     R_M, R_N = earth.radii(lat)
     away = (course.position[:, 1] - lon + np.pi) % (2.0 * np.pi) - np.pi
     dp = np.stack([away * (R_N + alt) * np.cos(lat), (course.position[:, 0] - lat) * (R_M + alt)], axis=1)
     phi = misalignment(course.C_nb, truth.C_nb)
-    return np.concatenate([dv, dp, phi], axis=1)
+    return np.concatenate([phi, dv, dp], axis=1)

@@ -1,6 +1,6 @@
 """Kalman filters that damp: on the velocity error, on its change, on both with the reference's own error, and the fusion.
 
-All estimate the errors of one undamped INS, open loop (output correction), on the model of :mod:`truenorth.models.marine`:
+All estimate the errors of one undamped INS, open loop (output correction), on the model of :mod:`truenorth.errors.marine`:
 
 - *filter 1*: ``z = v_INS - v_ref``;
 - *filter 2*: ``z = ((v_INS - v_ref)(t) - (v_INS - v_ref)(t - T))/T``, in which a constant error of the reference cancels; its
@@ -27,8 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
 from truenorth.errors.log import log_rows
+from truenorth.errors.marine import DP, DV, MOTION, PHI, STATES, MarineModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
-from truenorth.models.marine import DP, DV, MOTION, PHI, STATES, MarineModel
 
 Array = NDArray[np.float64]
 

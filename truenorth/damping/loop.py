@@ -31,7 +31,7 @@ from truenorth.core import earth
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import Course
 from truenorth.damping.networks import SCHULER_RATE, Network
-from truenorth.models.marine import DV, MOTION, PHI, MarineModel
+from truenorth.errors.marine import DV, MOTION, PHI, MarineModel
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from truenorth.damping.switching import Switching, switching
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors, log_errors, log_rows
-from truenorth.models.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI, STATES, MarineModel
+from truenorth.errors.marine import BA, BG, MOTION, OF_INS, STATES, MarineModel
 from truenorth.navigation.result import Navigation, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence, residual_evidence
 from truenorth.records import VelocityRecord
@@ -49,7 +49,7 @@ WINDOW = 5.0  # s, of filter 2
 LEVELLED = "levelled velocity log"  # its residuals, east and north
 LEAST_WALK = 1e-5  # m/s/sqrt(s), of an IMU without noise
 SHORTEST = 16  # epochs of a spectrum
-LEVEL = np.array([0, 1, 2, 3, 4, 6, 7])  # of errors.ins: PHI, and the level parts of DV and DP
+LEVEL = OF_INS[MOTION]
 
 
 def damp_navigation(
@@ -408,7 +408,7 @@ def _corrected(track: Track, damped: Course, found: _Found, start: int) -> Track
         for own, there in ((BG, ins.BG), (BA, ins.BA)):
             sensors[start:, there] += estimate.x[:, own]
             variance[:, there] = estimate.sigma[:, own] ** 2
-    variance[:, LEVEL] = np.concatenate([sigma[:, PHI], sigma[:, DV], sigma[:, DP]], axis=1) ** 2
+    variance[:, LEVEL] = sigma**2
     P[start:] = 0.0
     states = np.arange(P.shape[1])
     P[start:, states, states] = variance

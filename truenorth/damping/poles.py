@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from truenorth.damping.course import Course
 from truenorth.damping.filters import Filter
 from truenorth.damping.loop import Mode
-from truenorth.models.marine import DV
+from truenorth.errors.marine import DV
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9  # of an eigenvalue of one step: constants stay where they are, and their eigenvalue is 1

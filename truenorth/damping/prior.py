@@ -11,7 +11,7 @@ from truenorth.core import earth
 from truenorth.core.linalg import symmetric
 from truenorth.core.units import parse
 from truenorth.damping.course import Course
-from truenorth.models.marine import BA, BG, DP, DV, PHI, STATES, MarineModel
+from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES, MarineModel
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.staying import QUIETEST_BASE
 from truenorth.estimate.batch import Filtered
 from truenorth.filters import Estimates, LinearSystem, kalman
-from truenorth.models.static import QUIETEST_BASE
 
 Array = NDArray[np.float64]
 

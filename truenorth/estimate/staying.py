@@ -1,6 +1,6 @@
 """A log of a base that stays: what is taken off it, and the linear system of the errors that are left.
 
-States: misalignment, velocity error, gyro and accelerometer bias (:mod:`truenorth.models.static`), then groups by name:
+States: misalignment, velocity error, gyro and accelerometer bias (:mod:`truenorth.errors.staying`), then groups by name:
 ``matrices``, the scale factors and misalignments of the sensors, ``arm``, the lever arm, and ``rate``, the earth's level rate of
 an INS that is levelled to some heading.
 """
@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
+from truenorth.errors.arm import arm_rows, with_arm
+from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
+from truenorth.errors.matrices import MATRICES, matrices_of, with_matrices, without_errors
+from truenorth.errors.staying import BG, DV, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
+from truenorth.errors.sway import without_sway
 from truenorth.filters import LinearSystem
-from truenorth.models.level_rate import LEVEL_RATE, with_level_rate
-from truenorth.models.matrices import MATRICES, matrices_of, with_matrices, without_errors
-from truenorth.models.static import BG, DV, PHI, QUIETEST_BASE, STATES, StaticModel
-from truenorth.models.static_force import Form, force_system
-from truenorth.models.swaying import arm_rows, with_arm, without_sway
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import InertialIntegrals, integrate

@@ -10,7 +10,7 @@ from truenorth.core.language import translated as _
 from truenorth.damping.loop import in_words
 from truenorth.damping.spectrum import PADDING
 from truenorth.errors.log import BIAS
-from truenorth.models.marine import DP, DV, PHI
+from truenorth.errors.marine import DP, DV, PHI
 from truenorth.report.chart import Chart, Clock
 from truenorth.report.charts import over_time
 from truenorth.report.document import Panel

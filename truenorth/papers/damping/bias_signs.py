@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from truenorth.damping.course import errors_of
 from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.prior import paper_prior
-from truenorth.models.marine import BA, BG, DP, MarineModel
+from truenorth.errors.marine import BA, BG, DP, MarineModel
 from truenorth.papers.damping.methods import SWITCH
 from truenorth.papers.damping.truth import LOG_NOISE, Voyage
 

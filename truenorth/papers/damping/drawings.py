@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.damping.loop import Mode
 from truenorth.damping.spectrum import spectrum
+from truenorth.errors.marine import DV
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style, trace
 from truenorth.papers.damping.methods import SWITCH, Case
 from truenorth.papers.damping.statistics import Signs
@@ -34,9 +35,9 @@ NAMES = {
 }
 DRAWN = ("filter1", "filter2", "fused", "augmented_long")
 PANELS = {
-    "attitude": ((4, "phi E, deg"), (5, "phi N, deg"), (6, "phi U (heading), deg")),
-    "position": ((2, "latitude, deg"), (3, "longitude, deg")),
-    "velocity": ((0, "east, m/s"), (1, "north, m/s")),
+    "attitude": ((0, "phi E, deg"), (1, "phi N, deg"), (2, "phi U (heading), deg")),
+    "position": ((5, "latitude, deg"), (6, "longitude, deg")),
+    "velocity": ((3, "east, m/s"), (4, "north, m/s")),
 }
 
 
@@ -69,13 +70,13 @@ def draw_errors(case: Case, kind: Literal["attitude", "position", "velocity"]) -
 def draw_tables(ours: Mapping[str, Array], theirs: Mapping[str, Array], logs: Sequence[float]) -> Figure:
     """All seven columns of tables 1 and 2: errors (C, 7) at 20 h over the log's error, ours and the paper's."""
     order = (
-        (4, "phi E, 1e-3 deg", 1e3),
-        (5, "phi N, 1e-3 deg", 1e3),
-        (6, "phi U (heading), deg", 1.0),
-        (2, "latitude, deg", 1.0),
-        (3, "longitude, deg", 1.0),
-        (0, "v east, m/s", 1.0),
-        (1, "v north, m/s", 1.0),
+        (0, "phi E, 1e-3 deg", 1e3),
+        (1, "phi N, 1e-3 deg", 1e3),
+        (2, "phi U (heading), deg", 1.0),
+        (5, "latitude, deg", 1.0),
+        (6, "longitude, deg", 1.0),
+        (3, "v east, m/s", 1.0),
+        (4, "v north, m/s", 1.0),
     )
     with style():
         figure = new_figure(12.0, 6.2)
@@ -109,7 +110,7 @@ def draw_windows(signs: Signs, runs: int) -> Figure:
         figure = new_figure(10.0, 4.0)
         axes = figure.subplots(1, 2)
         edges = np.arange(3, 49)
-        for ax, (column, label) in zip(axes, ((6, "heading, deg"), (2, "latitude, deg")), strict=True):
+        for ax, (column, label) in zip(axes, ((2, "heading, deg"), (5, "latitude, deg")), strict=True):
             for number, method in enumerate(
                 ("filter1", "filter2", "fused", "fused_tuned", "augmented", "augmented_long")
             ):
@@ -120,7 +121,7 @@ def draw_windows(signs: Signs, runs: int) -> Figure:
                 ax.plot(edges[:-1] + 0.5, rms, color=COLOURS[number], label=NAMES[method])
             ax.set(yscale="log", xlabel="time, h", title=f"RMS of {label}")
             ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_formatter("{x:g}" if column == 6 else NullFormatter())
+            ax.yaxis.set_minor_formatter("{x:g}" if column == 2 else NullFormatter())
             ax.set_xticks(range(0, 49, 12))
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
         figure.suptitle(f"{runs} voyages, all errors with random signs", ha="left", x=0.01, fontsize=11)
@@ -134,7 +135,7 @@ def draw_spectra(case: Case) -> Figure:
         figure = new_figure(10.0, 4.0)
         axes = figure.subplots(1, 2, sharey=True)
         for number, method in enumerate(("undamped", "network_external", "filter1", "fused")):
-            dv = case.errors[method][settled]
+            dv = case.errors[method][settled][:, DV]
             found = spectrum(dv[:, 0] + 1j * dv[:, 1], case.course.interval)
             for ax, sign in zip(axes, (1.0, -1.0), strict=True):
                 f = sign * found.frequency
@@ -192,7 +193,7 @@ def draw_switching(case: Case, switched: Mapping[str, Array]) -> Figure:
     with style():
         figure = new_figure(9.0, 4.2)
         ax = figure.subplots()
-        free = np.linalg.norm(case.errors["undamped"][window, :2], axis=1)
+        free = np.linalg.norm(case.errors["undamped"][window, DV], axis=1)
         trace(ax, t, free, color="#BBBBBB", label="undamped")
         for number, (name, v) in enumerate(switched.items()):
             trace(ax, t, np.linalg.norm(v[window], axis=1), color=COLOURS[number], label=WAYS[name])

@@ -15,7 +15,7 @@ from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import second_order
 from truenorth.damping.prior import carried_prior, paper_prior
 from truenorth.errors.log import LogErrors
-from truenorth.models.marine import DP, MarineModel
+from truenorth.errors.marine import DP, MarineModel
 from truenorth.papers.damping.truth import HOUR, LOG_NOISE, Voyage
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Case:
 
     course: Course  # of the free INS
     time: Array  # (K+1,) s
-    # dict of (K+1, 7) arrays; by method: v_e, v_n (m/s), lat, lon (rad), phi_e, phi_n, phi_u (rad), computed minus true after
+    # dict of (K+1, 7) arrays; by method: phi_e, phi_n, phi_u (rad), v_e, v_n (m/s), lat, lon (rad), computed minus true after
     # its correction
     errors: dict[str, Array]
     estimates: dict[str, Estimate]  # of the filters

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from truenorth.analysis.consistency import nees
 from truenorth.damping.course import errors_of
 from truenorth.damping.filters import run_filters
-from truenorth.models.marine import REF
+from truenorth.errors.marine import MOTION, PHI, REF
 from truenorth.papers.damping.methods import LONG, LONG_REFERENCE_PRIOR, SWITCH, Case, filters_of, run_all
-from truenorth.papers.damping.truth import LOG_NOISE, Voyage
+from truenorth.papers.damping.truth import LOG_NOISE, Voyage, drawn
 from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 SPEC = ImuSpec(
     gyro_random_walk=LONG.gyro_random_walk, accel_random_walk=LONG.accel_random_walk, name="what the filter is given"
 )
+UP = PHI.stop - 1
 COMPARED = ("filter1", "filter2", "fused", "fused_tuned", "augmented", "augmented_long")
 
 
@@ -50,7 +51,7 @@ def random_signs(
     for run in range(runs):
         progress(f"random signs: voyage {run + 1} of {runs}")
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(4, run)))
-        x0 = voyage.paper_errors() * rng.choice([-1.0, 1.0], 13)
+        x0 = voyage.paper_errors() * drawn(rng.choice([-1.0, 1.0], 13))
         own = with_log(voyage, seed, run)
         course = own.navigate(x0)
         signed = c * rng.choice([-1.0, 1.0], 2)
@@ -84,15 +85,15 @@ def consistency(voyage: Voyage, runs: int, seed: int, progress: Callable[[str], 
     for run in range(runs):
         progress(f"consistency: voyage {run + 1} of {runs}")
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5, run)))
-        x0 = voyage.paper_errors() * rng.standard_normal(13)
+        x0 = voyage.paper_errors() * drawn(rng.standard_normal(13))
         c = LONG_REFERENCE_PRIOR * rng.standard_normal(2)
         own = with_log(voyage, seed, runs + run)
         course = own.navigate(x0, SPEC, seed, run)
         kinds = {"augmented_long": filters_of(own, course, raw=False)["augmented_long"]}
         start = round(SWITCH / course.interval)
         found = run_filters(course, own.reference(c), start=start, kinds=kinds)["augmented_long"]
-        error = np.concatenate([errors_of(course, own.truth)[-1], x0[7:], c]) - found.x[-1]
+        error = np.concatenate([errors_of(course, own.truth)[-1], x0[MOTION.stop :], c]) - found.x[-1]
         assert error[REF].shape == (2,)
         squares.append(float(nees(error, found.P)) / len(error))
-        heading.append(error[6] / found.sigma[-1, 6])
+        heading.append(error[UP] / found.sigma[-1, UP])
     return np.array(squares), np.array(heading)

@@ -13,6 +13,7 @@ from truenorth.damping.loop import Loop, eigenvalues, in_words
 from truenorth.damping.networks import NO_NETWORK
 from truenorth.damping.poles import filter_modes
 from truenorth.damping.spectrum import earth_line, schuler_lines
+from truenorth.errors.marine import DP, DV
 from truenorth.papers.claims import settle
 from truenorth.papers.damping import drawings
 from truenorth.papers.damping.bias_signs import BIASES, left_by_filter1, search
@@ -34,10 +35,10 @@ MAIN = "c-0.3"
 STEADY = 20.0 * HOUR  # when tables 1 and 2 are read; the paper does not say
 AROUND = 600.0  # s, over which the reading is averaged
 WINDOWS = ((3, 6), (6, 12), (12, 18), (18, 24), (24, 48))  # h
-QUANTITIES = ("v_e", "v_n", "lat", "lon", "phi_e", "phi_n", "phi_u")
-UNITS = ("m/s", "m/s", "deg", "deg", "deg", "deg", "deg")
+QUANTITIES = ("phi_e", "phi_n", "phi_u", "v_e", "v_n", "lat", "lon")
+UNITS = ("deg", "deg", "deg", "m/s", "m/s", "deg", "deg")
 PHI_U = QUANTITIES.index("phi_u")
-SCALE = np.array([1.0, 1.0, *[math.degrees(1.0)] * 5])
+SCALE = np.array([1.0 if unit == "m/s" else math.degrees(1.0) for unit in UNITS])
 
 # The paper's tables: phi_e, phi_n (1e-3 deg), phi_u, dL, dlon (deg), dv_e, dv_n (m/s), by the log's error.
 TABLE_1 = {
@@ -155,9 +156,9 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "`augmented` meets its bars (latitude and longitude below .02 deg at 6-12 h) with the paper's signs; over random signs see "
         "figures.csv. The heading of all filters has the floor eps_E/(w_ie cos L), .028 deg at the start and .036 at 58 N.",
         "Not as in the paper: with the signs that we took (all positive) filter 1's tilts change with each -.1 m/s by "
-        f"{1e3 * slopes[4]:+.1f}e-3 and {1e3 * slopes[5]:+.1f}e-3 deg, the paper's by {1e3 * _paper_slope('phi_e'):+.1f}e-3 and "
-        f"{1e3 * _paper_slope('phi_n'):+.1f}e-3; the fused v_E at -.3 m/s is {reading(main, 'fused')[0]:+.2f} m/s, the paper's "
-        f"{TABLE_1[-0.3][5]:+.2f}. The signs of the biases do not change the slopes.",
+        f"{1e3 * slopes[0]:+.1f}e-3 and {1e3 * slopes[1]:+.1f}e-3 deg, the paper's by {1e3 * _paper_slope('phi_e'):+.1f}e-3 and "
+        f"{1e3 * _paper_slope('phi_n'):+.1f}e-3; the fused v_E at -.3 m/s is {reading(main, 'fused')[DV.start]:+.2f} m/s, "
+        f"the paper's {TABLE_1[-0.3][5]:+.2f}. The signs of the biases do not change the slopes.",
         f"Signs of the biases that fit table 2 best: {fits[0]}; misfit {fits[0].misfit:.2f} in units of each column's RMS, "
         f"{next(f.misfit for f in fits if min(f.signs) > 0):.2f} with all positive. Errors with them are in figures.csv "
         "(cases c..._best_signs).",
@@ -267,7 +268,7 @@ def _paper_slope(quantity: str) -> float:
 
 def _lines(case: Case) -> tuple[tuple[float, float], float]:
     free = case.errors["undamped"]
-    return schuler_lines(free[:, :2], case.course.interval), earth_line(free[:, 2], case.course.interval)[0]
+    return schuler_lines(free[:, DV], case.course.interval), earth_line(free[:, DP.start], case.course.interval)[0]
 
 
 def _add_signs(table: Table, signs: Signs) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from truenorth.damping.course import errors_of
 from truenorth.damping.loop import network_correction
-from truenorth.models.marine import DV
+from truenorth.errors.marine import DV
 from truenorth.papers.damping.methods import NETWORK, SWITCH, Case
 from truenorth.papers.damping.truth import HOUR, Voyage
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.units import parse
 from truenorth.damping.course import Course
-from truenorth.models.marine import BA, BG, DP, DV, PHI, STATES
+from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import IdealLog, simulate
 from truenorth.simulation.scenario import read_scenario
@@ -62,6 +62,13 @@ class Voyage:
             for first, rest in ((begin.C_nb, out.C_nb), (begin.v_n, out.v_n), (begin.position, out.position))
         )
         return Course(self.truth.time, C_nb, v_n, position)
+
+
+def drawn(values: Array) -> Array:
+    """(13,) draws in the order of the states; drawn in the paper's: velocity, position, attitude, accelerometers, gyros."""
+    x = np.empty(STATES)
+    x[DV], x[DP], x[PHI], x[BA], x[BG] = np.split(values, [2, 4, 7, 10])
+    return x
 
 
 def sail(interval: float, seed: int, run: int = 0, scenario: str = "marine_damping") -> Voyage:

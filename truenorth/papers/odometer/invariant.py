@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from truenorth.aiding.sensors import from_odometer
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import misalignment
+from truenorth.errors.in_motion_azimuth import STATES, correction
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
-from truenorth.models.in_motion_azimuth import STATES, correction
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, POSITION_SIGMA, VELOCITY_SIGMA, Errors
 from truenorth.papers.odometer.scenario import Drives
 from truenorth.state.layout import BA, BG, DP, DV, PHI

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.azimuth_filters import NOMINAL, Begin, Belief, noise_density, run_loop
 from truenorth.core.attitude import misalignment, skew
-from truenorth.models import in_motion_azimuth as model
-from truenorth.models.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.errors import in_motion_azimuth as model
+from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
 from truenorth.papers.odometer.scenario import Drives
 
 Array = NDArray[np.float64]

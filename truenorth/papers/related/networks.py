@@ -17,10 +17,10 @@ from truenorth.damping.course import errors_of
 from truenorth.damping.design import SPAN, Design, design, step_response
 from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import SCHULER_RATE
+from truenorth.errors.marine import DV
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
-from truenorth.models.marine import DV
 from truenorth.papers.claims import Rule, exact, interval, paired, settle
-from truenorth.papers.damping.truth import HOUR, sail
+from truenorth.papers.damping.truth import HOUR, drawn, sail
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
 
@@ -98,7 +98,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     for run in range(count):
         progress(f"voyage {run + 1} of {count}")
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(6, run)))
-        course = voyage.navigate(voyage.paper_errors() * rng.choice([-1.0, 1.0], 13))
+        course = voyage.navigate(voyage.paper_errors() * drawn(rng.choice([-1.0, 1.0], 13)))
         free = errors_of(course, voyage.truth)[:, DV]
         second = designs["second"].network
         mu = FuzzyDamping().of_course(course, second)

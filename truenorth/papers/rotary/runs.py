@@ -20,13 +20,16 @@ from truenorth.analysis.consistency import nees
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.indexing import C_bs_from_angles
+from truenorth.errors.staying import PHI, STATES
+from truenorth.estimate.batch import Filtered, in_sigmas, settle
+from truenorth.estimate.staying import Prior
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.fading import Fading, fading
-from truenorth.models.rotary import BA, BG, PHI, RotaryModel, earth_axes
 from truenorth.papers.rotary.coarse import LAST, SOURCES, coarse_errors, sample
+from truenorth.papers.rotary.model import RotaryLog, earth_axes
 from truenorth.papers.rotary.truth import AXES, Noise, Run, simulate_run
 from truenorth.papers.sweeps import Sweep
-from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
+from truenorth.strapdown.inertial import earth_rotation, integrate
 
 Array = NDArray[np.float64]
 
@@ -119,17 +122,20 @@ class _Stage:
         self.sampled = sample(data, self.record)
         self.integrals = self.sampled.integrals
         self.truth = data.C_ns(self.integrals.start + self.integrals.time)
-        self.C_ne = earth_axes(data.place.lat)
 
-    def prior(self, angle: float) -> Array:
-        """(12, 12) covariance at the start, of angles known to `angle` (rad)."""
-        variances = [START_SIGMA["velocity"] ** 2] * 3 + [angle**2] * 3
-        return np.diag([*variances, *self.data.imu.bias_variance])
-
-    def again(self, bias: Array) -> InertialIntegrals:
-        """The integrals with biases taken off."""
-        record = self.record.between(None, self.integrals.start + self.integrals.time[-1] + 0.5 * self.record.interval)
-        return integrate(record, 1.0, bias[:3], bias[3:])
+    def log(self, start: Array, angle: float, **options: Any) -> RotaryLog:
+        """The log with an attitude off by `start` (3,) rad at the beginning, and angles believed to be known to `angle` (rad)."""
+        P = np.diag([angle**2] * 3 + [START_SIGMA["velocity"] ** 2] * 3 + [*self.data.imu.bias_variance])
+        return RotaryLog(
+            self.record.between(None, self.integrals.start + self.integrals.time[-1] + 0.5 * self.record.interval),
+            dcm_from_rotation_vector(-start) @ self.truth[0],
+            self.data.place,
+            noise_of(self.data.imu),
+            Prior(np.zeros(STATES), P, {}),
+            1.0,
+            arm_velocity=self.sampled.arm["gyros"],
+            **options,
+        )
 
 
 def _filters(
@@ -145,40 +151,27 @@ def _filters(
     rho: float = RHO,
 ) -> None:
     """12 states from the end of coarse alignment on, with its error at the start given."""
-    place, C_ne, truth = stage.data.place, stage.C_ne, stage.truth
-    model = RotaryModel(noise_of(stage.data.imu), R)
+    truth = stage.truth
     for method in filters:
         kind = FILTERS.get(method)
-        nominal, inside, bias = C_ne.T @ dcm_from_rotation_vector(-start) @ truth[0], stage.integrals, np.zeros(6)
-        for left in reversed(range(passes)):
-            arm = stage.sampled.arm["gyros"]
-            system = model.linearise(inside, nominal, place.lat, place.alt, stage.prior(P0), arm, keep_first=keep_first)
-            about, history = _about(system, bias), "last" if left else "full"
+
+        def estimate(system: LinearSystem, kind: Fading | None = kind) -> Filtered:
             if kind is None:
-                estimates = kalman(about, history=history, innovations=False)  # type: ignore[arg-type]
-            else:
-                estimates = fading(about, kind=kind, rho=rho, history=history, innovations=True)  # type: ignore[arg-type]
-                results.acted[case, method] = float(np.mean(np.any(estimates.adaptation > 1.0, axis=-1)))
-            if left:  # back to the start, and everything anew about the estimate
-                x = estimates.x[-1]
-                turned = np.einsum("k,kab->ab", inside.intervals, nominal @ inside.C_mean)
-                nominal = dcm_from_rotation_vector(x[PHI] + turned @ x[BG]) @ nominal
-                bias = bias + np.concatenate([x[BG], x[BA]])
-                inside = stage.again(bias)
-        C_n_i = np.swapaxes(earth_rotation(inside.time[1:], place.lat), 1, 2) @ C_ne
-        C_hat = C_n_i @ dcm_from_rotation_vector(estimates.x[:, PHI]) @ nominal @ inside.C_ib[1:]
+                return Filtered(system, kalman(system, history="full", innovations=False))
+            return Filtered(system, fading(system, kind=kind, rho=rho, history="full", innovations=True))
+
+        log = stage.log(start, P0, base_velocity=R, keep_first=keep_first)
+        estimates = settle(log, estimate, in_sigmas(PHI), most=passes, least=passes).found.estimates
+        if kind is not None:
+            results.acted[case, method] = float(np.mean(np.any(estimates.adaptation > 1.0, axis=-1)))
+        inside, C_ne = log.integrals, earth_axes(log.position.lat)
+        C_n_i = np.swapaxes(earth_rotation(inside.time[1:], log.position.lat), 1, 2) @ C_ne
+        C_hat = C_n_i @ dcm_from_rotation_vector(estimates.x[:, PHI]) @ C_ne.T @ log.C_n0_i @ inside.C_ib[1:]
         phi = misalignment(C_hat, truth[1:])
         results.curves[case, method] = phi
         P = C_n_i @ estimates.P[:, PHI, PHI] @ np.swapaxes(C_n_i, 1, 2)
         for at in FILTER_TIMES:
             results.found[case, method, at] = _found(phi[round(at) - 1], P[round(at) - 1])
-
-
-def _about(system: LinearSystem, bias: Array) -> LinearSystem:
-    """The prior of the biases stands about zero, whatever has been taken off."""
-    x0 = np.zeros(12)
-    x0[6:] = -bias
-    return replace(system, x0=x0)
 
 
 def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> None:

@@ -5,30 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from truenorth.analysis.observability import Observability, observability
+from truenorth.errors.stationary import KEPT, names_and_units
 from truenorth.filters import LinearSystem
-from truenorth.models.stationary import NAMES, STATE_UNITS
 from truenorth.papers.table import Table
 
-# Quantities of the table for each state.
+# Quantities of the table for each of the ten states.
 QUANTITIES = (
     "phi_e",
     "phi_n",
     "phi_u",
+    "v_e",
+    "v_n",
     "gyro_bias_x",
     "gyro_bias_y",
     "gyro_bias_z",
     "accel_bias_x",
     "accel_bias_y",
-    "v_e",
-    "v_n",
 )
 
 
 def degrees_of(system: LinearSystem) -> Observability:
     """Of the first run; all runs have the same covariances."""
-    n = system.states
-    return observability(replace(system, z=system.z[0]), NAMES[:n], STATE_UNITS[:n])
+    return observability(replace(system, z=system.z[0]), *names_and_units(system.states))
 
 
 def add_degrees(table: Table, seen: Mapping[tuple[str, int], Observability]) -> None:
@@ -37,7 +38,7 @@ def add_degrees(table: Table, seen: Mapping[tuple[str, int], Observability]) -> 
         method = f"states{states}"
         for number, degree in enumerate(result.degrees, 1):
             table.value(case, method, f"degree_{number}", "value", degree, "1")
-        for quantity, kept in zip(QUANTITIES, result.sigma_ratio, strict=False):
+        for quantity, kept in zip(np.array(QUANTITIES)[KEPT[states]], result.sigma_ratio, strict=True):
             table.value(case, method, quantity, "ratio", kept, "1")
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.consistency import nees
+from truenorth.errors.stationary import DV, KEPT, PHI, StationaryModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, kalman
-from truenorth.models.stationary import DV, PHI, StationaryModel
 from truenorth.papers.static.truth import Truth
 
 Array = NDArray[np.float64]
@@ -54,14 +54,21 @@ def system_of(truth: Truth, model: StationaryModel, states: int, P0: Array, R: f
     discrete = [model.discrete(T, C, states) for C in kinds]
     Phi, Q = (np.stack([d[i] for d in discrete])[which.ravel()] for i in (0, 1))
     if states == 10:
-        H = np.zeros((1, 2, 10))
-        H[0, :, DV] = np.eye(2)
+        H = np.eye(10)[None, DV]
         z, noise = truth.velocity, R
     else:
         # The mean over the interval that ends at the epoch: half an interval late, which a stationary base does not show.
         H = np.stack([model.accelerometer_rows(C) for C in kinds])[which.ravel()]
         z, noise = truth.force, R + model.accel_random_walk**2 / T
-    return LinearSystem(Phi=Phi, Q=Q, H=H, R=noise * np.eye(2)[None], z=z, x0=np.zeros(states), P0=P0[:states, :states])
+    return LinearSystem(
+        Phi=Phi,
+        Q=Q,
+        H=H,
+        R=noise * np.eye(2)[None],
+        z=z,
+        x0=np.zeros(states),
+        P0=P0[np.ix_(KEPT[states], KEPT[states])],
+    )
 
 
 def errors_at(
@@ -69,6 +76,7 @@ def errors_at(
 ) -> Errors:
     """Filter in stretches between the times, and hold each estimate against the truth."""
     estimate = run or (lambda part, state: kalman(part, state, innovations=False, workers=workers))
+    told = KEPT[8] if system.states == 10 else slice(None)
     true_phi = truth.phi if system.states == 10 else truth.phi_platform
     state: FilterState | None = None
     error, sigma, square, first = [], [], [], 0
@@ -76,9 +84,9 @@ def errors_at(
         last = int(np.searchsorted(truth.time, time * (1 - 1e-9))) + 1
         state = estimate(system.between(first, last), state).state
         x, P, first = state.x, state.P, last
-        e = x[:, :8] - np.concatenate([true_phi[:, last - 1], truth.bias], axis=1)
+        e = x[:, told] - np.concatenate([true_phi[:, last - 1], truth.bias], axis=1)
         P = np.broadcast_to(P, (len(e), *P.shape[-2:]))
         error.append(e)
-        sigma.append(np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, :8]))
+        sigma.append(np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, told]))
         square.append(nees(e[:, PHI], P[:, PHI, PHI]) / 3)
     return Errors(np.asarray(times, dtype=np.float64), np.stack(error), np.stack(sigma), np.stack(square))

@@ -15,6 +15,8 @@ from truenorth.alignment import align
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, misalignment
 from truenorth.core.position import Position
+from truenorth.errors.large_azimuth import Form, attitude_error, large_azimuth_system
+from truenorth.errors.stationary import StationaryModel
 from truenorth.filters import (
     FilterState,
     around_circle,
@@ -24,8 +26,6 @@ from truenorth.filters import (
     particle,
     unscented,
 )
-from truenorth.models.large_azimuth import Form, attitude_error, large_azimuth_system
-from truenorth.models.stationary import StationaryModel
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
 from truenorth.papers.table import Table
 from truenorth.records import ImuRecord
@@ -76,7 +76,7 @@ class Setting:
 
 def make_setting(lat: float, spec: ImuSpec, tilt_sigma: float, seed: int) -> Setting:
     """Prior of the ten states with nothing known of azimuth."""
-    sigmas = [tilt_sigma] * 2 + [CIRCLE] + [spec.gyro_bias] * 3 + [spec.accel_bias] * 2 + [VELOCITY_PRIOR] * 2
+    sigmas = [tilt_sigma] * 2 + [CIRCLE] + [VELOCITY_PRIOR] * 2 + [spec.gyro_bias] * 3 + [spec.accel_bias] * 2
     return Setting(Position(lat), spec, np.diag(np.square(sigmas)), seed)
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from truenorth.analysis.observability import PiecewiseObservability, Segment, piecewise_observability
 from truenorth.core.units import parse
+from truenorth.errors.stationary import DV, KEPT, StationaryModel, names_and_units
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
-from truenorth.models.stationary import DV, NAMES, STATE_UNITS, StationaryModel
 from truenorth.papers.claims import settle
 from truenorth.papers.static.degrees import add_degrees, degrees_of, hardly_in_words
 from truenorth.papers.static.drawings import draw_convergence, draw_degrees, draw_large, draw_literal
@@ -37,6 +37,7 @@ ACCEL_BIAS = parse("100 ug", "acceleration")
 GYRO_WALK = parse("0.001 deg/sqrt(h)", "angle_random_walk")
 ACCEL_WALK = parse("10 ug/sqrt(Hz)", "velocity_random_walk")
 VELOCITY_PRIOR = 1e-3  # m/s, one sigma
+SIGMAS = np.array([*PHI_SIGMA, *[VELOCITY_PRIOR] * 2, *[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 2])  # of the ten states
 QUIET = 1e-10  # (m/s)^2, and (m/s^2)^2: what even a still base is allowed
 SWAY_PERIOD = 5.5  # s, the middle of what is drawn
 WRONG = 1e-4  # the share of the sway's variance that a badly tuned filter believes in
@@ -148,7 +149,7 @@ def _honest_truth(base: Base, runs: int, seed: int) -> Truth:
 def _honest_system(truth: Truth, base: Base, states: int, share: float = 1.0, complete: bool = True) -> LinearSystem:
     """The filter that knows the noise; `share` of the base's motion, where it does not."""
     model = StationaryModel(LAT, 0.0, GYRO_WALK, ACCEL_WALK, complete)
-    P0 = np.diag([*PHI_SIGMA**2, *[GYRO_BIAS**2] * 3, *[ACCEL_BIAS**2] * 2, *[VELOCITY_PRIOR**2] * 2])
+    P0 = np.diag(SIGMAS**2)
     T = PERIOD * EVERY
     if states == 10:
         R = base.sway**2 + base.vibration**2
@@ -216,14 +217,13 @@ def _wrong_noise(truth: Truth, base: Base) -> dict[str, Errors]:
 
 def _observability(base: Base, states: int) -> PiecewiseObservability:
     """Of the positions of a base, one after the other."""
-    model = StationaryModel(LAT)
+    model, kept = StationaryModel(LAT), KEPT[states]
     segments = []
     for C in attitudes(base):
         H = np.eye(10)[DV] if states == 10 else model.accelerometer_rows(C)
         duration = TIMES[-1] / len(base.headings)
-        segments.append(Segment(model.dynamics(C)[:states, :states], H, duration))
-    scale = np.array([*PHI_SIGMA, *[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 2, *[VELOCITY_PRIOR] * 2])
-    return piecewise_observability(segments, scale[:states], NAMES[:states], STATE_UNITS[:states])
+        segments.append(Segment(model.dynamics(C)[np.ix_(kept, kept)], H, duration))
+    return piecewise_observability(segments, SIGMAS[kept], *names_and_units(states))
 
 
 def _add_cost(table: Table, seed: int) -> None:

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_euler
-from truenorth.models.stationary import BA, BG, DV, PHI, StationaryModel
+from truenorth.errors.stationary import BA, BG, DV, PHI, StationaryModel
 from truenorth.simulation.streams import stream
 
 Array = NDArray[np.float64]
 
 PERIOD = 0.02  # s, the paper's
 EVERY = 5  # periods between two measurements of the honest cases: 10 Hz
+DRIVEN = slice(PHI.start, DV.stop)  # by white noise
 STUDY_STREAMS = {"initial": 300, "gyro": 301, "accel": 302, "base": 303}
 ARCMIN = math.radians(1.0) / 60.0
 
@@ -85,7 +86,7 @@ def simulate(
     x = np.zeros((runs, 10))
     x[:, PHI] = initial[:, :3] * phi_sigma
     x[:, BG], x[:, BA] = initial[:, 3:6] * gyro_bias, initial[:, 6:] * accel_bias
-    bias = x[:, 3:8].copy()
+    bias = x[:, BG.start :].copy()
     platform = x.copy()
 
     turns = attitudes(base)
@@ -94,7 +95,6 @@ def simulate(
     velocity, force = np.empty((runs, count, 2)), np.empty((runs, count, 2))
     phi, phi_platform = np.empty((runs, count, 3)), np.empty((runs, count, 3))
     walk = np.sqrt(PERIOD) * np.array([model.gyro_random_walk] * 3 + [model.accel_random_walk] * 2)
-    columns = [0, 1, 2, 8, 9]
     before = platform[:, DV].copy()
     for k in range(steps):
         if k % 1000 == 0:  # noise in blocks: the same whatever the number of runs
@@ -109,8 +109,8 @@ def simulate(
         w = walk * noise[:, k % 1000]
         x = x @ fed[which[k]].T
         platform = platform @ free[which[k]].T
-        x[:, columns] += w
-        platform[:, columns] += w
+        x[:, DRIVEN] += w
+        platform[:, DRIVEN] += w
         if (k + 1) % every == 0:
             at = (k + 1) // every - 1
             velocity[:, at], phi[:, at] = x[:, DV], x[:, PHI]

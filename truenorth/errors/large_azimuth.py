@@ -1,6 +1,6 @@
 """Alignment of a stationary base from an azimuth of which nothing is known: models for nonlinear filters.
 
-The ten states of :mod:`truenorth.models.stationary` in the frozen level frame ``n0``, in which the INS keeps the attitude it
+The ten states of :mod:`truenorth.errors.stationary` in the frozen level frame ``n0``, in which the INS keeps the attitude it
 was given and gravity turns with the earth. Let ``B = C_n0_b_hat C_n0_b'`` be what the computed attitude is off:
 
     B' = [C_n0_b_hat eps x] B,    dv' = g - B g + C_n0_b_hat nabla,    z = dv (E, N)
@@ -32,8 +32,8 @@ from truenorth.core.attitude import (
     rotate,
 )
 from truenorth.core.compiled import compiled
+from truenorth.errors.stationary import DV, PHI, STATES, StationaryModel
 from truenorth.filters import NonlinearSystem, matrix_function, vector_function
-from truenorth.models.stationary import PHI, StationaryModel
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_velocity
 
 Array = NDArray[np.float64]
@@ -55,20 +55,20 @@ def turned_by(p: Array, bias: Array) -> tuple[float, float, float]:
 
 @compiled(forceinline=True)
 def add_velocity(x: Array, p: Array, felt: tuple[float, float, float], at: int, out: Array) -> None:
-    """Biases stay; ``dv`` grows by ``int (g - B g + C nabla) dt``, ``felt = int B g dt``; biases stand from `at` on."""
+    """Biases stay; ``dv`` grows by ``int (g - B g + C nabla) dt``, ``felt = int B g dt``; it stands at `at`, biases behind it."""
     T = p[INTERVAL]
-    for i in range(at, at + 5):
+    for i in range(at + 2, at + 7):
         out[i] = x[i]
-    a, v = at + 3, at + 5
-    out[v] = x[v] + p[GRAVITY] - felt[0] + T * (p[1] * x[a] + p[2] * x[a + 1])
-    out[v + 1] = x[v + 1] + p[GRAVITY + 1] - felt[1] + T * (p[4] * x[a] + p[5] * x[a + 1])
+    a = at + 5
+    out[at] = x[at] + p[GRAVITY] - felt[0] + T * (p[1] * x[a] + p[2] * x[a + 1])
+    out[at + 1] = x[at + 1] + p[GRAVITY + 1] - felt[1] + T * (p[4] * x[a] + p[5] * x[a + 1])
 
 
 @vector_function
 def tilt_azimuth_transition(x: Array, p: Array, out: Array) -> None:
-    """Of ``[phi_E, phi_N, phi_U, eps (3), nabla (2), dv (2)]``, a tilt after an azimuth."""
+    """Of ``[phi_E, phi_N, phi_U, dv (2), eps (3), nabla (2)]``, a tilt after an azimuth."""
     T = p[INTERVAL]
-    rate = turned_by(p, x[3:6])
+    rate = turned_by(p, x[5:8])
     tilt_E, tilt_N, azimuth = x[0] - T / 2 * rate[0], x[1] - T / 2 * rate[1], x[2] - T / 2 * rate[2]
     s, c = math.sin(azimuth), math.cos(azimuth)
     g = (c * p[GRAVITY] + s * p[GRAVITY + 1], c * p[GRAVITY + 1] - s * p[GRAVITY], p[GRAVITY + 2])  # Rz(-phi_U) g
@@ -82,31 +82,31 @@ def tilt_azimuth_transition(x: Array, p: Array, out: Array) -> None:
 def tilt_azimuth_jacobian(x: Array, p: Array, out: Array) -> None:
     """Of `tilt_azimuth_transition`."""
     T = p[INTERVAL]
-    rate = turned_by(p, x[3:6])
+    rate = turned_by(p, x[5:8])
     tilt_E, tilt_N, azimuth = x[0] - T / 2 * rate[0], x[1] - T / 2 * rate[1], x[2] - T / 2 * rate[2]
     s, c = math.sin(azimuth), math.cos(azimuth)
     g = (c * p[GRAVITY] + s * p[GRAVITY + 1], c * p[GRAVITY + 1] - s * p[GRAVITY], p[GRAVITY + 2])
     for i in range(10):
         out[i, i] = 1.0
-    out[8, 1], out[9, 0] = g[2], -g[2]
+    out[3, 1], out[4, 0] = g[2], -g[2]
     turned = (g[1], -g[0], 0.0)  # d g / d phi_U
     turn = cross((tilt_E, tilt_N, 0.0), turned)
-    out[8, 2], out[9, 2] = turn[0] - turned[0], turn[1] - turned[1]
+    out[3, 2], out[4, 2] = turn[0] - turned[0], turn[1] - turned[1]
     for j in range(3):
         for i in range(3):
-            out[i, 3 + j] = -T * p[ATTITUDE + 3 * i + j]
-        for i in (8, 9):
+            out[i, 5 + j] = -T * p[ATTITUDE + 3 * i + j]
+        for i in (3, 4):
             for m in range(3):  # half of what the bias turns within the interval is felt in it
-                out[i, 3 + j] += out[i, m] * -T / 2 * p[ATTITUDE + 3 * m + j]
+                out[i, 5 + j] += out[i, m] * -T / 2 * p[ATTITUDE + 3 * m + j]
     for j in range(2):
-        out[8, 6 + j], out[9, 6 + j] = T * p[ATTITUDE + j], T * p[ATTITUDE + 3 + j]
+        out[3, 8 + j], out[4, 8 + j] = T * p[ATTITUDE + j], T * p[ATTITUDE + 3 + j]
 
 
 @vector_function
 def rotation_vector_transition(x: Array, p: Array, out: Array) -> None:
     """Of the same states with ``B = exp(-[phi x])``: ``phi' = -J(-phi)^-1 C eps``, J the left Jacobian of the rotations."""
     T = p[INTERVAL]
-    rate = turned_by(p, x[3:6])
+    rate = turned_by(p, x[5:8])
     phi = (x[0], x[1], x[2])
     angle = math.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
     second = 1.0 / 12.0
@@ -131,9 +131,9 @@ def rotation_vector_transition(x: Array, p: Array, out: Array) -> None:
 
 @vector_function
 def quaternion_transition(x: Array, p: Array, out: Array) -> None:
-    """Of ``[q (4) of B, eps (3), nabla (2), dv (2)]``: ``q' = (0, C eps) q / 2``; its length has no meaning."""
+    """Of ``[q (4) of B, dv (2), eps (3), nabla (2)]``: ``q' = (0, C eps) q / 2``; its length has no meaning."""
     T = p[INTERVAL]
-    rate = turned_by(p, x[4:7])
+    rate = turned_by(p, x[6:9])
     scale = 1.0 / math.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2 + x[3] ** 2)
     q = (scale * x[0], scale * x[1], scale * x[2], scale * x[3])
     step = quaternion_from_rotation_vector((T / 2 * rate[0], T / 2 * rate[1], T / 2 * rate[2]))
@@ -147,15 +147,15 @@ def quaternion_transition(x: Array, p: Array, out: Array) -> None:
 
 @vector_function
 def velocity_measurement(x: Array, p: Array, out: Array) -> None:
-    """The last two states."""
-    out[0] = x[len(x) - 2]
-    out[1] = x[len(x) - 1]
+    """The velocity errors: seven states from the end, behind the attitude."""
+    out[0] = x[len(x) - 7]
+    out[1] = x[len(x) - 6]
 
 
 @matrix_function
 def velocity_jacobian(x: Array, p: Array, out: Array) -> None:
     """Of `velocity_measurement`."""
-    out[0, len(x) - 2] = out[1, len(x) - 1] = 1.0
+    out[0, len(x) - 7] = out[1, len(x) - 6] = 1.0
 
 
 def large_azimuth_system(
@@ -177,7 +177,7 @@ def large_azimuth_system(
     C_n0_i : (runs, 3, 3) array
         The attitude that the INS was given at the start.
     P0 : (10, 10) array
-        Of ``[phi, eps, nabla, dv]``; it may hold all of the circle.
+        Of ``[phi, dv, eps, nabla]``; it may hold all of the circle.
     R : float, (m/s)^2
         Variance of the base's velocity along each axis.
     form : {"tilt_azimuth", "rotation_vector", "quaternion"}
@@ -228,11 +228,11 @@ def attitude_error(x: Array, form: Form = "tilt_azimuth") -> Array:
 def _process_noise(model: StationaryModel, T: Array) -> Array:
     """(K, 10, 10): white gyro noise reaches phi at once and dv as a ramp, by gravity."""
     q_g, q_a, g = model.gyro_random_walk**2, model.accel_random_walk**2, model.gravity
-    Q = np.zeros((len(T), 10, 10))
-    Q[:, range(3), range(3)] = q_g * T[:, None]
-    Q[:, [8, 9], [8, 9]] = (q_a * T + q_g * T**3 / 3 * g**2)[:, None]
-    Q[:, 8, 1] = Q[:, 1, 8] = -q_g * T**2 / 2 * g
-    Q[:, 9, 0] = Q[:, 0, 9] = q_g * T**2 / 2 * g
+    Q = np.zeros((len(T), STATES, STATES))
+    Q[:, PHI, PHI] = q_g * T[:, None, None] * np.eye(3)
+    Q[:, DV, DV] = (q_a * T + q_g * T**3 / 3 * g**2)[:, None, None] * np.eye(2)
+    tilt = q_g * T[:, None, None] ** 2 / 2 * g * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+    Q[:, DV, PHI], Q[:, PHI, DV] = tilt, np.swapaxes(tilt, 1, 2)
     return Q
 
 

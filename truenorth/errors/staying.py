@@ -21,7 +21,8 @@ shakes the samples; the mean's tie to the states and to the process noise inside
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from truenorth.filters import LinearSystem
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
 
 Array = NDArray[np.float64]
+Form = Literal["velocity", "force"]
 
 PHI = slice(0, 3)
 DV = slice(3, 6)
@@ -104,7 +106,7 @@ class StaticModel:
         Q[:, BG, BG] = self.gyro_rate_walk**2 * T * eye
         Q[:, BA, BA] = self.accel_rate_walk**2 * T * eye
 
-        # Mean velocity error, given by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
+        # Mean velocity error by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
         # phi(t) = phi_k + int_t^k C eps; averaged, the force counts with its elapsed part s/T of the interval.
         H = np.zeros((count, 3, STATES))
         H[:, :, DV] = eye
@@ -118,8 +120,7 @@ class StaticModel:
         S[:, PHI] = q_g * T**2 / 6 * np.swapaxes(f, 1, 2)
         S[:, DV] = -q_a * T / 2 * eye + q_g * T**3 / 24 * ff
 
-        middle = (integrals.time[1:] + integrals.time[:-1]) / 2
-        C_n_n0 = np.swapaxes(earth_rotation(middle, lat), 1, 2)
+        C_n_n0 = local_axes(integrals, lat)
         C_n0_n = np.swapaxes(C_n_n0, 1, 2)
         z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
         return LinearSystem(
@@ -145,6 +146,71 @@ def gravity_force(integrals: InertialIntegrals, lat: float, alt: float) -> tuple
     v, p = -gravity_velocity(integrals.time, lat, alt), -gravity_position(integrals.time, lat, alt)
     v_mean = np.diff(p, axis=0) / integrals.intervals[:, None]
     return skew(np.diff(v, axis=0) / integrals.intervals[:, None]), skew(v[1:] - v_mean)
+
+
+def sampled_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
+    """(K+1, 3) velocity at the ends of the intervals that the INS computes in ``n0``, m/s; zero for a perfect one at rest."""
+    return np.asarray(integrals.velocity @ C_n0_i.T + gravity_velocity(integrals.time, lat, alt))
+
+
+def gained_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
+    """(K, 3) velocity that the INS gains in each interval in ``n0``, m/s; zero for a perfect one at rest."""
+    return np.diff(sampled_velocity(integrals, C_n0_i, lat, alt), axis=0)
+
+
+def local_axes(integrals: InertialIntegrals, lat: float) -> Array:
+    """(K, 3, 3) ``C_n_n0`` at the middle of each interval."""
+    middle = (integrals.time[1:] + integrals.time[:-1]) / 2
+    return np.asarray(np.swapaxes(earth_rotation(middle, lat), 1, 2))
+
+
+def sampled_system(core: LinearSystem, z: Array, variance: float) -> LinearSystem:
+    """A system observed by the velocity (K, 3) at the ends of the intervals: one state a row, as multiple factors need it."""
+    H = np.zeros((1, 3, STATES))
+    H[0, :, DV] = np.eye(3)
+    return replace(core, H=H, R=variance * np.eye(3)[None], S=None, z=z)
+
+
+def force_system(
+    core: LinearSystem, integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float
+) -> LinearSystem:
+    """A system of :meth:`StaticModel.linearise` observed by the level accelerometers themselves: the velocity gained.
+
+        z_k = dv_k - dv_{k-1} = int (-g_n0 x phi + C nabla + w_a) dt + (the base's own gain)
+
+    On a base that does not move beyond the noise of its accelerometers it says what the velocity says, and asks nothing of where
+    the velocity began; on one that does, the base's motion comes in differentiated, and the velocity form is the better.
+
+    Source: system 4, "Kalman filters for static alignment": its eight states beside its ten.
+
+    Parameters
+    ----------
+    core : LinearSystem
+        Its measurement is left out.
+    integrals, C_n0_i, lat, alt
+        That it was linearised with.
+
+    Returns
+    -------
+    LinearSystem
+        Whose R holds the variance of the quietest base only.
+    """
+    # z = J x_{k-1} + w_dv, and x_{k-1} = Phi^-1 (x_k - w): by the state after the interval, as the filter has it.
+    J = core.Phi[:, DV].copy()
+    J[:, :, DV] -= np.eye(3)
+    back = J @ np.linalg.inv(core.Phi)
+    own = np.eye(STATES)[DV] - back
+    C = local_axes(integrals, lat)
+    C_t = np.swapaxes(C, 1, 2)
+    noise = C @ own @ core.Q @ np.swapaxes(own, 1, 2) @ C_t
+    z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
+    return replace(
+        core,
+        H=C @ back,
+        R=0.5 * (noise + np.swapaxes(noise, 1, 2)) + QUIETEST_BASE**2 * np.eye(3),
+        S=core.Q @ np.swapaxes(own, 1, 2) @ C_t,
+        z=z,
+    )
 
 
 def grown(system: LinearSystem, n: int) -> dict[str, Array]:

@@ -5,8 +5,8 @@ import pytest
 
 from truenorth.alignment.azimuth_mechanisation import mechanise_interval
 from truenorth.core.attitude import dcm_from_quaternion, dcm_from_rotation_vector, quaternion_from_dcm
+from truenorth.errors import in_motion_azimuth as model
 from truenorth.filters import NonlinearSystem, check_jacobians
-from truenorth.models import in_motion_azimuth as model
 from truenorth.simulation import ideal_log
 from truenorth.simulation.scenario import read_scenario
 from truenorth.strapdown import wander

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from truenorth.models.disturbance import AxisMotion, Oscillator
+from truenorth.errors.sway import AxisMotion, Oscillator
 
 OSCILLATORS = [
     Oscillator(order, 0.03, w, damping) for order in (1, 2) for w in (0.3, 2.8) for damping in (1e-9, 0.02, 0.6)

@@ -4,11 +4,11 @@ States, errors computed minus true:
 
 | slice | state | unit |
 | --- | --- | --- |
+| PHI | misalignment E, N, U, ``C_nb_hat = (I - [phi x]) C_nb`` | rad |
 | DV | velocity error east, north | m/s |
 | DP | position error east, north | m |
-| PHI | misalignment E, N, U, ``C_nb_hat = (I - [phi x]) C_nb`` | rad |
-| BA | accelerometer bias left, measured minus true, body axes | m/s^2 |
 | BG | gyro bias left, measured minus true, body axes | rad/s |
+| BA | accelerometer bias left, measured minus true, body axes | m/s^2 |
 | REF | drift of the speed log east, north, the first of its groups (:mod:`truenorth.errors.log`) | m/s |
 
 It is the INS model of :mod:`truenorth.errors.ins` in ENU with altitude fixed, its rows of the vertical channel left out and
@@ -44,18 +44,16 @@ from truenorth.state import layout as ins
 
 Array = NDArray[np.float64]
 
-DV = slice(0, 2)
-DP = slice(2, 4)
-PHI = slice(4, 7)
-BA = slice(7, 10)
-BG = slice(10, 13)
+PHI = slice(0, 3)
+DV = slice(3, 5)
+DP = slice(5, 7)
+BG = slice(7, 10)
+BA = slice(10, 13)
 REF = slice(13, 15)
 MOTION = slice(0, 7)  # what drives each other; the biases run by themselves
 STATES = 13
-NAMES = ("v_e", "v_n", "p_e", "p_n", "phi_e", "phi_n", "phi_u")
-
-# The same states in the order of errors.ins; its vertical channel, which does not move, has no place here.
-OF_INS = np.array([3, 4, 6, 7, 0, 1, 2, 12, 13, 14, 9, 10, 11])
+# Of the states of errors.ins, all but its vertical channel, which does not move.
+OF_INS = np.delete(np.arange(ins.STATES), [ins.DV.stop - 1, ins.DP.stop - 1])
 
 
 @dataclass(frozen=True)

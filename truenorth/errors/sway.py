@@ -16,15 +16,23 @@ wave spectra).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
+from truenorth.errors.staying import QUIETEST_BASE, grown
+from truenorth.filters import LinearSystem
+from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
+
+MOST_OSCILLATORS = 2  # along an axis; always as many states, the unused ones zero: one compiled filter serves all
+AXIS_STATES = 4 * MOST_OSCILLATORS
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
@@ -174,3 +182,64 @@ def add_autocovariance(orders: Any, values: Any, interval: float, acf: Any) -> N
             else:
                 acf[k] += variance * ((1.0 + dt * (1.0 - u**2)) * c + (u**3 - 2.0 * dt * u) * s)
             c, s = c * c_step - s * s_step, c * s_step + s * c_step
+
+
+def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMotion]) -> LinearSystem:
+    """The system with the motion of its base as states.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        Whose R holds the variance of the quietest base.
+    interval : float, s
+    motion : three AxisMotion
+        Along E, N, U; none quieter than that.
+
+    Returns
+    -------
+    LinearSystem
+        Of 24 more states.
+    """
+    n = system.states
+    bigger = grown(system, n + 3 * AXIS_STATES)
+    white = np.zeros(3)
+    for axis, item in enumerate(motion):
+        first = n + axis * AXIS_STATES
+        part = slice(first, first + item.states)
+        Phi, Q, P, h = item.blocks(interval)
+        bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q
+        bigger["P0"][part, part], bigger["H"][:, axis, part] = P, h
+        white[axis] = item.white
+    return replace(system, **bigger, R=system.R + np.diag(white**2 - QUIETEST_BASE**2))
+
+
+def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> InertialIntegrals:
+    """The integrals with the base's sway averaged out of the attitude by which biases act; an indexer's turning stays.
+
+    A bias seen from a base that sways makes a velocity of the sway's own periods, tenths of a mm/s of 100 ug. So do scale
+    factors, a centre of rotation that is none, and the IMU's size: a filter that believed the signature of the bias would
+    claim levels of arcseconds. What is left to tell a bias is its mean, and an indexer's modulation.
+
+    Parameters
+    ----------
+    integrals : InertialIntegrals
+    C_sb : (K+1, 3, 3) array, optional
+        Attitude of the base in the IMU at the integrals' times; the two are one when left out.
+    """
+    turned = None if C_sb is None else _half_way(C_sb)
+    t = np.linspace(-1.0, 1.0, len(integrals.C_mean))
+    basis, root = np.stack([np.ones_like(t), t], axis=1), np.sqrt(1.0 - t**2 + 1e-9)
+
+    def slow(C: Array) -> Array:
+        base = (C if turned is None else C @ turned).reshape(len(t), 9)
+        coefficients = np.linalg.lstsq(root[:, None] * basis, root[:, None] * base, rcond=None)[0]
+        mean = (basis @ coefficients).reshape(-1, 3, 3)
+        return mean if turned is None else mean @ np.swapaxes(turned, 1, 2)
+
+    return replace(integrals, C_mean=slow(integrals.C_mean), C_late=slow(integrals.C_late))
+
+
+def _half_way(C: Array) -> Array:
+    """(K, 3, 3) attitudes half way between K + 1 ones."""
+    step = rotation_vector_from_dcm(C[1:] @ np.swapaxes(C[:-1], 1, 2))
+    return dcm_from_rotation_vector(0.5 * step) @ C[:-1]

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import normal_gravity
 from truenorth.core.position import Position
-from truenorth.models.static import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
+from truenorth.errors.staying import BA, BG, DV, PHI, STATES, StaticModel, mean_velocity
 from truenorth.records import ImuRecord
 from truenorth.simulation import Sway, Tone, simulate
 from truenorth.strapdown.inertial import gravity_velocity, integrate

@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.staying import DV, PHI, gravity_force, grown, local_axes
 from truenorth.filters import LinearSystem
-from truenorth.models.static import DV, PHI, gravity_force, grown
-from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
+from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
 
@@ -25,15 +25,14 @@ LEVEL_RATE = 2
 
 
 def with_level_rate(system: LinearSystem, integrals: InertialIntegrals, lat: float, alt: float) -> LinearSystem:
-    """A system of :meth:`truenorth.models.static.StaticModel.linearise` with the level rate (E, N), rad/s, as two more states."""
+    """A system of :meth:`truenorth.errors.staying.StaticModel.linearise` with the level rate (E, N), rad/s, as two more states."""
     T = integrals.intervals[:, None, None]
     n = system.states
     bigger = grown(system, n + LEVEL_RATE)
     rate, level = slice(n, n + LEVEL_RATE), np.eye(3)[:, :LEVEL_RATE]
     f, f_late = gravity_force(integrals, lat, alt)
-    C_n_n0 = np.swapaxes(earth_rotation((integrals.time[1:] + integrals.time[:-1]) / 2, lat), 1, 2)
     bigger["Phi"][:, rate, rate] = np.eye(LEVEL_RATE)
     bigger["Phi"][:, PHI, rate] = -T * level
     bigger["Phi"][:, DV, rate] = -T * (f_late @ level)
-    bigger["H"][:, :, rate] = -(T**2) / 6 * (C_n_n0 @ f @ level)
+    bigger["H"][:, :, rate] = -(T**2) / 6 * (local_axes(integrals, lat) @ f @ level)
     return replace(system, **bigger)

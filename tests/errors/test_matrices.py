@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from truenorth.core.position import Position
+from truenorth.errors.matrices import without_errors
+from truenorth.errors.staying import StaticModel
 from truenorth.estimate.staying import StayingLog, prior_of
-from truenorth.models.matrices import without_errors
-from truenorth.models.static import StaticModel
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import Axis, Indexed, Indexer, rest, simulate, steps

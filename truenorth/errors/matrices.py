@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.staying import DV, PHI, grown, local_axes
 from truenorth.filters import LinearSystem
-from truenorth.models.static import DV, PHI, grown
 from truenorth.records import ImuRecord
-from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
+from truenorth.strapdown.inertial import InertialIntegrals
 from truenorth.strapdown.level import increments, inertial_integrals
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ MATRICES = 18
 def with_matrices(
     system: LinearSystem, record: ImuRecord, integrals: InertialIntegrals, C_n0_i: Array, lat: float
 ) -> LinearSystem:
-    """A system of :meth:`truenorth.models.static.StaticModel.linearise` with the matrices of both sensors as 18 more states.
+    """A system of :meth:`truenorth.errors.staying.StaticModel.linearise` with the matrices of both sensors as 18 more states.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def with_matrices(
     """
     T = integrals.intervals[:, None, None]
     gyro, accel = _moments(record, integrals)
-    C_n_n0 = np.swapaxes(earth_rotation((integrals.time[1:] + integrals.time[:-1]) / 2, lat), 1, 2)
+    C_n_n0 = local_axes(integrals, lat)
     force = system.Phi[:, DV, PHI] / T  # [f x], f the reaction to gravity
     n, K = system.states, len(T)
     bigger = grown(system, n + MATRICES)

@@ -9,11 +9,12 @@ from truenorth.coarse.lever_arm import arm_velocity
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.models.disturbance import AxisMotion, Oscillator
-from truenorth.models.rotary import BA, BG, DV, PHI, RotaryModel, earth_axes
-from truenorth.models.static import StaticModel
-from truenorth.models.swaying import arm_rows, with_arm, with_motion, without_sway
+from truenorth.errors.arm import arm_rows, with_arm
+from truenorth.errors.staying import BA, BG, DV, PHI, StaticModel
+from truenorth.errors.sway import AxisMotion, Oscillator, with_motion, without_sway
+from truenorth.estimate.staying import Prior
 from truenorth.papers.rotary.drawings import modulated
+from truenorth.papers.rotary.model import RotaryLog, earth_axes
 from truenorth.papers.rotary.truth import INDEXER_RATES
 from truenorth.records import ImuRecord
 from truenorth.simulation import Axis, Indexed, Indexer, Spin, Sway, Tone, simulate
@@ -41,27 +42,31 @@ def turning():
     return moving, simulate(moving, rate=200.0, duration=40.0).record
 
 
+def rotary_system(record, C_n0_i):
+    prior = Prior(np.zeros(12), np.eye(12), {})
+    arm = np.zeros((41, 3))
+    return RotaryLog(
+        record, C_n0_i, PLACE, StaticModel(0.0, 0.0), prior, 1.0, arm_velocity=arm, base_velocity=0.05
+    ).linearise()
+
+
 def test_transition_against_perturbed_logs(turning):
     """Columns of the product of all Phi: a wrong start attitude and unit biases, through the real integration."""
     moving, record = turning
-    lat, alt = PLACE.lat, PLACE.alt
-    C_ne = earth_axes(lat)
-    C_i_s0 = C_ne.T @ moving.states(np.array(0.0)).C_nb
+    C_in, C_n0_i = earth_axes(PLACE.lat).T, moving.states(np.array(0.0)).C_nb
     clean = integrate(record, 1.0)
-    model = RotaryModel(StaticModel(0.0, 0.0), 0.05)
-    system = model.linearise(clean, C_i_s0, lat, alt, np.eye(12), np.zeros((41, 3)))
+    system = rotary_system(record, C_n0_i)
     Phi = np.eye(12)
     for step in system.Phi:
         Phi = step @ Phi
-    z0, C0 = system.z[-1], C_i_s0 @ clean.C_ib[-1]
+    z0, C0 = system.z[-1], C_in @ C_n0_i @ clean.C_ib[-1]
 
     def end(phi=(0, 0, 0), gyro=(0, 0, 0), accel=(0, 0, 0)):
         T = record.interval
         log = ImuRecord(record.time, record.gyro + T * np.array(gyro), record.accel + T * np.array(accel), "increments")
-        C = dcm_from_rotation_vector(-np.array(phi)) @ C_i_s0
-        inside = integrate(log, 1.0)
-        z = model.linearise(inside, C, lat, alt, np.eye(12), np.zeros((41, 3))).z[-1]
-        return z - z0, -rotation_vector_from_dcm(C @ inside.C_ib[-1] @ C0.T)
+        C = dcm_from_rotation_vector(-np.array(phi)) @ C_in @ C_n0_i
+        z = rotary_system(log, C_in.T @ C).z[-1]
+        return z - z0, -rotation_vector_from_dcm(C @ integrate(log, 1.0).C_ib[-1] @ C0.T)
 
     for part, name, size in ((PHI, "phi", 1e-5), (BG, "gyro", 1e-7), (BA, "accel", 1e-3)):
         for axis in range(3):
@@ -76,10 +81,7 @@ def test_transition_against_perturbed_logs(turning):
 def test_a_perfect_log_leaves_nothing(turning):
     """A base that sways about its centre, without a lever arm: z is zero but for the strapdown's errors."""
     moving, record = turning
-    C_i_s0 = earth_axes(PLACE.lat).T @ moving.states(np.array(0.0)).C_nb
-    model = RotaryModel(StaticModel(0.0, 0.0), 0.05)
-    system = model.linearise(integrate(record, 1.0), C_i_s0, PLACE.lat, PLACE.alt, np.eye(12), np.zeros((41, 3)))
-    assert np.max(np.abs(system.z)) < 2e-5
+    assert np.max(np.abs(rotary_system(record, moving.states(np.array(0.0)).C_nb).z)) < 2e-5
 
 
 @pytest.mark.parametrize("source", ["gyros", "nominal", "attitude"])

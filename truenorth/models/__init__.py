@@ -1,1 +1,0 @@
-"""Error models: each is written once, and any filter runs on it."""
