@@ -9,6 +9,7 @@ from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, eu
 from truenorth.core.units import significant
 from truenorth.errors.large_azimuth import attitude_error, large_azimuth_system
 from truenorth.errors.stationary import StationaryModel
+from truenorth.errors.walks import Walks
 from truenorth.filters import around_circle, extended, gaussian_sum
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
 from truenorth.quality.noise import noise_coefficients
@@ -22,7 +23,7 @@ DEG_PER_HOUR = np.radians(1.0) / 3600.0
 def _by_hypotheses(record, position, start, spec):
     """Gaussian sum of twelve extended filters around the circle."""
     integrals = integrate(record, 5.0)
-    model = StationaryModel(position.lat, position.alt, spec.gyro_random_walk, spec.accel_random_walk)
+    model = StationaryModel(position.lat, position.alt, Walks.of(spec))
     sigmas = [0.01, 0.01, 1.0, 1e-2, 1e-2, *[spec.gyro_bias] * 3, *[spec.accel_bias] * 2]
     P0 = np.diag(np.square(sigmas))
     system = large_azimuth_system(model, [integrals], start[None], P0, 1e-8)

@@ -18,6 +18,7 @@ from truenorth.damping.course import Course, errors_of
 from truenorth.damping.options import Damper
 from truenorth.errors.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI
 from truenorth.navigation import Mounting, Start, navigate
+from truenorth.papers.damping.truth import drawn
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import simulate
@@ -42,7 +43,7 @@ class Ship:
     def __init__(self, lat=45.78, heading=51.34, seed=1):
         self.rng = np.random.default_rng(seed)
         ideal, self.truth = ideal_and_truth(lat, heading, hours=24.0)
-        x0 = SIGMA * self.rng.standard_normal(13)
+        x0 = SIGMA * drawn(self.rng.standard_normal(13))
         biases = {"gyro_bias": x0[BG], "accel_bias": x0[BA]}
         self.record = simulate(ideal, imu=ImuSpec(**_walks()), seed=seed, errors=biases).record
         begin = self.truth.between(0, 1).corrected(-x0[:7])

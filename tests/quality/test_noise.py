@@ -8,10 +8,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
-from truenorth.alignment.inference import noise_of
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.units import parse
+from truenorth.errors.staying import StaticModel
 from truenorth.quality.noise import gauss_markov_variance, noise_from_log
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -72,7 +72,7 @@ def test_a_simulated_imu_is_found(seed):
     assert found.spec.gyro_quantisation == found.spec.accel_quantisation == 0.0
     assert_allclose(found.random_walk, [[KNOWN.gyro_random_walk] * 3, [KNOWN.accel_random_walk] * 3], rtol=0.03)
     # ... and it is what the filter of an alignment takes.
-    assert_allclose(noise_of(found.spec).gyro_random_walk, KNOWN.gyro_random_walk, rtol=0.03)
+    assert_allclose(StaticModel.of(found.spec).gyro_random_walk, KNOWN.gyro_random_walk, rtol=0.03)
 
 
 def test_quantisation_is_told_from_random_walk():

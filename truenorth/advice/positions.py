@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.inference import noise_of
 from truenorth.alignment.positions import ARM_SIGMA, SHORTEST_POSITION, prior_covariance
 from truenorth.analysis.error_budget import Source, error_budget
 from truenorth.core.earth import DEFLECTION
@@ -221,7 +220,7 @@ class _Scheme:
         self.position, self.T = position, T
         P_bias = prior_covariance(spec, position)
         self.prior = prior_of(P_bias, spec=spec, arm=np.zeros(3), arm_sigma=arm_sigma)
-        self.model = noise_of(spec)
+        self.model = StaticModel.of(spec)
         self.record = simulate(_motion(position, turns, T), rate=IDEAL_RATE, duration=T).record
         self.interval = max(1.0, T / EPOCHS)
         self.integrals = integrate(self.record, self.interval)

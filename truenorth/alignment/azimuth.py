@@ -23,16 +23,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.azimuth_filters import METHODS, Begin, Logs, Solution, noise_density, run_loop
+from truenorth.alignment.azimuth_filters import METHODS, Begin, Logs, Solution, run_loop
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import skew
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.errors.in_motion_azimuth import BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.errors.in_motion_azimuth import BA, BG, DK, DV, PHI, STATES
+from truenorth.errors.walks import Walks
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import Layout
 from truenorth.state.mounting import Mounting
+from truenorth.state.prior import prior_covariance
 from truenorth.state.track import Residuals, Track
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import earth_rotation
@@ -91,15 +93,14 @@ def azimuth_track(
     C_nm = earth_rotation(elapsed, position.lat).T @ C_n0_b @ C_mb.T
     speed = float(np.interp(edges[rows[epoch]], odometer.time - wheel.latency, odometer.speed))
     v_n = C_nm[:, 1] * speed
-    sigma = np.zeros(STATES)
-    sigma[PHI] = LEVEL_SIGMA, LEVEL_SIGMA, HEADING_SIGMA
-    sigma[DV], sigma[DP] = VELOCITY_SIGMA, (position.horizontal_sigma,) * 2 + (position.vertical_sigma,)
-    variance = spec.bias_variance
-    sigma[BG], sigma[BA], sigma[DK] = np.sqrt(variance[:3]), np.sqrt(variance[3:]), wheel.scale_sigma
+    angles = LEVEL_SIGMA, LEVEL_SIGMA, HEADING_SIGMA
+    P = prior_covariance(angles, VELOCITY_SIGMA, position.sigma, spec.bias_variance, wheel.scale_sigma)
     J = np.eye(STATES)
     J[DV, PHI] = skew(v_n)
-    P0 = J @ np.diag(sigma**2) @ J.T
-    start = Begin(epoch, C_nm[None], v_n[None], coarse.position[-1], P0[None], noise_density(spec))
+    P0 = J @ P @ J.T
+    start = Begin(
+        epoch, C_nm[None], v_n[None], coarse.position[-1], P0[None], Walks.of(spec).density(STATES, PHI, DV, BG, BA)
+    )
     name = ALIASES.get(method, method)
     found = run_loop(logs, np.zeros(1, dtype=np.int64), start, name, gated=True, keep_P=True)
     return _track(found, edges[rows[epoch + 1 :]], C_mb, wheel)

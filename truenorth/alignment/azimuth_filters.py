@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.azimuth_mechanisation import mechanise_interval
 from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
 from truenorth.errors import in_motion_azimuth as model
-from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, STATES
 from truenorth.filters import (
     Estimates,
     Gate,
@@ -30,7 +30,6 @@ from truenorth.filters import (
     unscented,
 )
 from truenorth.filters.system import FilterState
-from truenorth.records.specs import ImuSpec
 from truenorth.strapdown import wander
 
 Array = NDArray[np.float64]
@@ -228,13 +227,6 @@ def run_loop(
         if keep_P:
             out.P[:, k] = P
     return replace(out, acted=out.acted / max(count, 1))
-
-
-def noise_density(spec: ImuSpec) -> Array:
-    """(16,) of the process noise, by a specification."""
-    noise = np.zeros(STATES)
-    noise[PHI], noise[DV] = spec.gyro_random_walk**2, spec.accel_random_walk**2
-    return noise
 
 
 def _room(B: int, count: int, keep_P: bool) -> Solution:

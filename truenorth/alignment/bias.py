@@ -37,9 +37,7 @@ def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array,
     slope = float(normal_gravity(position.lat, position.alt + 1.0)) - gravity
     up = C_n_b @ np.array([0.0, 0.0, 1.0])
     P[3:, 3:] += np.outer(up, up) * (slope * position.vertical_sigma) ** 2
-    # measured = (I + S + M) f: the i-th scale factor acts on f_i, the misalignments on the two others.
-    f2 = (gravity * up) ** 2
-    P[3:, 3:] += np.diag(spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2))
+    P[3:, 3:] += np.diag(spec.acting_variance(gravity * up))
     return P
 
 

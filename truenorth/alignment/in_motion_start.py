@@ -15,8 +15,9 @@ from truenorth.core.earth import radii
 from truenorth.core.position import Position
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.layout import DV, PHI, STATES
 from truenorth.state.mounting import Mounting
+from truenorth.state.prior import prior_covariance
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
@@ -86,24 +87,19 @@ def start_at(
 ) -> Start:
     """The state before the first sample: velocity by the wheel through the guessed attitude, else by GNSS."""
     time = float(record.time[0] - record.steps[0])
-    P = np.zeros((STATES, STATES))
-    P[PHI, PHI] = np.diag([guess.level_sigma**2, guess.level_sigma**2, guess.heading_sigma**2])
     v_n, sigma = np.zeros(3), UNKNOWN_START
     if odometer is not None:
         speed = float(np.interp(time, odometer.time - wheel.latency, odometer.speed))
         v_n, sigma = guess.C_nb @ wheel.C_mb[1] * speed, math.hypot(ODOMETER_START, wheel.angle_sigma * speed)
     elif gnss is not None:
         v_n, sigma = gnss_track(gnss, np.array([time, time + 1e-3, record.time[-1]]))[0][0], GNSS_START
-    P[DV, DV] = sigma**2 * np.eye(3)
+    # Slow parts of the biases are states of their own.
+    angles = guess.level_sigma, guess.level_sigma, guess.heading_sigma
+    P = prior_covariance(angles, sigma, position.sigma, spec.constant_variance)
     if odometer is not None:  # what the wheel says turns with the attitude: dv = dv_I + v x phi
         turn = np.eye(STATES)
         turn[DV, PHI] = skew(v_n)
         P = turn @ P @ turn.T
-    P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
-    variance = spec.bias_variance
-    # Slow parts are states of their own.
-    P[BG, BG] = np.eye(3) * (variance[0] - spec.gyro_bias_instability**2)
-    P[BA, BA] = np.eye(3) * (variance[3] - spec.accel_bias_instability**2)
     zero = np.zeros(3)
     return Start(time, guess.C_nb, v_n, position.lat, position.lon, position.alt, zero, zero, P)
 

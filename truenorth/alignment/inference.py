@@ -95,24 +95,9 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     )
 
 
-def noise_of(spec: ImuSpec) -> StaticModel:
-    """Noise of the static model for a specification.
-
-    A Gauss-Markov bias of size B and correlation time tau spreads as a random walk of ``B sqrt(2/tau)`` over times
-    shorter than tau.
-    """
-    spread = math.sqrt(2.0 / spec.correlation_time)
-    return StaticModel(
-        spec.gyro_random_walk,
-        spec.accel_random_walk,
-        math.hypot(spec.gyro_bias_instability * spread, spec.gyro_rate_random_walk),
-        math.hypot(spec.accel_bias_instability * spread, spec.accel_rate_random_walk),
-    )
-
-
 def usual_noise() -> StaticModel:
     """Where the fit of the random walks begins: the navigation preset's."""
-    return replace(noise_of(imu_spec("navigation")), accel_rate_walk=0.0)
+    return replace(StaticModel.of(imu_spec("navigation")), accel_rate_walk=0.0)
 
 
 def allan_noise(record: ImuRecord) -> StaticModel:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.answer import at_epoch, without_heading
 from truenorth.alignment.check import LogCheck, check_means, is_blind
 from truenorth.alignment.fine import FineAlignment, attitude_history
-from truenorth.alignment.inference import infer_spec, noise_of
+from truenorth.alignment.inference import infer_spec
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.table import TablePosition, TurntableErrors
 from truenorth.alignment.task import Task, bridged, level_of, make_task
@@ -206,7 +206,7 @@ def _fine(
         bias[:3], P_bias[:3, :3] = _bias_at_rest(rest, lat)
     prior = prior_of(P_bias, bias=bias, spec=spec, arm=np.zeros(3), arm_sigma=arm_sigma)
     rows = np.array([task.epoch.row])
-    log = StayingLog(task.record, np.eye(3), task.position, noise_of(spec), prior, task.interval, rows)
+    log = StayingLog(task.record, np.eye(3), task.position, StaticModel.of(spec), prior, task.interval, rows)
     rests = _resting(log.integrals, stretches)
     if rest is not None:  # no north to be found: i is the body at the first sample
         log.C_n0_i = level_of(log.integrals.mean_force[np.flatnonzero(rests)[0]])

@@ -20,7 +20,7 @@ from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import hand_over
-from truenorth.alignment.inference import allan_noise, infer_spec, noise_of, usual_noise
+from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
 from truenorth.alignment.published import FADING, STATIONARY, Published, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
@@ -229,7 +229,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     integrals = integrate(task.record, task.interval, rows_at=rows)
     coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt)
     filtered, noise = check_filter(
-        task, integrals, coarse.C_n0_i, usual_noise(), None if spec is None else noise_of(spec)
+        task, integrals, coarse.C_n0_i, usual_noise(), None if spec is None else StaticModel.of(spec)
     )
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     used, where = _specification(spec, check, noise)
@@ -238,12 +238,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
     if method not in ("kalman", "swaying", *FADING):
         disturbance = np.sqrt(np.mean(base_velocity(integrals, coarse.C_n0_i, lat, alt) ** 2, axis=0))
-        covariance, floor = coarse_covariance(coarse, integrals, noise_of(used), P, disturbance)
+        covariance, floor = coarse_covariance(coarse, integrals, StaticModel.of(used), P, disturbance)
         C_n0_b = coarse.C_n0_i @ task.epoch.attitude(integrals.C_ib_at[0])
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
-    start = (task.record, coarse.C_n0_i, task.position, noise_of(used), P, task.interval, rows)
+    start = (task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
     if method in FADING:
         fine = faded_align(*start, method)
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled)
@@ -257,7 +257,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
     """The answer of a published filter of ten or eight states."""
-    found = stationary_align(task, C_n0_i, noise_of(used), P, method)
+    found = stationary_align(task, C_n0_i, StaticModel.of(used), P, method)
     answer = at_epoch(task, used, where, found.C_n0_b, found.covariance, found.floor)
     known = ~np.isnan(found.bias[3:])
     return replace(

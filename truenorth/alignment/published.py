@@ -143,7 +143,7 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
             f"{task.record.source}: the base is {task.motion.overall}, the IMU tilted by {math.degrees(tilt):.1f} deg; the method "
             f"{method} holds for a still base and an IMU level to {math.degrees(LEVEL_IMU):g} deg: choose another method"
         )
-    walks = StationaryModel(lat, alt, model.gyro_random_walk, model.accel_random_walk)
+    walks = StationaryModel(lat, alt, model)
     whole = np.diag([LEVEL_PRIOR**2] * 2 + [HEADING_PRIOR**2] + [VELOCITY_PRIOR**2] * 2 + [0.0] * 5)
     whole[BIASES, BIASES] = P_bias[:5, :5]
     kept = stationary.KEPT[n]

@@ -23,7 +23,6 @@ from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
-from truenorth.alignment.inference import noise_of
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
@@ -33,6 +32,7 @@ from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
+from truenorth.errors.staying import StaticModel
 from truenorth.quality.encoder import encoder_evidence, zero_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
@@ -110,7 +110,7 @@ def align_rotary(
         angles = angles_at(encoder, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb)
-    fine = sway_align(record, C_n0_i, position, noise_of(spec), P_bias, task.interval, rows, mount, _turned(spec))
+    fine = sway_align(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows, mount, _turned(spec))
     source = f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 

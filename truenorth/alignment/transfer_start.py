@@ -102,18 +102,14 @@ def model_from_spec(
 ) -> TransferModel:
     """The error model of a specification; instabilities become random walks of the biases."""
     sigma, beta = ((0.0, 0.0, 0.0), 1.0) if flexure is None else (tuple(float(x) for x in flexure[0]), flexure[1])
-    wander = math.sqrt(2.0 / spec.correlation_time)
-    return TransferModel(
-        spec.gyro_random_walk,
-        spec.accel_random_walk,
-        gyro_rate_walk=math.hypot(spec.gyro_rate_random_walk, wander * spec.gyro_bias_instability),
-        accel_rate_walk=math.hypot(spec.accel_rate_random_walk, wander * spec.accel_bias_instability),
+    return TransferModel.of(
+        spec,
         turn_noise=turn_noise(spec.gyro_scale_factor, spec.gyro_misalignment),
         delay=assumed.delay_sigma > 0.0,
         lever_arm=assumed.lever_arm_sigma > 0.0,
         mounting=attitude and assumed.mounting_sigma > 0.0,
         delay_walk=delay_walk if assumed.delay_sigma > 0.0 else 0.0,
-        flexure_sigma=sigma,  # type: ignore[arg-type]  # three of them
+        flexure_sigma=sigma,
         flexure_beta=beta,
         master=master or MasterErrors(),
     )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.check import BLIND_RATE, LogCheck
 from truenorth.alignment.fine import MAX_NOISE_PASSES, FineAlignment
-from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, noise_of, usual
+from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, usual
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import StaticModel, mean_velocity
@@ -92,7 +92,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
             part,
             C,
             task.position,
-            noise_of(spec),
+            StaticModel.of(spec),
             prior,
             task.interval if whole else filter_interval(part),
             rows_at if whole else None,

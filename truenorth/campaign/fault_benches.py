@@ -22,6 +22,7 @@ from truenorth.navigation import navigate
 from truenorth.navigation.result import Navigation
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.state.mounting import Mounting
+from truenorth.state.prior import prior_covariance
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -85,10 +86,8 @@ def _aiding(built: Scenario, seed: int, run: int) -> dict[str, Any]:
 def _start(rng: np.random.Generator, at: Any, simulated: Any, built: Scenario) -> Start:
     """Drawn about the truth with the sigmas that it claims."""
     spec = built.imu_spec
-    sigma = np.repeat([3e-4, 0.02, 1.0, 0.0, 0.0], 3)
-    sigma[2] = 3e-3
-    sigma[9:] = np.sqrt(spec.bias_variance)
-    off = sigma * rng.standard_normal(15)
+    P = prior_covariance((3e-4, 3e-4, 3e-3), 0.02, 1.0, spec.bias_variance)
+    off = np.sqrt(np.diag(P)) * rng.standard_normal(15)
     return Start(
         time=float(simulated.record.time[0] - simulated.record.interval),
         C_nb=dcm_from_rotation_vector(-off[:3]) @ at.C_nb,
@@ -98,7 +97,7 @@ def _start(rng: np.random.Generator, at: Any, simulated: Any, built: Scenario) -
         alt=float(at.alt) + off[8],
         gyro_bias=np.zeros(3),
         accel_bias=np.zeros(3),
-        P=np.diag(sigma**2),
+        P=P,
     )
 
 

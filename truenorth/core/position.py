@@ -47,6 +47,11 @@ class Position:
         if not (self.horizontal_sigma >= 0.0 and self.vertical_sigma >= 0.0):
             raise UsageError("a position sigma is negative or not a number; expected metres, zero or more")
 
+    @property
+    def sigma(self) -> tuple[float, float, float]:
+        """One-sigma error east, north, up, m."""
+        return self.horizontal_sigma, self.horizontal_sigma, self.vertical_sigma
+
     @classmethod
     def from_degrees(cls, lat: float, lon: float = 0.0, alt: float = 0.0, **sigmas: float) -> Position:
         """Latitude and longitude in degrees, height in metres."""

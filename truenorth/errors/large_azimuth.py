@@ -227,7 +227,7 @@ def attitude_error(x: Array, form: Form = "tilt_azimuth") -> Array:
 
 def _process_noise(model: StationaryModel, T: Array) -> Array:
     """(K, 10, 10): white gyro noise reaches phi at once and dv as a ramp, by gravity."""
-    q_g, q_a, g = model.gyro_random_walk**2, model.accel_random_walk**2, model.gravity
+    q_g, q_a, g = model.walks.gyro_random_walk**2, model.walks.accel_random_walk**2, model.gravity
     Q = np.zeros((len(T), STATES, STATES))
     Q[:, PHI, PHI] = q_g * T[:, None, None] * np.eye(3)
     Q[:, DV, DV] = (q_a * T + q_g * T**3 / 3 * g**2)[:, None, None] * np.eye(2)

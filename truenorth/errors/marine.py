@@ -39,6 +39,7 @@ from truenorth.errors.deflection import STANDARD_GRAVITY
 from truenorth.errors.dynamics import Dynamics, dynamics_of
 from truenorth.errors.group import Group
 from truenorth.errors.ins import error_dynamics, transition
+from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state import layout as ins
 
@@ -57,21 +58,15 @@ OF_INS = np.delete(np.arange(ins.STATES), [ins.DV.stop - 1, ins.DP.stop - 1])
 
 
 @dataclass(frozen=True)
-class MarineModel:
+class MarineModel(Walks):
     """Noise and memory of the error model; one-sigma, SI."""
 
-    accel_random_walk: float  # m/s/sqrt(s)
-    gyro_random_walk: float  # rad/sqrt(s)
-    accel_rate_walk: float = 0.0  # m/s^2/sqrt(s); white noise that drives the biases
-    gyro_rate_walk: float = 0.0  # rad/s/sqrt(s)
     accel_time: float = math.inf  # s; correlation times of the biases; infinite: constants, or random walks
     gyro_time: float = math.inf  # s
     groups: tuple[Group, ...] = ()  # behind the thirteen, those of the speed log first
 
     def __post_init__(self) -> None:
-        for name in ("accel_random_walk", "gyro_random_walk", "accel_rate_walk", "gyro_rate_walk"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise UsageError(f"{name} is {getattr(self, name)}; expected zero or more")
+        super().__post_init__()
         for name in ("accel_time", "gyro_time"):
             if not getattr(self, name) > 0.0:
                 raise UsageError(f"{name} is {getattr(self, name)} s; expected more than zero")
@@ -93,18 +88,8 @@ class MarineModel:
 
     @classmethod
     def from_spec(cls, spec: ImuSpec, groups: tuple[Group, ...] = ()) -> MarineModel:
-        """The model of a specification: constant biases that may walk.
-
-        A bias instability, forgotten in minutes, does over hours what a random walk of density ``sigma sqrt(2 tau)`` does.
-        """
-        slow = math.sqrt(2.0 * spec.correlation_time)
-        return cls(
-            accel_random_walk=math.hypot(spec.accel_random_walk, slow * spec.accel_bias_instability),
-            gyro_random_walk=math.hypot(spec.gyro_random_walk, slow * spec.gyro_bias_instability),
-            accel_rate_walk=spec.accel_rate_random_walk,
-            gyro_rate_walk=spec.gyro_rate_random_walk,
-            groups=groups,
-        )
+        """The model of a specification: constant biases that may walk; over hours their instability is white noise."""
+        return cls.of(spec, "white", groups=groups)
 
     @property
     def states(self) -> int:
@@ -136,9 +121,7 @@ class MarineModel:
     @property
     def noise(self) -> Array:
         """(n,) spectral density of the white noise that drives each state in time, its unit^2/s."""
-        q = np.zeros(self.states)
-        q[DV], q[PHI] = self.accel_random_walk**2, self.gyro_random_walk**2
-        q[BA], q[BG] = self.accel_rate_walk**2, self.gyro_rate_walk**2
+        q = self.density(self.states, PHI, DV, BG, BA)
         q[STATES:] = self.dynamics.noise[ins.STATES :]
         return q
 

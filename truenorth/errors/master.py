@@ -26,6 +26,7 @@ from truenorth.core.errors import UsageError
 from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME
 from truenorth.errors.model import InsModel
+from truenorth.errors.walks import Walks
 from truenorth.state.layout import BA, BG, DP, DV, PHI, Layout
 
 Array = NDArray[np.float64]
@@ -110,13 +111,9 @@ def master_errors(given: MasterErrors | str | None) -> MasterErrors:
 
 
 @dataclass(frozen=True)
-class TransferModel:
+class TransferModel(Walks):
     """Noise of the slave, and which groups there are; one-sigma, SI."""
 
-    gyro_random_walk: float  # rad/sqrt(s)
-    accel_random_walk: float  # m/s/sqrt(s)
-    gyro_rate_walk: float = 0.0  # random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s)
-    accel_rate_walk: float = 0.0
     # s; what scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.errors.model.InsModel`
     turn_noise: float = 0.0
     delay: bool = True  # groups for them
@@ -130,8 +127,8 @@ class TransferModel:
     master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
 
     def __post_init__(self) -> None:
-        walks = (self.gyro_random_walk, self.accel_random_walk, self.gyro_rate_walk, self.accel_rate_walk)
-        if not all(0.0 <= x < math.inf for x in (*walks, self.turn_noise, self.delay_walk, *self.flexure_sigma)):
+        super().__post_init__()
+        if not all(0.0 <= x < math.inf for x in (self.turn_noise, self.delay_walk, *self.flexure_sigma)):
             raise UsageError(f"{self}: a random walk or a sigma is negative or not finite")
         if not 0.0 < self.flexure_beta < math.inf:
             raise UsageError(f"flexure_beta is {self.flexure_beta}; expected a positive frequency, rad/s")

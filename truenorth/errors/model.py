@@ -14,6 +14,7 @@ from truenorth.core.linalg import padded
 from truenorth.errors.dynamics import Dynamics, couple_pairs, dynamics_of, noise_of_pairs
 from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME, couple_sensors, error_dynamics, transition
+from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
 
@@ -23,13 +24,9 @@ GYRO_SCALE, ACCEL_SCALE = "gyro scale factor", "accelerometer scale factor"
 
 
 @dataclass(frozen=True)
-class InsModel:
+class InsModel(Walks):
     """Noise of an INS, and its states; everything one-sigma, SI."""
 
-    gyro_random_walk: float  # rad/sqrt(s)
-    accel_random_walk: float  # m/s/sqrt(s)
-    gyro_rate_walk: float = 0.0  # random walk of the biases, rad/s/sqrt(s) and m/s^2/sqrt(s)
-    accel_rate_walk: float = 0.0
     # (2,) s: what scale factors and misalignments of the gyros do in turns, as noise: their variances times `TURN_TIME`
     turn_noise: tuple[float, float] = (0.0, 0.0)
     groups: tuple[Group, ...] = ()  # further states, in order
@@ -63,12 +60,10 @@ class InsModel:
             if sigma > 0.0:
                 own.append(Group(name, np.full(3, sigma), time))
         scale = 0.0 if scale_factors else spec.gyro_scale_factor
-        return cls(
-            gyro_random_walk=spec.gyro_random_walk,
-            accel_random_walk=spec.accel_random_walk,
+        return cls.of(
+            spec,
+            "state",
             turn_noise=(scale**2 * TURN_TIME, spec.gyro_misalignment**2 * TURN_TIME),
-            gyro_rate_walk=spec.gyro_rate_random_walk,
-            accel_rate_walk=spec.accel_rate_random_walk,
             groups=(*own, *groups),
             fixed_altitude=fixed_altitude,
         )
@@ -96,9 +91,7 @@ class InsModel:
     @property
     def noise(self) -> Array:
         """(15,) spectral density of the white noise that drives the states of the INS, their unit^2/s."""
-        q = np.zeros(STATES)
-        q[PHI], q[DV] = self.gyro_random_walk**2, self.accel_random_walk**2
-        q[BG], q[BA] = self.gyro_rate_walk**2, self.accel_rate_walk**2
+        q = self.density(STATES, PHI, DV, BG, BA)
         if self.fixed_altitude:
             q[DV.stop - 1] = 0.0
         return q

@@ -17,13 +17,14 @@ approach to inertial navigation systems, J. Guid. Control Dyn. 11, 1988.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.errors.ins import error_dynamics
+from truenorth.errors.walks import Walks
 from truenorth.state.layout import STATES as INS_STATES
 
 Array = NDArray[np.float64]
@@ -48,8 +49,7 @@ class StationaryModel:
 
     lat: float  # rad
     alt: float = 0.0  # m
-    gyro_random_walk: float = 0.0  # rad/sqrt(s)
-    accel_random_walk: float = 0.0  # m/s/sqrt(s)
+    walks: Walks = field(default_factory=Walks)  # of the sensors; its biases are constants
     complete: bool = True  # with the two terms that the paper's own model leaves out
 
     @property
@@ -83,9 +83,7 @@ class StationaryModel:
         n = states
         kept = KEPT[n]
         F = self.dynamics(C_nb)[np.ix_(kept, kept)]
-        G = np.zeros(STATES)
-        G[PHI], G[DV] = self.gyro_random_walk**2, self.accel_random_walk**2
-        G = G[kept]
+        G = replace(self.walks, gyro_rate_walk=0.0, accel_rate_walk=0.0).density(STATES, PHI, DV, BG, BA)[kept]
         block = np.block([[-F, np.diag(G)], [np.zeros((n, n)), F.T]]) * interval
         power, total = np.eye(2 * n), np.eye(2 * n)
         for k in range(1, terms + 1):

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import skew
+from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
 
@@ -43,13 +44,8 @@ QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without nois
 
 
 @dataclass(frozen=True)
-class StaticModel:
-    """Noise of the model; everything one-sigma, SI."""
-
-    gyro_random_walk: float  # rad/sqrt(s)
-    accel_random_walk: float  # m/s/sqrt(s)
-    gyro_rate_walk: float = 0.0  # rad/s/sqrt(s); slow change of the gyro bias as a random walk
-    accel_rate_walk: float = 0.0  # m/s^2/sqrt(s); slow change of the accelerometer bias
+class StaticModel(Walks):
+    """The model of a base that stays, by its noise."""
 
     def linearise(
         self,

@@ -26,6 +26,8 @@ from truenorth.quality.regimes import motion_summary
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import note
+from truenorth.state.layout import PHI
+from truenorth.state.prior import prior_covariance
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -180,11 +182,8 @@ def known_start(
         raise UsageError(f"sigmas {sigma:g}, {level_sigma:g} rad, {velocity_sigma:g} m/s; expected all above zero")
     C_nb = dcm_from_euler(heading, pitch, roll)
     phi_of = np.linalg.inv(euler_jacobian(C_nb))
-    P = np.zeros((15, 15))
-    P[:3, :3] = phi_of @ np.diag([sigma, level_sigma, level_sigma]) ** 2 @ phi_of.T
-    P[3:6, 3:6] = velocity_sigma**2 * np.eye(3)
-    P[6:9, 6:9] = np.diag([at.horizontal_sigma, at.horizontal_sigma, at.vertical_sigma]) ** 2
-    P[9:, 9:] = np.diag(spec.bias_variance)
+    P = prior_covariance(dv=velocity_sigma, dp=at.sigma, bias_variance=spec.bias_variance)
+    P[PHI, PHI] = phi_of @ np.diag([sigma, level_sigma, level_sigma]) ** 2 @ phi_of.T
     zero, begin = np.zeros(3), float(log.time[0] - log.interval)
     return moving_start(begin, C_nb, np.array(velocity, dtype=np.float64), positive(P), zero, zero, at, spec)
 

@@ -19,9 +19,9 @@ from truenorth.core.errors import AlignmentError, DataError
 from truenorth.core.position import Position
 from truenorth.navigation.handover import Handover
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.layout import BA, BG, PHI, STATES
 from truenorth.state.mounting import Mounting
-from truenorth.state.prior import WholeBiases
+from truenorth.state.prior import WholeBiases, prior_covariance
 from truenorth.state.state import Start
 
 if TYPE_CHECKING:
@@ -91,13 +91,11 @@ def _start(
     disturbance: Array,
     duration: float,
 ) -> Start:
-    P = np.zeros((STATES, STATES))
+    motion = np.where(np.isfinite(disturbance), disturbance, 0.0)
+    P = prior_covariance(dv=np.hypot(motion, LEAST_VELOCITY_SIGMA), dp=position.sigma)
     joined = [*range(STATES)[PHI], *range(STATES)[BG], *range(STATES)[BA]]
     P[np.ix_(joined, joined)] = joint.P
-    motion = np.where(np.isfinite(disturbance), disturbance, 0.0)
-    P[DV, DV] = np.diag(motion**2 + LEAST_VELOCITY_SIGMA**2)
-    P[DP, DP] = np.diag([position.horizontal_sigma, position.horizontal_sigma, position.vertical_sigma]) ** 2
-    slow = np.repeat([spec.gyro_bias_instability, spec.accel_bias_instability], 3) ** 2
+    slow = spec.bias_variance - spec.constant_variance
     whole = WholeBiases(np.maximum(joint.prior - slow, 0.0), duration)
     lat, lon, alt = position.lat, position.lon, position.alt
     return Start(
@@ -124,8 +122,7 @@ def _by_static_limits(
     g = float(normal_gravity(position.lat, position.alt))
     eps = np.diag(gyro_bias_sigma**2)
     # What acts as an accelerometer bias as long as the vehicle stays level: also scale factor, misalignment, deflection.
-    f2 = (g * C_nb[2]) ** 2
-    acting = spec.accel_scale_factor**2 * f2 + spec.accel_misalignment**2 * (f2.sum() - f2)
+    acting = spec.acting_variance(g * C_nb[2])
     nabla = np.diag(accel_bias_sigma**2 + acting)
     prior = spec.bias_variance
     prior[3:] += acting
@@ -148,10 +145,8 @@ def moving_start(
     position: Position,
     spec: ImuSpec,
 ) -> Start:
-    """Of an alignment on the move, which knows velocity and the correlations of all errors."""
-    whole = WholeBiases(
-        np.repeat([spec.gyro_bias**2 + spec.gyro_turn_on_bias**2, spec.accel_bias**2 + spec.accel_turn_on_bias**2], 3)
-    )
+    """Of an alignment on the move, which knows velocity and how all errors hang together."""
+    whole = WholeBiases(spec.constant_variance)
     lat, lon, alt = position.lat, position.lon, position.alt
     return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
 

@@ -144,9 +144,27 @@ class ImuSpec:
     @property
     def bias_variance(self) -> NDArray[np.float64]:
         """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2."""
-        gyro = self.gyro_bias**2 + self.gyro_turn_on_bias**2 + self.gyro_bias_instability**2
-        accel = self.accel_bias**2 + self.accel_turn_on_bias**2 + self.accel_bias_instability**2
+        return self.constant_variance + np.repeat([self.gyro_bias_instability**2, self.accel_bias_instability**2], 3)
+
+    @property
+    def constant_variance(self) -> NDArray[np.float64]:
+        """(6,) of it what does not change within a log: all but the bias instabilities."""
+        gyro = self.gyro_bias**2 + self.gyro_turn_on_bias**2
+        accel = self.accel_bias**2 + self.accel_turn_on_bias**2
         return np.repeat([gyro, accel], 3)
+
+    def acting_variance(self, f: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(3,) variance of what acts as an accelerometer bias under a constant force, beyond the bias, (m/s^2)^2.
+
+        ``measured = (I + S + M) f``: the i-th scale factor acts on f_i, the misalignments on the two others.
+
+        Parameters
+        ----------
+        f : (3,) array, m/s^2
+            Specific force, body axes.
+        """
+        f2 = np.square(f)
+        return np.asarray(self.accel_scale_factor**2 * f2 + self.accel_misalignment**2 * (f2.sum() - f2))
 
     def with_random_walks(self, interval: float) -> ImuSpec:
         """What a filter sees of the noise of samples: random walks that hold it, at a sampling interval (s)."""

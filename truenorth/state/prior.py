@@ -1,11 +1,13 @@
-"""What is known of the errors at the start beyond a covariance of the fifteen states."""
+"""What is known of the errors at the start: the covariance of the states, made here and nowhere else, and how biases come apart."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
 
 Array = NDArray[np.float64]
 
@@ -17,3 +19,23 @@ class WholeBiases:
     # (6,): variance a priori of what is constant of the gyro and accelerometer biases, (rad/s)^2 and (m/s^2)^2
     constant: Array
     averaged: float = 0.0  # s; they are means over the time before the start; 0: they hold at the start
+
+
+def prior_covariance(
+    phi: ArrayLike = 0.0, dv: ArrayLike = 0.0, dp: ArrayLike = 0.0, bias_variance: ArrayLike = 0.0, *others: float
+) -> Array:
+    """(15 + m, 15 + m) covariance at the start of errors that do not hang together.
+
+    Parameters
+    ----------
+    phi, dv, dp : one or (3,) sigmas, rad, m/s, m
+    bias_variance : one or (6,) variances, (rad/s)^2 and (m/s^2)^2
+        Of the biases, as a specification has them: :attr:`truenorth.records.specs.ImuSpec.bias_variance`.
+    *others : m floats
+        Sigmas of the states behind the fifteen.
+    """
+    variance = np.zeros(STATES + len(others))
+    for part, sigma in ((PHI, phi), (DV, dv), (DP, dp), (slice(STATES, None), others)):
+        variance[part] = np.square(sigma)
+    variance[BG.start : BA.stop] = bias_variance
+    return np.diag(variance)

@@ -13,9 +13,9 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, POSITION_SIGMA, VELOCITY_SIGMA, Errors
 from truenorth.papers.odometer.scenario import Drives
-from truenorth.state.layout import BA, BG, DP, DV, PHI
-from truenorth.state.layout import STATES as INS_STATES
+from truenorth.state.layout import PHI
 from truenorth.state.mounting import Mounting
+from truenorth.state.prior import prior_covariance
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -42,10 +42,8 @@ def run_invariant(
     x0[:, PHI] = phi0
     begin = np.swapaxes(correction(x0), 1, 2) @ drives.C_nb[0]
     for b, run in enumerate(which):
-        P = np.zeros((INS_STATES, INS_STATES))
-        P[PHI, PHI] = np.diag([LEVEL_SIGMA**2, LEVEL_SIGMA**2, azimuth_sigma[b] ** 2])
-        P[DV, DV], P[DP, DP] = VELOCITY_SIGMA**2 * np.eye(3), POSITION_SIGMA**2 * np.eye(3)
-        P[BG, BG], P[BA, BA] = spec.gyro_bias**2 * np.eye(3), spec.accel_bias**2 * np.eye(3)
+        angles = LEVEL_SIGMA, LEVEL_SIGMA, azimuth_sigma[b]
+        P = prior_covariance(angles, VELOCITY_SIGMA, POSITION_SIGMA, spec.constant_variance)
         zero = np.zeros(3)
         start = Start(0.0, begin[b], zero, *drives.place, zero, zero, P)
         wheel = Mounting(

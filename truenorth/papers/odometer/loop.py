@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.azimuth_filters import NOMINAL, Begin, Belief, noise_density, run_loop
+from truenorth.alignment.azimuth_filters import NOMINAL, Begin, Belief, run_loop
 from truenorth.core.attitude import misalignment, skew
 from truenorth.errors import in_motion_azimuth as model
-from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, PHI, STATES
+from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DV, PHI, STATES
+from truenorth.errors.walks import Walks
 from truenorth.papers.odometer.scenario import Drives
+from truenorth.state.prior import prior_covariance
 
 Array = NDArray[np.float64]
 
@@ -80,14 +82,19 @@ def run_method(
     x0[:, PHI] = phi0
     off, v = np.swapaxes(model.correction(x0), 1, 2), drives.v_n[begin]
     spec = drives.spec
-    sigma = np.zeros(STATES)
-    sigma[PHI], sigma[DV], sigma[DP] = LEVEL_SIGMA, VELOCITY_SIGMA, POSITION_SIGMA
-    sigma[BG], sigma[BA], sigma[DK] = spec.gyro_bias, spec.accel_bias, drives.scale_sigma
-    P = np.tile(np.diag(sigma**2), (len(which), 1, 1))
+    P = prior_covariance(LEVEL_SIGMA, VELOCITY_SIGMA, POSITION_SIGMA, spec.constant_variance, drives.scale_sigma)
+    P = np.tile(P, (len(which), 1, 1))
     P[:, AZIMUTH, AZIMUTH] = azimuth_sigma**2
     J = np.eye(STATES)
     J[DV, PHI] = skew(v)  # dv = C v - v = v x phi
-    start = Begin(begin, off @ drives.C_nb[begin], off @ v, drives.places[begin], J @ P @ J.T, noise_density(spec))
+    start = Begin(
+        begin,
+        off @ drives.C_nb[begin],
+        off @ v,
+        drives.places[begin],
+        J @ P @ J.T,
+        Walks.of(spec).density(STATES, PHI, DV, BG, BA),
+    )
     found = run_loop(drives.logs, which, start, method, gated=gated, turned=turned, belief=belief)
     rows = slice(begin + 1, None)
     return Errors(

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.inference import noise_of
 from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
 from truenorth.analysis.consistency import nees
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.indexing import C_bs_from_angles
-from truenorth.errors.staying import PHI, STATES
+from truenorth.errors.staying import PHI, STATES, StaticModel
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import Prior
 from truenorth.filters import LinearSystem, kalman
@@ -130,7 +129,7 @@ class _Stage:
             self.record.between(None, self.integrals.start + self.integrals.time[-1] + 0.5 * self.record.interval),
             dcm_from_rotation_vector(-start) @ self.truth[0],
             self.data.place,
-            noise_of(self.data.imu),
+            StaticModel.of(self.data.imu),
             Prior(np.zeros(STATES), P, {}),
             1.0,
             arm_velocity=self.sampled.arm["gyros"],
@@ -176,7 +175,7 @@ def _filters(
 
 def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> None:
     """Methods on whole logs from the first sample on: windowed least squares, and the filter with coloured noise."""
-    place, walks = data.place, noise_of(data.imu)
+    place, walks = data.place, StaticModel.of(data.imu)
     P_bias = np.diag(data.imu.bias_variance)
     for at in times:
         record = data.record.between(None, at + 0.5 * data.record.interval)

@@ -59,7 +59,7 @@ def system_of(truth: Truth, model: StationaryModel, states: int, P0: Array, R: f
     else:
         # The mean over the interval that ends at the epoch: half an interval late, which a stationary base does not show.
         H = np.stack([model.accelerometer_rows(C) for C in kinds])[which.ravel()]
-        z, noise = truth.force, R + model.accel_random_walk**2 / T
+        z, noise = truth.force, R + model.walks.accel_random_walk**2 / T
     return LinearSystem(
         Phi=Phi,
         Q=Q,

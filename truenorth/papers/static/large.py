@@ -17,6 +17,7 @@ from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, mi
 from truenorth.core.position import Position
 from truenorth.errors.large_azimuth import Form, attitude_error, large_azimuth_system
 from truenorth.errors.stationary import StationaryModel
+from truenorth.errors.walks import Walks
 from truenorth.filters import (
     FilterState,
     around_circle,
@@ -71,7 +72,7 @@ class Setting:
     def model(self) -> StationaryModel:
         """The error model at the place."""
         lat, alt = self.position.lat, self.position.alt
-        return StationaryModel(lat, alt, self.spec.gyro_random_walk, self.spec.accel_random_walk)
+        return StationaryModel(lat, alt, Walks.of(self.spec))
 
 
 def make_setting(lat: float, spec: ImuSpec, tilt_sigma: float, seed: int) -> Setting:

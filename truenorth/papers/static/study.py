@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truenorth.analysis.observability import PiecewiseObservability, Segment, piecewise_observability
 from truenorth.core.units import parse
 from truenorth.errors.stationary import DV, KEPT, StationaryModel, names_and_units
+from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
 from truenorth.papers.claims import settle
 from truenorth.papers.static.degrees import add_degrees, degrees_of, hardly_in_words
@@ -36,6 +37,7 @@ GYRO_BIAS = parse("0.01 deg/h", "angular_rate")
 ACCEL_BIAS = parse("100 ug", "acceleration")
 GYRO_WALK = parse("0.001 deg/sqrt(h)", "angle_random_walk")
 ACCEL_WALK = parse("10 ug/sqrt(Hz)", "velocity_random_walk")
+WALKS = Walks(GYRO_WALK, ACCEL_WALK)
 VELOCITY_PRIOR = 1e-3  # m/s, one sigma
 SIGMAS = np.array([*PHI_SIGMA, *[VELOCITY_PRIOR] * 2, *[GYRO_BIAS] * 3, *[ACCEL_BIAS] * 2])  # of the ten states
 QUIET = 1e-10  # (m/s)^2, and (m/s^2)^2: what even a still base is allowed
@@ -133,7 +135,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
 
 
 def _honest_truth(base: Base, runs: int, seed: int) -> Truth:
-    model = StationaryModel(LAT, 0.0, GYRO_WALK, ACCEL_WALK)
+    model = StationaryModel(LAT, 0.0, WALKS)
     return simulate(
         model,
         base,
@@ -148,7 +150,7 @@ def _honest_truth(base: Base, runs: int, seed: int) -> Truth:
 
 def _honest_system(truth: Truth, base: Base, states: int, share: float = 1.0, complete: bool = True) -> LinearSystem:
     """The filter that knows the noise; `share` of the base's motion, where it does not."""
-    model = StationaryModel(LAT, 0.0, GYRO_WALK, ACCEL_WALK, complete)
+    model = StationaryModel(LAT, 0.0, WALKS, complete)
     P0 = np.diag(SIGMAS**2)
     T = PERIOD * EVERY
     if states == 10:
@@ -229,7 +231,7 @@ def _observability(base: Base, states: int) -> PiecewiseObservability:
 def _add_cost(table: Table, seed: int) -> None:
     """Time of a filter step with ten and eight states, side by side, best of five; and their ratio."""
     truth = simulate(
-        StationaryModel(LAT, 0.0, GYRO_WALK, ACCEL_WALK),
+        StationaryModel(LAT, 0.0, WALKS),
         BASES["still"],
         duration=60.0,
         runs=20,

@@ -94,7 +94,7 @@ def simulate(
     fed, free = zip(*(_exact(model, C) for C in turns), strict=True)
     velocity, force = np.empty((runs, count, 2)), np.empty((runs, count, 2))
     phi, phi_platform = np.empty((runs, count, 3)), np.empty((runs, count, 3))
-    walk = np.sqrt(PERIOD) * np.array([model.gyro_random_walk] * 3 + [model.accel_random_walk] * 2)
+    walk = np.sqrt(PERIOD) * np.array([model.walks.gyro_random_walk] * 3 + [model.walks.accel_random_walk] * 2)
     before = platform[:, DV].copy()
     for k in range(steps):
         if k % 1000 == 0:  # noise in blocks: the same whatever the number of runs
