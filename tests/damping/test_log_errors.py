@@ -14,7 +14,7 @@ from truenorth.damping.bands import filter_bands
 from truenorth.damping.drift import likely_time
 from truenorth.damping.filters import Filter, FixRows, run_filters
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
-from truenorth.errors.marine import DP, PHI, MarineModel
+from truenorth.errors.marine import BG, DP, PHI, MarineModel
 from truenorth.papers.damping.truth import drawn
 from truenorth.simulation.processes import gauss_markov
 
@@ -115,9 +115,9 @@ def test_two_fixes_calibrate_the_gyros(truth):
     first, second = round(2 * HOUR / 10), round(11 * HOUR / 10)
     z, sigma = np.full((len(truth.time), 3), np.nan), np.ones((len(truth.time), 3))
     for k in (first, second):
-        z[k], sigma[k] = x[k][[2, 3, 6]], [1.0, 1.0, np.radians(0.1 / 60)]
+        z[k], sigma[k] = [*x[k, DP], x[k, PHI.stop - 1]], [1.0, 1.0, np.radians(0.1 / 60)]
     prior = SIGMA.copy()
-    prior[10:] *= 20.0  # the fixes tell, not the prior
+    prior[BG] *= 20.0  # the fixes tell, not the prior
     kind = Filter(model, np.diag(prior**2), 0.05, fixes=FixRows(z, sigma))
     silent = np.full((len(truth.time), 2), np.nan)
     found = run_filters(course, silent, start=0, kinds={"free": kind})["free"]
@@ -125,7 +125,8 @@ def test_two_fixes_calibrate_the_gyros(truth):
     def theta(k):
         lat, _, alt = truth.position[k]
         R_M, R_N = radii(lat)
-        return np.array([-x[k, 3] / (R_M + alt), x[k, 2] / (R_N + alt), x[k, 2] / (R_N + alt) * math.tan(lat)])
+        east, north = x[k, DP]
+        return np.array([-north / (R_M + alt), east / (R_N + alt), east / (R_N + alt) * math.tan(lat)])
 
     psi = [x[k, PHI] - theta(k) for k in (first, second)]
     A, B = np.eye(3), np.zeros((3, 3))
@@ -136,9 +137,9 @@ def test_two_fixes_calibrate_the_gyros(truth):
         step = expm(-cross * truth.interval)
         A, B = step @ A, step @ B + truth.interval * truth.C_nb[k]
     eps = np.linalg.solve(B, A @ psi[0] - psi[1])
-    size = np.linalg.norm(x[0, 10:])
-    np.testing.assert_allclose(eps, x[0, 10:], atol=0.02 * size)  # the law, by the true errors
-    np.testing.assert_array_less(found.sigma[-1, 10:13], 0.3 * prior[10:])
-    np.testing.assert_array_less(np.abs(found.x[-1, 10:13] - x[-1, 10:]), 4.0 * found.sigma[-1, 10:13])
+    size = np.linalg.norm(x[0, BG])
+    np.testing.assert_allclose(eps, x[0, BG], atol=0.02 * size)  # the law, by the true errors
+    np.testing.assert_array_less(found.sigma[-1, BG], 0.3 * prior[BG])
+    np.testing.assert_array_less(np.abs(found.x[-1, BG] - x[-1, BG]), 4.0 * found.sigma[-1, BG])
     np.testing.assert_array_less(np.abs(found.x[second, DP] - x[second, DP]), 4.0)
     assert np.abs(found.x[first - 1, DP] - x[first - 1, DP]).max() > 100.0  # before the fix it was off

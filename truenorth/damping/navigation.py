@@ -217,7 +217,7 @@ def _with_time(
 def _whole(track: Track, log: _Log, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
     """All errors of INS and log at the switch."""
     model = MarineModel.from_spec(spec, (*errors.groups(), *others))
-    places, rows = list(range(STATES)), list(OF_INS)
+    places, rows = list(range(STATES)), OF_INS.tolist()
     deflected, there = model.slice_of(DEFLECTION), track.layout.slice_of(DEFLECTION)
     if deflected is not None and there is not None:
         places += range(deflected.start, deflected.stop)
