@@ -17,8 +17,9 @@ LAT, ALT = np.radians(40.0), 100.0
 
 def _turning_record(seconds: float = 20.0, rate: float = 100.0) -> tuple[ImuRecord, np.ndarray]:
     """An IMU that turns about its own centre on a base at rest, and its attitude at the start."""
-    tones = (Tone(0.3, 11.0, 0.4),), (Tone(0.2, 7.0, 1.0),), (Tone(0.25, 9.0, 2.0),)
-    motion = Sway(Position(LAT, 0.0, ALT), 0.7, 0.05, -0.1, *tones)
+    heading, pitch, roll = (Tone(0.3, 11.0, 0.4),), (Tone(0.2, 7.0, 1.0),), (Tone(0.25, 9.0, 2.0),)
+    place = Position(LAT, 0.0, ALT)
+    motion = Sway(place, 0.7, 0.05, -0.1, heading_tones=heading, pitch_tones=pitch, roll_tones=roll)
     return simulate(motion, rate=rate, duration=seconds).record, motion.states(0.0).C_nb
 
 

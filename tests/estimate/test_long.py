@@ -133,8 +133,11 @@ def test_halving_the_step_moves_position_by_less_than_a_millimetre():
 
     What differs in sway is an attitude of 1e-10 rad from its first seconds; it grows with the square of the amplitude.
     """
-    tones = (Tone(np.radians(2), 7.0, 1.0),), (Tone(np.radians(1.5), 5.0, 0.8),), (Tone(np.radians(3), 6.0, 0.4),)
-    sway = Sway(Position.from_degrees(40.0, 118.0), 0.5, 0.0, 0.0, *tones)
+    heading, pitch, roll = (
+        Tone(np.radians(a), T, phase) for a, T, phase in ((2, 7.0, 1.0), (1.5, 5.0, 0.8), (3, 6.0, 0.4))
+    )
+    place = Position.from_degrees(40.0, 118.0)
+    sway = Sway(place, 0.5, heading_tones=(heading,), pitch_tones=(pitch,), roll_tones=(roll,))
     cruise = course(Position.from_degrees(40.0, 118.0), straight(3600.0), heading=0.8, speed=10.0)
     for motion in (sway, cruise):
         fine = simulate(motion, rate=200.0, duration=3600.0).record
