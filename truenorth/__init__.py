@@ -52,7 +52,9 @@ if TYPE_CHECKING:
     )
     from truenorth.advice import advise, advise_manoeuvre
     from truenorth.aiding.aids import Barometer, Gnss, Indexer, Master, Odometer, Positions, VelocityLog
+    from truenorth.aiding.attitude import Attitude
     from truenorth.aiding.fixes import AzimuthFix, Fixes, PositionFix
+    from truenorth.aiding.magnetometer import Magnetometer, earth_field
     from truenorth.alignment import Alignment, Recipe, Request, align, register_recipe
     from truenorth.campaign import run_campaign
     from truenorth.core.errors import AlignmentError, DataError, TruenorthError, UsageError
@@ -71,8 +73,9 @@ if TYPE_CHECKING:
         write_imu,
         write_record,
     )
+    from truenorth.formats.magnetometer import read_magnetometer
     from truenorth.navigation import Mounting, Navigation, navigate
-    from truenorth.navigation.known import known_start, with_heading
+    from truenorth.navigation.known import known_start, start_from_master, with_heading
     from truenorth.quality import inspect
     from truenorth.records import (
         GnssRecord,
@@ -84,6 +87,7 @@ if TYPE_CHECKING:
         VelocityRecord,
     )
     from truenorth.records.calibration import Calibration
+    from truenorth.records.magnetometer import MagnetometerRecord
     from truenorth.records.specs import ImuSpec, imu_spec
     from truenorth.report import write_report
     from truenorth.results import Views, load, plot, register_result, save
@@ -92,6 +96,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Alignment": "alignment",
     "AlignmentError": "core.errors",
+    "Attitude": "aiding.attitude",
     "AzimuthFix": "aiding.fixes",
     "Barometer": "aiding.aids",
     "Calibration": "records.calibration",
@@ -105,6 +110,8 @@ _HOMES = {
     "ImuSpec": "records.specs",
     "Indexer": "aiding.aids",
     "LogErrors": "errors.log",
+    "Magnetometer": "aiding.magnetometer",
+    "MagnetometerRecord": "records.magnetometer",
     "Master": "aiding.aids",
     "MasterRecord": "records",
     "Mounting": "navigation",
@@ -125,6 +132,7 @@ _HOMES = {
     "advise": "advice",
     "advise_manoeuvre": "advice",
     "align": "alignment",
+    "earth_field": "aiding.magnetometer",
     "imu_spec": "records.specs",
     "inspect": "quality",
     "known_start": "navigation.known",
@@ -135,6 +143,7 @@ _HOMES = {
     "read_gnss": "formats",
     "read_height": "formats",
     "read_imu": "formats",
+    "read_magnetometer": "formats.magnetometer",
     "read_master": "formats",
     "read_odometer": "formats",
     "read_trajectory": "formats",
@@ -144,6 +153,7 @@ _HOMES = {
     "run_campaign": "campaign",
     "save": "results",
     "simulate": "simulation",
+    "start_from_master": "navigation.known",
     "with_heading": "navigation.known",
     "write_imu": "formats",
     "write_record": "formats",
@@ -153,6 +163,7 @@ _HOMES = {
 __all__ = [
     "Alignment",
     "AlignmentError",
+    "Attitude",
     "AzimuthFix",
     "Barometer",
     "Calibration",
@@ -166,6 +177,8 @@ __all__ = [
     "ImuSpec",
     "Indexer",
     "LogErrors",
+    "Magnetometer",
+    "MagnetometerRecord",
     "Master",
     "MasterRecord",
     "Mounting",
@@ -186,6 +199,7 @@ __all__ = [
     "advise",
     "advise_manoeuvre",
     "align",
+    "earth_field",
     "imu_spec",
     "inspect",
     "known_start",
@@ -196,6 +210,7 @@ __all__ = [
     "read_gnss",
     "read_height",
     "read_imu",
+    "read_magnetometer",
     "read_master",
     "read_odometer",
     "read_trajectory",
@@ -205,6 +220,7 @@ __all__ = [
     "run_campaign",
     "save",
     "simulate",
+    "start_from_master",
     "with_heading",
     "write_imu",
     "write_record",

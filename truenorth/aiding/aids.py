@@ -6,6 +6,7 @@ dataclass with a `key`, a `record` and a method `sources`, as :class:`Gnss` has;
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -21,6 +22,8 @@ from truenorth.records.flexure import FlexureSpec
 from truenorth.state.mounting import Mounting
 
 ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
+BASELINE = math.radians(1.0)  # of a second antenna said to be ahead of the first
+ANTENNA = Mounting(angle_sigma=BASELINE)  # whose mounting is not given
 WEATHER = Mounting(bias_sigma=10.0, bias_time=3600.0)  # of a barometer whose mounting is not given
 
 
@@ -66,7 +69,7 @@ class Gnss(_Mounted):
     ----------
     record : GnssRecord
     mounting : Mounting, optional
-        Of the antenna.
+        Of the antenna; a second one is on the forward axis of ``C_mb``, to `angle_sigma` (1 deg when left out).
     """
 
     record: GnssRecord
@@ -74,7 +77,7 @@ class Gnss(_Mounted):
 
     def sources(self, altitude: str) -> list[Aiding]:
         """Positions and velocities."""
-        return from_gnss(self.record, self.mounting or Mounting(), heights=altitude in ("gnss", "free"))
+        return from_gnss(self.record, self.mounting or ANTENNA, heights=altitude in ("gnss", "free"))
 
 
 @dataclass(frozen=True)

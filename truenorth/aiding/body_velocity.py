@@ -30,6 +30,7 @@ from truenorth.aiding.row import (
     AT_MOUNT,
     AT_OWN,
     AT_SCALE,
+    BODY_FRAME,
     MOUNT,
     Row,
     lag_now,
@@ -170,5 +171,8 @@ def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any,
 
 
 BODY_VELOCITY = Row(
-    "body velocity", _body_velocity, {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1, "own": 2}
+    "body velocity",
+    _body_velocity,
+    {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1, "own": 2},
+    axes=BODY_FRAME,
 )

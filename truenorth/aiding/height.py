@@ -34,4 +34,4 @@ def _height(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any
     height_row(now, matrix_of(now, NOW_C), arm, state_of(assumed, at[AT_BIAS]), at[AT_BIAS], measured, H, z)
 
 
-HEIGHT = Row("height", _height, {"bias": 1}, rows=1)
+HEIGHT = Row("height", _height, {"bias": 1}, rows=1, unit="m", axes=("height",))

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from truenorth.aiding.position import into_north
+from truenorth.aiding.position import convergence, into_north
 from truenorth.aiding.row import (
     ARM,
     AT_ARM,
@@ -172,11 +172,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         if at[AT_LAG] >= 0:
             H[j, at[AT_LAG]] = -turn[j]
     # East and north at the computed place are turned against those at the master's by the convergence of the meridians.
-    s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
-    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
-    if level > 0.0:
-        rate = axis[2] / level * (c * c * Kxx - 2.0 * s * c * Kxy + s * s * Kyy)
-        H[2, _DP], H[2, _DP + 1] = rate * c, -rate * s
+    H[2, _DP], H[2, _DP + 1] = convergence(now)
     into_north(now, H, z)
     if at[AT_BIAS] >= 0:
         for j in range(3):
@@ -185,5 +181,5 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 MASTER_VELOCITY = Row("master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1}, width=10, instant=True)
 MASTER_ATTITUDE = Row(
-    "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=8, instant=True
+    "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=8, instant=True, unit="rad"
 )

@@ -68,5 +68,5 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
 
 
 MASTER_ACCELERATION = Row(
-    "master acceleration", _acceleration, {"lever arm": 3, "bias": 3, "lag": 1}, width=9, instant=True
+    "master acceleration", _acceleration, {"lever arm": 3, "bias": 3, "lag": 1}, width=9, instant=True, unit="m/s^2"
 )

@@ -34,4 +34,4 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             H[0, a], H[1, a], H[2, a] = c * C[0, j] - s * C[1, j], s * C[0, j] + c * C[1, j], C[2, j]
 
 
-MASTER_POSITION = Row("master position", _position, {"lever arm": 3, "lag": 1})
+MASTER_POSITION = Row("master position", _position, {"lever arm": 3, "lag": 1}, unit="m")

@@ -42,6 +42,20 @@ def into_north(s: Any, H: Any, z: Any) -> None:
 
 
 @compiled
+def convergence(s: Any) -> Any:
+    """Of the meridians: by what north turns a metre along x and y of w, rad/m, two numbers."""
+    sine, cosine = azimuth(s)
+    axis = earth_axis(s)
+    Kxx, Kxy, Kyy = curvature(axis, s[11])
+    east = cosine * cosine * Kxx - 2.0 * sine * cosine * Kxy + sine * sine * Kyy  # curvature along east
+    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    rate = 0.0
+    if level > 0.0:
+        rate = axis[2] / level * east
+    return rate * cosine, -rate * sine
+
+
+@compiled
 def position_row(
     s: Any,
     C: Any,
@@ -117,4 +131,4 @@ def _position(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     position_row(now, C, arm, lag, bias, at[AT_ARM], at[AT_LAG], at[AT_BIAS], measured, H, z)
 
 
-POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1})
+POSITION = Row("position", _position, {"lever arm": 3, "bias": 3, "lag": 1}, unit="m")

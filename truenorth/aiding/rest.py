@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from truenorth.aiding.row import Row, row
+from truenorth.aiding.row import BODY_FRAME, Row, row
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_EARTH, NOW_GYRO_NOISE, NOW_MEAN_RATE, NOW_SINCE, matrix_of, vector_of
@@ -52,4 +52,4 @@ def _rotation(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             R[i] += now[NOW_GYRO_NOISE] / now[NOW_SINCE]
 
 
-ROTATION = Row("rotation", _rotation, {})
+ROTATION = Row("rotation", _rotation, {}, unit="rad/s", axes=BODY_FRAME)

@@ -31,6 +31,7 @@ ROLES = {
     "own": AT_OWN,
 }
 LARGEST = 10  # numbers in a measurement
+LEVEL_FRAME, BODY_FRAME = ("east", "north", "up"), ("right", "forward", "up")
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,10 @@ class Row:
         Numbers in a measurement, at most `LARGEST`.
     instant : bool
         It needs rate and specific force at its very time; the loop then waits for the three samples after it.
+    unit : str
+        Of `z`, SI: what its innovations are shown in.
+    axes : tuple of str
+        Names of the components of `z`.
     """
 
     name: str
@@ -60,6 +65,8 @@ class Row:
     rows: int = 3
     width: int = 3
     instant: bool = False
+    unit: str = "m/s"
+    axes: tuple[str, ...] = LEVEL_FRAME
 
 
 row = compiled_callback(SIGNATURE)  # compiles a row of a measurement, with the signature that the loop calls

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.aiding.heading import HEADING
 from truenorth.aiding.source import Aiding, Role, state
 from truenorth.core.errors import UsageError
 from truenorth.errors.group import Group
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 POSITION_SIGMA = np.array([3.0, 3.0, 5.0])  # m, of a fix whose receiver says nothing; times the dilution of precision
 USER_RANGE = 2.0  # m, of one range, where only dilutions of precision are given
 VELOCITY_SIGMA = np.array([0.1, 0.1, 0.2])  # m/s
+HEADING_SIGMA = math.radians(1.0)  # of a baseline whose receiver says nothing
 ODOMETER_SIGMA = 0.05  # m/s, besides the pulses' size
 LOG_SIGMA = 0.1  # m/s
 DRIFT_TIME = 3.0 * 3600.0  # s, of a log's drift where nobody knows it: between tides and eddies
@@ -45,14 +47,14 @@ def states_of(mounting: Mounting, name: str, *roles: Role) -> dict[Role, Group]:
 
 
 def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -> list[Aiding]:
-    """Positions and velocities of an antenna.
+    """Positions and velocities of an antenna, and the heading of the line to a second one.
 
     Parameters
     ----------
     record : GnssRecord
         Rows of quality 0 (no fix) and 6 (dead reckoning) are left out.
     mounting : Mounting
-        Of the antenna.
+        Of the antenna. The second one lies along the forward axis of ``C_mb``, to `angle_sigma`.
     heights : bool
         Use heights and vertical velocities.
 
@@ -90,6 +92,25 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         sigma = _or_default(record.velocity_sigma, VELOCITY_SIGMA, len(record))
         states = states_of(mounting, "GNSS", "lever arm", "lag")
         found.append(rows_of("velocity", moving, measured, sigma, states))
+    turned = record.has_heading & sound
+    if turned.any() and record.heading is not None:
+        states = states_of(mounting, "GNSS", "lag")
+        if mounting.angle_sigma > 0.0:
+            states["bias"] = Group("GNSS heading bias", np.array([mounting.angle_sigma]), unit="rad")
+        told = None if record.heading_sigma is None else record.heading_sigma[:, None]
+        sigma = np.tile(_or_default(told, np.array([HEADING_SIGMA]), len(record)), 3)
+        found.append(
+            Aiding(
+                "GNSS heading",
+                HEADING,
+                time[turned],
+                record.heading[turned, None],
+                sigma[turned],
+                C_mb=mounting.C_mb,
+                states=states,
+                gate=mounting.gate,
+            )
+        )
     return found
 
 

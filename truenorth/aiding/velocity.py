@@ -5,30 +5,15 @@ Its own states are a drift east and north (:mod:`truenorth.errors.log`): ``z = v
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from truenorth.aiding.position import into_north
+from truenorth.aiding.position import convergence, into_north
 from truenorth.aiding.row import ARM, AT_ARM, AT_LAG, AT_OWN, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
-from truenorth.strapdown.wander import azimuth, curvature, earth_axis
 
 _PHI, _DV, _DP, _BG = 0, 3, 6, 9
-
-
-@compiled
-def convergence_of_meridians(s: Any, sine: float, cosine: float) -> float:
-    """By how much north turns a metre eastwards, ``tan L/(R_N + h)``, rad/m; 0 at a pole."""
-    axis = earth_axis(s)
-    Kxx, Kxy, Kyy = curvature(axis, s[11])
-    east = cosine * cosine * Kxx - 2.0 * sine * cosine * Kxy + sine * sine * Kyy
-    level = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
-    turn = 0.0
-    if level > 0.0:
-        turn = axis[2] / level * east
-    return turn
 
 
 @compiled
@@ -50,8 +35,6 @@ def velocity_row(
         C[1, 0] * u_b[0] + C[1, 1] * u_b[1] + C[1, 2] * u_b[2],
         C[2, 0] * u_b[0] + C[2, 1] * u_b[1] + C[2, 2] * u_b[2],
     )
-    sine, cosine = azimuth(s)
-    convergence = convergence_of_meridians(s, sine, cosine)
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
         c = cross(u, e)
@@ -65,10 +48,10 @@ def velocity_row(
         if at_lag >= 0:
             H[j, at_lag] = push[j]
         z[j] = s[4 + j] + u[j] - lag * push[j]
-    H[0, _DP] = convergence * cosine * z[1]
-    H[0, _DP + 1] = -convergence * sine * z[1]
-    H[1, _DP] = -convergence * cosine * z[0]
-    H[1, _DP + 1] = convergence * sine * z[0]
+    turn = convergence(s)
+    for j in range(2):
+        H[0, _DP + j] = turn[j] * z[1]
+        H[1, _DP + j] = -turn[j] * z[0]
     into_north(s, H, z)
     for j in range(3):
         z[j] -= measured[j]

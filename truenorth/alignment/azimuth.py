@@ -131,6 +131,7 @@ def _track(found: Solution, time: Array, C_mb: Array, wheel: Mounting) -> Track:
         outside=0,
         stamp=time,
         jumped=np.zeros(len(time), dtype=bool),
+        unit="m",
     )
     layout = Layout(("odometer scale",), ((wheel.scale_sigma,),))
     return Track(

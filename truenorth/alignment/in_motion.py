@@ -11,10 +11,11 @@ from typing import Any, Literal, TypeGuard, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.sensors import from_gnss, from_odometer
+from truenorth.aiding.aids import BASELINE
+from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
-from truenorth.alignment.in_motion_latitude import find_latitude
+from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_start import (
     Guess,
     backtracked,
@@ -33,6 +34,7 @@ from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
 from truenorth.errors.group import Group, groups_of
+from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.rivals import misfit, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
@@ -41,7 +43,7 @@ from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
-from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
@@ -58,6 +60,7 @@ INTERVAL = 0.5  # s, of the filter's prediction
 OUTPUT = 1.0  # s, of the history
 GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros are asked for north first
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
+NO_LOG_ERRORS = LogErrors()
 WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
 PASSES = 2
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
@@ -74,19 +77,23 @@ class _Task:
     spec: ImuSpec
     model: InsModel
     position: Position
-    odometer: OdometerRecord | None
+    odometer: OdometerRecord | VelocityRecord | None  # what shows velocity in body axes
     gnss: GnssRecord | None
     wheel: Mounting
     antenna: Mounting
     stops: Sequence[Aiding]  # and gaps of the log
     more: Sequence[Aiding]
+    slow: LogErrors = NO_LOG_ERRORS
 
     def aiding(self, *, gated: bool) -> list[Aiding]:
         """Of all sensors; without gates as long as the filter may be wrong itself."""
         wheel, antenna = (m if gated else replace(m, gate=0.0) for m in (self.wheel, self.antenna))
         found = list(self.stops)
         if self.odometer is not None:
-            found += from_odometer(self.odometer, wheel)
+            log = self.odometer
+            found += (
+                from_odometer(log, wheel) if isinstance(log, OdometerRecord) else from_velocity(log, wheel, self.slow)
+            )
         if self.gnss is not None:
             found += from_gnss(self.gnss, antenna)
         return found + [source if gated else replace(source, gate=0.0) for source in self.more]
@@ -117,6 +124,8 @@ def align_in_motion(
     *,
     odometer: OdometerRecord | None = None,
     gnss: GnssRecord | None = None,
+    velocity: VelocityRecord | None = None,
+    velocity_errors: LogErrors = NO_LOG_ERRORS,
     position: Position | None = None,
     wheel: Mounting | None = None,
     antenna: Mounting | None = None,
@@ -142,13 +151,16 @@ def align_in_motion(
         Body axes RFU, about: heading is that of the y axis.
     imu : ImuSpec, str, path or mapping
         Specification of the IMU; a log on the move cannot be asked for it.
-    odometer, gnss : records, one at least
-        On the IMU's clock.
+    odometer, gnss, velocity : records, one at least
+        On the IMU's clock. `velocity` is a Doppler or speed log in body axes, in the place of an odometer.
+    velocity_errors : LogErrors
+        Its slow errors besides those of its mounting; none when left out.
     position : Position, optional
         At the start; not needed with GNSS positions. Without either the latitude is found from the log by gyros that see the
         earth turn, and said among the reasons.
     wheel, antenna : Mounting, optional
-        How they sit. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m) of the wheel are estimated.
+        How they sit; `wheel` is that of a velocity log, too. Left out, scale (3 %), mounting angles (3 deg) and lever arm (1 m)
+        of wheel or log are estimated.
     sources : sequence of Aiding
         Further measurements, such as rows of one's own.
     errors : sequence of Group or str
@@ -173,15 +185,17 @@ def align_in_motion(
     Raises
     ------
     UsageError
-        Neither odometer nor GNSS; an option out of range.
+        Neither odometer, velocity log nor GNSS; an option out of range.
     DataError
         Aiding logs that do not overlap; a gap that cannot be bridged.
     AlignmentError
         Too short a log.
     """
     tell = progress or (lambda stage: None)
-    task = _task(record, imu, odometer, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
-    task = replace(task, model=replace(task.model, groups=(*task.model.groups, *groups_of(errors, task.spec))))
+    body = _in_body_axes(odometer, velocity)
+    task = _task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
+    model = replace(task.model, groups=(*task.model.groups, *groups_of(errors, task.spec)))
+    task = replace(task, model=model, slow=velocity_errors)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
         raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")
     if not heading_limit > 0.0 or passes < 1:
@@ -190,11 +204,7 @@ def align_in_motion(
         )
     if method in AZIMUTH_METHODS:
         tell(f"aligning: {method}")
-        track = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
-        answer = _answer(task, track, method, "asked for; a published filter, to be compared", 0.0)
-        return judge_moving(
-            answer, track, heading_limit, [n for log in (odometer, gnss) if log for n in notes(log.notes)]
-        )
+        return _published(task, method, heading_limit, [n for log in (body, gnss) if log for n in notes(log.notes)])
     bias = float(np.sqrt(task.spec.bias_variance[0]))
     level_rate = EARTH_RATE * math.cos(task.position.lat)
     able = bias < level_rate * math.sin(GYROCOMPASS)
@@ -224,7 +234,7 @@ def align_in_motion(
         guess = replace(guess, C_nb=backtracked(task.record, track))
         track = task.run(guess, gated=True)
     answer = _answer(task, track, method, why, spread)
-    more = [item for log in (odometer, gnss) if log is not None for item in notes(log.notes)]
+    more = [item for log in (body, gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += _seen(task, track, guess, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)
@@ -243,6 +253,15 @@ def _seen(task: _Task, track: Track, guess: Guess, *, gated: bool) -> list[Evide
     )
 
 
+def _published(task: _Task, method: str, heading_limit: float, more: list[Evidence]) -> Alignment:
+    """By a published filter of an odometer."""
+    if not isinstance(task.odometer, OdometerRecord):
+        raise UsageError(f"method {method!r} is that of an odometer; expected one, or auto, gyrocompass, motion")
+    track = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
+    answer = _answer(task, track, method, "asked for; a published filter, to be compared", 0.0)
+    return judge_moving(answer, track, heading_limit, more)
+
+
 def _cost_at(task: _Task, lat: float) -> float:
     """Minus twice the log-likelihood of the log at a latitude."""
     task = replace(task, position=Position(lat, horizontal_sigma=0.0))
@@ -257,14 +276,29 @@ def _of_latitude(answer: Alignment, able: bool) -> Evidence:
     lat = answer.position.lat
     if able and answer.moving is not None:
         sigma = float(answer.moving.track.sigma[-1, DP][1]) / METRES_PER_RADIAN
-        return note("latitude.found", lat=lat, sigma=sigma)
+        if sigma < NARROWED * PRIOR:
+            return note("latitude.found", lat=lat, sigma=sigma)
     return note("latitude.assumed", lat=lat)
+
+
+def _in_body_axes(
+    odometer: OdometerRecord | None, velocity: VelocityRecord | None
+) -> OdometerRecord | VelocityRecord | None:
+    """The one sensor that shows velocity in body axes."""
+    if odometer is not None and velocity is not None:
+        raise UsageError("an odometer and a velocity log; expected one of them, and the other as a further source")
+    if velocity is not None and velocity.frame != "body":
+        raise UsageError(
+            f"{velocity.source}: velocities east, north, up; alignment on the move takes those of a GNSS log, with positions, or "
+            "velocities in body axes (v_right, v_forward, v_up)"
+        )
+    return odometer or velocity
 
 
 def _task(
     record: ImuRecord,
     imu: Any,
-    odometer: OdometerRecord | None,
+    odometer: OdometerRecord | VelocityRecord | None,
     gnss: GnssRecord | None,
     position: Position | None,
     wheel: Mounting | None,
@@ -276,7 +310,7 @@ def _task(
 ) -> _Task:
     if odometer is None and gnss is None:
         raise UsageError(
-            "alignment on the move without an odometer and without GNSS; expected odometer=, gnss= or both"
+            "alignment on the move without an odometer, a velocity log and GNSS; expected odometer= or velocity=, gnss= or both"
         )
     if imu is None:
         raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
@@ -288,7 +322,7 @@ def _task(
     odometer = None if odometer is None else odometer.shifted(offset)
     gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
     if position is None:
-        position = _first_fix(record, gnss) if _has_fixes(gnss) else Position(SOMEWHERE)
+        position = first_fix(record, gnss) if _has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
     spec = imu_spec(imu).seen_in(record)
@@ -331,14 +365,14 @@ def usual_antenna(gnss: GnssRecord | None) -> Mounting:
     told = None if gnss is None or gnss.position_sigma is None else gnss.position_sigma[:, :2]
     told = None if told is None else told[np.isfinite(told)]
     bias = RECEIVER_BIAS if told is None or not told.size else float(np.median(told))
-    return Mounting(latency_sigma=LATENCY_SIGMA, bias_sigma=bias, bias_time=RECEIVER_TIME)
+    return Mounting(latency_sigma=LATENCY_SIGMA, bias_sigma=bias, bias_time=RECEIVER_TIME, angle_sigma=BASELINE)
 
 
 def _has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
     return gnss is not None and bool(gnss.has_position.any())
 
 
-def _first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
+def first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
     """Where a log begins, by GNSS."""
     fixes = np.flatnonzero(gnss.has_position)
     nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
@@ -377,7 +411,8 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float) -> 
     history = _history(track, task)
     covariance = history.phi_covariance[-1].copy()
     covariance[2, 2] = min(covariance[2, 2] + spread**2, UNIFORM_SIGMA**2)
-    mounting = None if task.odometer is None else (task.wheel.C_mb, task.wheel.lever_arm)
+    sensor = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
+    mounting = None if task.odometer is None else (sensor, task.wheel.C_mb, task.wheel.lever_arm)
     speed = np.linalg.norm(track.v_n, axis=1)
     distance = float(np.trapezoid(speed, track.time))
     prior = np.sqrt(task.spec.bias_variance)
@@ -434,4 +469,7 @@ def _history(track: Track, task: _Task) -> History:
         innovation=innovation,
         innovation_sigma=expected,
         nis=nis,
+        innovation_of=aided.name if aided is not None else "nothing",
+        innovation_unit=aided.unit if aided is not None else "1",
+        innovation_axes=aided.axes if aided is not None else (),
     )

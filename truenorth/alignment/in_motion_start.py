@@ -13,7 +13,7 @@ from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odomet
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
-from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import DV, PHI, STATES
 from truenorth.state.mounting import Mounting
@@ -44,7 +44,7 @@ class Guess:
 def coarse_guess(
     record: ImuRecord,
     position: Position,
-    odometer: OdometerRecord | None,
+    odometer: OdometerRecord | VelocityRecord | None,
     gnss: GnssRecord | None,
     wheel: Mounting,
     antenna: Mounting,
@@ -59,7 +59,7 @@ def coarse_guess(
 
 
 def guesses_all_round(
-    record: ImuRecord, position: Position, odometer: OdometerRecord | None, wheel: Mounting
+    record: ImuRecord, position: Position, odometer: OdometerRecord | VelocityRecord | None, wheel: Mounting
 ) -> list[Guess]:
     """Level from the first seconds, and headings all round."""
     dtheta, dvel = increments(record)
@@ -68,9 +68,8 @@ def guesses_all_round(
     force = velocity[1]
     if odometer is not None:  # what the wheel says of the acceleration is not gravity's
         at = record.time[0] - record.steps[0] + np.array([0.0, float(record.steps[:rows].sum())])
-        speed = np.interp(at, odometer.time - wheel.latency, odometer.speed)
-        forward = wheel.C_mb[1]
-        force = force - (C[1] @ forward * speed[1] - C[0] @ forward * speed[0])
+        v_b = _velocity_b(odometer, wheel, at)
+        force = force - (C[1] @ v_b[1] - C[0] @ v_b[0])
     level = level_of(force)
     step = 2.0 * math.pi / HEADINGS
     return [Guess(dcm_from_euler(k * step, 0.0, 0.0) @ level, BANK_LEVEL, step) for k in range(HEADINGS)]
@@ -81,7 +80,7 @@ def start_at(
     guess: Guess,
     position: Position,
     spec: ImuSpec,
-    odometer: OdometerRecord | None,
+    odometer: OdometerRecord | VelocityRecord | None,
     gnss: GnssRecord | None,
     wheel: Mounting,
 ) -> Start:
@@ -89,8 +88,8 @@ def start_at(
     time = float(record.time[0] - record.steps[0])
     v_n, sigma = np.zeros(3), UNKNOWN_START
     if odometer is not None:
-        speed = float(np.interp(time, odometer.time - wheel.latency, odometer.speed))
-        v_n, sigma = guess.C_nb @ wheel.C_mb[1] * speed, math.hypot(ODOMETER_START, wheel.angle_sigma * speed)
+        v_b = _velocity_b(odometer, wheel, np.array([time]))[0]
+        v_n, sigma = guess.C_nb @ v_b, math.hypot(ODOMETER_START, wheel.angle_sigma * float(np.linalg.norm(v_b)))
     elif gnss is not None:
         v_n, sigma = gnss_track(gnss, np.array([time, time + 1e-3, record.time[-1]]))[0][0], GNSS_START
     # Slow parts of the biases are states of their own.
@@ -102,6 +101,12 @@ def start_at(
         P = turn @ P @ turn.T
     zero = np.zeros(3)
     return Start(time, guess.C_nb, v_n, position.lat, position.lon, position.alt, zero, zero, P)
+
+
+def _velocity_b(log: OdometerRecord | VelocityRecord, mounting: Mounting, at: Array) -> Array:
+    """(M, 3) velocity in body axes at these times, m/s."""
+    v = log.velocity_b(mounting.C_mb)
+    return np.stack([np.interp(at, log.time - mounting.latency, v[:, i]) for i in range(3)], axis=1)
 
 
 def backtracked(record: ImuRecord, track: Track) -> Array:

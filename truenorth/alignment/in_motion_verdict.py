@@ -27,7 +27,7 @@ def _wheel(answer: Alignment) -> list[Evidence]:
         return []
     wheel, layout = moving.wheel, moving.track.layout
     return [
-        note("odometer.scale", scale=wheel.scale, sigma=wheel.scale_sigma)
+        note("odometer.scale", name=wheel.sensor, scale=wheel.scale, sigma=wheel.scale_sigma)
         for name, prior in zip(layout.names, layout.priors, strict=True)
-        if name == "odometer scale" and wheel.scale_sigma < NOT_ESTIMATED * prior[0]
+        if name == f"{wheel.sensor} scale" and wheel.scale_sigma < NOT_ESTIMATED * prior[0]
     ]

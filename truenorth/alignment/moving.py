@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Wheel:
-    """How the odometer was found to sit and to count.
+    """How the odometer, or the velocity log, was found to sit and to count.
 
     Attributes
     ----------
@@ -32,6 +32,7 @@ class Wheel:
         Relative error of what it counts.
     lever_arm, lever_arm_sigma : (3,) arrays, m
         IMU to wheel, body axes.
+    sensor : {"odometer", "velocity log"}
     """
 
     C_mb: Array
@@ -40,6 +41,7 @@ class Wheel:
     scale_sigma: float
     lever_arm: Array
     lever_arm_sigma: Array
+    sensor: str = "odometer"
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,8 @@ class Moving:
         if self.wheel is not None:
             w = self.wheel
             result |= {
-                "odometer_scale": w.scale,
-                "odometer_scale_sigma": w.scale_sigma,
+                f"{w.sensor.replace(' ', '_')}_scale": w.scale,
+                f"{w.sensor.replace(' ', '_')}_scale_sigma": w.scale_sigma,
                 "mounting_C_mb": w.C_mb.tolist(),
                 "mounting_deg": [math.degrees(_signed(float(a))) for a in euler_from_dcm(w.C_mb)],
                 "mounting_sigma_deg": np.degrees(w.angle_sigma).tolist(),
@@ -115,10 +117,10 @@ def fifteen(track: Track) -> Array:
     return np.asarray(M @ track.P @ M.T)
 
 
-def wheel_of(track: Track, C_mb: Array, lever_arm: Array) -> Wheel:
-    """How the wheel sits after a track, from what was assumed."""
+def wheel_of(track: Track, sensor: str, C_mb: Array, lever_arm: Array) -> Wheel:
+    """How the wheel (or the log) sits after a track, from what was assumed."""
     layout, sensors, sigma = track.layout, track.sensors[-1], track.sigma[-1]
-    scale, angles, arm = (layout.slice_of(f"odometer {role}") for role in ("scale", "mounting", "lever arm"))
+    scale, angles, arm = (layout.slice_of(f"{sensor} {role}") for role in ("scale", "mounting", "lever arm"))
     if angles is not None:
         about_x, about_z = sensors[angles]
         C_mb = dcm_from_rotation_vector(-np.array([about_x, 0.0, about_z])) @ C_mb
@@ -129,11 +131,12 @@ def wheel_of(track: Track, C_mb: Array, lever_arm: Array) -> Wheel:
         scale_sigma=0.0 if scale is None else float(sigma[scale.start]),
         lever_arm=lever_arm if arm is None else lever_arm + sensors[arm],
         lever_arm_sigma=np.zeros(3) if arm is None else sigma[arm],
+        sensor=sensor,
     )
 
 
-def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[Array, Array] | None) -> Moving:
-    """The rest of the state at the end of a track; `mounting` is ``C_mb`` and lever arm as assumed of an odometer."""
+def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[str, Array, Array] | None) -> Moving:
+    """The rest of the state at the end of a track; `mounting` names the odometer or log: ``C_mb`` and lever arm as assumed."""
     P, C_nb = fifteen(track)[-1], track.C_nb[-1]
     wheel = None if mounting is None else wheel_of(track, *mounting)
     C_mb = np.eye(3) if wheel is None else wheel.C_mb
@@ -141,7 +144,7 @@ def moving_of(track: Track, distance: float, heading_from: str, mounting: tuple[
     variance = P[PHI, PHI][2, 2]
     if wheel is not None:
         # Heading and mounting yaw are correlated: the error of the vehicle's heading is phi_U and what is left of the yaw.
-        angles = track.layout.slice_of("odometer mounting")
+        angles = track.layout.slice_of(f"{wheel.sensor} mounting")
         if angles is not None:
             full = track.P[-1]
             yaw = angles.start + 1

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from truenorth.aiding.aids import Gnss, Indexer, Master, Odometer, Positions
+from truenorth.aiding.aids import Barometer, Gnss, Indexer, Master, Odometer, Positions, VelocityLog
 from truenorth.alignment.result import Alignment
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.errors import AlignmentError, UsageError
@@ -90,7 +90,7 @@ class Recipe:
     at : bool
         Whether another epoch than the last sample can be asked for.
     own : bool
-        Whether aids of a user's own module, with a method `sources`, may be given besides these.
+        Whether sensors of attitude, and aids of a user's own module, may be given besides these.
     """
 
     name: str
@@ -102,7 +102,7 @@ class Recipe:
 
     def fits(self, kinds: set[type]) -> bool:
         """Whether it takes aids of these types."""
-        kinds = {kind for kind in kinds if not (self.own and _of_a_user(kind))}
+        kinds = {kind for kind in kinds if not (self.own and _further(kind))}
         return kinds <= set(self.aids) if kinds else not self.aids
 
     def __call__(self, request: Request) -> Alignment:
@@ -114,8 +114,9 @@ class Recipe:
         return self.run(request)
 
 
-def _of_a_user(kind: type) -> bool:
-    return hasattr(kind, "sources") and not kind.__module__.startswith("truenorth.")
+def _further(kind: type) -> bool:
+    """Whether aids of this type bring their measurements themselves: sensors of attitude, or of a user's own module."""
+    return hasattr(kind, "sources") and kind not in (Gnss, Odometer, VelocityLog, Barometer)
 
 
 def on_base(r: Request) -> Alignment:
@@ -127,10 +128,12 @@ def on_base(r: Request) -> Alignment:
 
 
 def in_motion(r: Request) -> Alignment:
-    """A vehicle under way, by odometer, GNSS or both."""
+    """A vehicle under way, by odometer or velocity log, GNSS or both."""
     from truenorth.alignment.in_motion import align_in_motion
+    from truenorth.errors.log import LogErrors, log_errors
 
-    odometer, gnss = r.aids.get(Odometer), r.aids.get(Gnss)
+    odometer, log, gnss = r.aids.get(Odometer), r.aids.get(VelocityLog), r.aids.get(Gnss)
+    wheel = odometer or log
     if r.imu is None:
         raise UsageError(
             "on the move the errors of the IMU cannot be found from the log; expected imu: navigation, tactical, industrial, "
@@ -141,10 +144,12 @@ def in_motion(r: Request) -> Alignment:
         r.imu,
         odometer=None if odometer is None else odometer.record,
         gnss=None if gnss is None else gnss.record,
+        velocity=None if log is None else log.record,
+        velocity_errors=LogErrors() if log is None or log.errors is None else log_errors(log.errors, "body"),
         position=r.place,
-        wheel=None if odometer is None else odometer.mounting,
+        wheel=None if wheel is None else wheel.mounting,
         antenna=None if gnss is None else gnss.mounting,
-        sources=[source for kind, a in r.aids.items() if _of_a_user(kind) for source in a.sources("free")],
+        sources=[source for kind, a in r.aids.items() if _further(kind) for source in a.sources("free")],
         method=r.method,
         calibration=r.calibration,
         **r.common,
@@ -211,7 +216,7 @@ def on_table(r: Request) -> Alignment:
 
 RECIPES = [
     Recipe("a base that stays", on_base, methods=True, at=True),
-    Recipe("a vehicle on the move", in_motion, (Odometer, Gnss), methods=True, own=True),
+    Recipe("a vehicle on the move", in_motion, (Odometer, VelocityLog, Gnss), methods=True, own=True),
     Recipe("a master INS", by_master, (Master,)),
     Recipe("an IMU on an indexer", on_indexer, (Indexer,), at=True),
     Recipe("a turntable", on_table, (Positions,)),
@@ -238,8 +243,8 @@ def align(
 ) -> Alignment:
     """Find pitch, roll and true heading of an IMU.
 
-    Without aids the base stays where it is: still, shaken or swaying. On the move an odometer or a GNSS receiver aids; against a
-    master INS its solution; on an indexer its encoder; on a turntable say :class:`Positions`.
+    Without aids the base stays where it is: still, shaken or swaying. On the move an odometer, a velocity log in body axes or a
+    GNSS receiver aids; against a master INS its solution; on an indexer its encoder; on a turntable say :class:`Positions`.
 
     Parameters
     ----------
@@ -252,8 +257,8 @@ def align(
         Specification, a preset's name, or a YAML file. On a base that stays the scale of the errors is inferred from the log when
         it is left out.
     aid : aid or sequence of aids
-        :class:`Odometer`, :class:`Gnss`, :class:`Master`, :class:`Indexer`, :class:`Positions`; on the move also one of
-        your own, as navigation takes it.
+        :class:`Odometer`, :class:`VelocityLog`, :class:`Gnss`, :class:`Master`, :class:`Indexer`, :class:`Positions`; on the
+        move also :class:`Attitude`, :class:`Magnetometer`, or one of your own, as navigation takes it.
     method : str or callable
         ``auto``, or one of the recipe. On a base: ``analytic`` (TRIAD on mean rate and specific force, still base only),
         ``inertial`` (dual vector in the inertial frame), ``oba`` (optimisation-based alignment), ``kalman`` (coarse, then a Kalman

@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Status = Literal["aligned", "level_only", "not_converged", "not_observable", "inconsistent"]
 
 NOT_ESTIMATED = 0.9  # a bias whose sigma stays above this part of its prior has not been estimated
+SHORT = {"east": "E", "north": "N", "up": "U"}  # of axes, in names of columns
 NEAR_VERTICAL = np.radians(85.0)  # beyond this pitch only the combination of heading and roll is known
 
 
@@ -51,10 +52,16 @@ class History:
         Misalignment (E, N, U) of the attitude as known then against the final answer at the same time.
     gyro_bias, gyro_bias_sigma : (K, 3) arrays, rad/s
     accel_bias, accel_bias_sigma : (K, 3) arrays, m/s^2
-    innovation, innovation_sigma : (K, 3) arrays, m/s
-        Velocity of the base (E, N, U) seen against its prediction.
+    innovation, innovation_sigma : (K, 3) arrays
+        A measurement seen against its prediction; NaN where absent.
     nis : (K,) array
-        Normalised innovation squared; its mean is 3 where the model is right.
+        Normalised innovation squared; its mean is the number of components where the model is right.
+    innovation_of : str
+        The measurement, such as "velocity of the base" or "GNSS position".
+    innovation_unit : str
+        SI.
+    innovation_axes : tuple of str
+        Names of the components.
     """
 
     time: Array
@@ -69,6 +76,14 @@ class History:
     innovation: Array
     innovation_sigma: Array
     nis: Array
+    innovation_of: str = "velocity of the base"
+    innovation_unit: str = "m/s"
+    innovation_axes: tuple[str, ...] = ("east", "north", "up")
+
+    @property
+    def components(self) -> tuple[int, ...]:
+        """Which of the innovation's components were measured at all."""
+        return tuple(int(i) for i in np.flatnonzero(np.isfinite(self.innovation).any(axis=0)))
 
     @cached_property
     def euler(self) -> Array:
@@ -324,8 +339,10 @@ class Alignment(Shown):
             columns[f"gyro_bias_{axis}_sigma_deg_h"] = h.gyro_bias_sigma[:, i] / DEG_PER_HOUR
             columns[f"accel_bias_{axis}_ug"] = h.accel_bias[:, i] / MICRO_G
             columns[f"accel_bias_{axis}_sigma_ug"] = h.accel_bias_sigma[:, i] / MICRO_G
-        for i, axis in enumerate("ENU"):
-            columns[f"innovation_{axis}_m_s"] = h.innovation[:, i]
-            columns[f"innovation_{axis}_sigma_m_s"] = h.innovation_sigma[:, i]
+        unit = h.innovation_unit.replace("/", "_")
+        for i in h.components:
+            axis = SHORT.get(h.innovation_axes[i], h.innovation_axes[i])
+            columns[f"innovation_{axis}_{unit}"] = h.innovation[:, i]
+            columns[f"innovation_{axis}_sigma_{unit}"] = h.innovation_sigma[:, i]
         columns["nis"] = h.nis
         return columns

@@ -42,6 +42,7 @@ MOST_EPOCHS = 400  # of the linear system that says what is told apart
 MOST_ROWS = 5000  # of the history
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
+UNITS = {None: "rad", "velocity": "m/s", "position": "m", "acceleration": "m/s^2"}
 TIED = 0.95  # correlation of two states beyond which one is not known without the other
 
 WORDS = {
@@ -307,6 +308,8 @@ def _history(slave: ImuRecord, track: TransferTrack, what: Matched) -> History:
         innovation=track.innovation[k, columns],
         innovation_sigma=track.innovation_sigma[k, columns],
         nis=track.nis[k, 1 if what.translation is None else 0],
+        innovation_of=f"{what.translation or 'attitude'} of the master",
+        innovation_unit=UNITS[what.translation],
     )
 
 

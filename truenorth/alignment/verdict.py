@@ -133,7 +133,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
                     {"axis": axis, "residual": float(residual), "allowed": bias, "imu": answer.imu_source},
                     "bounded",
                     Effect(heading=turned),
-                    ("latitude", "units", "specification"),
+                    ("latitude", "imu_axes", "units", "specification"),
                 )
             )
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.

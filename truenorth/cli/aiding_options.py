@@ -23,6 +23,14 @@ PARTS = ("scale", "mounting", "lever_arm", "latency", "scale_factors")
 SIGMAS = {"scale": 0.05, "mounting": math.radians(5.0), "lever_arm": 2.0, "latency": 0.3}
 
 
+Baseline = Annotated[
+    str | None,
+    option(
+        "Direction of the second GNSS antenna from the first on the vehicle, and its one sigma, deg; '0,1' without it."
+    ),
+]
+
+
 def arm_of(text: str, option: str) -> Any:
     """A lever arm: right, forward, up, m."""
     import numpy as np
@@ -164,14 +172,20 @@ class OnTheMove:
         Path | None,
         option("GNSS log, positions and/or velocities, alone or with an odometer; --lat is then not needed."),
     ] = None
-    offset: Annotated[float, option("Added to the times of the odometer's and the GNSS log, s.")] = 0.0
+    velocity: Annotated[
+        Path | None,
+        option("Log of a Doppler or speed log in body axes (v_right, v_forward, v_up), in place of an odometer."),
+    ] = None
+    offset: Annotated[float, option("Added to the times of those logs, s.")] = 0.0
     wheel_arm: Annotated[
-        str | None, option("IMU to the odometer's wheel, m: right,forward,up; estimated without it.")
+        str | None,
+        option("IMU to the odometer's wheel or the velocity log, m: right,forward,up; estimated without it."),
     ] = None
     antenna_arm: Annotated[str | None, option("IMU to the GNSS antenna, m: right,forward,up.")] = None
     latency: Annotated[
         float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
     ] = None
+    baseline: Baseline = None
     mounting: Annotated[
         str | None, option("Heading,pitch,roll of the IMU against the vehicle (or the master), deg.")
     ] = None
@@ -184,27 +198,30 @@ class OnTheMove:
     @property
     def given(self) -> bool:
         """Whether a sensor of motion is named."""
-        return self.odometer is not None or self.gnss is not None
+        return any(log is not None for log in (self.odometer, self.gnss, self.velocity))
 
     def aids(self) -> list[Any]:
-        """Odometer and GNSS, where they are named."""
+        """Odometer, velocity log and GNSS, where they are named."""
         from dataclasses import replace
 
-        from truenorth.aiding.aids import Gnss, Odometer
+        from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
         from truenorth.alignment.in_motion import WHEEL, usual_antenna
         from truenorth.core.errors import UsageError
-        from truenorth.formats import read_gnss, read_odometer
+        from truenorth.formats import read_gnss, read_odometer, read_velocity
 
         if self.given and not self.mounting_sigma > 0.0:
             raise UsageError(f"--mounting-sigma {self.mounting_sigma:g}: expected degrees above zero")
         found: list[Any] = []
+        wheel = replace(WHEEL, angle_sigma=math.radians(self.mounting_sigma))
+        if self.mounting is not None:
+            wheel = replace(wheel, C_mb=angles_of(self.mounting))
+        if self.wheel_arm is not None:
+            wheel = replace(wheel, lever_arm=arm_of(self.wheel_arm, "--wheel-arm"), lever_arm_sigma=0.0)
         if self.odometer is not None:
-            wheel = replace(WHEEL, angle_sigma=math.radians(self.mounting_sigma), noise=self.odometer_noise)
-            if self.mounting is not None:
-                wheel = replace(wheel, C_mb=angles_of(self.mounting))
-            if self.wheel_arm is not None:
-                wheel = replace(wheel, lever_arm=arm_of(self.wheel_arm, "--wheel-arm"), lever_arm_sigma=0.0)
-            found.append(Odometer(read_odometer(self.odometer).shifted(self.offset), wheel))
+            counted = replace(wheel, noise=self.odometer_noise)
+            found.append(Odometer(read_odometer(self.odometer).shifted(self.offset), counted))
+        if self.velocity is not None:
+            found.append(VelocityLog(read_velocity(self.velocity).shifted(self.offset), wheel))
         if self.gnss is not None:
             receiver = read_gnss(self.gnss).shifted(self.offset)
             antenna = usual_antenna(receiver)
@@ -212,7 +229,7 @@ class OnTheMove:
                 antenna = replace(antenna, lever_arm=arm_of(self.antenna_arm, "--antenna-arm"))
             if self.latency is not None:
                 antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
-            found.append(Gnss(receiver, antenna))
+            found.append(Gnss(receiver, on_baseline(antenna, self.baseline)))
         return found
 
 
@@ -253,6 +270,7 @@ class Sensors:
         float, option("Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
     ] = 0.0
     lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up.")] = None
+    baseline: Baseline = None
     wheel_arm: Annotated[str | None, option("IMU to the odometer's wheel, m: right,forward,up.")] = None
     mounting: Annotated[
         str | None, option("Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log).")
@@ -290,7 +308,7 @@ class Sensors:
                     f"--gnss-drift {self.gnss_drift}: expected metres and seconds above zero, such as 2,60"
                 )
             antenna = replace(antenna, bias_sigma=sigma, bias_time=time)
-        return replace(antenna, latency=self.latency)
+        return on_baseline(replace(antenna, latency=self.latency), self.baseline)
 
     def log_errors(self, frame: str) -> LogErrors | None:
         """Of the velocity log: those of its kind, and what is given of them; None: nothing is said."""
@@ -368,6 +386,19 @@ class Sensors:
             scale_sigma=sigma.get("scale", 0.0),
             latency_sigma=sigma.get("latency", 0.0),
         )
+
+
+def on_baseline(antenna: Mounting, baseline: str | None) -> Mounting:
+    """The antenna with the direction of a second one."""
+    from dataclasses import replace
+
+    from truenorth.aiding.aids import BASELINE
+    from truenorth.state.mounting import mounting_angles
+
+    if baseline is None:
+        return replace(antenna, angle_sigma=BASELINE)
+    angle, sigma = (math.radians(x) for x in numbers_of(baseline, "--baseline", 2, "heading and one sigma in degrees"))
+    return replace(antenna, C_mb=mounting_angles(-angle), angle_sigma=sigma)
 
 
 def _delay(text: str | None, usual: float) -> tuple[float, float]:

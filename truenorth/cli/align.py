@@ -12,6 +12,7 @@ import typer
 
 from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable
 from truenorth.cli.align_options import check_options
+from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.print_alignment import print_alignment
@@ -37,6 +38,8 @@ Examples:
   truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv --indexer-axes z,x
   truenorth align drive.csv --odometer odo.csv --lat 39.9 --imu navigation -o start
   truenorth align drive.csv --gnss gnss.csv --imu industrial -o start
+  truenorth align boat.csv --velocity dvl.csv --lat 59.4 --imu navigation
+  truenorth align drive.csv --gnss gnss.csv --magnetometer mag.csv --date 2025-06-01 --imu consumer
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
@@ -74,6 +77,7 @@ def align(
     indexer: OnIndexer,
     master: ByMaster,
     moving: OnTheMove,
+    pointing: OfAttitude,
 ) -> None:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying."""
     from dataclasses import replace
@@ -103,7 +107,8 @@ def align(
             )
         aids: list[Any] = [
             *master.aids(indexer.arm, moving.mounting, moving.mounting_sigma),
-            *(moving.aids() if master.master is None else []),
+            *(found := moving.aids() if master.master is None else []),
+            *(pointing.aids(record, place or _first_place(record, found)) if pointing.given else []),
             *table.aids(),
             *indexer.aids(),
         ]
@@ -141,6 +146,14 @@ def align(
             print_advice(make_console(), advice)
     if result.status not in ("aligned", "level_only"):
         raise typer.Exit(4)
+
+
+def _first_place(record: ImuRecord, aids: list[Any]) -> Position | None:
+    """Where GNSS says that a log begins."""
+    from truenorth.alignment.in_motion import first_fix
+
+    fixes = next((aid.record for aid in aids if aid.key == "gnss" and aid.record.has_position.any()), None)
+    return None if fixes is None else first_fix(record, fixes)
 
 
 def _latitude(place: Position | None, aids: list[Any]) -> float | None:

@@ -12,7 +12,9 @@ PROCEDURES = {
     "--master": "a master INS",
     "--odometer": "a vehicle on the move",
     "--gnss": "a vehicle on the move",
+    "--velocity": "a vehicle on the move",
 }
+MOVING = ("--odometer", "--gnss", "--velocity")
 BELONGS = {
     "--arm-sigma": ("--positions",),
     "--indexer-axes": ("--indexer",),
@@ -23,19 +25,27 @@ BELONGS = {
     "--matching": ("--master",),
     "--delay": ("--master",),
     "--flexure": ("--master",),
-    "--offset": ("--odometer", "--gnss"),
-    "--wheel-arm": ("--odometer",),
+    "--offset": MOVING,
+    "--wheel-arm": ("--odometer", "--velocity"),
+    "--attitude": MOVING,
+    "--attitude-sigma": ("--attitude",),
+    "--attitude-mounting": ("--attitude",),
+    "--magnetometer": MOVING,
+    "--magnetometer-axes": ("--magnetometer",),
+    "--magnetometer-iron": ("--magnetometer",),
+    "--date": ("--magnetometer",),
+    "--baseline": ("--gnss",),
     "--odometer-noise": ("--odometer",),
     "--antenna-arm": ("--gnss",),
     "--error": ("--odometer", "--gnss"),
     "--latency": ("--gnss",),
-    "--mounting": ("--odometer", "--gnss", "--master"),
-    "--mounting-sigma": ("--odometer", "--gnss", "--master"),
+    "--mounting": (*MOVING, "--master"),
+    "--mounting-sigma": (*MOVING, "--master"),
 }
 CLASHES = {
     "--method": ("--positions", "--indexer", "--master"),
-    "--at": ("--positions", "--master", "--odometer", "--gnss"),
-    "--advise": ("--master", "--odometer", "--gnss"),
+    "--at": ("--positions", "--master", *MOVING),
+    "--advise": ("--master", *MOVING),
 }
 INSTEAD = {
     "--method": "leave it out: the procedure has a method of its own",
@@ -61,7 +71,7 @@ def check_options(context: typer.Context) -> None:
                 "align with each, in two calls"
             )
     for option, homes in BELONGS.items():
-        if option in given and not set(homes) & set(chosen):
+        if option in given and not set(homes) & set(given):
             raise UsageError(f"{option} belongs to {' or '.join(homes)}; expected it along with that, or not at all")
     for option, others in CLASHES.items():
         clash = [other for other in chosen if other in others]

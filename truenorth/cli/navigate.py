@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import typer
 
 from truenorth.cli.aiding_options import Sensors
+from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import make_console, print_written, stages
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, Reading, numbers_of
@@ -34,6 +35,8 @@ Examples:
   truenorth navigate log.csv --start start --odometer odo.csv --estimate scale,mounting --zupt auto
   truenorth navigate log.csv --start start --velocity dvl.csv --altitude fixed --json
   truenorth navigate log.csv --start start --baro baro.csv --altitude baro --offset -0.35
+  truenorth navigate log.csv --master ins.csv --master-sigma 0.1,0.02 --imu tactical --gnss gnss.csv
+  truenorth navigate log.csv --start start --attitude ahrs.csv --attitude-sigma 0.1,0.3,300
   truenorth navigate log.csv --heading 123,1 --position 48.1,11.5,520 --imu consumer --gnss gnss.csv
   truenorth navigate log.csv --start start --damping augmented --velocity log.csv -o damped
 
@@ -86,6 +89,10 @@ class KnownStart:
         str | None,
         option("Heading and its one-sigma, deg: '123,1'; with --position, or with a --start that has levelled."),
     ] = None
+    master: Annotated[
+        Path | None, option("Log of another system's solution: the start is its first row within the log.")
+    ] = None
+    master_sigma: Annotated[str | None, option("One sigma of that row's heading and level, deg: '0.5,0.1'.")] = None
     position: Annotated[
         str | None, option("Where the log begins: lat,lon or lat,lon,alt in degrees and metres; needs --imu.")
     ] = None
@@ -102,9 +109,19 @@ class KnownStart:
         from truenorth.core.errors import UsageError
         from truenorth.navigation.start import read_start, start_from_alignment
 
+        if self.master is not None:
+            if folder is not None or self.heading is not None:
+                raise UsageError("--master is a start itself; expected it without --start and --heading")
+            if self.master_sigma is None:
+                raise UsageError(
+                    "--master without --master-sigma HEADING,LEVEL: how good that row is cannot be seen in it"
+                )
+            return None
         if folder is None:
             if self.heading is None or self.position is None:
-                raise UsageError("no start; expected --start FOLDER, or --heading DEG,SIGMA with --position LAT,LON")
+                raise UsageError(
+                    "no start; expected --start FOLDER, or --heading DEG,SIGMA with --position LAT,LON, or --master FILE"
+                )
             self.given()
             return None
         if self.position is not None or self.pitch is not None or self.roll is not None:
@@ -123,13 +140,23 @@ class KnownStart:
         from truenorth.navigation.known import known_start
 
         text = self.position or ""
-        place = numbers_of(text, "--position", 2 if text.count(",") == 1 else 3, "lat,lon or lat,lon,alt")
+        place = (
+            numbers_of(text, "--position", 2 if text.count(",") == 1 else 3, "lat,lon or lat,lon,alt") if text else None
+        )
+        if self.master is not None:
+            from truenorth.formats import read_master
+            from truenorth.navigation.known import start_from_master
+
+            given = numbers_of(self.master_sigma or "", "--master-sigma", 2, "heading and level in degrees")
+            sigmas = [math.radians(x) for x in given]
+            at = None if place is None else Position.from_degrees(*place)
+            return start_from_master(record, read_master(self.master), imu, *sigmas, place=at)
         if (self.pitch is None) != (self.roll is None):
             raise UsageError("--pitch or --roll alone; expected both, or none: the level then comes from the log")
         level = (
             {} if self.pitch is None else {"pitch": math.radians(self.pitch), "roll": math.radians(self.roll or 0.0)}
         )
-        return known_start(record, Position.from_degrees(*place), imu, *self.given(), **level)
+        return known_start(record, Position.from_degrees(*(place or ())), imu, *self.given(), **level)
 
     def imu_of(self, folder: Path | None) -> Any:
         """The specification in the folder, where a heading turns its start."""
@@ -162,12 +189,14 @@ def navigate(
     *,
     known: KnownStart,
     sensors: Sensors,
+    pointing: OfAttitude,
     reading: Reading,
     damped: Damping,
 ) -> None:
     """Carry an IMU log on from an alignment: position, velocity and attitude with their uncertainty."""
     from truenorth.core.atomic import writable_folder
     from truenorth.core.errors import UsageError
+    from truenorth.core.position import Position
     from truenorth.navigation import navigate as navigate_record
     from truenorth.records.calibration import Calibration
 
@@ -185,10 +214,11 @@ def navigate(
         tell(f"reading {log.name}")
         record = reading.read(log)
         begin = begin or known.of_log(record, imu or "")
+        place = Position(begin.lat, begin.lon, begin.alt)
         result = navigate_record(
             record,
             begin if known.heading is not None or start is None else start,
-            aid=sensors.aids(begin.wheel),
+            aid=[*sensors.aids(begin.wheel), *pointing.aids(record, place)],
             altitude=altitude,  # type: ignore[arg-type]  # checked there, with the choices in the message
             zupt=stops,
             smooth=smooth,

@@ -66,7 +66,7 @@ def print_moving(console: Console, result: Alignment) -> None:
     s = moving.summary()
     velocity = ", ".join(f"{v:.3f}" for v in s["velocity_m_s"])
     console.print(f"velocity E, N, U: {velocity} m/s, after {moving.distance:.0f} m", soft_wrap=True)
-    if moving.wheel is None:
+    if (wheel := moving.wheel) is None:
         return
     if result.heading_known:
         heading, sigma = s["vehicle_heading_deg"], s["vehicle_heading_sigma_deg"]
@@ -74,7 +74,7 @@ def print_moving(console: Console, result: Alignment) -> None:
     yaw, pitch, _ = s["mounting_deg"]
     sigma_pitch, sigma_yaw = s["mounting_sigma_deg"]
     console.print(
-        f"odometer: scale {100 * s['odometer_scale']:+.3f} ± {100 * s['odometer_scale_sigma']:.2g} %; IMU on the vehicle: heading "
+        f"{wheel.sensor}: scale {100 * wheel.scale:+.3f} ± {100 * wheel.scale_sigma:.2g} %; IMU on the vehicle: heading "
         f"{yaw:.3f} ± {sigma_yaw:.2g} deg, pitch {pitch:.3f} ± {sigma_pitch:.2g} deg",
         soft_wrap=True,
     )

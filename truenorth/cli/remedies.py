@@ -12,6 +12,7 @@ OPTIONS = {
     "begin_after": "--from {after:.0f}",
     "latitude": "--lat",
     "height": "--alt",
+    "place": "--lat, --lon, --position-sigma",
     "units": "--units",
     "specification": "--imu",
     "slave_specification": "--imu",

@@ -37,7 +37,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, ecef_axes, normal_gravity, radii
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
-from truenorth.records import GnssRecord, ImuRecord, OdometerRecord
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.state.mounting import Mounting
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import InertialIntegrals, integrate
@@ -62,7 +62,7 @@ class MovingAttitude:
 
 def odometer_alignment(
     record: ImuRecord,
-    odometer: OdometerRecord,
+    odometer: OdometerRecord | VelocityRecord,
     position: Position,
     mounting: Mounting | None = None,
     form: Form = "velocity",
@@ -72,6 +72,8 @@ def odometer_alignment(
 
     Parameters
     ----------
+    odometer : OdometerRecord or VelocityRecord
+        The latter in body axes.
     position : Position
         At the start.
     mounting : Mounting, optional
@@ -186,7 +188,7 @@ def frames(time: Array, place: Array) -> Array:
 
 
 def _wheel_displacement(
-    record: ImuRecord, odometer: OdometerRecord, mounting: Mounting, integrals: InertialIntegrals
+    record: ImuRecord, odometer: OdometerRecord | VelocityRecord, mounting: Mounting, integrals: InertialIntegrals
 ) -> Array:
     """(K+1, 3) how far the IMU went in i since the start, by the wheel, m, at the ends of the intervals."""
     ends = odometer.time - mounting.latency
@@ -197,14 +199,13 @@ def _wheel_displacement(
             f"{odometer.source}: runs from {starts[0]:.3f} s to {ends[-1]:.3f} s, {record.source} from {at[0]:.3f} s to "
             f"{at[-1]:.3f} s; expected an odometer that covers the log, on its clock: check it (`record.shifted`)"
         )
-    # Attitude half way through each row's interval; the wheel goes along the vehicle's forward axis.
+    # Attitude half way through each row's interval.
     edges = np.concatenate([[at[0]], record.time])
     rows = np.clip(np.searchsorted(edges, 0.5 * (starts + ends)), 0, len(record))
     dtheta, dvel = increments(record)
     every, back = np.unique(rows, return_inverse=True)
     C_ib = inertial_integrals(dtheta, dvel, record.steps, every)[0][back]
-    forward = mounting.C_mb[1]
-    steps = odometer.distance[:, None] * (C_ib @ forward)
+    steps = np.einsum("kij,kj->ki", C_ib, odometer.way_b(mounting.C_mb))
     path = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     clock = np.concatenate([starts[:1], ends])
     moved = np.stack([np.interp(at, clock, path[:, i]) for i in range(3)], axis=1)

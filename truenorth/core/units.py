@@ -21,10 +21,10 @@ STANDARD_GRAVITY = 9.80665  # m/s^2
 DEG_PER_HOUR = math.radians(1.0) / 3600.0  # rad/s
 MICRO_G = 1e-6 * STANDARD_GRAVITY  # m/s^2
 
-Dimension = tuple[Fraction, Fraction, Fraction, Fraction]  # exponents of angle, length, time, temperature
+Dimension = tuple[Fraction, ...]  # exponents of angle, length, time, temperature, magnetic flux density
 
-# Factor to SI, and exponents of rad, m, s, K.
-_ATOMS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
+# Factor to SI, and exponents of rad, m, s, K, T; zeros at the end left out.
+_ATOMS: dict[str, tuple[float, tuple[int, ...]]] = {
     "rad": (1.0, (1, 0, 0, 0)),
     "mrad": (1e-3, (1, 0, 0, 0)),
     "urad": (1e-6, (1, 0, 0, 0)),
@@ -59,6 +59,12 @@ _ATOMS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
     "mGal": (1e-5, (0, 1, -2, 0)),
     "K": (1.0, (0, 0, 0, 1)),
     "degC": (1.0, (0, 0, 0, 1)),  # differences of temperature only
+    "T": (1.0, (0, 0, 0, 0, 1)),
+    "mT": (1e-3, (0, 0, 0, 0, 1)),
+    "uT": (1e-6, (0, 0, 0, 0, 1)),
+    "nT": (1e-9, (0, 0, 0, 0, 1)),
+    "gauss": (1e-4, (0, 0, 0, 0, 1)),
+    "mgauss": (1e-7, (0, 0, 0, 0, 1)),
     "ppm": (1e-6, (0, 0, 0, 0)),
     "%": (1e-2, (0, 0, 0, 0)),
     "1": (1.0, (0, 0, 0, 0)),
@@ -93,6 +99,10 @@ _SPELLINGS = {
     "kt": "kn",
     "hz": "Hz",
     "G": "g",
+    "µT": "uT",
+    "μT": "uT",
+    "Gauss": "gauss",
+    "mG": "mgauss",
     "µg": "ug",
     "μg": "ug",
     "µrad": "urad",
@@ -104,8 +114,10 @@ _SPELLINGS = {
 }
 
 
-def _dimension(angle: int = 0, length: int = 0, time: Fraction | int = 0, temperature: int = 0) -> Dimension:
-    return Fraction(angle), Fraction(length), Fraction(time), Fraction(temperature)
+def _dimension(
+    angle: int = 0, length: int = 0, time: Fraction | int = 0, temperature: int = 0, field: int = 0
+) -> Dimension:
+    return tuple(Fraction(exponent) for exponent in (angle, length, time, temperature, field))
 
 
 _HALF = Fraction(1, 2)
@@ -124,6 +136,7 @@ DIMENSIONS: dict[str, tuple[Dimension, str]] = {
     "frequency": (_dimension(time=-1), "100 Hz"),
     "ratio": (_dimension(), "100 ppm"),
     "temperature": (_dimension(temperature=1), "20 degC"),
+    "flux_density": (_dimension(field=1), "50 uT"),
     "acceleration_density": (_dimension(0, 2, -3), "0.01 g^2/Hz"),
     "rate_per_acceleration": (_dimension(1, -1, 1), "1 deg/h/g"),
     "rate_per_temperature": (_dimension(1, time=-1, temperature=-1), "0.1 deg/h/degC"),
@@ -196,8 +209,7 @@ def _power(rest: str, text: str) -> tuple[float, Dimension, str]:
     if match is not None:
         power *= Fraction(match[1]) if match[1] else Fraction(int(match[2]), int(match[3]))
         rest = rest[match.end() :]
-    zero = Fraction(0), Fraction(0), Fraction(0), Fraction(0)
-    return factor ** float(power), _sum(zero, dimension, power), rest
+    return factor ** float(power), _sum(_dimension(), dimension, power), rest
 
 
 def _atom(name: str, text: str) -> tuple[float, Dimension]:
@@ -206,12 +218,12 @@ def _atom(name: str, text: str) -> tuple[float, Dimension]:
         near = get_close_matches(known, _ATOMS, n=3, cutoff=0.5)
         hint = f"; did you mean {', '.join(near)}?" if near else ""
         raise UsageError(f"unit {name!r} in {text!r} is not known{hint}")
-    factor, (angle, length, time, temperature) = _ATOMS[known]
-    return factor, _dimension(angle, length, time, temperature)
+    factor, exponents = _ATOMS[known]
+    return factor, _dimension(*exponents)
 
 
 def _sum(a: Dimension, b: Dimension, times: Fraction | int) -> Dimension:
-    return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2], a[3] + times * b[3]
+    return tuple(x + times * y for x, y in zip(a, b))
 
 
 def parse_quantity(text: str) -> tuple[float, Dimension]:

@@ -283,9 +283,9 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
 
 def _nothing(model: InsModel, sources: Sequence[Aiding]) -> Track:
     """What is put out before the first sample is taken."""
-    n, none, three = model.states, np.zeros(0), np.zeros((0, 3))
+    n, none, three, truth = model.states, np.zeros(0), np.zeros((0, 3)), np.zeros(0, bool)
     silent = tuple(
-        Residuals(source.name, none, three, three, none, np.zeros(0, bool), 0, none, np.zeros(0, bool))
+        Residuals(source.name, none, three, three, none, truth, 0, none, truth, source.row.unit, source.row.axes)
         for source in sources
         if source.does == "measurement"
     )
@@ -362,6 +362,8 @@ def _residuals(
                 outside[number],
                 np.append(plan.time, late.time)[rows],
                 verdict[rows] == REOPENED,
+                source.row.unit,
+                source.row.axes,
             )
         )
     return tuple(found)

@@ -90,14 +90,14 @@ def _biases(ax: Axes, t: Array, bias: Array, sigma: Array) -> None:
 
 
 def _innovations(ax: Axes, h: History) -> None:
-    for axis, name in enumerate(("east", "north", "up")):
+    for axis in h.components:
         ratio = h.innovation[:, axis] / h.innovation_sigma[:, axis]
-        trace(ax, h.time, ratio, color=COLOURS[axis], label=name, linewidth=0.8)
+        trace(ax, h.time, ratio, color=COLOURS[axis], label=h.innovation_axes[axis], linewidth=0.8)
     for level, dashes in ((2.0, ":"), (3.0, "--")):
         for sign in (1.0, -1.0):
             ax.axhline(sign * level, color=REFERENCE, linestyle=dashes, linewidth=1.0)
     ax.set_ylim(-5.0, 5.0)
-    ax.set_title("Velocity innovations over their σ (lines: 2σ, 3σ)")
+    ax.set_title(f"Innovations of {h.innovation_of} over their σ (lines: 2σ, 3σ)")
     ax.set_ylabel("sigmas")
     ax.legend(ncols=3, loc="upper right")
 

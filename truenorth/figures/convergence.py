@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 SETTLED_FROM = 0.25  # of the log: vertical axes are scaled to what comes after
 NIS_BLOCK = 10  # epochs averaged
-MEASURED = 3  # velocities an epoch
-NIS_BAND = (1.6790772, 4.6979242)  # chi_square_band(MEASURED, runs=NIS_BLOCK), for which SciPy takes .2 s to load
+# By components: chi_square_band(n, runs=NIS_BLOCK), for which SciPy takes .2 s to load.
+NIS_BANDS = {1: (0.3246973, 2.0483177), 2: (0.9590777, 3.4169607), 3: (1.6790772, 4.6979242)}
 
 
 @dataclass(frozen=True)
@@ -82,5 +82,5 @@ def averaged_nis(history: History) -> tuple[Array, Array, float, float]:
     return (
         history.time[:rows].reshape(count, NIS_BLOCK).mean(axis=1),
         history.nis[:rows].reshape(count, NIS_BLOCK).mean(axis=1),
-        *NIS_BAND,
+        *NIS_BANDS[max(1, len(history.components))],
     )

@@ -193,7 +193,7 @@ def read_velocity(
     )
     frames = [key for key, of in names.items() if any(found.has(name) for name in of)]
     if any(found.has(q.name) for q in AXES):
-        velocity = _turned(found.stack(*(q.name for q in AXES)), others.get("axes"))
+        velocity = turned(found.stack(*(q.name for q in AXES)), others.get("axes"))
         frames = frames or ["body"]
     chosen: Any = others.get("frame") or (frames[0] if len(frames) == 1 else None)
     if not frames:
@@ -283,7 +283,7 @@ def read_master(
     )
     values = _poses(found)
     for ours, sensor in (("w_ib_b", "gyro"), ("f_b", "accel")):
-        values[ours] = _turned(whole(found, *(f"{sensor}_{axis}" for axis in "xyz")), others.get("axes"))
+        values[ours] = turned(whole(found, *(f"{sensor}_{axis}" for axis in "xyz")), others.get("axes"))
     if values["C_nb"] is None and values["v_n"] is None:
         raise found.missing("time and attitude (heading, pitch, roll) or velocity (VE, VN, VU) or both")
     return made(found, MasterRecord, **values)
@@ -390,7 +390,7 @@ def _poses(found: Found) -> dict[str, Any]:
     return {"C_nb": C_nb, "v_n": whole(found, "VE", "VN", "VU"), "lat": lat, "lon": lon, "alt": alt}
 
 
-def _turned(values: Array | None, axes: str | None) -> Array | None:
+def turned(values: Array | None, axes: str | None) -> Array | None:
     """Columns x, y, z along right, forward, up; NaN stays with its axis."""
     if values is None or axes is None:
         return values

@@ -37,6 +37,8 @@ WALKS = (DEG / 60.0 * 5e-5, DEG / 60.0 * 3.0)  # rad/sqrt(s): random walks of th
 LARGEST_BIAS = 5.0 * DEG  # rad/s
 LARGEST_RATE = 2000.0 * DEG  # rad/s
 BIAS_RATIOS = np.logspace(0.0, 4.0, 17)  # bias, deg/h, over random walk, deg/sqrt(h), of gyros of all classes
+TYPICAL, TYPICAL_FORCE, WORST_FORCE_WALK = DEG / 60.0 * 0.2, 80e-6 * G, 400e-6 * G  # rad/sqrt(s), m/s/sqrt(s)
+CLASS_DECADES = 0.6
 DECADE = 0.25  # decades by which those limits are soft
 
 # Prior weight of a unit: how often logs are written so.
@@ -111,13 +113,14 @@ def accel_readings(
 
 @dataclass(frozen=True)
 class GyroFacts:
-    """What the gyros show, in their own unit a second, compared with the accelerometers' turning of gravity."""
+    """What the gyros show, in their own unit a second, and of the accelerometers how they turn gravity and their random walk."""
 
     turning: Turning
     mean: float
     mean_sigma: float
     walk: float
     largest: float
+    force_walk: float
 
 
 def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
@@ -130,19 +133,24 @@ def gyro_facts(time: Array, gyro: Array, accel: Array, kind: Kind) -> GyroFacts:
         data = data / interval
     rates = data.reshape(cells, rows, 6).mean(axis=1).T if cells else np.zeros((6, 0))
     turning = fit_turning(rows * interval, np.ascontiguousarray(rates))
+    walk, force_walk = _random_walk(data[:, :3], interval), _random_walk(data[:, 3:], interval)
+    parts = [part.mean(axis=0) for part in np.array_split(data[:, :3], 10)] if len(data) >= 100 else []
+    wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
+    mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
+    largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
+    return GyroFacts(turning, mean, wander, walk, largest, force_walk)
+
+
+def _random_walk(data: Array, interval: float) -> float:
+    """Of the three columns the middle one's: the least of the Allan deviation times the root of its time."""
     walks = []
     for tau in (interval, 0.1, 0.5, 1.0, 2.0):
         m = max(1, round(tau / interval))
         count = len(data) // m
         if count >= 8:
-            means = data[: count * m, :3].reshape(count, m, 3).mean(axis=1)
+            means = data[: count * m].reshape(count, m, 3).mean(axis=1)
             walks.append(np.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2, axis=0) * m * interval))
-    walk = float(np.median(np.min(walks, axis=0))) if walks else 0.0
-    parts = [part.mean(axis=0) for part in np.array_split(data[:, :3], 10)] if len(data) >= 100 else []
-    wander = float(np.linalg.norm(np.std(parts, axis=0))) / np.sqrt(10.0) if parts else np.inf
-    mean = float(np.linalg.norm(data[:, :3].mean(axis=0))) if len(data) else 0.0
-    largest = float(np.quantile(np.abs(data[:, :3]), 0.999)) if len(data) else 0.0
-    return GyroFacts(turning, mean, wander, walk, largest)
+    return float(np.median(np.min(walks, axis=0))) if walks else 0.0
 
 
 def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence[str] | None = None) -> list[Reading]:
@@ -159,8 +167,8 @@ def gyro_readings(facts: GyroFacts, kind: Kind, accel_unit: str, units: Sequence
             likely *= 0.95 * np.exp(-0.5 * (away / 0.15) ** 2) + 0.05 * np.exp(-0.5 * (away / 0.6) ** 2) + 1e-12
             why = f"in {unit} the gyros turn {scale:.3g} times as far as gravity in the accelerometers"
         elif facts.walk > 0.0 and facts.mean_sigma < np.inf:
-            rest = _at_rest(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
-            likely *= rest
+            likely *= _at_rest(facts.mean * factor, facts.mean_sigma * factor, facts.walk * factor)
+            likely *= _of_one_class(facts.walk * factor, facts.force_walk * size(accel_unit))
             walk = facts.walk * factor / DEG * 60.0
             why = (
                 f"in {unit} the mean rate is {facts.mean * factor / EARTH_RATE:.3g} times the earth's, the random walk "
@@ -188,6 +196,18 @@ def _at_rest(mean: float, sigma: float, walk: float) -> float:
     near = np.exp(-0.5 * ((x - w) / bias) ** 2) - np.exp(-0.5 * ((x + w) / bias) ** 2)
     density = x * x / (w * bias * np.sqrt(2.0 * np.pi)) * near
     return float(np.mean(density) + 1e-6) * _below(walk, WALKS[1]) * _below(WALKS[0], walk) * _below(mean, LARGEST_BIAS)
+
+
+def _of_one_class(walk: float, force_walk: float) -> float:
+    """Likelihood of a gyro's random walk (rad/sqrt(s)) beside an accelerometer of this one (m/s/sqrt(s)) in one IMU.
+
+    Data sheets from ring lasers with pendulous accelerometers to MEMS: ``walk = TYPICAL (force walk / 80 ug/sqrt(Hz))^1.3``,
+    to half a decade. A base that shakes raises the accelerometers' more: beyond a MEMS's it says nothing more.
+    """
+    if not force_walk > 0.0:
+        return 1.0
+    expected = TYPICAL * (min(force_walk, WORST_FORCE_WALK) / TYPICAL_FORCE) ** 1.3
+    return float(np.exp(-0.5 * (np.log10(walk / expected) / CLASS_DECADES) ** 2) + 1e-4)
 
 
 def clock_readings(step: float, first: float, units: Sequence[str] | None = None) -> list[Reading]:

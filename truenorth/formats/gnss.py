@@ -35,8 +35,22 @@ SIGMAS = (
     *sigmas([q.name for q in EARTH_FIXED], "length", "m", "sigma"),
     *sigmas([q.name for q in EARTH_FIXED_VELOCITY], "speed", "m/s", "sigma_velocity"),
 )
+HEADING = (
+    Quantity("heading", "angle", "deg", ("heading_true", "true_heading", "dual_heading", "baseline_heading", "hdt")),
+    Quantity("sigma_heading", "angle", "deg", ("heading_sigma", "heading_std", "heading_accuracy", "heading_acc")),
+)
+BASELINE = (
+    Quantity("baseline_E", "length", "m", ("rel_pos_e", "relpos_e", "baseline_east"), (), "baseline"),
+    Quantity("baseline_N", "length", "m", ("rel_pos_n", "relpos_n", "baseline_north"), (), "baseline"),
+    Quantity("baseline_U", "length", "m", ("baseline_up",), ("rel_pos_d", "relpos_d", "baseline_D"), "baseline"),
+    *sigmas(["baseline_E", "baseline_N"], "length", "m", "baseline"),
+)
+BASELINE_SIGMA = 0.01  # m, of each axis of a baseline by carrier phases whose receiver says nothing
 RECEIVER = (Quantity("hdop"), Quantity("vdop"), Quantity("quality", aliases=("fix", "fix_quality")))
-QUANTITIES = (TIME, *PLACE, *NAVIGATION, *TRACK, *SIGMAS, *RECEIVER, *EARTH_FIXED, *EARTH_FIXED_VELOCITY, *LOCAL)
+ANTENNAS = (*HEADING, *BASELINE)
+QUANTITIES = (
+    *(TIME, *PLACE, *NAVIGATION, *TRACK, *SIGMAS, *ANTENNAS, *RECEIVER, *EARTH_FIXED, *EARTH_FIXED_VELOCITY, *LOCAL),
+)
 
 
 def read_gnss(
@@ -56,8 +70,10 @@ def read_gnss(
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
     up`` (or ``down``) from an `origin`; velocity as ``VE, VN, VU`` (or ``VD``), ``ecef_vx, ecef_vy, ecef_vz``, or ``speed`` and
     ``course``; standard deviations with ``sigma_`` before the names (``sigma_E, sigma_N, sigma_U`` of the position; of earth-fixed
-    ones the correlation between the axes is not known and taken as none); ``hdop, vdop, quality``. Empty cells are absent
-    values; a standard deviation of zero is an unknown one. Rows of quality 0 (no fix) lose their position and velocity.
+    ones the correlation between the axes is not known and taken as none); ``hdop, vdop, quality``. Of two antennas ``heading`` with
+    ``sigma_heading`` (without it, it may be the course, and is used only where `columns` names it), or their ``baseline_E,
+    baseline_N, baseline_U``. Empty cells are absent values; a standard deviation of zero is an unknown one. Rows of quality 0 (no
+    fix) lose their position and velocity.
 
     Parameters
     ----------
@@ -90,19 +106,37 @@ def read_gnss(
     given = {"columns": columns, "units": units, "topic": topic}
     found, _ = open_log(path, "csv" if format == "kf-gins" else format, QUANTITIES, given, "gnss")
     values = _geodetic(found) or _earth_fixed(found) or _local(found, origin)
-    track = _velocity(found)
-    if not values and track is None:
+    track, turned = _velocity(found), _heading(found)
+    if not values and track is None and not turned:
         raise found.missing("time and lat, lon, alt, or VE, VN, VU")
     absent = np.full(len(found.values["time"]), np.nan)
-    values = {"lat": absent, "lon": absent, "alt": absent, "v_n": track} | values
+    values = {"lat": absent, "lon": absent, "alt": absent, "v_n": track} | values | turned
     no_fix = found.values.get("quality", absent) == 0
-    for name in ("lat", "lon", "alt", "v_n"):
-        if values[name] is not None and no_fix.any():
+    for name in ("lat", "lon", "alt", "v_n", "heading"):
+        if values.get(name) is not None and no_fix.any():
             values[name] = np.where(no_fix if values[name].ndim == 1 else no_fix[:, None], np.nan, values[name])
     values.setdefault("position_sigma", known(found.stack("sigma_E", "sigma_N", "sigma_U")))
     values.setdefault("velocity_sigma", known(found.stack("sigma_VE", "sigma_VN", "sigma_VU")))
     dop = known(found.stack("hdop", "vdop"))
     return made(found, GnssRecord, **values, dop=dop, quality=found.values.get("quality"))
+
+
+def _heading(found: Found) -> dict[str, Any]:
+    """Heading of two antennas, told or from their baseline.
+
+    A column called heading without a sigma is, in many a receiver's log, the course over ground: it is left out.
+    """
+    if found.has("baseline_E", "baseline_N"):
+        east, north = found.values["baseline_E"], found.values["baseline_N"]
+        level = np.hypot(east, north)
+        given = found.stack("sigma_baseline_E", "sigma_baseline_N")
+        sigma = np.full((len(east), 2), BASELINE_SIGMA) if given is None else given
+        across = np.hypot(north * sigma[:, 0], east * sigma[:, 1]) / np.where(level > 0.0, level, np.nan) ** 2
+        return {"heading": np.where(level > 0.0, np.arctan2(east, north), np.nan), "heading_sigma": known(across)}
+    sure = found.has("heading", "sigma_heading") or "heading" in found.asked
+    if not (found.has("heading") and sure):
+        return {}
+    return {"heading": found.values["heading"], "heading_sigma": known(found.values.get("sigma_heading"))}
 
 
 def _geodetic(found: Found) -> dict[str, Any]:

@@ -38,7 +38,6 @@ DIMENSION_OF: dict[Kind, dict[str, str]] = {
     "rates": {"gyro": "angular_rate", "accel": "acceleration", "time": "time"},
     "increments": {"gyro": "angle", "accel": "speed", "time": "time"},
 }
-CLAIM = 100.0  # prior weight of SI where the columns have the documented names
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -281,7 +280,7 @@ def _no_gravity(level: float, accel: Array, kind: Kind, interval: float) -> str:
 
 
 def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str, guesses: list[Guess]) -> None:
-    """Ask where documented names, which mean SI, stand over numbers that are hardly in it."""
+    """Ask where documented names, which mean SI, stand over numbers that look like another unit."""
     interval = float(np.median(np.diff(time)))
     unit = "rad/s" if kind == "rates" else "rad"
     force = "m/s^2" if kind == "rates" else "m/s"
@@ -289,9 +288,8 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
     if len(time) < FEWEST or not accel_readings(gravity_level(accel), interval, (kind,), (force,)):
         return  # what is no gravity in SI, the checks of plausibility name
     readings = gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force)
-    weights = [r.probability * (CLAIM if r.unit == unit else 1.0) for r in readings]
-    if readings and readings[int(np.argmax(weights))].unit != unit:
-        best = readings[int(np.argmax(weights))]
+    if readings and readings[0].unit != unit:
+        best = readings[0]
         claim = next((r.why for r in readings if r.unit == unit), f"in {unit} they cannot be a gyro's")
         options = [{"units": {"gyro": best.unit, "accel": force}}, {"units": {"gyro": unit, "accel": force}}]
         raise UnsureError(

@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment.recipes import align
 from truenorth.alignment.result import Alignment
-from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_jacobian
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, euler_jacobian
 from truenorth.core.earth import EARTH_RATE
-from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.navigation.start import moving_start, positive, start_from_alignment
 from truenorth.quality.regimes import motion_summary
-from truenorth.records import ImuRecord
+from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import note
 from truenorth.state.layout import PHI
@@ -186,6 +186,78 @@ def known_start(
     P[PHI, PHI] = phi_of @ np.diag([sigma, level_sigma, level_sigma]) ** 2 @ phi_of.T
     zero, begin = np.zeros(3), float(log.time[0] - log.interval)
     return moving_start(begin, C_nb, np.array(velocity, dtype=np.float64), positive(P), zero, zero, at, spec)
+
+
+def start_from_master(
+    record: ImuRecord,
+    master: MasterRecord,
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any],
+    heading_sigma: float,
+    level_sigma: float,
+    *,
+    place: Position | tuple[float, ...] | None = None,
+    C_mb: ArrayLike | None = None,
+    velocity_sigma: float = VELOCITY_SIGMA,
+) -> Start:
+    """A start of navigation from a row of another system's solution: the first one within the record.
+
+    Parameters
+    ----------
+    record : ImuRecord or DataFrame
+    master : MasterRecord
+        With attitude; its velocity (zero without) and position.
+    imu : ImuSpec, str, path or mapping
+    heading_sigma, level_sigma : float, rad
+        Of the row's attitude, the seat's error included.
+    place : Position or (lat, lon[, alt]), optional
+        Where the master has no position.
+    C_mb : (3, 3) array, optional
+        IMU's to the master's axes; the same when left out.
+    velocity_sigma : float, m/s
+
+    Returns
+    -------
+    Start
+        At the row's time.
+
+    Raises
+    ------
+    UsageError
+        Neither a place nor positions of the master; a master without attitude.
+    DataError
+        No row of the master within the record.
+    """
+    log = ImuRecord.of(record)
+    if master.C_nb is None:
+        raise UsageError(f"{master.source}: no attitude in it; expected heading, pitch and roll")
+    inside = np.flatnonzero((master.time >= log.time[0] - log.interval) & (master.time < log.time[-1] - log.interval))
+    if not inside.size:
+        raise DataError(
+            f"{master.source}: runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s, {log.source} from "
+            f"{log.time[0]:.3f} s to {log.time[-1]:.3f} s; expected a row within the log, on its clock"
+        )
+    row = int(inside[0])
+    if master.lat is not None and master.lon is not None and master.alt is not None:
+        at = Position(float(master.lat[row]), float(master.lon[row]), float(master.alt[row]))
+    elif place is not None:
+        at = Position.of(place)
+    else:
+        raise UsageError(f"{master.source}: no position in it, and no place is given; expected one of them")
+    C_nb = master.C_nb[row] if C_mb is None else master.C_nb[row] @ np.asarray(C_mb, dtype=np.float64)
+    heading, pitch, roll = (float(x) for x in euler_from_dcm(C_nb))
+    start = known_start(
+        log,
+        at,
+        imu,
+        heading,
+        heading_sigma,
+        pitch=pitch,
+        roll=roll,
+        level_sigma=level_sigma,
+        velocity=np.zeros(3) if master.v_n is None else master.v_n[row],
+        velocity_sigma=velocity_sigma,
+    )
+    return replace(start, time=float(master.time[row]))
 
 
 def _resting(record: ImuRecord) -> ImuRecord:

@@ -183,7 +183,7 @@ class Navigation(Shown):
 
         parts = []
         for r in self.residuals:
-            part = pd.DataFrame({"time": r.time, "sensor": r.name})
+            part = pd.DataFrame({"time": r.time, "sensor": r.name, "unit": r.unit})
             for i in range(3):
                 part[f"innovation_{i + 1}"], part[f"sigma_{i + 1}"] = r.innovation[:, i], r.sigma[:, i]
             part["nis"], part["used"] = r.nis, r.used

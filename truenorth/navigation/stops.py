@@ -45,7 +45,7 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
 
 def seconds_at_rest(
     record: ImuRecord,
-    odometer: OdometerRecord | None = None,
+    odometer: OdometerRecord | VelocityRecord | None = None,
     gnss: GnssRecord | None = None,
     velocity: VelocityRecord | None = None,
 ) -> tuple[Array, Array]:

@@ -26,14 +26,12 @@ from truenorth.state.track import Residuals
 Array = NDArray[np.float64]
 
 FEWEST = 60  # components, from which size and colour are judged
+ONE_PLACE = 4.0  # mean over scatter of places that are all off alike
 LAGS, MOST_LAGS = 5, 60
 SCHULER = 5064.0  # s
 MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 LEAST_CORRELATION = 0.05  # mean over the first lags
-# Sources of places: their errors last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
-PLACES = {"GNSS position": ("position",), "barometer": ("position",)}
 BODY = ("odometer", "velocity log", "zero velocity", "zero rotation")
-UNITS = {"GNSS position": "m", "barometer": "m", "zero rotation": "rad/s"}
 
 
 def mean_nis(source: Residuals) -> float | None:
@@ -101,9 +99,13 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
         rejected = int(np.sum(~source.used))
         if rejected > limit("rejected") * count:
             size = float(np.median(np.sqrt(np.nansum(source.innovation**2, axis=1))))
-            unit = UNITS.get(source.name, "m/s")
+            away = _elsewhere(source)
             found.append(
                 contradiction(
+                    "innovations.elsewhere", "place", name=source.name, rejected=rejected, count=count, distance=away
+                )
+                if away > 0.0
+                else contradiction(
                     "innovations.rejected",
                     "source",
                     "specification",
@@ -111,7 +113,7 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
                     rejected=rejected,
                     count=count,
                     scatter=size,
-                    unit=unit,
+                    unit=source.unit,
                 )
             )
         elif rejected:
@@ -154,6 +156,15 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
     return found
 
 
+def _elsewhere(source: Residuals) -> float:
+    """How far places lie from the track, m, where all of them do in one direction and by one distance; else 0."""
+    first = source.innovation[: max(FEWEST // 3, len(source.time) // 4), :2]
+    if source.unit != "m" or len(first) < 2 or not np.isfinite(first).all():
+        return 0.0
+    away = float(np.linalg.norm(first.mean(axis=0)))
+    return away if away > ONE_PLACE * float(np.linalg.norm(first.std(axis=0))) else 0.0
+
+
 def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]:
     """By how much the innovations of a source say that sigma is too small."""
     used = source.used & (source.rows > 0)
@@ -165,7 +176,8 @@ def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]
         return []
     more = dict.fromkeys(("velocity", "position"), math.sqrt(found.growth**2 - 1.0))
     more |= dict.fromkeys(("heading", "level"), math.sqrt(found.of_attitude**2 - 1.0))
-    touched: tuple[str, ...] = PLACES.get(source.name, OUTPUTS)
+    # Errors of places last for minutes (multipath, atmosphere, pressure), and spoil places, not attitude.
+    touched: tuple[str, ...] = ("position",) if source.unit == "m" else OUTPUTS
     if by_motion and source.name in BODY:
         touched = ("level", "velocity", "position")
     effect = Effect(

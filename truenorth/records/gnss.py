@@ -36,6 +36,9 @@ class GnssRecord(Record):
         Horizontal and vertical dilution of precision.
     quality : (N,) array or None
         Indicator of NMEA 0183: 0 no fix, 1 single, 2 differential, 4 RTK fixed, 5 RTK float, 6 dead reckoning.
+    heading : (N,) array or None, rad
+        Of the line from the first to a second antenna, clockwise from true north.
+    heading_sigma : (N,) array or None, rad
     source : str
 
     Raises
@@ -50,8 +53,12 @@ class GnssRecord(Record):
         "velocity_sigma": ("sigma_VE", "sigma_VN", "sigma_VU"),
         "dop": ("hdop", "vdop"),
         "quality": ("quality",),
+        "heading": ("heading",),
+        "heading_sigma": ("sigma_heading",),
     }
-    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"v_n", "position_sigma", "velocity_sigma", "dop", "quality"})
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset(
+        {"v_n", "position_sigma", "velocity_sigma", "dop", "quality", "heading", "heading_sigma"}
+    )
     PARTIAL: ClassVar[frozenset[str]] = OPTIONAL | {"lat", "lon", "alt"}
 
     time: Array
@@ -63,13 +70,16 @@ class GnssRecord(Record):
     velocity_sigma: Array | None = None
     dop: Array | None = None
     quality: Array | None = None
+    heading: Array | None = None
+    heading_sigma: Array | None = None
     source: str = field(default="GNSS record", compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_place(self)
-        check_positive(self, "position_sigma", "velocity_sigma", "dop")
-        if not (self.has_position.any() or self.has_velocity.any()):
+        check_positive(self, "position_sigma", "velocity_sigma", "dop", "heading_sigma")
+        check_range(self, "heading", -2 * math.pi, 2 * math.pi, "headings are in radians here: were degrees handed in?")
+        if not (self.has_position.any() or self.has_velocity.any() or self.has_heading.any()):
             raise DataError(f"{self.source}: neither a position nor a velocity in any row; expected some fixes")
 
     @property
@@ -84,8 +94,13 @@ class GnssRecord(Record):
             return np.zeros(len(self), dtype=bool)
         return np.isfinite(self.v_n[:, 0]) & np.isfinite(self.v_n[:, 1])
 
+    @property
+    def has_heading(self) -> NDArray[np.bool_]:
+        """(N,) whether a row holds a heading."""
+        return np.zeros(len(self), dtype=bool) if self.heading is None else np.isfinite(self.heading)
+
     def columns(self) -> dict[str, Array]:
-        """Latitude and longitude in degrees; the rest in SI."""
+        """Latitude, longitude and heading in degrees; the rest in SI."""
         return in_degrees(super().columns())
 
 
@@ -145,5 +160,6 @@ def check_place(record: Record) -> None:
 
 
 def in_degrees(columns: dict[str, Array]) -> dict[str, Array]:
-    """The same columns, latitude and longitude in degrees."""
-    return {name: np.degrees(values) if name in ("lat", "lon") else values for name, values in columns.items()}
+    """The same columns, latitude, longitude and heading in degrees."""
+    angles = ("lat", "lon", "heading", "sigma_heading")
+    return {name: np.degrees(values) if name in angles else values for name, values in columns.items()}

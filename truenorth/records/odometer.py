@@ -87,6 +87,14 @@ class OdometerRecord(Record):
         """(N,) speed, m/s: instantaneous where it is measured, else the mean of the interval that ends at each row."""
         return self.values if self.kind == "speed" else self.distance / self.steps
 
+    def velocity_b(self, C_mb: Array) -> Array:
+        """(N, 3) velocity in body axes, m/s, of a wheel along the vehicle's forward axis."""
+        return np.asarray(self.speed[:, None] * C_mb[1])
+
+    def way_b(self, C_mb: Array) -> Array:
+        """(N, 3) way of the interval that ends at each row, body axes, m."""
+        return np.asarray(self.distance[:, None] * C_mb[1])
+
     def columns(self) -> dict[str, Array]:
         """The values; of pulses also the size of one, m."""
         size = {} if self.pulse_size is None else {"pulse_size": np.full(len(self), self.pulse_size)}

@@ -68,6 +68,20 @@ class VelocityRecord(Record):
         right, forward, up = np.isfinite(self.velocity).T
         return np.array([right.any(), forward.any(), up.any()])
 
+    def velocity_b(self, C_mb: Array) -> Array:
+        """(N, 3) velocity in body axes, m/s; between its rows where one is empty, zero along an axis that is not measured."""
+        filled = np.zeros_like(self.velocity)
+        for i in np.flatnonzero(self.measured):
+            known = np.isfinite(self.velocity[:, i])
+            filled[:, i] = np.interp(self.time, self.time[known], self.velocity[known, i])
+        return np.asarray(filled @ C_mb)
+
+    def way_b(self, C_mb: Array) -> Array:
+        """(N, 3) way of the interval that ends at each row, body axes, by the trapezoidal rule, m."""
+        v = self.velocity_b(C_mb)
+        v[1:] = 0.5 * (v[1:] + v[:-1])
+        return np.asarray(v * self.steps[:, None])
+
     def columns(self) -> dict[str, Array]:
         """Of the axes that are measured."""
         kept = [name for name, there in zip(COLUMNS[self.frame], self.measured) if there]

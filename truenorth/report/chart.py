@@ -217,6 +217,14 @@ def angle_unit(values: ArrayLike) -> tuple[float, str]:
     )
 
 
+def unit_of(unit: str, values: ArrayLike) -> tuple[float, str]:
+    """An SI unit in that of its kind that fits these values, and its name."""
+    if unit == "rad/s":
+        return float(np.radians(1.0 / 3600.0)), "deg/h"
+    fitting = {"m": length_unit, "m/s": speed_unit, "rad": angle_unit}.get(unit)
+    return (1.0, unit) if fitting is None else fitting(values)
+
+
 def _fitting(values: ArrayLike, units: Sequence[tuple[float, str, float]]) -> tuple[float, str]:
     """The first unit whose least value the greatest of these values reaches."""
     finite = np.abs(np.asarray(values, dtype=np.float64))

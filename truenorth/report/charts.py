@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.language import translated as _
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.figures.convergence import MEASURED, NIS_BLOCK, Course, averaged_nis, courses, settled_limits
-from truenorth.report.chart import Chart, Clock, speed_unit
+from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
+from truenorth.report.chart import Chart, Clock, unit_of
 from truenorth.report.document import Panel
 
 if TYPE_CHECKING:
@@ -64,9 +64,9 @@ def _of_history(result: Alignment) -> list[Panel]:
         Panel(
             _("Innovations"),
             _(
-                "Measured velocity less its prediction. Dotted: two sigma; dashed: three sigma. The innovations should look like "
+                "Predicted less measured: {what}. Dotted: two sigma; dashed: three sigma. The innovations should look like "
                 "noise and stay inside."
-            ),
+            ).format(what=_(h.innovation_of)),
             _innovations(h, clock),
         ),
         Panel(
@@ -75,7 +75,7 @@ def _of_history(result: Alignment) -> list[Panel]:
                 "Mean of {block} epochs, with the 95 % band of such a mean. {expected} is expected; the mean over the log is "
                 "{mean:.2f}. The band is that of independent innovations: where the base's own motion makes neighbours alike, "
                 "more means fall outside."
-            ).format(block=NIS_BLOCK, expected=MEASURED, mean=np.mean(h.nis)),
+            ).format(block=NIS_BLOCK, expected=len(h.components), mean=np.nanmean(h.nis)),
             _nis(h, clock),
         ),
     ]
@@ -125,14 +125,14 @@ def _biases(t: Array, bias: Array, sigma: Array, scale: float, unit: str, clock:
 
 
 def _innovations(h: History, clock: Clock) -> Chart:
-    scale, unit = speed_unit(h.innovation_sigma[len(h.time) // 4 :])
-    names = (_("east"), _("north"), _("up"))
+    scale, unit = unit_of(h.innovation_unit, h.innovation_sigma[len(h.time) // 4 :])
+    names = [_(h.innovation_axes[i]) for i in h.components]
     chart = Chart([f"{name}, {unit}" for name in names], over_time(clock))
-    for i, name in enumerate(names):
+    for row, (i, name) in enumerate(zip(h.components, names)):
         sigma = h.innovation_sigma[:, i] / scale
-        chart.line(i, clock(h.time), h.innovation[:, i] / scale, f"c{i}", name)
-        limits(chart, i, clock(h.time), sigma)
-        chart.axis(i, range=list(settled_limits(np.zeros_like(sigma), 4.0 * sigma)))
+        chart.line(row, clock(h.time), h.innovation[:, i] / scale, f"c{row}", name)
+        limits(chart, row, clock(h.time), sigma)
+        chart.axis(row, range=list(settled_limits(np.zeros_like(sigma), 4.0 * sigma)))
     return chart
 
 
@@ -148,7 +148,7 @@ def _nis(h: History, clock: Clock) -> Chart:
     chart = Chart(["NIS"], over_time(clock), height=320)
     ends = clock(h.time[[0, -1]])
     chart.band(0, ends, np.full(2, low), np.full(2, high), "ref")
-    chart.limit(0, ends, np.full(2, float(MEASURED)), "dash")
+    chart.limit(0, ends, np.full(2, float(len(h.components))), "dash")
     chart.line(0, clock(t), mean, "c0", "NIS")
     chart.axis(0, range=[0.0, max(1.3 * high, float(np.quantile(mean, 0.98)) if mean.size else 0.0)])
     chart.across(range=list(ends))

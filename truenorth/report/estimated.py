@@ -67,9 +67,14 @@ def relation_table(transfer: Transfer | None, moving: Moving | None) -> Table | 
     rows.append((_("Heading of the vehicle"), *_shown(heading[0], heading[1], "deg", True)))
     if moving.wheel is not None:
         wheel = moving.wheel
-        rows.append((_("Odometer scale"), *_shown(100 * wheel.scale, 100 * wheel.scale_sigma, "%", True)))
+        rows.append(
+            (
+                _("Scale: {sensor}").format(sensor=_(wheel.sensor)),
+                *_shown(100 * wheel.scale, 100 * wheel.scale_sigma, "%", True),
+            )
+        )
         for i, axis in enumerate((_("right"), _("forward"), _("up"))):
-            name = _("Wheel arm, {axis}").format(axis=axis)
+            name = _("Arm of the {sensor}, {axis}").format(sensor=_(wheel.sensor), axis=axis)
             rows.append((name, *_shown(wheel.lever_arm[i], wheel.lever_arm_sigma[i], "m", True)))
     return Table(_("Vehicle"), [_("Quantity"), _("Value"), _("One sigma")], rows)
 

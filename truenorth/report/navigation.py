@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truenorth.core.language import translated as _
 from truenorth.figures.thinning import evenly
 from truenorth.quality.innovations import mean_nis
-from truenorth.report.chart import POINTS, Chart, Clock, angle_unit, length_unit, speed_unit
+from truenorth.report.chart import POINTS, Chart, Clock, angle_unit, length_unit, speed_unit, unit_of
 from truenorth.report.charts import limits, over_time
 from truenorth.report.damping import damping_facts, damping_panels
 from truenorth.report.document import Panel, Table, render, verdict_lines
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
-
-BODY = ("odometer", "velocity log")  # sensors whose innovations are right, forward, up
 
 
 def navigation_page(result: Navigation) -> str:
@@ -199,11 +197,8 @@ def _sigmas(
 
 def _innovations(r: Residuals, clock: Clock) -> Chart:
     there = [i for i in range(3) if np.isfinite(r.innovation[:, i]).any()]
-    names = (_("right"), _("forward"), _("up")) if r.name in BODY else (_("east"), _("north"), _("up"))
-    if r.name == "barometer":
-        names = (_("height"), "", "")
-    scale, unit = _unit_of(r)
-    chart = Chart([f"{names[i]}, {unit}" for i in there], over_time(clock))
+    scale, unit = unit_of(r.unit, r.sigma)
+    chart = Chart([f"{_(r.axes[i])}, {unit}" for i in there], over_time(clock))
     for row, i in enumerate(there):
         rows = np.flatnonzero(np.isfinite(r.innovation[:, i]))
         rows = rows[evenly(len(rows), POINTS)]
@@ -218,9 +213,3 @@ def _innovations(r: Residuals, clock: Clock) -> Chart:
         reach = 4.0 * float(np.median(r.sigma[rows, i])) / scale
         chart.axis(row, range=[-reach, reach])
     return chart
-
-
-def _unit_of(r: Residuals) -> tuple[float, str]:
-    if r.name == "zero rotation":
-        return float(np.radians(1.0 / 3600.0)), "deg/h"
-    return length_unit(r.sigma) if r.name in ("GNSS position", "barometer") else speed_unit(r.sigma)

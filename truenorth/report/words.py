@@ -11,4 +11,7 @@ WORDS = (
     "holds", "does not hold", "holds in part", "too few runs", "Aligned, with warnings", "Navigated, with warnings",
     "case", "method", "log, s", "runs", "failed", "RMS", "95 % interval", "median", "95th percentile", "Cramer-Rao bound",
     "RMS/bound", "claimed sigma", "RMS/sigma", "95 % band",
+    "velocity of the base", "velocity of the master", "position of the master",
+    "acceleration of the master", "attitude of the master", "odometer displacement", "height", "attitude",
+    "GNSS heading", "magnetometer",
 )  # fmt: skip

@@ -68,7 +68,7 @@ SENTENCES = {
         "the latitude was not given: found from the log, {lat:deg|.2f} deg, to {sigma:deg|.2g} deg (one sigma)"
     ),
     "latitude.assumed": (
-        "the latitude was not given: {lat:deg|.0f} deg assumed; gyros as poor as these do not see the difference"
+        "the latitude was not given: {lat:deg|.0f} deg assumed; gyros as poor, or a log as short, do not see the difference"
     ),
     # ---- a base that stays, against earth and gravity
     "base.moves": "the base does not stay where it is: it moves from {until:.1f} s on",
@@ -182,6 +182,9 @@ SENTENCES = {
         "{name}: {rejected} of {count} measurements rejected: they contradict the track (half of them by more than "
         "{scatter:.3g} {unit})"
     ),
+    "innovations.elsewhere": (
+        "{name}: {rejected} of {count} measurements rejected: all of them lie about {distance:.3g} m from where the track began"
+    ),
     "innovations.outliers": "{name}: {rejected} of {count} measurements rejected as outliers",
     "innovations.size": (
         "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted"
@@ -199,7 +202,7 @@ SENTENCES = {
         "more: the sigma of position is too small"
     ),
     "odometer.taken_over": "odometer: scale, mounting and wheel arm are the alignment's, and estimated on",
-    "odometer.scale": "the odometer counts {scale:%|+.2f} % ({sigma:%|.2g} % one sigma)",
+    "odometer.scale": "the {name} counts {scale:%|+.2f} % ({sigma:%|.2g} % one sigma)",
     # ---- a slave against its master
     "transfer.clocks_part": (
         "the master's stamps are {before:.2f} s behind the slave's clock until {until:.1f} s and {after:.2f} s from "
@@ -269,6 +272,7 @@ REMEDIES = {
     "begin_after": "align the part after it, or the part before it",
     "latitude": "check the latitude",
     "height": "check the height",
+    "place": "check the position at the start, or say how rough it is",
     "units": "check the units",
     "specification": "check the specification",
     "source": "check axes, units, clock, lever arm and sigmas of that sensor",
@@ -306,7 +310,7 @@ REMEDIES = {
     "log": "check its units, axes, mounting, and whether it lives",
     "log_error": "check the error that was stated for it",
     "manoeuvre_gnss": "the vehicle must accelerate and turn while GNSS sees it",
-    "north": "an odometer tells nothing of north; use gyros that see the earth turn, or GNSS",
+    "north": "velocity along the vehicle tells nothing of north; use gyros that see the earth turn, or GNSS",
 }
 
 TERMS = {

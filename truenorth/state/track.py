@@ -32,6 +32,10 @@ class Residuals:
         The measurements' own times, which differ from `time` where they are re-timed.
     jumped : (M,) array of bool
         Where a jump was believed, and taken up.
+    unit : str
+        Of the innovations, SI.
+    axes : tuple of str
+        Names of their components.
     """
 
     name: str
@@ -43,6 +47,8 @@ class Residuals:
     outside: int
     stamp: Array
     jumped: NDArray[np.bool_]
+    unit: str = "m/s"
+    axes: tuple[str, ...] = ("east", "north", "up")
 
     @property
     def rows(self) -> NDArray[np.int64]:
