@@ -127,7 +127,7 @@ def test_after_a_long_gap_alignment_begins_anew_and_says_when(record):
 def test_merged_rows_keep_the_sums_whatever_the_chunks(kind, chunk):
     random = np.random.default_rng(1)
     count = 9000
-    rows = np.column_stack([np.arange(1, count + 1) * 0.01, random.normal(size=(count, 6))])
+    rows = np.column_stack([np.arange(1, count + 1) * 0.001, random.normal(size=(count, 6))])
     log = Log(kind, most=1000)
     for first in range(0, count, chunk):
         assert log.add(rows[first : first + chunk])
@@ -141,7 +141,20 @@ def test_merged_rows_keep_the_sums_whatever_the_chunks(kind, chunk):
     upto = int(np.searchsorted(rows[:, 0], record.time[-1], side="right"))
     np.testing.assert_allclose(record.gyro.sum(axis=0), dtheta[:upto].sum(axis=0), atol=1e-9)
     np.testing.assert_allclose(record.accel.sum(axis=0), dvel[:upto].sum(axis=0), atol=1e-9)
-    np.testing.assert_allclose(np.diff(record.time), 0.16, atol=1e-9)
+    np.testing.assert_allclose(np.diff(record.time), 0.016, atol=1e-9)
+
+
+def test_rows_of_a_tenth_of_a_second_are_merged_no_further_and_the_oldest_go():
+    log = Log("increments", most=1000)
+    rows = np.column_stack([np.arange(1, 20_001) * 0.02, np.ones((20_000, 6))])
+    for first in range(0, len(rows), 500):
+        log.add(rows[first : first + 500])
+    assert log.merged == 4
+    assert 500 < len(log) <= 1000
+    record = log.record()
+    assert record.time[-1] == rows[-1, 0]
+    np.testing.assert_array_equal(record.gyro, 4.0)
+    assert log.dropped + len(log) == 5000
 
 
 def test_a_base_that_drives_off_is_noticed_and_the_heading_until_then_kept(record):

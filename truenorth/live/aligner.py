@@ -119,12 +119,11 @@ class Aligner:
         self._carry: Carry | None = None
         self._earlier: Carry | None = None  # of the solution before, which knows no row of a drive that has just begun
         self._mover: Navigator | None = None  # on the move
-        self._newest: deque[Array] = (
-            deque()
-        )  # blocks as they came, of the last `RECENT` seconds and since the solution's epoch
+        self._newest: deque[Array] = deque()  # blocks as they came: `RECENT`, and what a running solution lacks
+        self._solving = np.inf  # s: last row of the solution that runs
         self._pool = ThreadPoolExecutor(1, "align") if background else None
         self._running: Future[Alignment] | None = None
-        self._due, self._cost, self._free_at = FIRST, 0.0, 0.0
+        self._due, self._cost, self._free_at = -np.inf, 0.0, 0.0
         self._lock = threading.Lock()
 
     def push(self, time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
@@ -266,7 +265,7 @@ class Aligner:
         state = kept(path, "Aligner")
         found = cls(state["place"], state["imu"], background=background, share=state["share"], method=state["method"])
         vars(found).update(state)
-        if found._solution is not None:
+        if found._solution is not None and found._newest[0][0, 0] <= found._solution.time:
             found._take_over(found._solution)
         return found
 
@@ -290,7 +289,7 @@ class Aligner:
             return
         self._taken(block)
         self._newest.append(block)
-        oldest = self.log.end - RECENT if self._solution is None else min(self.log.end - RECENT, self._solution.time)
+        oldest = min(self.log.end - RECENT, self._solving)
         while self._newest[0][-1, 0] < oldest:
             self._newest.popleft()
         if self._mover is not None:
@@ -304,7 +303,7 @@ class Aligner:
                 self._solution = carry.solution
 
     def _start_when_due(self) -> None:
-        if self._running is not None or self.duration < self._due:
+        if self._running is not None or self.duration < FIRST or self.log.end < self._due:
             return
         if self._pool is not None and clock.monotonic() < self._free_at:
             return
@@ -312,6 +311,7 @@ class Aligner:
         if self.left is not None and not aids:
             return
         record = self._record(aids)
+        self._solving = float(record.time[-1])
         if self._pool is not None:
             self._running = self._pool.submit(self._solve, record, aids)
             return
@@ -360,10 +360,10 @@ class Aligner:
         """Take over a solution that is ready."""
         if self._running is None or not self._running.done():
             return
-        running, self._running = self._running, None
+        running, self._running, self._solving = self._running, None, np.inf
         if self.solutions:  # the first one loads the compiled code as well
             self._free_at = clock.monotonic() + self._cost * (1.0 / self.share - 1.0)
-        self._due = GROWTH * max(self.duration, FIRST)
+        self._due = self.log.end + (GROWTH - 1.0) * max(self.duration, FIRST)
         try:
             found = running.result()
         except (AlignmentError, DataError) as error:
@@ -404,7 +404,8 @@ class Aligner:
             if feed.left_out:
                 more.append(f"{key}: {feed.left_out} row{'s' * (feed.left_out > 1)} left out")
         if self.log.merged > 1:
-            more.append(f"the log is long: rows are kept as increments over {self.log.merged} of them")
+            since = f", the last {self.duration / 3600.0:.1f} h count" if self.log.dropped else ""
+            more.append(f"the log is long: rows are kept as increments over {self.log.merged} of them{since}")
         if self.failure:
             more.append(self.failure)
         return (*at.reasons, *more)
