@@ -82,6 +82,28 @@ def test_septentrio(tmp_path):
         read_imu(path)
 
 
+def test_septentrio_earth_fixed_with_two_antennas(tmp_path):
+    """As receivers write that are set to PVTCartesian; sigmas are turned into east, north, up."""
+    pysbf2 = pytest.importorskip("pysbf2")
+    from truenorth.core.earth import ecef_axes, ecef_from_geodetic
+
+    home, C = ecef_from_geodetic(np.radians(LAT), np.radians(LON), ALT), ecef_axes(np.radians(LAT), np.radians(LON))
+    velocity = C @ [2.0, 1.0, -0.5]
+    with (path := tmp_path / "log.sbf").open("wb") as file:
+        for k in range(10):
+            fix = {"TOW": round(TOW * 1e3) + 1000 * k, "WNc": 2300}
+            place = {**dict(zip("XYZ", map(float, home))), **dict(zip(("Vx", "Vy", "Vz"), map(float, velocity)))}
+            file.write(pysbf2.SBFMessage("PVTCartesian", Error=0, **fix, **place).serialize())
+            file.write(pysbf2.SBFMessage("PosCovCartesian", **fix, Cov_xx=4.0, Cov_yy=4.0, Cov_zz=4.0).serialize())
+            file.write(pysbf2.SBFMessage("AttEuler", Error=0, **fix, Heading=123.0, Pitch=0.0, Roll=0.0).serialize())
+            file.write(pysbf2.SBFMessage("AttCovEuler", **fix, Cov_HeadHead=0.04).serialize())
+    record = read_gnss(path)
+    assert_is_at_home(record, 10)
+    np.testing.assert_allclose(record.position_sigma, 2.0, rtol=1e-6)
+    np.testing.assert_allclose(np.degrees(record.heading), 123.0, rtol=1e-6)
+    np.testing.assert_allclose(np.degrees(record.heading_sigma), 0.2, rtol=1e-5)
+
+
 def ulog_bytes():
     """A ULog as PX4 writes it: header, flags, formats, subscriptions, data."""
 
