@@ -44,12 +44,27 @@ def test_a_second_is_a_stop_where_all_that_look_agree(standing):
         found = seconds_at_rest(standing, **logs)[0]
         assert len(found) > 190, logs
         assert not np.any((found > 100.0) & (found < 200.0)), logs
-    # Where a receiver has no fix nobody but the IMU looks; one that tells no velocity has no say.
+    # Where a receiver has no fix nobody but the IMU looks.
     silent = gnss(np.where(((T > 100.0) & (T < 200.0))[:, None], np.nan, 0.0 * north))
     found = seconds_at_rest(standing, gnss=silent)[0]
     assert len(found) > 190
     assert not np.any((found > 102.0) & (found < 198.0))
-    np.testing.assert_array_equal(seconds_at_rest(standing, gnss=gnss(None))[0], alone)
+
+
+@pytest.mark.parametrize(("noise", "edge"), [(0.02, 4.0), (0.5, 12.0), (2.5, 22.0)])
+def test_places_without_velocities_show_stops(standing, noise, edge):
+    """Fixes of a receiver that tells no velocity: no stop is found while they move on, nor a standing base denied for long."""
+    rng = np.random.default_rng(3)
+    north = 14.0 * np.clip(T - 100.0, 0.0, 100.0) + noise * rng.standard_normal(len(T))
+    east = noise * rng.standard_normal(len(T))
+    scale = 6.37e6
+    log = GnssRecord(T, PLACE.lat + north / scale, PLACE.lon + east / (scale * np.cos(PLACE.lat)), 0 * T)
+    found = seconds_at_rest(standing, gnss=log)[0]
+    assert not np.any((found > 100.0) & (found < 200.0))
+    rests = (found < 100.0 - edge) | (found > 200.0 + edge)
+    assert np.count_nonzero(rests) > (0.95 if noise < 1.0 else 0.6) * (200.0 - 2.0 * edge)
+    hopeless = GnssRecord(T[::40], log.lat[::40], log.lon[::40], 0 * T[::40])
+    assert len(seconds_at_rest(standing, gnss=hopeless)[0]) == 0
 
 
 def test_height_does_not_wander_while_the_vehicle_stands(standing):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
+from truenorth.core.earth import radii
 from truenorth.core.errors import UsageError
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
@@ -18,6 +19,9 @@ Array = NDArray[np.float64]
 STILL_VELOCITY = 0.01  # m/s, one sigma of a base on which nothing is seen to move
 DISTURBED_VELOCITY = 0.03  # m/s, of one that people, wind or an engine shake
 STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
+FEWEST_FIXES = 5  # through which a line is laid
+REACHES = (2.0, 5.0, 10.0, 20.0)  # s before and after a fix
+SHARP = 0.4  # of the speed of standing: one sigma of a slope that tells
 STANDING_PULSES = 1.5  # pulses in a row of an odometer: no more is standing
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
 STILL_RATE = 1e-6  # rad/s, of its rotation, besides what the gyros show of themselves
@@ -56,7 +60,6 @@ def seconds_at_rest(
     """
     seconds = stops_in(record)
     speeds = [_speed_of(log) for log in (odometer, gnss, velocity) if log is not None]
-    speeds = [(time, moves) for time, moves in speeds if time.size]
     if not speeds:
         return seconds
     agreed = []
@@ -78,11 +81,40 @@ def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array,
         pulse = 0.0 if log.pulse_size is None else STANDING_PULSES * log.pulse_size / log.interval
         return log.time - 0.5 * log.steps, np.abs(log.speed) > max(STANDING, pulse)
     velocity = log.v_n if isinstance(log, GnssRecord) else log.velocity
-    if velocity is None:
-        return np.empty(0), np.empty(0, dtype=bool)
+    if velocity is None or not np.isfinite(velocity[:, :2]).any():
+        return _speed_of_places(log) if isinstance(log, GnssRecord) else (np.empty(0), np.empty(0, dtype=bool))
     level = velocity[:, :2]
     told = np.isfinite(level).any(axis=1)
     return log.time[told], np.linalg.norm(np.nan_to_num(level[told]), axis=1) > STANDING
+
+
+def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
+    """The same of fixes without velocities: the slope of a line through the fixes around each.
+
+    The shortest stretch is taken whose slope is sharp enough to tell standing from motion, the scatter of neighbouring fixes
+    being noise. Where even the longest is not, the fix says nothing.
+    """
+    fixed = np.isfinite(log.lat) & np.isfinite(log.lon)
+    time, lat, lon = log.time[fixed], log.lat[fixed], log.lon[fixed]
+    if time.size < FEWEST_FIXES:
+        return np.empty(0), np.empty(0, dtype=bool)
+    R_M, R_N = radii(lat[0])
+    place = np.stack([(lon - lon[0]) * R_N * np.cos(lat[0]), (lat - lat[0]) * R_M], axis=1)
+    # Second differences of white noise have six times its variance; a steady course has none.
+    noise = float(np.median(np.abs(np.diff(place, n=2, axis=0)))) / 0.6745 / np.sqrt(6.0)
+    speed, told = np.full(time.size, np.nan), np.zeros(time.size, dtype=bool)
+    t = time - time[0]
+    sums = np.concatenate(
+        [np.zeros((1, 7)), np.cumsum(np.column_stack([t**0, t, t**2, place, t[:, None] * place]), axis=0)]
+    )
+    for reach in REACHES:
+        first, last = np.searchsorted(time, time - reach), np.searchsorted(time, time + reach, side="right")
+        n, st, stt, *rest = (sums[last] - sums[first]).T
+        spread = np.maximum(stt - st**2 / n, 1e-12)
+        slope = np.stack([(rest[2 + i] - st * rest[i] / n) / spread for i in range(2)])
+        sharp = ~told & (n >= FEWEST_FIXES) & (noise / np.sqrt(spread) < SHARP * STANDING)
+        speed[sharp], told[sharp] = np.linalg.norm(slope[:, sharp], axis=0), True
+    return time[told], speed[told] > STANDING
 
 
 def rate_scatter(record: ImuRecord, interval: float, seconds: Array) -> float:
