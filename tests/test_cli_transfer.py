@@ -41,6 +41,21 @@ def test_what_a_person_reads(logs):
     assert "does not separate them well" in result.stdout
 
 
+def test_sigma_is_absolute_where_the_master_s_own_errors_are_given(logs):
+    slave, master = logs
+    found = {}
+    for options in ((), ("--master-sigma", "tactical"), ("--master-sigma", "heading=1 deg,level=1 deg")):
+        result = CliRunner().invoke(app, ["align", slave, "--master", master, "--json", *options])
+        assert result.exit_code in (0, 3), result.output
+        found[options] = json.loads(result.stdout)
+    alone, tactical, poor = found.values()
+    assert alone["sigma_is"] == "relative to the master"
+    assert tactical["sigma_is"] == poor["sigma_is"] == "absolute"
+    assert alone["heading_sigma_deg"] < 0.9 * tactical["heading_sigma_deg"] < 0.9 * poor["heading_sigma_deg"]
+    result = CliRunner().invoke(app, ["align", slave, "--master", master, "--master-sigma", "tactical"])
+    assert "sigma is absolute" in result.stdout
+
+
 def test_another_time_base_and_what_is_not_seen(logs, tmp_path):
     """A delay of more than an hour keeps the digits that its sigma has; what velocity does not see is not "as given"."""
     slave, master = logs

@@ -17,7 +17,7 @@ from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import ARM, DELAY, TransferModel
+from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel, master_errors
 from truenorth.filters import kalman
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -378,3 +378,17 @@ def test_errors_of_the_master_count_in_sigma_and_not_in_the_sigma_against_it(rea
     assert np.all(np.abs(off) < 3 * np.sqrt(np.diag(result.phi_covariance)))
     with pytest.raises(UsageError, match="expected one of navigation"):
         align_transfer(slave, master, master_errors="perfect")
+    assert "transfer.absolute" in [item.key for item in result.evidence]
+    assert "transfer.relative" in [item.key for item in found.evidence]
+
+
+def test_errors_of_the_master_by_name():
+    given = master_errors("level=0.3 arcmin, heading=2 arcmin,velocity=0.05 m/s,correlation_time=200 s")
+    assert given == MasterErrors(0.3 * ARCMIN, 2.0 * ARCMIN, 0.05, 0.3 * ARCMIN, 0.05, 200.0)
+    for wrong, message in (
+        ("level=1", "no unit"),
+        ("tilt=1 arcmin", "expected one of"),
+        ("level 1 deg", "expected one of"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            master_errors(wrong)

@@ -25,7 +25,7 @@ from truenorth.core.attitude import (
 )
 from truenorth.core.earth import earth_rate_n, transport_rate_n
 from truenorth.core.position import Position
-from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, MasterErrors, TransferModel
+from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, VELOCITY_ERROR, MasterErrors, TransferModel
 from truenorth.estimate.loop import SAME_TIME
 from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
@@ -159,6 +159,7 @@ def _transfer(
         v_n=track.v_n[-1],
         P=_fifteen(track.last_P, Position(0.0)),
         relative_sigma=_relative(track, model),
+        considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
         jumps=_jumps(track, what),
         open=_open(slave, model, assumed, start, track, noise, what),
         notes=(*notes, *silences),

@@ -38,6 +38,8 @@ class Transfer:
         Covariance of phi, dv, dp, gyro and accelerometer bias there (:mod:`truenorth.errors.ins`): what navigation begins with.
     relative_sigma : (3,) array, rad
         Of heading, pitch and roll against the master's solution, where its own errors are considered; else as the absolute ones.
+    considered : bool
+        Whether the master's own errors are in the alignment's sigma, which is absolute then; else it is against the master.
     jumps : tuple of str
         Where the master jumped, in words.
     open : tuple of str
@@ -63,6 +65,7 @@ class Transfer:
     v_n: Array
     P: Array
     relative_sigma: Array
+    considered: bool = False
     jumps: tuple[str, ...] = ()
     open: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -106,6 +109,7 @@ class Transfer:
             "master_position_noise_m": known(self.position_noise),
             "master_acceleration_noise_m_s2": known(self.acceleration_noise),
             "master_attitude_noise_deg": known(float(np.degrees(self.attitude_noise))),
+            "sigma_is": "absolute" if self.considered else "relative to the master",
             "relative_sigma_deg": np.degrees(self.relative_sigma).tolist(),
             "master_rows_used": self.used,
             "master_rows_rejected": self.rejected,

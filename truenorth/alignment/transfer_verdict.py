@@ -43,8 +43,17 @@ def judge_transfer(
             contradiction("transfer.jumps", "transfer_geometry", "put_times_right", count=len(transfer.jumps))
         )
     evidence += [note("transfer.open", states=words) for words in transfer.open]
+    evidence.append(_against_what(transfer))
     needs = "match_velocity" if transfer.matching == "attitude" else "manoeuvre"
     return judged(answer, counted_once(evidence), heading_limit, waiting=False, remedies=(needs,))
+
+
+def _against_what(transfer: Transfer) -> Evidence:
+    """Whether sigma is absolute, or against the master."""
+    if transfer.considered:
+        heading, pitch, roll = transfer.relative_sigma.tolist()
+        return note("transfer.absolute", heading=heading, level=max(pitch, roll))
+    return note("transfer.relative")
 
 
 def _rejected(transfer: Transfer) -> list[Evidence]:

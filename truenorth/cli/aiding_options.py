@@ -131,6 +131,13 @@ class ByMaster:
         ),
     ] = None
     lever_arm_sigma: Annotated[float, option("What --lever-arm (master to IMU) is uncertain by, m; 0: known.")] = 1.0
+    master_sigma: Annotated[
+        str | None,
+        option(
+            "Slow errors of the master's own solution: navigation, tactical, or 'level=0.3 arcmin,heading=2 arcmin,"
+            "velocity=0.05 m/s'; without it the master is taken for the truth, and sigma is against it."
+        ),
+    ] = None
     flexure: Annotated[
         str | None, option("The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time.")
     ] = None
@@ -157,7 +164,7 @@ class ByMaster:
         )
         record = read_master(self.master, columns=self.master_columns, units=self.master_units)
         flexure = None if self.flexure is None else _flexure(self.flexure)
-        return [Master(record, mounted, self.matching, flexure)]  # type: ignore[arg-type]  # checked there, with the choices
+        return [Master(record, mounted, self.matching, flexure, self.master_sigma)]  # type: ignore[arg-type]  # checked there, with the choices
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
+from truenorth.core.units import parse
 from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME
 from truenorth.errors.model import InsModel
@@ -91,23 +92,43 @@ MASTERS = {
         math.radians(3.0 / 60), math.radians(20.0 / 60), 0.2, math.radians(3.0 / 60), 0.2, correlation_time=300.0
     ),
 }  # by grade: an aided INS of a ship or an aircraft
+DIMENSIONS = {
+    "level": "angle",
+    "heading": "angle",
+    "velocity": "speed",
+    "attitude_drift": "angle",
+    "velocity_drift": "speed",
+    "correlation_time": "time",
+}
 
 
 def master_errors(given: MasterErrors | str | None) -> MasterErrors:
-    """Of a grade's name, or as given; None: the master is taken for the truth.
+    """Of a grade's name, of words such as ``level=.3 arcmin, heading=2 arcmin, velocity=.05 m/s``, or as given.
+
+    None: the master is taken for the truth. Of words, drifts that are left out are as large as the constants.
 
     Raises
     ------
     UsageError
-        An unknown grade.
+        An unknown grade, a name that is none, a value that cannot be read.
     """
     if given is None:
         return MasterErrors()
     if isinstance(given, MasterErrors):
         return given
-    if given not in MASTERS:
-        raise UsageError(f"errors of the master {given!r}; expected one of {', '.join(MASTERS)}, or MasterErrors(...)")
-    return MASTERS[given]
+    if given in MASTERS:
+        return MASTERS[given]
+    said = dict(part.split("=", 1) for part in given.split(",") if "=" in part)
+    values = {name.strip(): text for name, text in said.items()}
+    if len(said) != given.count(",") + 1 or not values.keys() <= DIMENSIONS.keys():
+        raise UsageError(
+            f"errors of the master {given!r}; expected one of {', '.join(MASTERS)}, or sigmas by name "
+            f"({', '.join(DIMENSIONS)}), such as level=0.3 arcmin,heading=2 arcmin,velocity=0.05 m/s"
+        )
+    found = {name: parse(text, DIMENSIONS[name]) for name, text in values.items()}
+    found.setdefault("attitude_drift", found.get("level", 0.0))
+    found.setdefault("velocity_drift", found.get("velocity", 0.0))
+    return MasterErrors(**found)
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,10 @@ SENTENCES = {
     ),
     # ---- a base that stays, against earth and gravity
     "base.moves": "the base does not stay where it is: it moves from {until:.1f} s on",
+    "base.stays": (
+        "that the base stays is taken as given: a steady {speed:.2g} m/s towards north or south would turn heading by its sigma, "
+        "and the log would not show it"
+    ),
     "base.unsettled": "re-linearisation did not settle: the log does not look like that of a base that stays where it is",
     "drift.step": (
         "the base drifts {axis:term}: from about {onset:.0f} s on its velocity shows a step to {velocity:.2g} m/s (likelihood "
@@ -84,6 +88,10 @@ SENTENCES = {
     "rate.misses": (
         "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification ({imu}) "
         "allows {allowed:deg/h|} deg/h"
+    ),
+    "rate.doubtful": (
+        "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification ({imu}) "
+        "allows {allowed:deg/h|} deg/h: a miss of that size towards east is in sigma"
     ),
     "force.misses": (
         "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu}) allows "
@@ -223,6 +231,11 @@ SENTENCES = {
         "specification ({imu}) allows, or the master drifts"
     ),
     "transfer.jumps": "the master's solution jumps {count} times: it does not fit this slave",
+    "transfer.absolute": (
+        "sigma is absolute, the master's own errors are in it; against the master heading is known to {heading:angle}, level "
+        "to {level:angle}"
+    ),
+    "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
     "transfer.open": "this motion does not separate them well: {states}",
     # ---- clocks, arms, scales and mountings left open
     "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
@@ -271,6 +284,7 @@ REMEDIES = {
     "still_part": "align a part in which the base stays",
     "begin_after": "align the part after it, or the part before it",
     "latitude": "check the latitude",
+    "base_stays": "check that the base stays where it is",
     "height": "check the height",
     "place": "check the position at the start, or say how rough it is",
     "units": "check the units",
