@@ -73,7 +73,8 @@ def simulated(scenario: Mapping[str, Any], seed: int, run: int, of_imu: bool = F
     record = simulation.record
     at = simulation.motion.states(record.time[:: max(1, round(read.rate))])
     here = Position(float(at.lat.mean()), float(at.lon.mean()), float(at.alt.mean()))
-    body = getattr(simulation.motion, "motion", simulation.motion) if not of_imu else simulation.motion
+    turned = "indexer" in scenario and not of_imu
+    body = getattr(simulation.motion, "motion", simulation.motion) if turned else simulation.motion
 
     def C_nb(when: float) -> Array:
         then = body.states(np.asarray(when))

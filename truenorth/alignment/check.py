@@ -130,6 +130,30 @@ def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogChe
     )
 
 
+def implied(check: LogCheck, bias: Array, P: Array, P0: Array) -> LogCheck:
+    """The check, with those rates that a filter with a prior implies better: what it saw before the prior drew it to zero.
+
+    Of a bias b, known before to P0 and after to P, the data alone say ``b P0 / (P0 - P)``, to ``P P0 / (P0 - P)``.
+
+    Parameters
+    ----------
+    check : LogCheck
+    bias : (3,) array, rad/s
+        As estimated, along east, north and up.
+    P, P0 : (3, 3) arrays, (rad/s)^2
+        Its covariance, after and before.
+    """
+    after, before = np.diag(P)[1:], np.diag(P0)[1:]
+    seen = np.maximum(before - after, 1e-9 * before)
+    noise = np.sqrt(after * before / seen)
+    better = noise < check.rate_noise
+    return replace(
+        check,
+        rate_residual=np.where(better, bias[1:] * before / seen, check.rate_residual),
+        rate_noise=np.where(better, noise, check.rate_noise),
+    )
+
+
 def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
     """Whether the mean rate of a base that does not turn is so far from the earth's that it holds no heading."""
     if motion.overall not in ("still", "disturbed"):

@@ -15,7 +15,7 @@ from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, 
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import bias_step_evidence, turn_evidence
-from truenorth.alignment.check import LogCheck, check_filter, check_means, is_blind, sharper
+from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
@@ -32,7 +32,7 @@ from truenorth.coarse.uncertainty import base_velocity
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.staying import STATES, StaticModel, gained_velocity
+from truenorth.errors.staying import BG, STATES, StaticModel, gained_velocity
 from truenorth.quality.density import specification_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.quality.regimes import MotionSummary
@@ -251,6 +251,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
     answer = answer_of(task, fine, used, where, P, sways)
+    if spec is not None:
+        C = answer.C_nb
+        check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
     steps = [*bias_step_evidence(fine), *bad_stretches(fine, task.record)]
     return _Found(answer, check, fine.settled, detect_drift(fine), "" if sways else form, steps)
 

@@ -13,7 +13,7 @@ from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import Alignment, Status
 from truenorth.core.attitude import UNIFORM_SIGMA
-from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
 from truenorth.core.errors import AlignmentError
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
@@ -22,6 +22,7 @@ from truenorth.state.limits import limit
 Array = NDArray[np.float64]
 
 
+WALKING = 2.0  # m/s: nobody takes what moves faster for a base that stays
 FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
 
 
@@ -125,17 +126,19 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     bias = float(np.max(answer.gyro_bias_prior))
     horizontal = EARTH_RATE * math.cos(place.lat)
     for axis, residual, noise in zip(("north", "up"), check.rate_residual, check.rate_noise, strict=True):
-        if abs(residual) > limit("specification") * math.hypot(bias, noise):
-            turned = min(abs(residual) / max(horizontal, 1e-12), UNIFORM_SIGMA)
-            found.append(
-                Evidence(
-                    "rate.misses",
-                    {"axis": axis, "residual": float(residual), "allowed": bias, "imu": answer.imu_source},
-                    "bounded",
-                    Effect(heading=turned),
-                    ("latitude", "imu_axes", "units", "specification"),
-                )
-            )
+        turned = min(abs(residual) / max(horizontal, 1e-12), UNIFORM_SIGMA)
+        figures: dict[str, Figure] = {
+            "axis": axis,
+            "residual": float(residual),
+            "allowed": bias,
+            "imu": answer.imu_source,
+        }
+        misses = abs(residual) / math.hypot(bias, noise)
+        if misses > limit("specification"):
+            remedies = ("latitude", "imu_axes", "units", "specification", "base_stays")
+            found.append(Evidence("rate.misses", figures, "bounded", Effect(heading=turned), remedies))
+        elif misses > limit("doubt"):
+            found.append(Evidence("rate.doubtful", figures, "known", Effect(heading=turned)))
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
     g = float(normal_gravity(place.lat, place.alt))
     accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)
@@ -149,7 +152,14 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
                 ("height", "units", "specification"),
             )
         )
-    return found + base_speed(answer) + model_evidence(drift, settled=settled)
+    return found + base_speed(answer) + _taken_to_stay(answer) + model_evidence(drift, settled=settled)
+
+
+def _taken_to_stay(answer: Alignment) -> list[Evidence]:
+    """Which steady speed towards north would turn heading by its sigma, and leave nothing to be seen: ``R w_ie cos L sigma``."""
+    sigma, lat = azimuth_sigmas(answer)[0], answer.position.lat
+    speed = float(radii(lat)[0]) * EARTH_RATE * math.cos(lat) * sigma
+    return [note("base.stays", speed=speed)] if speed < WALKING else []
 
 
 def base_speed(answer: Alignment) -> list[Evidence]:

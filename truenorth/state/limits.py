@@ -28,6 +28,11 @@ LIMITS: dict[str, Limit] = {
     "pole": Limit(0.1, "1", "cosine of 84 deg latitude, from which the place, not the gyro, is what hides north"),
     # ---- checks of the sensors against earth and gravity
     "specification": Limit(5.0, "sigma", "a sound IMU misses its specification by that much once in a million"),
+    "doubt": Limit(
+        2.5,
+        "sigma",
+        "a sound IMU misses its specification by that much once in a hundred; from here on the miss is in sigma",
+    ),
     "drift": Limit(
         25.0, "1", "likelihood ratio, chi-square with 1 degree of freedom, 12 signatures: 1e-5 false alarms"
     ),
