@@ -70,14 +70,8 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
 
     Parameters
     ----------
-    task : Task
-    spec : ImuSpec
     rows_at : (M,) int array
         Rows after which the integrated attitude is wanted.
-
-    Returns
-    -------
-    FineAlignment
     """
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large

@@ -96,7 +96,6 @@ def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSp
 
     Parameters
     ----------
-    record : ImuRecord
     motion : MotionSummary
         Of the same record.
     spec : ImuSpec

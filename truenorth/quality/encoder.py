@@ -66,7 +66,6 @@ def zero_evidence(record: ImuRecord, C_sb: Callable[[Array], Array], inner: Call
 
     Parameters
     ----------
-    record : ImuRecord
     C_sb : callable
         Attitude (K, 3, 3) of the base in the IMU at times (s).
     inner : callable
