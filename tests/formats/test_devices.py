@@ -32,22 +32,25 @@ def assert_is_at_home(record, count, velocity=(2.0, 1.0, -0.5)):
     np.testing.assert_allclose(record.v_n[:, : len(velocity)], np.tile(velocity, (count, 1)), atol=2e-2)
 
 
+def ubx_bytes(pyubx2):
+    parts = []
+    for k, t in enumerate(TIME):
+        if k % 20 == 0:
+            fix = pyubx2.UBXMessage(
+                "NAV", "NAV-PVT", pyubx2.GET, iTOW=round((TOW + t) * 1e3), lat=LAT, lon=LON, height=500000, velE=2000,
+                velN=1000, velD=500, hAcc=1000, vAcc=2000, sAcc=100, fixType=3,
+            )  # fmt: skip
+            parts.append(fix.serialize())
+        counts = [*np.degrees(SWAY.gyro[k]) * 2**12, *SWAY.accel[k] * 2**10]
+        words = [kind << 24 | round(value) % (1 << 24) for kind, value in zip((14, 13, 5, 16, 17, 18), counts)]
+        payload = bytes(4) + b"".join(struct.pack("<II", word, k * 256) for word in words)
+        parts.append(pyubx2.UBXMessage("ESF", "ESF-RAW", pyubx2.GET, payload=payload).serialize())
+    return parts
+
+
 def test_ublox(tmp_path):
-    pyubx2 = pytest.importorskip("pyubx2")
     path = tmp_path / "log.ubx"
-    with path.open("wb") as file:
-        for k, t in enumerate(TIME):
-            if k % 20 == 0:
-                fix = pyubx2.UBXMessage(
-                    "NAV", "NAV-PVT", pyubx2.GET, iTOW=round((TOW + t) * 1e3), lat=LAT, lon=LON, height=500000, velE=2000,
-                    velN=1000, velD=500, hAcc=1000, vAcc=2000, sAcc=100, fixType=3,
-                )  # fmt: skip
-                file.write(fix.serialize())
-            counts = [*np.degrees(SWAY.gyro[k]) * 2**12, *SWAY.accel[k] * 2**10]
-            kinds = (14, 13, 5, 16, 17, 18)
-            words = [kind << 24 | round(value) % (1 << 24) for kind, value in zip(kinds, counts)]
-            payload = bytes(4) + b"".join(struct.pack("<II", word, k * 256) for word in words)
-            file.write(pyubx2.UBXMessage("ESF", "ESF-RAW", pyubx2.GET, payload=payload).serialize())
+    path.write_bytes(b"".join(ubx_bytes(pytest.importorskip("pyubx2"))))
     record = read_imu(path)
     assert_is_sway(record, 1e-5, 1e-3, record.time[0] - TIME[0])
     assert abs(record.time[0] - TOW - TIME[0]) < 0.11  # the clock is known to the spacing of the fixes

@@ -1,14 +1,13 @@
 """Streams of devices and sensors: the bytes of their logs in pieces, noise in between, are the rows of those logs."""
 
 import socket
-import struct
 import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from tests.formats.test_devices import FRD, SWAY, TIME, TOW, novatel_line
+from tests.formats.test_devices import FRD, SWAY, TIME, TOW, novatel_line, ubx_bytes
 from tests.formats.test_devices import LAT as LAT
 from truenorth.core.errors import UsageError
 from truenorth.formats import read_gnss, read_imu
@@ -29,22 +28,6 @@ def in_pieces(data, hear, seed=0, longest=700):
         found.append(hear(data[at : at + step]))
         at += step
     return found
-
-
-def ubx_bytes(pyubx2):
-    parts = []
-    for k, t in enumerate(TIME):
-        if k % 20 == 0:
-            fix = pyubx2.UBXMessage(
-                "NAV", "NAV-PVT", pyubx2.GET, iTOW=round((TOW + t) * 1e3), lat=LAT, lon=LON, height=500000, velE=2000,
-                velN=1000, velD=500, hAcc=1000, vAcc=2000, sAcc=100, fixType=3,
-            )  # fmt: skip
-            parts.append(fix.serialize())
-        counts = [*np.degrees(SWAY.gyro[k]) * 2**12, *SWAY.accel[k] * 2**10]
-        words = [kind << 24 | round(value) % (1 << 24) for kind, value in zip((14, 13, 5, 16, 17, 18), counts)]
-        payload = bytes(4) + b"".join(struct.pack("<II", word, k * 256) for word in words)
-        parts.append(pyubx2.UBXMessage("ESF", "ESF-RAW", pyubx2.GET, payload=payload).serialize())
-    return parts
 
 
 def test_ublox_in_pieces_is_the_log(tmp_path):

@@ -34,7 +34,6 @@ def arm_velocity(
 
     Parameters
     ----------
-    source : {"gyros", "nominal", "attitude"}
     arm : (3,) array, m
         Base axes.
     step : float, s
@@ -45,10 +44,6 @@ def arm_velocity(
         Rate of the IMU at the times.
     indexer_rate : (K, 3) array, rad/s
         ``w_bs_s`` as designed, for the source "nominal".
-
-    Returns
-    -------
-    (K, 3) array
 
     Raises
     ------

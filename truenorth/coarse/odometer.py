@@ -45,6 +45,7 @@ from truenorth.strapdown.level import inertial_integrals
 
 Array = NDArray[np.float64]
 
+INTERVAL = 1.0  # s, over which both sides are averaged
 ITERATIONS = 3  # of the odometer's small terms; each is a thousandth of the one before
 LEAST_FIXES = 5
 FIRST = 0.25  # of the time elapsed, that GNSS's noise at a single epoch shall not be in all pairs
@@ -66,7 +67,6 @@ def odometer_alignment(
     position: Position,
     mounting: Mounting | None = None,
     form: Form = "velocity",
-    interval: float = 1.0,
 ) -> MovingAttitude:
     """Attitude at the start of a drive, from inertial sensors and an odometer; from any heading.
 
@@ -79,7 +79,6 @@ def odometer_alignment(
     mounting : Mounting, optional
         Of the wheel: its axes and lever arm as far as known.
     form : {"velocity", "position"}
-    interval : float, s
 
     Raises
     ------
@@ -87,7 +86,7 @@ def odometer_alignment(
         The odometer does not cover the log.
     """
     mounting = mounting or Mounting()
-    integrals = integrate(record, interval)
+    integrals = integrate(record, INTERVAL)
     moved = _wheel_displacement(record, odometer, mounting, integrals)  # (K+1, 3) in i, since the start
     T = integrals.intervals
     velocity = np.diff(moved, axis=0) / T[:, None]  # mean over each interval
@@ -111,8 +110,6 @@ def gnss_alignment(
     record: ImuRecord,
     gnss: GnssRecord,
     mounting: Mounting | None = None,
-    form: Form = "velocity",
-    interval: float = 1.0,
 ) -> MovingAttitude:
     """Attitude at the start of a log, from inertial sensors and a GNSS receiver; from any heading.
 
@@ -122,15 +119,13 @@ def gnss_alignment(
         Velocities where it has them, else differences of positions.
     mounting : Mounting, optional
         Of the antenna: its latency; the lever arm, against unknown attitude, is of no use yet.
-    form : {"velocity", "position"}
-    interval : float, s
 
     Raises
     ------
     DataError
         Fewer than five fixes in the log.
     """
-    integrals = integrate(record, interval)
+    integrals = integrate(record, INTERVAL)
     latency = 0.0 if mounting is None else mounting.latency
     at = integrals.start + integrals.time
     velocity, place = gnss_track(gnss, at, latency)
@@ -140,7 +135,7 @@ def gnss_alignment(
     w = np.asarray(earth_rate_n(float(place[0, 0])))
     rate = np.cross(w, v_n0) - _gravity(C_n0_n, place)
     r = 0.5 * (v_n0[1:] + v_n0[:-1]) + _mean_of_integral(rate, T)
-    return _solve(integrals.time, integrals.mean_velocity, r, form, place, FIRST)
+    return _solve(integrals.time, integrals.mean_velocity, r, "velocity", place, FIRST)
 
 
 def gnss_track(gnss: GnssRecord, at: Array, latency: float = 0.0) -> tuple[Array, Array]:

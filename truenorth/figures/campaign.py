@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -256,4 +256,4 @@ def _folded(name: str) -> str:
 
 def _title(figure: Figure, campaign: Campaign, what: str) -> None:
     runs = campaign.table["run"].nunique()
-    figure.suptitle(f"{campaign.plan.name}: {what}; {runs} runs", ha="left", x=0.01, fontsize=11)
+    headed(figure, f"{campaign.plan.name}: {what}; {runs} runs")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse_unit
-from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
+from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, headed, new_figure, style, trace
 
 if TYPE_CHECKING:
     from truenorth.analysis.allan import NoiseCoefficients
@@ -56,7 +56,7 @@ def plot_inspection(inspection: Inspection) -> Figure:
         wander.set_xlabel("time, s")
         draw_allan(figure.add_subplot(right[0]), inspection.gyro_noise, "Gyro Allan deviation", "deg/h")
         draw_allan(figure.add_subplot(right[1]), inspection.accel_noise, "Accelerometer Allan deviation", "ug")
-        figure.suptitle(_title(inspection), ha="left", x=0.01, fontsize=11)
+        headed(figure, _title(inspection))
         figure.legend(handles=_legend(inspection), loc="outside lower left", ncols=9, fontsize=9, handlelength=1.4)
     return figure
 

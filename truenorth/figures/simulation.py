@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import euler_from_dcm
 from truenorth.core.earth import radii
 from truenorth.core.units import STANDARD_GRAVITY
-from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, new_figure, style, trace
+from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, headed, new_figure, style, trace
 from truenorth.records import GnssRecord, HeightRecord, MasterRecord, OdometerRecord, Record, VelocityRecord
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def plot_simulation(simulation: Simulation, title: str = "", aiding: Mapping[str
         rows[3].set_xlabel(f"time, {name}")
         for ax in (speed, *rows[:3]):
             ax.tick_params(labelbottom=False)
-        figure.suptitle(title or record.source, ha="left", x=0.01, fontsize=11)
+        headed(figure, title or record.source)
     return figure
 
 

@@ -111,3 +111,8 @@ def trace(ax: Axes, time: ArrayLike, values: ArrayLike, **options: Any) -> None:
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     keep = thin(t, v)
     ax.plot(t[keep], v[keep], **options)
+
+
+def headed(figure: Figure, text: str) -> None:
+    """Put a heading over all axes, flush left."""
+    figure.suptitle(text, ha="left", x=0.01, fontsize=11)

@@ -95,17 +95,9 @@ def drive(
     _raise_failure(out, shape)
 
     out = out._replace(**{name: a.reshape(shape + a.shape[1:]) for name, a in out._asdict().items()})
-    return Estimates(
-        x=out.x,
-        sigma=out.sigma,
-        P=out.P,
-        innovation=out.innovation,
-        innovation_covariance=out.innovation_covariance,
-        nis=out.nis,
-        log_likelihood=out.log_likelihood,
-        state=FilterState(out.x[..., -1, :], out.P[..., -1, :, :], out.log_likelihood, out.memory),
-        adaptation=out.adaptation,
-    )
+    after = FilterState(out.x[..., -1, :], out.P[..., -1, :, :], out.log_likelihood, out.memory)
+    of_rows = out.innovation, out.innovation_covariance, out.nis, out.log_likelihood
+    return Estimates(out.x, out.sigma, out.P, *of_rows, after, out.adaptation)
 
 
 def _remembered(state: FilterState, length: int, shape: tuple[int, ...]) -> Array:

@@ -25,7 +25,7 @@ from truenorth.core.linalg import Array, Size, dot, transposed_times
 from truenorth.filters.drive import Running
 from truenorth.filters.linear import run_linear, variant
 from truenorth.filters.recursion import SOUND, Workspace, update
-from truenorth.filters.sage_husa import check_independent_rows
+from truenorth.filters.sage_husa import check_independent_rows, check_limits
 from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 AdaptiveKind = Literal["innovation", "residual"]
@@ -112,13 +112,11 @@ def innovation_adaptive(
 
     Parameters
     ----------
-    system : LinearSystem
-        With a diagonal R, which is what each row begins with, and without S.
+    system, smallest, largest
+        As of :func:`truenorth.filters.sage_husa`.
     kind : "innovation" or "residual"
     window : int
         Measurements of a row that count; the variance scatters by ``sqrt(2 / window)`` and more.
-    smallest, largest : float
-        Limits of the estimated variance, in units of the given one.
 
     Returns
     -------
@@ -134,8 +132,7 @@ def innovation_adaptive(
         raise UsageError(f'kind is {kind!r}, expected "innovation" or "residual"')
     if window < 1:
         raise UsageError(f"window is {window}, expected at least 1 measurement")
-    if not 0.0 < smallest <= 1.0 <= largest:
-        raise UsageError(f"smallest is {smallest} and largest {largest}, expected 0 < smallest <= 1 <= largest")
+    check_limits(smallest, largest)
     check_independent_rows(system)
 
     options = InnovationAdaptive(int(window), kind == "innovation", float(smallest), float(largest))

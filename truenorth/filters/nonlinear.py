@@ -132,27 +132,26 @@ def load_rows(size: Size, system: NonlinearRuns, run: int, epoch: int, w: Worksp
 
 
 @compiled
-def predict_point(
-    size: Size, functions: Functions, rule: QuadratureRule, order: NDArray[np.int64], w: Workspace, s: Points
+def linear_at(
+    size: Size,
+    functions: Functions,
+    rule: QuadratureRule,
+    order: NDArray[np.int64],
+    w: Workspace,
+    s: Points,
+    measured: bool,
 ) -> int:
-    """``X = E f(x)``, ``P = cov f(x)``, without Q; the failure, if any."""
+    """The prediction of state and covariance without Q, or the linear measurement ``z = H dx + v``; the failure, if any."""
     if len(rule.mean) == 0:
-        return SOUND if predict_tangent(size, functions, w, s) else NOT_FINITE
+        sound = measure_tangent(size, functions, w, s) if measured else predict_tangent(size, functions, w, s)
+        return SOUND if sound else NOT_FINITE
     if not decompose(size, w.P, order, s):
         return NOT_POSITIVE
-    return SOUND if predict_nodes(size, functions, rule, order, w, s) else NOT_FINITE
-
-
-@compiled
-def measure_point(
-    size: Size, functions: Functions, rule: QuadratureRule, order: NDArray[np.int64], w: Workspace, s: Points
-) -> int:
-    """``w.z, w.H, w.R`` of the linear measurement ``z = H dx + v``; the failure, if any."""
-    if len(rule.mean) == 0:
-        return SOUND if measure_tangent(size, functions, w, s) else NOT_FINITE
-    if not decompose(size, w.P, order, s):
-        return NOT_POSITIVE
-    return SOUND if measure_nodes(size, functions, rule, order, w, s) else NOT_FINITE
+    if measured:
+        sound = measure_nodes(size, functions, rule, order, w, s)
+    else:
+        sound = predict_nodes(size, functions, rule, order, w, s)
+    return SOUND if sound else NOT_FINITE
 
 
 @compiled(forceinline=True)
@@ -299,7 +298,7 @@ def nonlinear_runs(
         rejected = out.memory[run, rows * first :]
         for epoch in range(epochs):
             load_epoch(size, system, run, epoch, w, s)
-            failure = predict_point(size, functions, rule, order, w, s)
+            failure = linear_at(size, functions, rule, order, w, s, False)
             if failure != SOUND:
                 conclude(out, run, epoch, failure, 0.0, 0.0)
                 break
@@ -308,7 +307,7 @@ def nonlinear_runs(
             add_noise(size, w)
             present = load_rows(size, system, run, epoch, w)
             if present > 0 or out.innovation.shape[1] > 0:
-                failure = measure_point(size, functions, rule, order, w, s)
+                failure = linear_at(size, functions, rule, order, w, s, True)
                 if options.tracking and failure == SOUND:
                     if options.gate != NO_GATE:
                         innovate(size, w, nu, W)
@@ -324,7 +323,7 @@ def nonlinear_runs(
                         w.z[i] = z[i]
                     if lam[0] > 1.0 and len(rule.mean) > 0:  # the nodes lie further out
                         load_rows(size, system, run, epoch, w)
-                        failure = measure_point(size, functions, rule, order, w, s)
+                        failure = linear_at(size, functions, rule, order, w, s, True)
                 if failure != SOUND:
                     conclude(out, run, epoch, failure, 0.0, 0.0)
                     break
@@ -346,7 +345,7 @@ def nonlinear_runs(
                 for _ in range(1, options.iterations):
                     # Linearise at the last estimate, update from the prediction: z - h(X_i) + H (X_i - X).
                     load_rows(size, system, run, epoch, w)
-                    failure = measure_point(size, functions, rule, order, w, s)
+                    failure = linear_at(size, functions, rule, order, w, s, True)
                     for i in range(n):
                         before[i] = dx[i]
                     for i in range(rows):

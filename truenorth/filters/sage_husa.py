@@ -99,8 +99,7 @@ def sage_husa(
     """
     if not 0.0 < b < 1.0:
         raise UsageError(f"b is {b}, expected a number between 0 and 1")
-    if not 0.0 < smallest <= 1.0 <= largest:
-        raise UsageError(f"smallest is {smallest} and largest {largest}, expected 0 < smallest <= 1 <= largest")
+    check_limits(smallest, largest)
     check_independent_rows(system)
 
     memory = np.concatenate([np.full(system.rows, np.nan), np.ones(system.rows)])
@@ -115,3 +114,9 @@ def check_independent_rows(system: LinearSystem) -> None:
         raise UsageError("R is not diagonal: to estimate variances row by row, decorrelate the measurements first")
     if system.S is not None and system.S.any():
         raise UsageError("S is given: variances estimated row by row need noise uncorrelated with the process noise")
+
+
+def check_limits(smallest: float, largest: float) -> None:
+    """Limits of an estimated variance hold the given one between them."""
+    if not 0.0 < smallest <= 1.0 <= largest:
+        raise UsageError(f"smallest is {smallest} and largest {largest}, expected 0 < smallest <= 1 <= largest")

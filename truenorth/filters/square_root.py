@@ -235,19 +235,8 @@ def square_root(
     state: FilterState | None = None,
     **running: Unpack[Running],
 ) -> Estimates:
-    """Square-root Kalman filter; exact for any ``R`` and ``S`` like :func:`truenorth.filters.kalman`.
+    """Square-root Kalman filter; called as :func:`truenorth.filters.kalman`, and exact for any ``R`` and ``S`` like it.
 
-    Parameters
-    ----------
-    system : LinearSystem
-    state : FilterState, optional
-        From an earlier call, to go on from; its `memory` is the factor.
-    **running
-        ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
-
-    Raises
-    ------
-    DataError
-        The variance of an innovation is zero, naming run and epoch.
+    The `memory` of its state is the factor. A DataError says where the variance of an innovation is zero.
     """
     return drive(square_root_runs, system, state, memory=np.full(system.states**2, np.nan), **running)

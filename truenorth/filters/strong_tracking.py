@@ -59,10 +59,8 @@ def strong_tracking(
     softening : float
         beta, at least 1: how much larger than expected the measurement noise may look before the factor fires; at 1
         the filter is the fading filter of kind "single".
-    rho : float
-        Weight of the past in V, where the newest innovation has 1; the memory is ``1 + rho`` epochs.
-    cap : float
-        Largest factor.
+    rho, cap
+        As of :func:`truenorth.filters.fading`.
 
     Returns
     -------

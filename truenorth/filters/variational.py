@@ -125,8 +125,8 @@ def variational(
 
     Parameters
     ----------
-    system : LinearSystem
-        With a diagonal R, the prior guess of the variances, and without S.
+    system
+        As of :func:`truenorth.filters.sage_husa`; R is the prior guess of the variances.
     rho : float
         Forgetting factor; the memory is ``1 / (1 - rho)`` epochs.
     worth : float

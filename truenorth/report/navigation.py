@@ -13,12 +13,11 @@ from truenorth.quality.innovations import mean_nis
 from truenorth.report.chart import POINTS, Chart, Clock, angle_unit, length_unit, speed_unit, unit_of
 from truenorth.report.charts import limits, over_time
 from truenorth.report.damping import damping_facts, damping_panels
-from truenorth.report.document import Panel, Table, render, verdict_lines
+from truenorth.report.document import Panel, Table, render
 from truenorth.report.estimated import estimated_rows
 from truenorth.report.numbers import short
-from truenorth.report.page import MOODS
+from truenorth.report.page import head_of
 from truenorth.report.track import track_panel
-from truenorth.state.wording import headline
 
 if TYPE_CHECKING:
     from truenorth.navigation.result import Navigation
@@ -29,19 +28,11 @@ Array = NDArray[np.float64]
 
 def navigation_page(result: Navigation) -> str:
     """HTML text of the page; everything is inside, so that it works offline."""
-    mood, verdict = MOODS.get(result.status, "bad"), headline(result.status, result.evidence)
-    reasons, warnings = verdict_lines(result.reasons)
-    if warnings and mood == "good":
-        mood, verdict = "fair", "Navigated, with warnings"
     tables, panels = _tables(result), _panels(result)
     return render(
         "navigation.html",
         interactive=True,
-        result=result,
-        mood=mood,
-        verdict=_(verdict),
-        reasons=reasons,
-        warnings=warnings,
+        **head_of(result, "Navigated, with warnings"),
         numbers=_numbers(result),
         facts=_facts(result),
         tables=tables,

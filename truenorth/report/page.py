@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,27 +23,29 @@ if TYPE_CHECKING:
 MOODS = {"aligned": "good", "navigated": "good", "level_only": "fair"}
 
 
+def head_of(result: Any, warned: str, doubts: Sequence[Any] = ()) -> dict[str, Any]:
+    """What stands on top of a page: the verdict with its mood (`warned`: a good one with warnings), reasons and warnings."""
+    mood, verdict = MOODS.get(result.status, "bad"), headline(result.status, result.evidence)
+    reasons, warnings = verdict_lines(result.reasons)
+    warnings = [*warnings, *doubts]
+    if warnings and mood == "good":
+        mood, verdict = "fair", warned
+    return {"result": result, "mood": mood, "verdict": _(verdict), "reasons": reasons, "warnings": warnings}
+
+
 def alignment_page(result: Alignment) -> str:
     """HTML text of the page; everything is inside, so that it works offline."""
     shown, health = panels(result), _health(result)
     relation = relation_table(result.transfer, result.moving)
-    mood, verdict = MOODS.get(result.status, "bad"), headline(result.status, result.evidence)
     findings = () if result.inspection is None else result.inspection.findings
-    reasons, warned = verdict_lines(result.reasons)
-    warnings = [*warned, *(finding for finding in findings if finding.severity != "note")]
-    if warnings and mood == "good":
-        mood, verdict = "fair", "Aligned, with warnings"
+    doubts = [finding for finding in findings if finding.severity != "note"]
     contents = [_("Verdict"), _("Attitude"), _("How it was found")]
     contents += [relation.title] if relation else []
     contents += [panel.title for panel in shown] or [_("Convergence")]
     return render(
         "alignment.html",
         interactive=bool(shown),
-        result=result,
-        mood=mood,
-        verdict=_(verdict),
-        reasons=reasons,
-        warnings=warnings,
+        **head_of(result, "Aligned, with warnings", doubts),
         numbers=_numbers(result),
         facts=_facts(result),
         biases=_biases(result),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.damping.loop import Mode
 from truenorth.damping.spectrum import spectrum
 from truenorth.errors.marine import DV
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style, trace
+from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style, trace
 from truenorth.papers.damping.methods import SWITCH, Case
 from truenorth.papers.damping.statistics import Signs
 from truenorth.papers.damping.switching import SETTLED, WAYS
@@ -63,7 +63,7 @@ def draw_errors(case: Case, kind: Literal["attitude", "position", "velocity"]) -
         axes[-1].set_xlabel("time, h")
         axes[-1].set_xticks(range(0, 49, 6))
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        figure.suptitle(f"{kind.capitalize()} errors, log error -.3 m/s", ha="left", x=0.01, fontsize=11)
+        headed(figure, f"{kind.capitalize()} errors, log error -.3 m/s")
     return figure
 
 
@@ -100,7 +100,7 @@ def draw_tables(ours: Mapping[str, Array], theirs: Mapping[str, Array], logs: Se
             ax.tick_params(labelbottom=True)
         axes[7].set_visible(False)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        figure.suptitle("Tables 1 and 2: errors at 20 h", ha="left", x=0.01, fontsize=11)
+        headed(figure, "Tables 1 and 2: errors at 20 h")
     return figure
 
 
@@ -124,7 +124,7 @@ def draw_windows(signs: Signs, runs: int) -> Figure:
             ax.yaxis.set_minor_formatter("{x:g}" if column == 2 else NullFormatter())
             ax.set_xticks(range(0, 49, 12))
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        figure.suptitle(f"{runs} voyages, all errors with random signs", ha="left", x=0.01, fontsize=11)
+        headed(figure, f"{runs} voyages, all errors with random signs")
     return figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
 from truenorth.papers.odometer.loop import Errors
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ def draw_paper_figures(found: Mapping[tuple[str, str], Errors], case: str) -> Fi
             ax.set_xlabel("time, s")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
         runs = len(found[case, "ckf"].phi)
-        figure.suptitle(f"RMS errors over {runs} runs, from 10 deg of azimuth error", ha="left", x=0.01, fontsize=11)
+        headed(figure, f"RMS errors over {runs} runs, from 10 deg of azimuth error")
     return figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.core.indexing import C_bs_from_angles
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
 from truenorth.papers.drawing import marked
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES
 
@@ -53,12 +53,7 @@ def draw_modulation() -> Figure:
             axes[0, column].set(title=f"{name} bias in the body", ylabel=unit)
             axes[1, column].set(title="its integral", ylabel=whole, xlabel="time, s")
         figure.legend(*axes[1, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        figure.suptitle(
-            "Rotation modulation, w1 = 18 deg/s about x, w2 = 6 deg/s about z (eqs. 8, 9)",
-            ha="left",
-            x=0.01,
-            fontsize=11,
-        )
+        headed(figure, "Rotation modulation, w1 = 18 deg/s about x, w2 = 6 deg/s about z (eqs. 8, 9)")
     return figure
 
 
@@ -91,7 +86,7 @@ def draw_coarse(errors: Mapping[str, Array]) -> Figure:
             ax.set_xlim(0.0, len(count) + 1.0)
             ax.xaxis.get_major_locator().set_params(integer=True)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        figure.suptitle("Coarse alignment, 120 s, configuration A", ha="left", x=0.01, fontsize=11)
+        headed(figure, "Coarse alignment, 120 s, configuration A")
     return figure
 
 
@@ -125,11 +120,9 @@ def draw_filters(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str,
         for ax in axes[-1]:
             ax.set_xlabel("time of fine alignment, s")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        figure.suptitle(
+        headed(
+            figure,
             "Fine alignment by the paper's filters, one run; dotted: the 250 s within which it says they converge",
-            ha="left",
-            x=0.01,
-            fontsize=11,
         )
     return figure
 
@@ -153,7 +146,7 @@ def draw_convergence(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[
             ax.set_xlabel("time of fine alignment, s")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
         runs = len(next(iter(next(iter(curves.values())).values())))
-        figure.suptitle(f"Fine alignment by the paper's filters, RMS over {runs} runs", ha="left", x=0.01, fontsize=11)
+        headed(figure, f"Fine alignment by the paper's filters, RMS over {runs} runs")
     return figure
 
 

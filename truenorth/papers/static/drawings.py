@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.analysis.observability import Observability
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
 from truenorth.papers.drawing import marked
 from truenorth.papers.static.filtering import Errors
 from truenorth.papers.static.truth import ARCMIN, Truth
@@ -46,9 +46,7 @@ def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
         for ax in axes[1]:
             ax.set_xlabel("time, s")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
-        figure.suptitle(
-            "The paper's scenario: P0 = 1e5 I, Q = 0, R = .001, 1000 steps of .02 s", ha="left", x=0.01, fontsize=11
-        )
+        headed(figure, "The paper's scenario: P0 = 1e5 I, Q = 0, R = .001, 1000 steps of .02 s")
     return figure
 
 
@@ -78,7 +76,7 @@ def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Err
         axes[0, 0].set_ylabel("heading, arcmin")
         axes[1, 0].set_ylabel("level, arcmin")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        figure.suptitle(f"Honest comparison, {runs} runs of each case", ha="left", x=0.01, fontsize=11)
+        headed(figure, f"Honest comparison, {runs} runs of each case")
     return figure
 
 
