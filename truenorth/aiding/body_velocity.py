@@ -47,43 +47,25 @@ _PHI, _DV, _BG = 0, 3, 9
 
 @compiled
 def body_velocity_row(
-    s: Any,
+    s: Any,  # as of :func:`truenorth.aiding.position.position_row`; z in m/s
     C: Any,
-    w_b: Any,
-    push: Any,
-    C_mb: Any,
-    arm: Any,
+    w_b: Any,  # tuple of 3, rad/s; rate of the body against the earth, body axes
+    push: Any,  # tuple of 3, m/s^2; change of the velocity along w
+    C_mb: Any,  # (3, 3): body to vehicle axes, as assumed now
+    arm: Any,  # as assumed now: m in body axes, 1, m/s, s
     scale: float,
     bias: Any,
     lag: float,
-    at_arm: int,
+    at_arm: int,  # the first state of each; -1: none. The mounting angles are those about x and z.
     at_scale: int,
     at_mount: int,
     at_bias: int,
     at_lag: int,
-    measured: Any,
+    measured: Any,  # (3,) m/s: right, forward, up
     H: Any,
     z: Any,
 ) -> None:
-    """Velocity in the vehicle's axes.
-
-    Parameters
-    ----------
-    s, C, H, z
-        As of :func:`truenorth.aiding.position.position_row`; z in m/s.
-    w_b : tuple of 3, rad/s
-        Rate of the body against the earth, body axes.
-    push : tuple of 3, m/s^2
-        Change of the velocity along w.
-    C_mb : (3, 3) array
-        Body to vehicle axes, as assumed now.
-    arm, scale, bias, lag
-        As assumed now: m in body axes, 1, m/s, s.
-    at_arm, at_scale, at_mount, at_bias, at_lag : int
-        The first state of each; -1: none. The mounting angles are those about x and z.
-    measured : (3,) array, m/s
-        Right, forward, up.
-    """
+    """Velocity in the vehicle's axes."""
     gain = 1.0 + scale
     v = times_back(C, (s[4], s[5], s[6]))
     change = times_back(C, push)  # of the velocity as its axes do not turn

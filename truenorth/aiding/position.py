@@ -57,40 +57,19 @@ def convergence(s: Any) -> Any:
 
 @compiled
 def position_row(
-    s: Any,
-    C: Any,
-    arm: Any,
-    lag: float,
-    bias: Any,
-    at_arm: int,
+    s: Any,  # (24,): the state, see :mod:`truenorth.strapdown.wander`
+    C: Any,  # (3, 3): ``C_wb``
+    arm: Any,  # tuple of 3, m; IMU to antenna, body axes
+    lag: float,  # s
+    bias: Any,  # tuple of 3, m; East, north, up: what the receiver is off by for minutes
+    at_arm: int,  # the first state of lever arm, lag and bias; -1: none
     at_lag: int,
     at_bias: int,
-    measured: Any,
-    H: Any,
-    z: Any,
+    measured: Any,  # (3,): latitude, longitude (rad), height (m)
+    H: Any,  # (3, N): zeros; filled in
+    z: Any,  # (3,) m: filled in
 ) -> None:
-    """Position of an antenna.
-
-    Parameters
-    ----------
-    s : (24,) array
-        The state, see :mod:`truenorth.strapdown.wander`.
-    C : (3, 3) array
-        ``C_wb``.
-    arm : tuple of 3, m
-        IMU to antenna, body axes.
-    lag : float, s
-    bias : tuple of 3, m
-        East, north, up: what the receiver is off by for minutes.
-    at_arm, at_lag, at_bias : int
-        The first state of lever arm, lag and bias; -1: none.
-    measured : (3,) array
-        Latitude, longitude (rad), height (m).
-    H : (3, N) array
-        Zeros; filled in.
-    z : (3,) array, m
-        Filled in.
-    """
+    """Position of an antenna."""
     lat, lon = measured[0], measured[1]
     level = math.cos(lat)
     back = (s[7], -s[8], -s[9], -s[10])

@@ -49,25 +49,14 @@ VELOCITY_SIGMA = 0.1  # m/s
 
 
 def azimuth_track(
-    record: ImuRecord,
+    record: ImuRecord,  # without gaps
     odometer: OdometerRecord | None,
-    position: Position,
+    position: Position,  # at the start
     spec: ImuSpec,
-    wheel: Mounting,
-    method: str,
+    wheel: Mounting,  # its mounting, scale's sigma and latency are used
+    method: str,  # one of `AZIMUTH_METHODS`
 ) -> Track:
     """Track of a vehicle by one of the published filters, from the end of coarse alignment on.
-
-    Parameters
-    ----------
-    record : ImuRecord
-        Without gaps.
-    position : Position
-        At the start.
-    wheel : Mounting
-        Its mounting, scale's sigma and latency are used.
-    method : str
-        One of `AZIMUTH_METHODS`.
 
     Raises
     ------

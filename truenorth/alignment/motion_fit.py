@@ -36,24 +36,13 @@ FARTHEST = 30.0  # rad: phase over the log by which a search may move a frequenc
 
 
 def fit_motion(
-    residual: Array,
-    interval: float,
+    residual: Array,  # (K,) m/s: mean velocity of the base over each interval, but for a smooth trend
+    interval: float,  # s
     walks: Walks,
-    start: AxisMotion | None = None,
-    most: int = MOST_OSCILLATORS,
+    start: AxisMotion | None = None,  # a good guess, which competes with what a search from nothing finds
+    most: int = MOST_OSCILLATORS,  # oscillators
 ) -> AxisMotion:
-    """The motion along one axis.
-
-    Parameters
-    ----------
-    residual : (K,) array, m/s
-        Mean velocity of the base over each interval, but for a smooth trend.
-    interval : float, s
-    start : AxisMotion, optional
-        A good guess, which competes with what a search from nothing finds.
-    most : int
-        Oscillators.
-    """
+    """The motion along one axis."""
     series = Series(residual, interval, walks)
     best = _search(series, most)
     return best if start is None else min(best, _climb(series, start, POLISHES), key=series.score)

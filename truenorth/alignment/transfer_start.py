@@ -128,17 +128,10 @@ def hand_over(
     model: TransferModel,
     spec: ImuSpec,
     assumed: Assumed,
-    noise: tuple[float, float],
-    position: Position | None,
+    noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
+    position: Position | None,  # where the master tells none
 ) -> tuple[ImuRecord, SlaveStart]:
     """The slave's record from the master's first row on, and its first state as the master tells it.
-
-    Parameters
-    ----------
-    noise : (velocity, attitude) floats, m/s and rad
-        Of the master's rows.
-    position : Position or None
-        Where the master tells none.
 
     Raises
     ------

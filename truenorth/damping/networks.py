@@ -134,25 +134,16 @@ def second_order(damping: float = DAMPING, stretch: float = STRETCH, second_damp
 
 
 def third_order(
-    damping: float = DAMPING,
+    damping: float = DAMPING,  # as in :func:`first_order`
     stretch: float = STRETCH,
-    second: float = 2.5,
+    second: float = 2.5,  # of the other pair: its rate over Schuler's, and its damping ratio
     second_damping: float = 1.0,
-    third: float = 2.5,
+    third: float = 2.5,  # the real pole over Schuler's rate
 ) -> Network:
     """The network of third order that puts all five poles of a level channel where they are asked for.
 
     ``s^2 D + w_s^2 N = (s^2 + 2 zeta w s + w^2)(s^2 + 2 zeta_2 w_2 s + w_2^2)(s + q)``, with N and D of third degree, both with
     the first coefficient 1 (high frequencies pass) and the same last one (``H(0) = 1``): five coefficients, five unknowns.
-
-    Parameters
-    ----------
-    damping, stretch : float
-        As in :func:`first_order`.
-    second, second_damping : float
-        Of the other pair: its rate over Schuler's, and its damping ratio.
-    third : float
-        The real pole over Schuler's rate.
 
     Raises
     ------

@@ -28,21 +28,12 @@ def save_run(
     simulation: Simulation,
     folder: str | PathLike[str],
     *,
-    seed: int,
+    seed: int,  # that the run was made with
     run: int = 0,
-    suffix: Suffix = "parquet",
-    plot: bool = True,
+    suffix: Suffix = "parquet",  # of the logs and the truth
+    plot: bool = True,  # also figure.png
 ) -> list[Path]:
     """Write a run; the same scenario, seed and run give the same bytes of logs and truth.
-
-    Parameters
-    ----------
-    seed, run : int
-        That the run was made with.
-    suffix : {"parquet", "csv"}
-        Of the logs and the truth.
-    plot : bool
-        Also figure.png.
 
     Raises
     ------

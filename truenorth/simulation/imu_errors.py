@@ -35,26 +35,17 @@ Array = NDArray[np.float64]
 
 
 def apply_errors(
-    dtheta: Array,
-    dvel: Array,
-    interval: float,
-    spec: ImuSpec,
+    dtheta: Array,  # (N, 3) rad
+    dvel: Array,  # (N, 3) m/s
+    interval: float,  # s
+    spec: ImuSpec,  # terms that are zero are left out
     *,
     seed: int,
     run: int = 0,
     scenario: int = 0,
-    given: Mapping[str, ArrayLike] | None = None,
+    given: Mapping[str, ArrayLike] | None = None,  # see :func:`truenorth.simulation.true_errors.drawn_errors`
 ) -> tuple[Array, Array, TrueErrors]:
     """Ideal increments as the IMU of a specification would give them.
-
-    Parameters
-    ----------
-    dtheta, dvel : (N, 3) arrays, rad and m/s
-    interval : float, s
-    spec : ImuSpec
-        Terms that are zero are left out.
-    given : mapping, optional
-        See :func:`truenorth.simulation.true_errors.drawn_errors`.
 
     Returns
     -------

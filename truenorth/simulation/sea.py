@@ -108,11 +108,11 @@ class Hull:
 def sea_motion(
     spectrum: WaveSpectrum,
     hull: Hull,
-    rng: np.random.Generator,
+    rng: np.random.Generator,  # numpy.random.Generator
     *,
-    direction: float,
-    heading: float = 0.0,
-    speed: float = 0.0,
+    direction: float,  # rad; that the waves run to, clockwise from north
+    heading: float = 0.0,  # rad; of the ship: waves are met at ``w_e = w - k V cos(beta)``
+    speed: float = 0.0,  # m/s
     components: int = COMPONENTS,
 ) -> dict[str, tuple[Tone, ...]]:
     """Motion of a ship in a long-crested sea, all six degrees of freedom from the same waves.
@@ -120,14 +120,6 @@ def sea_motion(
     With ``k = w^2/g``, ``beta = direction - heading``, the elevation ``a cos(w_e t + phi)`` at the ship and its slope ``s =
     k a sin(w_e t + phi)``: heave follows the elevation, pitch ``s cos(beta)``, roll ``-s sin(beta)``, each through the mean over
     the hull and an oscillator; the centre is carried along the waves' direction as the water is.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    direction : float, rad
-        That the waves run to, clockwise from north.
-    heading, speed : float, rad and m/s
-        Of the ship: waves are met at ``w_e = w - k V cos(beta)``.
 
     Returns
     -------
