@@ -40,3 +40,11 @@ def changed(a, index, value):
     a = np.array(a)
     a[index] = value
     return a
+
+
+def start_before(record, C_nb, v_n, place, biases, sigma):
+    """A start of navigation an interval before a record's first row; `place` holds lat, lon, alt, `sigma` the fifteen states'."""
+    from truenorth.state.state import Start
+
+    lat, lon, alt = map(float, place)
+    return Start(float(record.time[0] - record.interval), C_nb, v_n, lat, lon, alt, *biases, np.diag(sigma**2))

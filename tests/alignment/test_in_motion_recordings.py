@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests import recordings
+from tests.helpers import start_before
 from truenorth import align, navigate
 from truenorth.aiding.aids import Odometer
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import backtracked
 from truenorth.coarse.odometer import gnss_track
 from truenorth.navigation import Mounting
-from truenorth.state.state import Start
 
 FOG = {
     "name": "FOG",
@@ -87,17 +87,8 @@ def test_car_dead_reckons_by_the_odometer(car):
     imu, odometer, gnss, answer = car
     moving = answer.moving
     sigma = np.concatenate([np.radians([1.0, 1.0, 5.0]), [0.1] * 3, [3.0] * 3, [2e-4] * 3, [0.05] * 3])
-    start = Start(
-        float(imu.time[0] - imu.interval),
-        backtracked(imu, moving.track),
-        np.zeros(3),
-        float(gnss.lat[0]),
-        float(gnss.lon[0]),
-        float(gnss.alt[0]),
-        answer.gyro_bias,
-        answer.accel_bias,
-        np.diag(sigma**2),
-    )
+    place, biases = (gnss.lat[0], gnss.lon[0], gnss.alt[0]), (answer.gyro_bias, answer.accel_bias)
+    start = start_before(imu, backtracked(imu, moving.track), np.zeros(3), place, biases, sigma)
     wheel = Mounting(C_mb=moving.wheel.C_mb, lever_arm=moving.wheel.lever_arm, scale_sigma=0.02, noise=0.4)
     result = navigate(imu, start, aid=Odometer(odometer, wheel), imu="consumer", check_clocks=False)
     _, place = gnss_track(gnss, result.track.time)

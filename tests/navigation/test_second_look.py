@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.helpers import start_before
 from tests.navigation.test_navigate import SPEC, drive, fixes
 from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
 from truenorth.core.attitude import dcm_from_rotation_vector
@@ -156,7 +157,6 @@ def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
 
 def test_a_latency_on_a_shaking_vehicle():
     """The acceleration of single samples is vibration, by which a latency seemed half as long: within 5 % of .2 s."""
-    from truenorth.navigation import Start
     from truenorth.records.specs import imu_spec
     from truenorth.simulation.scenario import read_scenario
 
@@ -165,17 +165,8 @@ def test_a_latency_on_a_shaking_vehicle():
     record, truth = simulation.record, simulation.truth
     sigma = np.repeat([1e-3, 0.01, 0.3, 0.05 * spec.gyro_bias, 0.1 * spec.accel_bias], 3)
     errors = simulation.errors
-    start = Start(
-        float(record.time[0] - record.interval),
-        truth.C_nb[0],
-        truth.v_n[0],
-        float(truth.lat[0]),
-        float(truth.lon[0]),
-        float(truth.alt[0]),
-        errors.gyro_bias,
-        errors.accel_bias,
-        np.diag(sigma**2),
-    )
+    place, biases = (truth.lat[0], truth.lon[0], truth.alt[0]), (errors.gyro_bias, errors.accel_bias)
+    start = start_before(record, truth.C_nb[0], truth.v_n[0], place, biases, sigma)
     late = van.simulate_aiding(seed=3)["odometer"].record.shifted(0.2)
     wheel = Mounting(
         lever_arm=np.array([-0.3, -0.8, -0.5]), scale_sigma=0.05, angle_sigma=0.05, latency_sigma=0.3, gate=0.0

@@ -23,27 +23,14 @@ RateSource = Literal["gyros", "nominal", "attitude"]
 
 def arm_velocity(
     source: RateSource,
-    arm: ArrayLike,
-    step: float,
-    C_is: Array,
-    C_bs: Array,
-    w_is_s: Array,
-    indexer_rate: Array | None = None,
+    arm: ArrayLike,  # (3,) m, base axes
+    step: float,  # s, between an attitude and its neighbours
+    C_is: Array,  # (K, 3, 3, 3): attitude of the IMU in the inertial frame, a step before each time, at it, and a step after
+    C_bs: Array,  # (K, 3, 3, 3): the same in the base
+    w_is_s: Array,  # (K, 3) rad/s: rate of the IMU at the times
+    indexer_rate: Array | None = None,  # (K, 3) rad/s: ``w_bs_s`` as designed, for the source "nominal"
 ) -> Array:
     """(K, 3) velocity of the IMU relative to the base's centre at K times, in the inertial frame, m/s.
-
-    Parameters
-    ----------
-    arm : (3,) array, m
-        Base axes.
-    step : float, s
-        Between an attitude and its neighbours.
-    C_is, C_bs : (K, 3, 3, 3) arrays
-        Attitude of the IMU in the inertial frame and in the base: a step before each time, at it, and a step after.
-    w_is_s : (K, 3) array, rad/s
-        Rate of the IMU at the times.
-    indexer_rate : (K, 3) array, rad/s
-        ``w_bs_s`` as designed, for the source "nominal".
 
     Raises
     ------

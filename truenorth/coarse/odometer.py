@@ -106,19 +106,11 @@ def odometer_alignment(
     return found
 
 
-def gnss_alignment(
-    record: ImuRecord,
-    gnss: GnssRecord,
-    mounting: Mounting | None = None,
-) -> MovingAttitude:
+def gnss_alignment(record: ImuRecord, gnss: GnssRecord, mounting: Mounting | None = None) -> MovingAttitude:
     """Attitude at the start of a log, from inertial sensors and a GNSS receiver; from any heading.
 
-    Parameters
-    ----------
-    gnss : GnssRecord
-        Velocities where it has them, else differences of positions.
-    mounting : Mounting, optional
-        Of the antenna: its latency; the lever arm, against unknown attitude, is of no use yet.
+    Velocities where the receiver has them, else differences of positions. Of the antenna's mounting the latency counts; its lever
+    arm, against unknown attitude, is of no use yet.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -96,12 +96,17 @@ def _checked(content: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _columns(value: Any) -> dict[str, str]:
+    return _texts("columns", value, KNOWN_COLUMNS, "our names to the log's, such as gyro_x: wx")
+
+
+def _texts(what: str, value: Any, known: Sequence[str], wanted: str) -> dict[str, str]:
+    """A mapping of known keys to texts."""
     if not isinstance(value, Mapping):
-        raise UsageError(f"columns are {value!r}; expected our names to the log's, such as gyro_x: wx")
+        raise UsageError(f"{what} are {value!r}; expected {wanted}")
     for key in value:
-        if key not in KNOWN_COLUMNS:
-            raise UsageError(unknown_key("columns", key, KNOWN_COLUMNS))
-    return {key: str(name) for key, name in value.items()}
+        if key not in known:
+            raise UsageError(unknown_key(what, key, known))
+    return {key: str(text) for key, text in value.items()}
 
 
 def _units(value: Any) -> dict[str, str]:
@@ -115,12 +120,7 @@ def _units(value: Any) -> dict[str, str]:
                 f"units {value!r}; expected those of gyro and accelerometer, such as 'deg/s,g' (or 'deg/s,g,ms')"
             )
         return dict(zip(names, parts))
-    if not isinstance(value, Mapping):
-        raise UsageError(f"units are {value!r}; expected text such as 'deg/s,g', or gyro: deg/s and accel: g")
-    for key in value:
-        if key not in names:
-            raise UsageError(unknown_key("units", key, names))
-    return {key: str(unit) for key, unit in value.items()}
+    return _texts("units", value, names, "text such as 'deg/s,g', or gyro: deg/s and accel: g")
 
 
 def _rate(value: Any) -> float:
