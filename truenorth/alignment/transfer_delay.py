@@ -38,17 +38,13 @@ class Found(NamedTuple):
     sure: bool  # the correlation is high, no chance, and the only one
 
 
-def find_delay(
-    slave: ImuRecord, master: MasterRecord, C_mb: Array, around: float = 0.0, within: float = math.inf
-) -> Found:
-    """Find the delay of a master by correlation.
+def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Found:
+    """Find the delay of a master by correlation, of all at which both logs have 10 s in common.
 
     Parameters
     ----------
     C_mb : (3, 3) array
         Slave to master axes, within some ten degrees.
-    around, within : float, s
-        Delays from ``around - within`` to ``around + within`` are tried; all at which both logs have 10 s in common when left out.
 
     Returns
     -------
@@ -65,8 +61,8 @@ def find_delay(
     # Shift k puts row j of the master on row j + k of the slave: delay = (start of master) - (start of slave) - k step.
     offset = float(master.time[0] - slave.time[0])
     shifts, score, common = _correlations(a, b)
-    delays = offset - step * shifts
-    possible = (common >= least) & (np.abs(delays - around) <= within)
+    offset - step * shifts
+    possible = common >= least
     if not possible.any():
         return Found(math.nan, 0.0, 0.0, False)
     score = np.where(possible, score, -1.0)

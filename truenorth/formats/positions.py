@@ -25,14 +25,8 @@ KF_GINS_VELOCITY = ["VN [m/s]", "VE [m/s]", "VD [m/s]", "sigma_VN [m/s]", "sigma
 LARGEST_SIGMA = 1e4  # m
 
 
-def columns_of_positions(path: Path, asked: bool = False) -> Columns | None:
-    """The columns of such a file; None where it is of another kind.
-
-    Raises
-    ------
-    DataError
-        The file is not KF-GINS's though the caller `asked` for that, or its times are no times.
-    """
+def columns_of_positions(path: Path) -> Columns | None:
+    """The columns of such a file; None where it is of another kind; a DataError where its times are no times."""
     table = open_table(path)
     header = next(
         (line for line in (*table.above, table.header) if "latitude(deg)" in line and "longitude(deg)" in line), None
@@ -50,10 +44,6 @@ def columns_of_positions(path: Path, asked: bool = False) -> Columns | None:
         )
         if fits and np.all((head[:, 4:7] > 0.0) & (head[:, 4:7] < LARGEST_SIGMA)):
             return Columns(path, names, renamed.read, renamed.column, renamed.place)
-    if asked:
-        raise DataError(
-            f"{path.name}: not a GNSS file of KF-GINS; expected rows of {', '.join(KF_GINS)} (and velocity with its sigmas)"
-        )
     return None
 
 

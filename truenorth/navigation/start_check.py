@@ -23,7 +23,7 @@ CLEAR = 8.0  # sigmas
 SHAKE = 0.02  # m/s^2 and, divided by a second, rad/s: of a mean over seconds at rest with the engine running
 
 
-def check_start(start: Start, source: str = "start") -> None:
+def check_start(start: Start) -> None:
     """Refuse a start that is no state with a covariance.
 
     Raises
@@ -43,27 +43,27 @@ def check_start(start: Start, source: str = "start") -> None:
         start.P,
     )
     if not all(np.all(np.isfinite(x)) for x in numbers):
-        raise DataError(f"{source}: a number of the start is not finite; expected all finite: align anew")
+        raise DataError("start: a number of it is not finite; expected all finite: align anew")
     C, P = np.asarray(start.C_nb), np.asarray(start.P)
     if C.shape != (3, 3) or np.abs(C @ C.T - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(C) < 0.0:
         raise DataError(
-            f"{source}: C_nb is no rotation; expected orthonormal, right-handed axes: the start is damaged, align anew"
+            "start: C_nb is no rotation; expected orthonormal, right-handed axes: the start is damaged, align anew"
         )
     if not (abs(start.lat) <= math.pi / 2.0 and abs(start.lon) <= 2.0 * math.pi):
         raise DataError(
-            f"{source}: latitude {start.lat:g} rad, longitude {start.lon:g} rad; expected a place on the earth"
+            f"start: latitude {start.lat:g} rad, longitude {start.lon:g} rad; expected a place on the earth"
         )
     variance = np.diag(P)
     scale = np.sqrt(np.outer(np.abs(variance), np.abs(variance)))
     if P.shape != (STATES, STATES) or np.any(np.abs(P - P.T) > SYMMETRIC * scale.max()):
         raise DataError(
-            f"{source}: the covariance P is not symmetric; expected ({STATES}, {STATES}), symmetric: align anew"
+            f"start: the covariance P is not symmetric; expected ({STATES}, {STATES}), symmetric: align anew"
         )
     known = variance > 0.0
     unit = P[np.ix_(known, known)] / scale[np.ix_(known, known)]
     if np.any(variance < 0.0) or (known.any() and np.linalg.eigvalsh(unit).min() < -SYMMETRIC):
         raise DataError(
-            f"{source}: the covariance P has a negative variance; expected none: the start is damaged, align anew"
+            "start: the covariance P has a negative variance; expected none: the start is damaged, align anew"
         )
 
 
