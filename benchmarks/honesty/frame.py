@@ -25,38 +25,21 @@ DEFECT = 4.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one run.
+    """Of one run."""
 
-    Attributes
-    ----------
-    ratios : mapping of output to array
-        Errors over their sigmas.
-    refused : str
-        Why the answer has no good status; empty: it has one.
-    said : str
-        What the run has to say beyond that, for `--verbose`.
-    """
-
-    ratios: Mapping[str, Array] = field(default_factory=dict)
-    refused: str = ""
-    said: str = ""
+    ratios: Mapping[str, Array] = field(default_factory=dict)  # errors over their sigmas
+    refused: str = ""  # why the answer has no good status; empty: it has one
+    said: str = ""  # what the run has to say beyond that, for `--verbose`
 
 
 @dataclass(frozen=True)
 class Case:
-    """A row of the table: ``run(seed, number)``, and what it is called.
-
-    Attributes
-    ----------
-    procedure, name : str
-    run : callable
-    goals : mapping of output to (low, high)
-        Where other limits than `HONEST` hold for a reason; (0, high): sigma may be careful.
-    """
+    """A row of the table: ``run(seed, number)``, and what it is called."""
 
     procedure: str
     name: str
     run: Callable[[int, int], Outcome]
+    # mapping of output to (low, high); where other limits than `HONEST` hold for a reason; (0, high): sigma may be careful
     goals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 

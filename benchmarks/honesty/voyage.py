@@ -65,21 +65,12 @@ def passage(hours: float, lat: float, turns: bool) -> tuple[Any, Course]:
 
 @dataclass(frozen=True)
 class Voyage:
-    """One voyage with drawn errors.
-
-    Attributes
-    ----------
-    record : ImuRecord
-    start : Start
-    truth : Course
-    rng : Generator
-        For its sensors.
-    """
+    """One voyage with drawn errors."""
 
     record: ImuRecord
     start: Start
     truth: Course
-    rng: np.random.Generator
+    rng: np.random.Generator  # for its sensors
 
     def log(self, errors: LogErrors, frame: str = "navigation") -> VelocityRecord:
         """A speed log with errors drawn from these."""

@@ -161,8 +161,6 @@ def from_velocity(record: VelocityRecord, mounting: Mounting, errors: LogErrors)
 
     Parameters
     ----------
-    record : VelocityRecord
-    mounting : Mounting
     errors : LogErrors
         Its slow errors; the larger of these and those of the mounting count. A drift whose time nobody knows lasts `DRIFT_TIME`.
 

@@ -42,7 +42,6 @@ def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: 
     ----------
     course : Course
         From the switch on.
-    loop : Loop
     whole : Filter
         All errors of INS and log: model, covariance at the switch, white noise of an epoch of the log.
     mu : (K+1,) array

@@ -31,7 +31,6 @@ def likely_time(course: Course, reference: Array, start: int, kind: Filter) -> f
 
     Parameters
     ----------
-    course : Course
     reference : (K+1, 2) array, m/s
         NaN where absent.
     start : int

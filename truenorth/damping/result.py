@@ -20,21 +20,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LogHistory:
-    """Errors of the speed log as the augmented filter found them, behind them the deflection of the vertical.
+    """Errors of the speed log as the augmented filter found them, behind them the deflection of the vertical."""
 
-    Attributes
-    ----------
-    time : (K,) array, s
-    names, units : tuples of str
-        Of each state; a name stands as often as its group has states.
-    x, sigma : (K, m) arrays
-    """
-
-    time: Array
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    x: Array
-    sigma: Array
+    time: Array  # (K,) s
+    names: tuple[str, ...]  # tuples of str; of each state; a name stands as often as its group has states
+    units: tuple[str, ...]  # tuples of str
+    x: Array  # (K
+    sigma: Array  # m)
 
     def last(self, name: str) -> tuple[Array, Array]:
         """Values and one-sigma at the end, empty where there is no such group."""

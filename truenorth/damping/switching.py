@@ -40,23 +40,12 @@ class Switch(NamedTuple):
 
 @dataclass(frozen=True)
 class Switching:
-    """How far the loop is damped, and why.
+    """How far the loop is damped, and why."""
 
-    Attributes
-    ----------
-    mu : (K+1,) array
-        1 damped, 0 undamped.
-    manoeuvre : (K+1, 2) array, m/s
-        Velocity that manoeuvres have changed, from the beginning on.
-    leak, allowed : (K+1,) arrays, m/s
-        Of it, what the network lets into the loop, and how much may be before it is switched off.
-    switches : tuple of Switch
-    """
-
-    mu: Array
-    manoeuvre: Array
-    leak: Array
-    allowed: Array
+    mu: Array  # (K+1,): 1 damped, 0 undamped
+    manoeuvre: Array  # (K+1, 2) m/s: velocity that manoeuvres have changed, from the beginning on
+    leak: Array  # (K+1,) m/s: of it, what the network lets into the loop, and how much may be before it is switched off
+    allowed: Array  # (K+1,) m/s
     switches: tuple[Switch, ...]
 
 

@@ -133,7 +133,6 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
 
     Parameters
     ----------
-    sources : iterable of Residuals
     sigma : Effect
         Of the answer.
     memory : float, s
