@@ -18,37 +18,19 @@ Array = NDArray[np.float64]
 
 @compiled
 def mechanise_interval(
-    steps: Any,
-    dtheta: Any,
-    dvel: Any,
-    wheel: Any,
-    which: Any,
+    steps: Any,  # (N,) s
+    dtheta: Any,  # (R, N, 3) rad
+    dvel: Any,  # (R, N, 3) m/s
+    wheel: Any,  # (R, N) m: distance by the odometer in each sample
+    which: Any,  # (B,): of the R logs, which each run has
     first: int,
     last: int,
-    errors: Any,
-    s: Any,
-    p: Any,
-    z: Any,
+    errors: Any,  # (B, 7): gyro and accelerometer bias and odometer scale as known so far, taken off
+    s: Any,  # (B, 24): the state (:mod:`truenorth.strapdown.wander`); changed in place
+    p: Any,  # (B, 28): parameters of the error model (:mod:`truenorth.errors.in_motion_azimuth`), filled in
+    z: Any,  # (B, 3) m: displacement of the INS less that of the odometer; filled in
 ) -> None:
-    """Carry each run through the samples ``first`` to ``last - 1``.
-
-    Parameters
-    ----------
-    steps : (N,) array, s
-    dtheta, dvel : (R, N, 3) arrays, rad and m/s
-    wheel : (R, N) array, m
-        Distance by the odometer in each sample.
-    which : (B,) array of int
-        Of the R logs, which each run has.
-    errors : (B, 7) array
-        Gyro and accelerometer bias and odometer scale as known so far, taken off.
-    s : (B, 24) array
-        The state (:mod:`truenorth.strapdown.wander`); changed in place.
-    p : (B, 28) array
-        Parameters of the error model (:mod:`truenorth.errors.in_motion_azimuth`), filled in.
-    z : (B, 3) array, m
-        Displacement of the INS less that of the odometer; filled in.
-    """
+    """Carry each run through the samples ``first`` to ``last - 1``."""
     C, mean = np.zeros((3, 3)), np.zeros((3, 3))
     length = 0.0
     for i in range(first, last):

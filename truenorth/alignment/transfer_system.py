@@ -19,31 +19,17 @@ Array = NDArray[np.float64]
 
 
 def system_of_motion(
-    motion: Moving,
+    motion: Moving,  # of the slave
     model: TransferModel,
-    P0: Array,
-    R: Array,
-    stop: float,
-    step: float = 0.5,
-    start: float = 0.0,
-    C_mb: Array | None = None,
-    translation: Translation = "velocity",
+    P0: Array,  # (n, n)
+    R: Array,  # (6,): variances of velocity (or what `translation` says) and attitude; infinite: not measured
+    stop: float,  # s
+    step: float = 0.5,  # s
+    start: float = 0.0,  # s
+    C_mb: Array | None = None,  # (3, 3): slave to master axes; the unit matrix when left out
+    translation: Translation = "velocity",  # what is matched
 ) -> LinearSystem:
-    """The model along a known motion, measured every `step` (s).
-
-    Parameters
-    ----------
-    motion : Motion
-        Of the slave.
-    P0 : (n, n) array
-    R : (6,) array
-        Variances of velocity (or what `translation` says) and attitude; infinite: not measured.
-    stop, step, start : float, s
-    C_mb : (3, 3) array, optional
-        Slave to master axes; the unit matrix when left out.
-    translation : {"velocity", "position", "acceleration"}
-        What is matched.
-    """
+    """The model along a known motion, measured every `step` (s)."""
     t = start + step * (np.arange(round((stop - start) / step)) + 1.0)
     middle, T = motion.states(t - 0.5 * step), np.full(len(t), step)
     return system_along(middle, motion.states(t), T, model, P0, R, C_mb=C_mb, translation=translation)
@@ -52,26 +38,15 @@ def system_of_motion(
 def system_along(
     middle: MotionStates,
     at: MotionStates,
-    T: Array,
-    model: TransferModel,
+    T: Array,  # (K,) s
+    model: TransferModel,  # as :func:`system_of_motion`
     P0: Array,
     R: Array,
-    arm: Array | None = None,
-    C_mb: Array | None = None,
+    arm: Array | None = None,  # (3,) m, optional: as assumed; none when left out
+    C_mb: Array | None = None,  # (3, 3): slave to master axes; the unit matrix when left out
     translation: Translation = "velocity",
 ) -> LinearSystem:
-    """The model along a motion that is known at the middle and at the end of K intervals.
-
-    Parameters
-    ----------
-    T : (K,) array, s
-    model, P0, R, translation
-        As :func:`system_of_motion`.
-    arm : (3,) array, m, optional
-        As assumed; none when left out.
-    C_mb : (3, 3) array, optional
-        Slave to master axes; the unit matrix when left out.
-    """
+    """The model along a motion that is known at the middle and at the end of K intervals."""
     f_n = np.einsum("kij,kj->ki", middle.C_nb, middle.f_b)
     ins = model.ins
     Phi, Q = ins.linearise(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b)

@@ -24,7 +24,6 @@ def arm_rows(integrals: InertialIntegrals, C_n0_i: Array, lat: float, C_sb: Arra
 
     Parameters
     ----------
-    integrals : InertialIntegrals
     C_n0_i : (3, 3) array
     lat : float, rad
     C_sb : (K+1, 3, 3) array, optional
@@ -40,7 +39,6 @@ def with_arm(system: LinearSystem, rows: Array, arm: Array) -> LinearSystem:
 
     Parameters
     ----------
-    system : LinearSystem
     rows : (K, 3, 3) array
         Of :func:`arm_rows`.
     arm : (3,) array, m

@@ -159,30 +159,14 @@ def velocity_jacobian(x: Array, p: Array, out: Array) -> None:
 
 
 def large_azimuth_system(
-    model: StationaryModel,
-    integrals: Sequence[InertialIntegrals],
-    C_n0_i: Array,
-    P0: Array,
-    R: float,
-    form: Form = "tilt_azimuth",
+    model: StationaryModel,  # place and random walks
+    integrals: Sequence[InertialIntegrals],  # of each run's log; all of the same intervals
+    C_n0_i: Array,  # (runs, 3, 3): the attitude that the INS was given at the start
+    P0: Array,  # (10, 10): of ``[phi, dv, eps, nabla]``; it may hold all of the circle
+    R: float,  # (m/s)^2: variance of the base's velocity along each axis
+    form: Form = "tilt_azimuth",  # how the attitude error is written; Jacobians come with the first
 ) -> NonlinearSystem:
-    """The system of logs that start from attitudes with a large azimuth error.
-
-    Parameters
-    ----------
-    model : StationaryModel
-        Place and random walks.
-    integrals : sequence of InertialIntegrals
-        Of each run's log; all of the same intervals.
-    C_n0_i : (runs, 3, 3) array
-        The attitude that the INS was given at the start.
-    P0 : (10, 10) array
-        Of ``[phi, dv, eps, nabla]``; it may hold all of the circle.
-    R : float, (m/s)^2
-        Variance of the base's velocity along each axis.
-    form : {"tilt_azimuth", "rotation_vector", "quaternion"}
-        How the attitude error is written; Jacobians come with the first.
-    """
+    """The system of logs that start from attitudes with a large azimuth error."""
     time, T = integrals[0].time, integrals[0].intervals
     gravity = gravity_velocity(time, model.lat, model.alt)
     velocity = np.stack([one.velocity for one in integrals]) @ np.swapaxes(C_n0_i, 1, 2) + gravity
