@@ -63,22 +63,12 @@ class MovingAttitude:
 
 def odometer_alignment(
     record: ImuRecord,
-    odometer: OdometerRecord | VelocityRecord,
-    position: Position,
-    mounting: Mounting | None = None,
+    odometer: OdometerRecord | VelocityRecord,  # OdometerRecord or VelocityRecord; the latter in body axes
+    position: Position,  # at the start
+    mounting: Mounting | None = None,  # of the wheel: its axes and lever arm as far as known
     form: Form = "velocity",
 ) -> MovingAttitude:
     """Attitude at the start of a drive, from inertial sensors and an odometer; from any heading.
-
-    Parameters
-    ----------
-    odometer : OdometerRecord or VelocityRecord
-        The latter in body axes.
-    position : Position
-        At the start.
-    mounting : Mounting, optional
-        Of the wheel: its axes and lever arm as far as known.
-    form : {"velocity", "position"}
 
     Raises
     ------
