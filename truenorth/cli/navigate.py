@@ -175,12 +175,12 @@ def navigate(
     zupt: Annotated[
         str | None, option("Stops: auto, or seconds such as '0-20,63-70'. None are used without it.")
     ] = None,
-    smooth: Annotated[bool, option("Estimate each epoch from the whole log.", "--smooth")] = False,
+    smooth: Annotated[bool, option("Estimate each epoch from the whole log.", "--smooth", panel="The track")] = False,
     imu: Annotated[str | None, option("Specification; the alignment's own without it.")] = None,
     deflection: Annotated[
         str | None, option("The vertical is deflected under way: '6 arcsec, 20 km', one sigma and over which distance.")
     ] = None,
-    every: Annotated[float | None, option("Seconds between rows of the track.")] = None,
+    every: Annotated[float | None, option("Seconds between rows of the track.", panel="The track")] = None,
     calibration: Annotated[Path | None, option("YAML file of known errors of the IMU, taken off first.")] = None,
     output: Annotated[
         Path | None, option("Folder for summary.json, track.parquet, .geojson, report.html.", "-o", "--output")
