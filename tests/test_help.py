@@ -44,7 +44,6 @@ def test_every_option_says_what_it_is(name):
                 "azimuth_damping": "azimuth",
                 "damping_start": "start",
                 "damping_ramp": "ramp",
-                "log_error": "reference_sigma",
             },
         ),
     ],
