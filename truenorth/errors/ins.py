@@ -181,7 +181,7 @@ def transition(size: Any, F: Any, decay: Any, T: float, Phi: Any, Phi_t: Any) ->
     for i in range(DYNAMIC):
         for j in range(len(size)):
             total = 0.0
-            for k in range(len(size)):
+            for k in range(DYNAMIC):
                 total += F[i, k] * F[k, j]
             Phi[i, j] = F[i, j] * T + half * total
         for j in range(DYNAMIC, n):  # the sensors' own decay, which stands on the diagonal of their rows
