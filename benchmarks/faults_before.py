@@ -145,6 +145,8 @@ def judge(folder: Path, into: Path) -> None:
     truths: dict[tuple[str, int], Any] = {}
     sound: dict[tuple[str, int], Any] = {}
     for path in sorted(folder.glob("*.in")):
+        if not path.with_suffix(".out").exists():
+            continue
         case, said = pickle.loads(path.read_bytes()), pickle.loads(path.with_suffix(".out").read_bytes())
         name, run = case["procedure"], case["run"]
         about = (name, case["fault"], case["seed"], run, case["size"])

@@ -73,12 +73,36 @@ def savers(kind, request):
             journal.flush(old.kind)
 
         return lambda folder: None, lambda folder: part(folder, 1)
+    if kind == "a specification from noise":
+        from truenorth.cli.noise import _write
+        from truenorth.quality import inspect
+
+        found = inspect(old)
+        return tuple(lambda folder, like=like: _write(folder, found, like) for like in ("navigation", "tactical"))
+    if kind == "a layout":
+        from truenorth.formats import read_imu, write_layout
+
+        log = "log.csv"
+        return (
+            lambda folder: write_imu(old, folder / log),
+            lambda folder: write_layout(read_imu(folder / log, axes="FRD"), folder / log),
+        )
+    if kind == "the tables of faults":
+        from truenorth.campaign.fault_pages import keeper
+        from truenorth.campaign.faults import Trial
+
+        first, second = (Trial("still", "none", 0, run, "", "harmless", 1.0, "") for run in (0, 1))
+        return (
+            lambda folder: keeper(folder / "trials.csv", [first]),
+            lambda folder: keeper(folder / "trials.csv", [first, second]),
+        )
     plan = read_plan(PLAN)
     tables = [work(plan.to_mapping(), Block(0, first, first)) for first in (0, 1)]
     return tuple(lambda folder, table=table: Store(folder).write(Block(0, 0, 0), table) for table in tables)
 
 
 KINDS = ["alignment", "simulation", "log.csv", "log.parquet", "log.npz", "live rows", "shard"]
+KINDS += ["a specification from noise", "a layout", "the tables of faults"]
 KINDS += [pytest.param("navigation", marks=pytest.mark.slow)]
 
 

@@ -19,11 +19,18 @@ from truenorth.quality.tilt import check_tilt
 SEED = 11
 # Procedure and faults that gave a wrong answer without a word before there was one judge.
 ONCE_SILENT = {
-    "swaying": ("gyro axes exchanged", "gyro sign", "late gyros"),
+    "swaying": ("noisy for a while", "gyro axes exchanged", "gyro sign", "late gyros"),
     "rotary": ("gyro axes exchanged", "gyro sign", "encoder axes exchanged", "encoder sign", "held rows", "clock rate"),
-    "gnss": ("grid north", "clock rate"),
-    "transfer": ("accel axes exchanged", "master's V_E and V_N exchanged", "turned master", "clock rate"),
-    "navigate": ("grid north", "damaged start", "late GNSS"),
+    "gnss": ("grid north", "clock rate", "clock jumps", "accel scale"),
+    "transfer": (
+        "accel axes exchanged",
+        "master's V_E and V_N exchanged",
+        "turned master",
+        "clock rate",
+        "gyro bias step",
+        "late gyros",
+    ),
+    "navigate": ("accel bias step", "grid north", "damaged start", "late GNSS"),
     "still": ("accel bias step", "dead sensor", "clipped gyro"),
 }
 

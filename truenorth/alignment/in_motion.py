@@ -36,7 +36,7 @@ from truenorth.core.units import significant
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
-from truenorth.estimate.rivals import misfit, wandering_evidence
+from truenorth.estimate.rivals import jump_evidence, misfit, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.stops import seconds_at_rest, updates_at
@@ -244,6 +244,7 @@ def _seen(task: _Task, track: Track, guess: Guess, *, gated: bool) -> list[Evide
     """What the receiver, the log itself and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
+    found += jump_evidence(lambda record: replace(task, record=record).run(guess, gated=gated), track, task.record)
     return found + wandering_evidence(
         lambda model: replace(task, model=model).run(guess, gated=gated),
         track,

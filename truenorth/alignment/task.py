@@ -106,6 +106,7 @@ def filter_interval(record: ImuRecord) -> float:
 
 def bridged(record: ImuRecord) -> ImuRecord:
     """The record with up to three lost samples in a row bridged; longer gaps are refused."""
+    record.check_rate()
     gaps = record.gaps
     if gaps.size == 0:
         return record

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from truenorth.campaign.fault_limits import UNSEEN
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
+from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError
 
 
@@ -40,7 +41,7 @@ def read_trials(path: Path) -> list[Trial]:
 
 def keeper(path: Path, done: Sequence[Trial]) -> Callable[[Trial], None]:
     """A function that writes each trial to the end of a file, on disk before it returns; those done come first."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with atomic_path(path) as whole, whole.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([Trial._fields, *done])
 
     def keep(trial: Trial) -> None:
@@ -111,4 +112,5 @@ def _unseen() -> list[str]:
 
 
 def _sizes(size: str) -> str:
-    return f" ({size.strip()})" if size else ""
+    named = {"(?!yxz)": "all but x and y exchanged", "[xy] ": "x or y", "z ": "z", "1\\.": "below 2 m"}
+    return f" ({named.get(size, size)})" if size else ""

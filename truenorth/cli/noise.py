@@ -91,7 +91,9 @@ def _figures(gyro: NoiseCoefficients, accel: NoiseCoefficients) -> list[dict[str
 
 
 def _write(output: Path, found: Inspection, like: str | None) -> list[Path]:
-    from truenorth.core.atomic import atomic_path, writable_folder
+    from matplotlib import rc_context
+
+    from truenorth.core.atomic import atomic_files, writable_folder
     from truenorth.figures.noise import plot_noise
     from truenorth.quality.noise import noise_from_log
     from truenorth.records.kalibr import write_kalibr
@@ -100,11 +102,12 @@ def _write(output: Path, found: Inspection, like: str | None) -> list[Path]:
     record, rest = found.record, found.noise_from
     assert record is not None and rest is not None  # noqa: PT018  # checked before
     spec = noise_from_log(record.between(rest.start, rest.stop), like, record.source).spec
-    spec.to_yaml(folder / "imu.yaml")
-    write_kalibr(spec, record.rate, folder / "kalibr.yaml")
-    with atomic_path(folder / "noise.svg") as path:
-        plot_noise(found).savefig(path)
-    return [folder / name for name in ("imu.yaml", "kalibr.yaml", "noise.svg")]
+    paths = [folder / name for name in ("imu.yaml", "kalibr.yaml", "noise.svg")]
+    with atomic_files() as file, rc_context({"svg.hashsalt": "noise"}):  # the same log makes the same bytes
+        spec.to_yaml(file(paths[0]))
+        write_kalibr(spec, record.rate, file(paths[1]))
+        plot_noise(found).savefig(file(paths[2]), metadata={"Date": None})
+    return paths
 
 
 def _print(source: str, start: float, stop: float, figures: list[dict[str, Any]], paths: list[Path]) -> None:

@@ -23,8 +23,9 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.quality.innovations import whiteness
+from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import NO_EFFECT, Effect, Evidence, Figure
+from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals
 
@@ -128,6 +129,36 @@ def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: 
     return [Evidence(f"rival.{sensor}_wanders", figures, "known", effect, ("specification",))]
 
 
+def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRecord) -> list[Evidence]:
+    """Whether the gaps of a log are jumps of its clock: without them it fits the measurements better.
+
+    Parameters
+    ----------
+    run : callable
+        The same measurements with another record.
+    first : track
+        Of the record as it is.
+    record : ImuRecord
+    """
+    gaps = record.gaps[record.gaps > 0]
+    if not gaps.size:
+        return []
+    missing, bridged = np.zeros(len(record)), np.ones((len(record), 1))
+    missing[gaps] = record.steps[gaps] - record.interval
+    if record.kind == "increments":  # the row after a gap was given the whole of it
+        bridged[gaps, 0] = record.interval / record.steps[gaps]
+    time = record.time - np.cumsum(missing)
+    closed = replace(record, time=time, gyro=record.gyro * bridged, accel=record.accel * bridged)
+    try:
+        ratio = _ratio(first.residuals, run(closed).residuals)
+    except DataError:
+        return []
+    if ratio <= limit("drift"):
+        return []
+    figures: dict[str, Figure] = {"count": len(gaps), "lost": float(missing.sum()), "ratio": ratio}
+    return [Evidence("record.clock_jumps", figures, "unknown", ANY_EFFECT, ("common_clock",))]
+
+
 def counted_once(evidence: Sequence[Evidence]) -> list[Evidence]:
     """The same evidence, rivals with what coloured innovations do not add to sigma already: both see the same.
 
@@ -162,15 +193,15 @@ def _ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> float:
     others = {r.name: r for r in rival}
     for r in first:
         other = others[r.name]
-        if len(other.time) != len(r.time):
+        _, at, of_other = np.intersect1d(r.stamp, other.stamp, return_indices=True)
+        both = r.used[at] & other.used[of_other] & (r.rows[at] > 0) & (other.rows[of_other] == r.rows[at])
+        at, of_other = at[both], of_other[both]
+        if not len(at):
             continue
-        both = r.used & other.used & (r.rows > 0)
-        if not both.any():
-            continue
-        narrower = 2.0 * (np.nansum(np.log(r.sigma[both])) - np.nansum(np.log(other.sigma[both])))
-        e = r.innovation[both] / r.sigma[both]
+        narrower = 2.0 * (np.nansum(np.log(r.sigma[at])) - np.nansum(np.log(other.sigma[of_other])))
+        e = r.innovation[at] / r.sigma[at]
         share = whiteness(e[:, np.isfinite(e).all(axis=0)]).growth ** 2
-        total += float(r.nis[both].sum() - other.nis[both].sum() + narrower) / share
+        total += float(r.nis[at].sum() - other.nis[of_other].sum() + narrower) / share
     return total
 
 

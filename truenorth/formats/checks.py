@@ -13,9 +13,12 @@ from truenorth.records.base import first_disorder
 Array = NDArray[np.float64]
 
 
+LARGEST = 1e100  # in whatever unit; squares of what is larger overflow
+
+
 def check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
-    """Refuse NaN and inf among the columns (N, len(labels)) of a file, by place and column."""
-    finite = np.isfinite(values)
+    """Refuse NaN, inf and what no sensor writes in any unit among the columns (N, len(labels)) of a file, by place and column."""
+    finite = np.abs(values) < LARGEST
     if not finite.all():
         row, column = (int(i) for i in np.argwhere(~finite)[0])
         raise DataError(

@@ -18,7 +18,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
-from truenorth.estimate.rivals import counted_once, wandering_evidence
+from truenorth.estimate.rivals import counted_once, jump_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import second_look, slow_errors
@@ -218,6 +218,7 @@ def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, 
         spec,
         plan.record.duration,
     )
+    found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     return found + second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, _looked_at(given))
 
 
@@ -307,6 +308,7 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
 
     What the base did in a gap is as different from that as its rates differ over the log.
     """
+    record.check_rate()
     rows = record.gaps[record.gaps > 0]
     if rows.size == 0:
         return record, (), []

@@ -20,7 +20,8 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 SMALL = 10.0  # times its prior: beyond it a small-angle model does not hold
-CLEAR = 6.0  # sigmas from which a contradiction counts
+CLEAR = 6.0  # sigmas from which a contradiction is worth a warning; from HINT on its effect is added to sigma
+HINT = 3.5
 LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data do not show it
 LEAST_FIXES = 60
 LAGS = 5
@@ -90,8 +91,10 @@ def second_look(
             if where is None or getattr(given, OPEN[role].sigma) > 0.0:
                 continue
             value, sigma = track.sensors[-1, where], track.sigma[-1, where]
-            if np.any((np.abs(value) > CLEAR * sigma) & (np.abs(value) > OPEN[role].least)):
-                against.append(_contradiction(role, name, key, given, value, sigma))
+            size = np.where(np.abs(value) > OPEN[role].least, np.abs(value) / sigma, 0.0)
+            if np.any(size > HINT):
+                item = _contradiction(role, name, key, given, value, sigma)
+                against.append(replace(item, urgent=bool(np.any(size > CLEAR))))
             elif role == "lever arm" and np.linalg.norm(given.lever_arm) > LONG_ARM:
                 arm = given.lever_arm
                 length = float(np.linalg.norm(arm))

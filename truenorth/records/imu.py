@@ -15,6 +15,7 @@ from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
 LARGEST = (1e6, 1e8)  # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
+SLOWEST = 1.0  # s between two rows
 Kind = Literal["rates", "increments"]
 
 COLUMNS = {
@@ -75,6 +76,20 @@ class ImuRecord(Record):
                     f"{self.source}: row {row + 1}, column {names[i]}: {values[row, i]:g}; no such sensor measures more than "
                     f"{limit * scale:g}: check the units, or repair the row"
                 )
+
+    def check_rate(self) -> None:
+        """Refuse a record whose rows are too far apart to be integrated.
+
+        Raises
+        ------
+        DataError
+            More than a second between two rows.
+        """
+        if self.interval > SLOWEST:
+            raise DataError(
+                f"{self.source}: a row every {self.interval:.4g} s; expected {SLOWEST:g} s at most: time is probably in "
+                "milliseconds, microseconds or ticks; convert it to seconds, or give the rate"
+            )
 
     @property
     def jitter(self) -> float:

@@ -21,6 +21,7 @@ from truenorth.core.errors import UsageError
 from truenorth.records import Record
 from truenorth.records.motion import MotionStates
 from truenorth.records.unit_spec import UnitSpec, value
+from truenorth.simulation.sensing import MOST_SAMPLES
 from truenorth.simulation.streams import stream
 
 Array = NDArray[np.float64]
@@ -198,6 +199,10 @@ def sample_times(spec: AidingSpec[Any], start: float, duration: float) -> Array:
     if count < 2:
         raise UsageError(
             f"{spec.rate:g} Hz over {duration:g} s with a latency of {spec.latency:g} s; expected two rows at least"
+        )
+    if count > MOST_SAMPLES:
+        raise UsageError(
+            f"{count:.3g} rows ({spec.rate:g} Hz over {duration:g} s); expected {MOST_SAMPLES:.0e} at most"
         )
     return start + np.arange(count) / spec.rate
 

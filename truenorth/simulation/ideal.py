@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.records.motion import Moving
-from truenorth.simulation.sensing import acceleration_gain, increments, leverage
+from truenorth.simulation.sensing import MOST_SAMPLES, acceleration_gain, increments, leverage
 
 Array = NDArray[np.float64]
 
@@ -69,5 +69,10 @@ def ideal_log(motion: Moving, *, rate: float, duration: float, start: float = 0.
     """
     if not (rate > 0 and duration > 0 and rate * duration >= 2):
         raise UsageError(f"rate {rate:g} Hz over {duration:g} s; expected both positive and two samples at least")
+    if rate * duration > MOST_SAMPLES:
+        raise UsageError(
+            f"{rate * duration:.3g} samples ({rate:g} Hz over {duration:g} s); expected {MOST_SAMPLES:.0e} at most, which are some "
+            "20 GB: a lower rate, or a shorter time"
+        )
     edges = start + np.arange(round(duration * rate) + 1) / rate
     return IdealLog(motion, edges, *increments(motion, edges))

@@ -41,6 +41,7 @@ from truenorth.simulation.scenario_sensors import AIDING, IndexerModel
 from truenorth.simulation.streams import stream
 
 MOTION_STREAM = 200  # of the motion's own draws, and one more for each disturbance
+LONGEST = 1e7  # s; motions lay their knots over all of it
 SHIPPED = resources.files("truenorth.simulation") / "scenarios"
 
 
@@ -109,6 +110,13 @@ class Scenario(Strict):
     def _positive(cls, value: float) -> float:
         if not value > 0:
             raise ValueError(f"{value:g}; expected a positive value")
+        return value
+
+    @field_validator("duration")
+    @classmethod
+    def _of_this_life(cls, value: float) -> float:
+        if value > LONGEST:
+            raise ValueError(f"{value:g} s; expected {LONGEST:g} s ({LONGEST / 86400:.0f} days) at most")
         return value
 
     @cached_property

@@ -16,6 +16,8 @@ from truenorth.core.attitude import skew
 from truenorth.records.motion import MotionStates, Moving
 
 Array = NDArray[np.float64]
+
+MOST_SAMPLES = 2e8  # of one log: two days at a kilohertz
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 BLOCK = 4096  # intervals at once: keeps the work arrays in the cache
 

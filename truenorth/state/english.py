@@ -112,6 +112,10 @@ SENTENCES = {
     "record.gaps": "{text}",
     "record.jitter": "{text}",
     "record.time_unit": "{text}",
+    "record.clock_jumps": (
+        "the log has {count:d} gap(s) of {lost:.2f} s in all, and fits the measurements better without them (likelihood ratio "
+        "{ratio:.0f}): its clock has jumped, no rows are lost"
+    ),
     "tilt.axes": (
         "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
         "gyro columns x y z read as {axes}"
