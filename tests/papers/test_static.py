@@ -170,6 +170,7 @@ def test_what_becomes_of_one_normal_distribution_on_a_circle(value):
     assert value("large_180", "gyrocompass_loop", "diverged", "mean") < 0.2
 
 
+@pytest.mark.slow
 @few
 def test_the_study_repeats(study):
     """To the bit, but for the time that a step takes."""
