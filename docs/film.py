@@ -1,21 +1,21 @@
 """The film of a heading converging, docs/assets/heading.svg: an animated picture of one alignment, a few kilobytes.
 
-Run from the repository: ``python docs/film.py``. It uses the ring-laser recording in ``../shared/data`` where that is here, and
-a simulated ship elsewhere.
+Run from the repository: ``python docs/film.py``. It uses the package's sample of a ring-laser IMU (``truenorth example rlg``).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 
 import truenorth as tn
+from truenorth.formats.samples import write_sample
 
 HERE = Path(__file__).resolve().parent
-RECORDING = HERE.parents[1] / "shared" / "data" / "rlg_vehicle_xian" / "rlg_0_900s.npz"
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 400, 62, 16, 74, 44
 FRAMES, RUN, HOLD = 60, 9.0, 3.0  # pictures of the counter; seconds of the film, and of its end
 SPAN = 0.7  # deg above and below the answer that the axis shows
@@ -27,20 +27,10 @@ Array = NDArray[np.float64]
 
 def recording() -> tuple[tn.ImuRecord, tn.Position, str]:
     """A record of 300 s, its place, and what it is."""
-    if RECORDING.exists():
-        file = np.load(RECORDING)
-        values = (file["counts"] * file["scale"])[:30_000]
-        time = 0.01 * np.arange(1, len(values) + 1)
-        record = tn.ImuRecord(time, values[:, :3], values[:, 3:], "increments", "rlg_vehicle_xian")
-        return (
-            record,
-            tn.Position.from_degrees(34.246, 108.910, 380.0),
-            "ring-laser IMU, people moving a parked vehicle",
-        )
-    from truenorth.simulation.scenario import read_scenario
-
-    record = read_scenario("quay").simulate(run=0).record.between(None, 300.0)
-    return record, tn.Position.from_degrees(53.54, 9.97, 12.0), "simulated navigation-grade IMU on a ship at the quay"
+    with TemporaryDirectory() as folder:
+        (log, *_) = write_sample("rlg", folder)
+        record = tn.read_imu(log)
+    return record, tn.Position.from_degrees(34.246, 108.910, 380.0), "ring-laser IMU, people moving a parked vehicle"
 
 
 @dataclass(frozen=True)
