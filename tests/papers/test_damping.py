@@ -10,6 +10,7 @@ from truenorth.damping.course import errors_of
 from truenorth.damping.spectrum import earth_line, schuler_lines
 from truenorth.errors.marine import DP, DV
 from truenorth.papers import reproduce
+from truenorth.papers.damping.choices import SWEEPS
 from truenorth.papers.damping.methods import SWITCH, run_all
 from truenorth.papers.damping.statistics import consistency, random_signs
 from truenorth.papers.damping.study import reading, run_rms, window_rms
@@ -114,7 +115,8 @@ def test_the_study(tmp_path):
     assert set(table["unit"]) <= set(UNITS)
     logs = {f"c-0.{i}" for i in range(1, 6)}
     expected = logs | {f"{c}_best_signs" for c in logs} | {"c0", "random_signs", "drawn", "all"}
-    assert set(table["case"]) == expected
+    swept = {sweep.case_of(value) for sweep in SWEEPS for value in sweep.values}
+    assert set(table["case"]) == expected | swept
 
     def value(case, method, quantity, statistic, hours=None):
         rows = table[(table["case"] == case) & (table["method"] == method) & (table["quantity"] == quantity)]

@@ -146,6 +146,13 @@ def test_a_sweep_says_whether_a_verdict_depends_on_a_choice():
     (found,) = swept(rules, table, [sweep])
     assert found.depends
     assert str(found) == '"one is better" depends on R, m/s: 0.1: holds; 1: does not hold.'
+    table.value(sweep.case_of(1.0), "one", "x", "mean", 0.5, "1")
+    table.value(sweep.case_of(0.1), "one", "x", "mean", 0.5, "1")
+    (same,) = swept([Rule("small", (exact("a one x mean < 1"),))], table, [sweep])
+    assert str(same) == '"small" does not depend on R, m/s (0.1, 1): holds.'
+    (few,) = swept([Rule("small", (exact("a one x mean < 1", 5),))], table, [sweep])
+    assert not few.depends
+    assert str(few) == 'Whether "small" depends on R, m/s (0.1, 1): too few runs.'
 
 
 def test_claims_in_markdown():

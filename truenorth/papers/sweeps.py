@@ -41,12 +41,19 @@ class Swept:
 
     @property
     def depends(self) -> bool:
-        """Whether they differ."""
-        return len(set(self.verdicts.values())) > 1
+        """Whether they differ; never where there are too few runs."""
+        return not self.open and len(set(self.verdicts.values())) > 1
+
+    @property
+    def open(self) -> bool:
+        """Whether there are too few runs to say."""
+        return "too few runs" in self.verdicts.values()
 
     def __str__(self) -> str:
         """In words."""
         name = f"{self.sweep.label} ({', '.join(f'{value:g}' for value in self.verdicts)})"
+        if self.open:
+            return f'Whether "{self.claim}" depends on {name}: too few runs.'
         if not self.depends:
             return f'"{self.claim}" does not depend on {name}: {next(iter(self.verdicts.values()))}.'
         each = "; ".join(f"{value:g}: {verdict}" for value, verdict in self.verdicts.items())
@@ -87,6 +94,8 @@ def draw_sweeps(
     table: Table, sweeps: Sequence[Sweep], found: Sequence[Swept], quantity: str = "heading@600", unit: str = "arcmin"
 ) -> Figure:
     """RMS of a quantity over the values of each choice, a line a method; the title says which verdicts depend on it."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
     from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 
     with style():
@@ -109,10 +118,15 @@ def draw_sweeps(
             ax.axvline(sweep.chosen, color=REFERENCE, linestyle="--", linewidth=0.8)
             ax.set(yscale="log", xlabel=sweep.label, xscale="log" if sweep.logarithmic else "linear")
             ax.set_xticks(sweep.values, [f"{v:g}" for v in sweep.values])
-            ax.minorticks_off()
+            ax.xaxis.set_minor_locator(NullLocator())
+            ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            ax.yaxis.set_major_formatter("{x:g}")
+            ax.yaxis.set_minor_locator(NullLocator())
             depend = sum(s.depends for s in found if s.sweep == sweep)
             of = sum(s.sweep == sweep for s in found)
-            ax.set_title(f"{depend} of {of} verdicts depend on it" if of else "no verdict to be changed", fontsize=9)
+            unsettled = any(s.open for s in found if s.sweep == sweep)
+            words = "too few runs to say" if unsettled else f"{depend} of {of} verdicts depend on it"
+            ax.set_title(words if of else "no verdict to be changed", fontsize=9)
         axes[0].set_ylabel(f"{quantity.partition('@')[0]} RMS, {unit}")
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 SWITCH = 2.5 * HOUR
 WINDOW = 5.0  # s, the paper's T
 R2, TUNED_R2 = 0.001, 1e-4  # m/s^2: the paper's, and that of the fusion tuned like the 15 states
-FUSION = Fusion()
+SPAN = 3600.0  # s, over which the fusion takes its mean: the paper's N at its epochs of 1 s
 REFERENCE_PRIOR = 0.5  # m/s, of the 15-state filter, next to the paper's P0
 LONG_REFERENCE_PRIOR = 0.3  # m/s, of its long-run tuning
 NETWORK = Loop(second_order(0.5))
@@ -81,7 +82,7 @@ def run_all(
     start = round(SWITCH / course.interval)
     kinds = filters_of(voyage, course, raw=raw)
     found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
-    found["fused"] = FUSION(found["filter1"], found["filter2"], course.interval)
+    found["fused"] = fused(found, course.interval)
     found["fused_tuned"] = tuned_fusion(voyage, course, reference, workers)
     corrections = {"undamped": np.zeros((course.epochs + 1, 7))}
     if networks:
@@ -100,6 +101,11 @@ def run_all(
     return Case(course, course.time, errors, found, kinds, runtime)
 
 
+def fused(found: Mapping[str, Estimate], interval: float, span: float = SPAN) -> Estimate:
+    """The paper's fusion of filters 1 and 2, with its mean over as long a time at epochs of any length."""
+    return Fusion(samples=max(1, round(span / interval)))(found["filter1"], found["filter2"], interval)
+
+
 def tuned_fusion(voyage: Voyage, course: Course, reference: Array, workers: int) -> Estimate:
     """The fusion with what the long-run 15-state filter has: the same P0 and Q, and the R2 that suits them."""
     start, model = round(SWITCH / course.interval), replace(LONG, groups=())
@@ -109,7 +115,7 @@ def tuned_fusion(voyage: Voyage, course: Course, reference: Array, workers: int)
         "filter2": Filter(model, P0, TUNED_R2, window=WINDOW),
     }
     found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
-    return FUSION(found["filter1"], found["filter2"], course.interval)
+    return fused(found, course.interval)
 
 
 def without_overlap(voyage: Voyage, case: Case, reference: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.consistency import nees
-from truenorth.damping.course import errors_of
+from truenorth.damping.course import Course, errors_of
 from truenorth.damping.filters import run_filters
 from truenorth.errors.marine import MOTION, PHI, REF
 from truenorth.papers.damping.methods import LONG, LONG_REFERENCE_PRIOR, SWITCH, Case, filters_of, run_all
@@ -42,6 +42,14 @@ def with_log(voyage: Voyage, seed: int, run: int) -> Voyage:
     return Voyage(voyage.ideal, voyage.truth, noise)
 
 
+def drawn_voyage(voyage: Voyage, c: float, seed: int, run: int) -> tuple[Voyage, Course, Array]:
+    """A voyage with the paper's errors and biases, each with a sign of its own, and the log's too: its course and its log."""
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(4, run)))
+    x0 = voyage.paper_errors() * drawn(rng.choice([-1.0, 1.0], 13))
+    own = with_log(voyage, seed, run)
+    return own, own.navigate(x0), own.reference(c * rng.choice([-1.0, 1.0], 2))
+
+
 def random_signs(
     voyage: Voyage, c: float, runs: int, seed: int, workers: int, progress: Callable[[str], None]
 ) -> Signs:
@@ -50,12 +58,8 @@ def random_signs(
     ratios = []
     for run in range(runs):
         progress(f"random signs: voyage {run + 1} of {runs}")
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(4, run)))
-        x0 = voyage.paper_errors() * drawn(rng.choice([-1.0, 1.0], 13))
-        own = with_log(voyage, seed, run)
-        course = own.navigate(x0)
-        signed = c * rng.choice([-1.0, 1.0], 2)
-        case: Case = run_all(own, course, own.reference(signed), networks=False, raw=False, workers=workers)
+        own, course, reference = drawn_voyage(voyage, c, seed, run)
+        case: Case = run_all(own, course, reference, networks=False, raw=False, workers=workers)
         for name in COMPARED:
             kept[name].append(case.errors[name])
         ratios.append(_fused_over_sigma(voyage, case))

@@ -23,6 +23,7 @@ from truenorth.papers.static.large import DURATION, add_large, align_all, make_s
 from truenorth.papers.static.rules import RULES
 from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
+from truenorth.papers.sweeps import Sweep, draw_sweeps, swept
 from truenorth.papers.table import Table
 from truenorth.records.specs import ImuSpec
 
@@ -49,6 +50,14 @@ LITERAL_P0, LITERAL_R, LITERAL_TIME = 1e5, 1e-3, 20.0
 LITERAL_TIMES = (0.5, 2.0, 10.0, LITERAL_TIME)
 LITERAL_DRIFT = np.array([0.01, 0.01, 0.03]) * parse("1 deg/h", "angular_rate")
 
+# What decides between ten and eight states there: R has another unit in each.
+SWEEPS = (
+    Sweep("literal", "R", "R, (m/s)^2 and (m/s^2)^2", LITERAL_R, (1e-4, LITERAL_R, 1e-2, 1e-1)),
+    Sweep("literal", "P0", "P0, all states, SI", LITERAL_P0, (1e-3, 1.0, 1e3, LITERAL_P0)),
+    Sweep("literal", "start", "initial misalignment, times 10', 10', 60'", 1.0, (0.1, 1.0, 6.0)),
+)
+SWEPT_RUNS = 50  # at most
+
 BASES = {
     "still": Base("still"),
     "sway": Base("sway", sway=5e-3),
@@ -65,7 +74,10 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     found: dict[tuple[str, int], Errors] = {}
     progress(f"the paper's own scenario: {count} runs")
     literal = _literal(count, seed)
-    _add_literal(table, literal)
+    _add_literal(table, "literal", literal)
+    for sweep in SWEEPS:
+        for value in sweep.values:
+            _add_literal(table, sweep.case_of(value), _literal(min(count, SWEPT_RUNS), seed, **{sweep.name: value}))
     for name, base in BASES.items():
         progress(f"{name}: {count} runs")
         truth = _honest_truth(base, count, seed)
@@ -101,12 +113,14 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     add_large(table, large)
     progress("cost of a step")
     _add_cost(table, seed)
+    sweeps = swept(RULES, table, SWEEPS)
     claims = settle(RULES, table, {"entangled": "; ".join(map(str, seen["still", 10].entangled))})
     drawings = {
         "figures_1_to_6": draw_literal(literal),
         "convergence": draw_convergence(TIMES, found, count),
         "observability": draw_degrees(degrees),
         "large_180": draw_large(large, DURATION),
+        "open_choices": draw_sweeps(table, SWEEPS, sweeps, "level@20"),
     }
     captions = {
         "figures_1_to_6": "The paper's figures 1 to 6: one run of 20 s with its P0, Q and R. Estimated misalignment and "
@@ -115,6 +129,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "convergence": "RMS of heading and level over the runs, with noise that both filters know. Dashed: their own sigma.",
         "observability": "Degrees: the measurements' information on each direction of the state, in units of the prior (600 s). "
         "Below 1 a direction is hardly seen. Right: the part of its prior sigma that each state keeps.",
+        "open_choices": "The paper's scenario with other numbers, one by one: level RMS at 20 s; dashed: as in the paper.",
         "large_180": "Heading error after 300 s of each run, started from any azimuth; the share below 1 deg, and the RMS of all.",
     }
     remarks = [
@@ -130,6 +145,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         f"{hardly_in_words(degrees['two_position', 10])}.",
         "Any azimuth: logs of a simulated IMU at 10 Hz, heading and azimuth error uniform on the circle, nonlinear filters every "
         "5 s. Their normal prior of the azimuth has the uniform one's sigma, 104 deg.",
+        *(str(sweep) for sweep in sweeps),
     ]
     return Study(TITLE, table, claims, drawings, captions, remarks)
 
@@ -166,8 +182,13 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
         table.attitude(case, method, phi, sigma, errors.nees[k], time=at, noise="random_walk")
 
 
-def _literal(runs: int, seed: int) -> dict[int, tuple[Truth, Array, Array]]:
-    """The paper's scenario, with measurement noise drawn anew in each run: truth, phi (runs, K, 3) and sigmas (K, 3)."""
+def _literal(
+    runs: int, seed: int, R: float = LITERAL_R, P0: float = LITERAL_P0, start: float = 1.0
+) -> dict[int, tuple[Truth, Array, Array]]:
+    """The paper's scenario, with measurement noise drawn anew in each run: truth, phi (runs, K, 3) and sigmas (K, 3).
+
+    `R` as both the noise has it and the filters believe it; `start` in units of our initial misalignment.
+    """
     model = StationaryModel(LAT, complete=False)
     result = {}
     for states in (10, 8):
@@ -177,7 +198,7 @@ def _literal(runs: int, seed: int) -> dict[int, tuple[Truth, Array, Array]]:
             duration=LITERAL_TIME,
             runs=runs,
             seed=seed,
-            phi_sigma=PHI_SIGMA,
+            phi_sigma=start * PHI_SIGMA,
             gyro_bias=-LITERAL_DRIFT,
             accel_bias=ACCEL_BIAS,
             every=1,
@@ -185,21 +206,21 @@ def _literal(runs: int, seed: int) -> dict[int, tuple[Truth, Array, Array]]:
         )
         measured = truth.velocity if states == 10 else truth.force
         for run, values in enumerate(measured):
-            values += math.sqrt(LITERAL_R) * np.random.default_rng([seed, states, run]).standard_normal(values.shape)
-        system = system_of(truth, model, states, LITERAL_P0 * np.eye(10), LITERAL_R)
+            values += math.sqrt(R) * np.random.default_rng([seed, states, run]).standard_normal(values.shape)
+        system = system_of(truth, model, states, P0 * np.eye(10), R)
         estimates = kalman(system, history="sigma", innovations=False)
         sigma = estimates.sigma.reshape(-1, *estimates.sigma.shape[-2:])[0]
         result[states] = truth, estimates.x[..., :3], sigma[:, :3]
     return result
 
 
-def _add_literal(table: Table, literal: dict[int, tuple[Truth, Array, Array]]) -> None:
+def _add_literal(table: Table, case: str, literal: dict[int, tuple[Truth, Array, Array]]) -> None:
     for states, (truth, x, sigma) in literal.items():
         true = truth.phi if states == 10 else truth.phi_platform
         for at in LITERAL_TIMES:
             k = round(at / PERIOD) - 1
             error, claimed = (x[:, k] - true[:, k]) / ARCMIN, np.broadcast_to(sigma[k] / ARCMIN, x[:, k].shape)
-            table.attitude("literal", f"states{states}", error, claimed, time=at, noise="per_sample")
+            table.attitude(case, f"states{states}", error, claimed, time=at, noise="per_sample")
 
 
 def _wrong_noise(truth: Truth, base: Base) -> dict[str, Errors]:
