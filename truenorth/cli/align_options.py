@@ -37,7 +37,7 @@ BELONGS = {
     "--baseline": ("--gnss",),
     "--odometer-noise": ("--odometer",),
     "--antenna-arm": ("--gnss",),
-    "--error": ("--odometer", "--gnss"),
+    "--error": MOVING,
     "--latency": ("--gnss",),
     "--mounting": (*MOVING, "--master"),
     "--mounting-sigma": (*MOVING, "--master"),
