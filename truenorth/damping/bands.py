@@ -7,7 +7,8 @@ change of what filter 1 smooths over a step for filter 2,
 
     e+ = Phi e + w,    x1+ = A_1 x1 + K_1 (H e+ + n),    x2+ = A_2 x2 + K_2 (x1+ - x1)_v/T
 
-and the bands are those of ``x1 - e``, ``x2 - e``, or of both by the fusion's weights: what the two have in common counts.
+and the bands are those of ``x1 - e``. The fusion's error is ``x2 - e + w (x1 - x2)``, in which the difference of the filters is
+known: where filter 1 is far off, they differ and its weight is small. Its bands are of the error given that difference.
 
 Source: R. Brown, P. Hwang, *Introduction to Random Signals and Applied Kalman Filtering*, 4th ed. (2012), sec. 5.7 (suboptimal
 filters); J. Farrell, M. Barth, *The Global Positioning System and Inertial Navigation* (1999), sec. 4.10 (covariance analysis).
@@ -21,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.course import Course
-from truenorth.damping.filters import BLOCK, Filter
+from truenorth.damping.filters import BLOCK, SETTLING, Filter
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
 from truenorth.errors.marine import DV, MOTION
 
@@ -82,7 +83,7 @@ def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: 
 
 
 def filter_bands(
-    course: Course, whole: Filter, one: Filter, two: Filter | None = None, weight: Array | None = None
+    course: Course, whole: Filter, one: Filter, two: Filter | None = None, fused: tuple[Array, Array] | None = None
 ) -> Bands:
     """Of filter 1, or of filters 1 and 2 fused, that do not know all errors of the log.
 
@@ -94,8 +95,8 @@ def filter_bands(
         All errors of INS and log, as in :func:`network_bands`.
     one, two : Filter
         As they run.
-    weight : (K+1, 7) array, optional
-        Of filter 1 in the fusion.
+    fused : (weight, difference), optional
+        Of filters 1 and 2: (K+1, 7) the weight of filter 1, and by how much its estimate differs from filter 2's.
     """
     step = LONGEST_STEP if two is None else two.window
     stride = max(1, int(step / course.interval + 1e-9))
@@ -108,9 +109,7 @@ def filter_bands(
     joint[e, e] = whole.P0
     P2 = None if two is None else two.P0
     R1 = one.sigma**2 / stride * np.eye(2)
-    share = np.ones((coarse.epochs + 1, MOTION.stop))
-    if weight is not None:
-        share = np.stack([np.interp(coarse.time, course.time, w) for w in weight.T], axis=1)
+    share, apart = (None, None) if fused is None else (fused[0][::stride], fused[1][::stride])
     errors, residual = np.empty((coarse.epochs + 1, MOTION.stop)), np.empty((coarse.epochs + 1, 2))
     errors[0], residual[0] = np.diagonal(whole.P0)[MOTION], whole.sigma**2
     for begin in range(0, coarse.epochs, BLOCK):
@@ -129,6 +128,8 @@ def filter_bands(
             B[e], B[x1], G[x1] = np.eye(n), K1 @ H[k], K1
             if two is not None and P2 is not None:
                 H2 = F1[k, DV, : two.model.states]
+                settled = (begin + k) * part.interval >= SETTLING - 1e-6  # before that filter 2 listens to nothing
+                H2 = H2 * settled
                 K2, P2 = _gain(P2, Phi1[k], Q1, H2, two.sigma**2 / (stride if two.overlap else 1) * np.eye(2))
                 A[x2, x2] = Phi1[k] - K2 @ H2 @ Phi1[k]
                 A[x2] += K2 @ A[v1] / part.interval
@@ -136,16 +137,33 @@ def filter_bands(
                 B[x2], G[x2] = K2 @ B[v1] / part.interval, K2 @ G[v1] / part.interval
             joint = A @ joint @ A.T + B @ Q[k] @ B.T + G @ R1 @ G.T
             row = begin + k + 1
-            off = np.zeros((MOTION.stop, count))
+            off, differs = np.zeros((2, MOTION.stop, count))  # of the last filter, and between the two
             off[:, MOTION] = -np.eye(MOTION.stop)
-            off[:, x1.start : x1.start + MOTION.stop] = np.diag(share[row])
-            if two is not None:
-                off[:, x2.start : x2.start + MOTION.stop] = np.diag(1.0 - share[row])
-            errors[row] = np.sum((off @ joint) * off, axis=1)
+            last = x1 if two is None else x2
+            off[:, last.start : last.start + MOTION.stop] = np.eye(MOTION.stop)
             seen = off[DV].copy()
             seen[:, e] = -H[k]  # x - (dv - d): the residual's slow part
-            residual[row] = np.sum((seen @ joint) * seen, axis=1) + whole.sigma**2
+            errors[row] = np.sum((off @ joint) * off, axis=1)
+            residual[row] = np.sum((seen @ joint) * seen, axis=1)
+            if share is not None and apart is not None:
+                differs[:, x1.start : x1.start + MOTION.stop] = np.eye(MOTION.stop)
+                differs[:, x2.start : x2.start + MOTION.stop] = -np.eye(MOTION.stop)
+                spread = np.sum((differs @ joint) * differs, axis=1)
+                known = share[row], apart[row], spread
+                errors[row] = _given(errors[row], np.sum((off @ joint) * differs, axis=1), *known)
+                with_log = np.sum((seen @ joint) * differs[DV], axis=1)
+                residual[row] = _given(residual[row], with_log, *(part[DV] for part in known))
+            residual[row] += whole.sigma**2
     return _spread(course, coarse, errors, residual)
+
+
+def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spread: Array) -> Array:
+    """Second moment of ``y + w d``: an error y of filter 2, and the difference d of the filters, which is known.
+
+    Given d, y has the mean ``k d``, ``k = cov(y, d)/var(d)``, and the variance ``var(y) - k^2 var(d)``.
+    """
+    k = np.divide(covariance, spread, out=np.zeros_like(spread), where=spread > 0.0)
+    return np.maximum(variance - k**2 * spread, 0.0) + ((weight + k) * apart) ** 2
 
 
 def _gain(P: Array, Phi: Array, Q: Array, H: Array, R: Array) -> tuple[Array, Array]:

@@ -296,14 +296,15 @@ def _damped(
     two = None if damper.method == "kalman" else _change(one, errors, course.interval)
     kinds = {"filter1": one} if two is None else {"filter1": one, "filter2": two}
     estimates = run_filters(course, reference.velocity, start=start, kinds=kinds)
-    estimate = estimates["filter1"]
+    estimate, known = estimates["filter1"], None
     if two is not None:
         samples = max(1, round(3600.0 / course.interval))
         fused = Fusion(samples=samples)(estimate, estimates["filter2"], course.interval)
-        estimate = replace(fused, innovation=estimate.innovation)
+        assert fused.weight is not None  # of a fusion
+        known = fused.weight[:, MOTION], (estimate.x - estimates["filter2"].x)[:, MOTION]
+        estimate = fused
     x[start:] = estimate.x[:, MOTION]
-    weight = None if estimate.weight is None else estimate.weight[:, MOTION]
-    return _Found(x, filter_bands(rest, whole, one, two, weight), estimate, None)
+    return _Found(x, filter_bands(rest, whole, one, two, known), estimate, None)
 
 
 def _change(one: Filter, errors: LogErrors, interval: float) -> Filter:
