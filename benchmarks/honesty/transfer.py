@@ -9,17 +9,17 @@ Run: ``python -m benchmarks.honesty.transfer --runs 20``.
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import numpy as np
 
+from benchmarks.honesty.frame import Case, Outcome, main
 from truenorth.alignment.transfer import align_transfer
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors
 from truenorth.records.specs import imu_spec
-from truenorth.simulation import MasterSpec, ideal_log, simulate, simulate_sensor
+from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.simulation.sway import Disturbed
@@ -48,13 +48,11 @@ def aircraft() -> Any:
     return course(Position.from_degrees(62.0, 20.0, 3000.0), legs, heading=0.6, speed=150.0)
 
 
-def run_case(name: str, motion: Any, errors: MasterErrors | None, seed: int, runs: int) -> str:
-    """A line of the table."""
-    ideal = ideal_log(motion, rate=RATE, duration=SECONDS)
-    spec = imu_spec("tactical")
-    ratios, nees, refused = [], [], 0
-    for run in range(runs):
-        rng = np.random.default_rng([seed, run])
+def transferred(motion: Any, errors: MasterErrors | None) -> Any:
+    """A run against a master with these errors; None: it is taken for the truth."""
+
+    def run(seed: int, number: int) -> Outcome:
+        rng = np.random.default_rng([seed, number])
         arm, tau, mount = rng.standard_normal(3), 0.05 * rng.standard_normal(), 3 * DEG * rng.standard_normal(3)
         sigma = {"level": 0.3 * ARCMIN, "heading": 2.0 * ARCMIN, "attitude_drift": 0.3 * ARCMIN}
         of_master = MasterSpec(
@@ -68,35 +66,29 @@ def run_case(name: str, motion: Any, errors: MasterErrors | None, seed: int, run
             attitude_noise=ARCMIN,
             **sigma,
         )
-        slave = simulate(ideal, imu=spec, seed=seed, run=run).record
-        master = simulate_sensor(motion, of_master, duration=SECONDS, seed=seed, run=run).record
+        way, spec = motion(), imu_spec("tactical")
+        slave = simulate(way, rate=RATE, duration=SECONDS, imu=spec, seed=seed, run=number).record
+        master = simulate_sensor(way, of_master, duration=SECONDS, seed=seed, run=number).record
         answer = align_transfer(slave, master, spec, master_errors=errors)
         t = answer.transfer
-        phi = -rotation_vector_from_dcm(answer.C_nb @ motion.states(np.array(answer.time)).C_nb.T)
-        off = np.concatenate([phi, [t.delay - tau], t.lever_arm - arm])
-        own = np.concatenate([np.sqrt(np.diag(answer.phi_covariance)), [t.delay_sigma], t.lever_arm_sigma])
-        ratios.append(off / own)
-        nees.append(phi @ np.linalg.solve(answer.phi_covariance, phi) / 3.0)
-        refused += answer.status != "aligned"
-    found = np.array(ratios) ** 2
-    level, heading, delay, arms = (np.sqrt(found[:, k].mean()) for k in (slice(0, 2), 2, 3, slice(4, 7)))
-    how = "considered" if errors else "taken for the truth"
-    return (
-        f"{name:9s} {how:20s} {runs:3d} runs  heading {heading:5.2f}  level {level:5.2f}  delay {delay:5.2f}  arm {arms:5.2f}  "
-        f"NEES/3 {np.mean(nees):6.2f}  refused {refused}"
-    )
+        phi = -rotation_vector_from_dcm(answer.C_nb @ way.states(np.array(answer.time)).C_nb.T)
+        ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
+        ratios = {
+            "heading": ratio[2:],
+            "level": ratio[:2],
+            "delay": np.array([(t.delay - tau) / t.delay_sigma]),
+            "arm": (t.lever_arm - arm) / t.lever_arm_sigma,
+        }
+        return Outcome(ratios, "" if answer.status == "aligned" else f"{answer.status}: {answer.reasons[0]}")
+
+    return run
 
 
-def main() -> None:
-    """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    for name, motion in (("ship", ship()), ("aircraft", aircraft())):
-        for errors in (ERRORS, None):
-            print(run_case(name, motion, errors, given.seed, given.runs), flush=True)
-
+CASES = tuple(
+    Case("transfer", f"{name}, errors of the master {how}", transferred(motion, errors), left_out=errors is None)
+    for name, motion in (("ship", ship), ("aircraft", aircraft))
+    for how, errors in (("considered", ERRORS), ("left out", None))
+)
 
 if __name__ == "__main__":
-    main()
+    main(CASES)

@@ -10,7 +10,7 @@ from tests.damping.test_filters import SIGMA, WALKS, reference
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
 from truenorth.damping.bands import filter_bands
-from truenorth.damping.drift import likely_time
+from truenorth.damping.drift import likely_drift
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
 from truenorth.errors.marine import BG, DP, PHI, MarineModel
@@ -95,7 +95,10 @@ def test_the_time_of_a_drift_is_found(truth, hours, low, high):
     if math.isfinite(hours):
         drift = gauss_markov(0.5, hours * HOUR, truth.interval, len(truth.time), rng, axes=2)
     kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
-    assert low * HOUR <= likely_time(course, reference(truth, drift), 0, kind) <= high * HOUR
+    found = likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.3))
+    assert low * HOUR <= found.time <= high * HOUR
+    if math.isfinite(hours):  # the walk, which the data show, to a quarter
+        assert found.drift / math.sqrt(found.time) == pytest.approx(0.5 / math.sqrt(hours * HOUR), rel=0.25)
 
 
 def test_two_fixes_calibrate_the_gyros(truth):

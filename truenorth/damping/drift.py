@@ -4,6 +4,9 @@ Of white innovations ``nu`` with covariance ``S`` the likelihood is ``-1/2 sum(n
 for each correlation time in question. Under a drift that is taken for too slow the innovations hang together and are too large;
 under one too fast S is larger than they are.
 
+The walk of the drift, ``sigma^2/tau``, shows within hours, its size ``sigma`` only over several ``tau``: the time is searched
+with the size as it is given, then both along the same walk, where a size twice the given one costs half a unit of log-likelihood.
+
 Source: F. Schweppe, "Evaluation of likelihood functions for Gaussian signals", IEEE Trans. Inf. Theory 11 (1965).
 """
 
@@ -18,16 +21,18 @@ from numpy.typing import NDArray
 from truenorth.damping.course import Course
 from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.loop import LONGEST_STEP
-from truenorth.errors.log import DRIFT
+from truenorth.errors.log import DRIFT, LogErrors
 
 Array = NDArray[np.float64]
 
 HOUR = 3600.0
 TIMES = (math.inf, *(HOUR * x for x in (96.0, 48.0, 24.0, 12.0, 6.0, 3.0, 1.5, 0.75, 0.375)))  # s
+SIZES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # times the given one
+DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
 
 
-def likely_time(course: Course, reference: Array, start: int, kind: Filter) -> float:
-    """The most likely correlation time of a log's drift, s; infinite: a constant.
+def likely_drift(course: Course, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
+    """The log's errors with the most likely size and correlation time of its drift; an infinite time: a constant.
 
     Parameters
     ----------
@@ -36,15 +41,36 @@ def likely_time(course: Course, reference: Array, start: int, kind: Filter) -> f
     start : int
         Epoch of the switch.
     kind : Filter
-        The augmented filter; the time of its drift is set in turn.
+        The augmented filter; size and time of its drift are set in turn.
+    given : LogErrors
     """
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
     coarse, seen = course.between(start, course.epochs).every(stride), reference[start::stride]
-    kinds = {}
-    for time in TIMES:
-        groups = tuple(
-            replace(group, correlation_time=time) if group.name == DRIFT else group for group in kind.model.groups
-        )
-        kinds[str(time)] = replace(kind, model=replace(kind.model, groups=groups))
-    found = run_filters(coarse, seen, start=0, kinds=kinds)
-    return max(TIMES, key=lambda time: found[str(time)].likelihood)
+
+    def best(pairs: list[tuple[float, float]]) -> tuple[float, float]:
+        kinds = {str(pair): _with(kind, *pair) for pair in pairs}
+        found = run_filters(coarse, seen, start=0, kinds=kinds)
+
+        def weighed(pair: tuple[float, float]) -> float:
+            doubt = math.log(pair[0] / given.drift) / DOUBT
+            return found[str(pair)].likelihood - 0.5 * doubt**2
+
+        return max(pairs, key=weighed)
+
+    size, time = best([(given.drift, time) for time in TIMES])
+    if math.isfinite(time):
+        size, time = best([(size * f, time * f**2) for f in SIZES])
+    return replace(given, drift=size, drift_time=time)
+
+
+def _with(kind: Filter, size: float, time: float) -> Filter:
+    """The filter with this drift."""
+    groups = tuple(
+        replace(group, sigma=np.full_like(group.sigma, size), correlation_time=time) if group.name == DRIFT else group
+        for group in kind.model.groups
+    )
+    model, P0 = replace(kind.model, groups=groups), kind.P0.copy()
+    own = model.slice_of(DRIFT)
+    assert own is not None  # it has a drift
+    P0[own, own] = size**2 * np.eye(2)
+    return replace(kind, model=model, P0=P0)

@@ -15,7 +15,7 @@ from truenorth.core import earth
 from truenorth.core.errors import DataError, UsageError
 from truenorth.damping.bands import Bands, filter_bands, network_bands
 from truenorth.damping.course import Course
-from truenorth.damping.drift import likely_time
+from truenorth.damping.drift import likely_drift
 from truenorth.damping.filters import Estimate, Filter, FixRows, Fusion, run_filters
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order
@@ -112,7 +112,7 @@ def damp_navigation(
             "earlier start"
         )
     log = _Log(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity)
-    errors, evidence = _with_time(course, track, log, spec, others, start)
+    errors, evidence = _with_drift(course, track, log, spec, others, start)
     whole = replace(_whole(track, log, errors, spec, others, start), fixes=_fixes_on(course, fixes, start))
     found = _damped(course, log.reference, spec, damper, start, whole, errors, track)
     damped = course.corrected(found.x)
@@ -202,16 +202,18 @@ def _fixes_on(course: Course, fixes: Fixes, start: int) -> FixRows | None:
     return FixRows(z[start:], sigma[start:]) if np.isfinite(z).any() else None
 
 
-def _with_time(
+def _with_drift(
     course: Course, track: Track, log: _Log, spec: ImuSpec, others: Sequence[Group], start: int
 ) -> tuple[LogErrors, list[Evidence]]:
-    """Errors of the log; the time of a drift that nobody knows is found, and told."""
+    """Errors of the log; a drift of which nobody knows how long it lasts is found."""
     errors = log.errors
     if log.reference is None or errors.drift == 0.0 or errors.drift_time is not None:
         return errors, []
-    time = likely_time(course, log.reference.velocity, start, _whole(track, log, errors, spec, others, start))
-    told = note("log.constant") if math.isinf(time) else note("log.drifts", drift=errors.drift, hours=time / 3600.0)
-    return replace(errors, drift_time=time), [told]
+    kind = _whole(track, log, errors, spec, others, start)
+    found = likely_drift(course, log.reference.velocity, start, kind, errors)
+    if math.isinf(found.time):
+        return found, [note("log.constant")]
+    return found, [note("log.drifts", drift=found.drift, hours=found.time / 3600.0)]
 
 
 def _whole(track: Track, log: _Log, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:

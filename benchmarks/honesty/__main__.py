@@ -1,0 +1,21 @@
+"""The matrix of mismatch: every procedure, each error on and off, in one table with marks.
+
+Run: ``python -m benchmarks.honesty --runs 20 --markdown``; ``--only damping`` for a part. The worlds are drawn from seed and run.
+"""
+
+from __future__ import annotations
+
+from benchmarks.honesty import damping, navigation, staying, transfer, turning
+from benchmarks.honesty.frame import main
+from benchmarks.honesty.harness import framed
+
+CASES = (
+    *framed("base that stays", staying.CASES),
+    *framed("turning sensor", turning.CASES),
+    *transfer.CASES,
+    *damping.CASES,
+    *navigation.CASES,
+)
+
+if __name__ == "__main__":
+    main(CASES, __doc__)

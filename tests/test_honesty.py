@@ -1,0 +1,52 @@
+"""The matrix of mismatch: its marks, and (slow) every case of it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.honesty.__main__ import CASES
+from benchmarks.honesty.frame import Case, Line, Outcome, as_markdown, run_case
+from truenorth.core.errors import DataError
+
+RUNS = 8
+
+
+def drawn(factor, refuse=0.0):
+    """A case whose errors are so many times their sigma, and of which a share is refused."""
+
+    def run(seed, number):
+        rng = np.random.default_rng([seed, number])
+        if rng.random() < refuse:
+            raise DataError("no")
+        return Outcome({"heading": factor * rng.standard_normal(2)})
+
+    return Case("drawn", "errors", run)
+
+
+def test_marks():
+    assert run_case(drawn(1.0), 1, 200).mark == "ok"
+    assert run_case(drawn(1.5), 1, 200).mark in ("small", "defect")
+    assert run_case(drawn(0.5), 1, 200).mark == "large"
+    assert run_case(drawn(6.0), 1, 200).mark == "defect"
+    line = run_case(drawn(1.0, refuse=0.5), 1, 50)
+    assert line.mark == "refused"
+    assert 10 < len(line.refused) < 40
+    one = Line(drawn(1.0), 20, {"heading": 1.1}, (), 2.0, 0, 0.1)
+    assert one.mark == "ok"  # by chance of twenty runs
+    assert "| drawn | errors | 20 | heading 1.10 | 0 | 2.0 | ok |" in as_markdown([one])
+    assert math.isfinite(one.seconds)
+
+
+def test_every_case_has_a_name_of_its_own():
+    names = [(case.procedure, case.name) for case in CASES]
+    assert len(set(names)) == len(names)
+    assert len({case.procedure for case in CASES}) >= 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [c for c in CASES if not c.left_out], ids=lambda c: f"{c.procedure}: {c.name}")
+def test_sigma_is_honest(case):
+    """No run beyond four sigmas with a good status, no sigma that is too small, few refusals; eight worlds each."""
+    line = run_case(case, 7, RUNS)
+    assert line.mark in ("ok", "large"), line.cells()
