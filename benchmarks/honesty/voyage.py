@@ -17,7 +17,7 @@ from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
 from truenorth.errors.deflection import STANDARD_GRAVITY, Deflection
 from truenorth.errors.log import LogErrors, log_rows
-from truenorth.errors.marine import BA, BG, DP, DV, OF_INS, PHI
+from truenorth.errors.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI
 from truenorth.navigation import Start
 from truenorth.records import ImuRecord, VelocityRecord
 from truenorth.records.specs import ImuSpec
@@ -99,11 +99,16 @@ class Voyage:
         truth = Course(*(a[rows] for a in (self.truth.time, self.truth.C_nb, self.truth.v_n, self.truth.position)))
         k = np.unique([int(np.argmin(np.abs(found.time - h * HOUR))) for h in hours])
         e, s = errors_of(found, truth)[k], result.track.sigma[k]
-        sigma = np.concatenate([s[:, 3:5], s[:, 6:8], s[:, :3]], axis=1)
+        sigma = s[:, OF_INS[MOTION]]
         ratio = e / sigma
-        ratios = {"velocity": ratio[:, DV], "position": ratio[:, DP], "heading": ratio[:, 6], "level": ratio[:, 4:6]}
+        ratios = {
+            "velocity": ratio[:, DV],
+            "position": ratio[:, DP],
+            "heading": ratio[:, PHI][:, 2],
+            "level": ratio[:, PHI][:, :2],
+        }
         bad = "" if result.status == "navigated" else f"{result.status}: {result.reasons[0]}"
-        said = f"{np.round(e[-1, :4], 2)} {np.round(np.degrees(e[-1, 6]), 3)} sigma {np.round(sigma[-1, :4], 2)}"
+        said = f"of {np.round(e[-1, DP])} m, sigma {np.round(sigma[-1, DP])} m"
         return Outcome(ratios, bad, said)
 
 
