@@ -144,7 +144,7 @@ def test_an_odometer_is_needed(drives):
     record, _, place, spec, motion = drives[0]
     at = motion.states(record.time[::100])
     gnss = GnssRecord(record.time[::100], v_n=at.v_n, lat=at.lat, lon=at.lon, alt=at.alt)
-    with pytest.raises(UsageError, match="expected an odometer's log"):
+    with pytest.raises(UsageError, match="is that of an odometer"):
         align_in_motion(record, spec, gnss=gnss, position=place, method="gh3")
 
 

@@ -190,7 +190,7 @@ def test_the_command(tmp_path):
     result = CliRunner().invoke(app, ["reproduce", "static", "--runs", "4", "-o", str(tmp_path)])
     assert result.exit_code == 0, result.output
     names = {path.name for path in tmp_path.iterdir()}
-    drawings = {"figures_1_to_6.png", "convergence.png", "observability.png", "large_180.png"}
+    drawings = {"figures_1_to_6.png", "convergence.png", "observability.png", "large_180.png", "open_choices.png"}
     assert names == {"figures.csv", "claims.md", "report.html"} | drawings
     table = pd.read_csv(tmp_path / "figures.csv")
     assert set(table["case"]) == {

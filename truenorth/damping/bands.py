@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.course import Course
-from truenorth.damping.filters import BLOCK, SETTLING, Filter
+from truenorth.damping.filters import BLOCK, SETTLING, Filter, silences
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
 from truenorth.errors.marine import DV, MOTION
 
@@ -83,7 +83,12 @@ def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: 
 
 
 def filter_bands(
-    course: Course, whole: Filter, one: Filter, two: Filter | None = None, fused: tuple[Array, Array] | None = None
+    course: Course,
+    whole: Filter,
+    one: Filter,
+    two: Filter | None = None,
+    fused: tuple[Array, Array] | None = None,
+    absent: NDArray[np.bool_] | None = None,
 ) -> Bands:
     """Of filter 1, or of filters 1 and 2 fused, that do not know all errors of the log.
 
@@ -97,6 +102,8 @@ def filter_bands(
         As they run.
     fused : (weight, difference), optional
         Of filters 1 and 2: (K+1, 7) the weight of filter 1, and by how much its estimate differs from filter 2's.
+    absent : (K+1,) array of bool, optional
+        Epochs at which the log says nothing: the filters go on without it.
     """
     step = LONGEST_STEP if two is None else two.window
     stride = max(1, int(step / course.interval + 1e-9))
@@ -109,6 +116,9 @@ def filter_bands(
     joint[e, e] = whole.P0
     P2 = None if two is None else two.P0
     R1 = one.sigma**2 / stride * np.eye(2)
+    absent = np.zeros(course.epochs + 1, dtype=bool) if absent is None else absent
+    silent = silences(absent, max(1, round(SETTLING / course.interval)))[::stride]
+    absent = absent[::stride]
     share, apart = (None, None) if fused is None else (fused[0][::stride], fused[1][::stride])
     errors, residual = np.empty((coarse.epochs + 1, MOTION.stop)), np.empty((coarse.epochs + 1, 2))
     errors[0], residual[0] = np.diagonal(whole.P0)[MOTION], whole.sigma**2
@@ -121,15 +131,17 @@ def filter_bands(
         Q1, H1 = one.model.noise_of(part.interval, mean)[0], one.rows(part)
         for k in range(part.epochs):
             A, G = np.zeros((count, count)), np.zeros((count, 2))
-            K1, P1 = _gain(P1, Phi1[k], Q1, H1[k], R1)
+            K1, P1 = _gain(P1, Phi1[k], Q1, H1[k] * (not absent[begin + k + 1]), R1)
             A[e, e] = Phi[k]
             A[x1, e], A[x1, x1] = K1 @ H[k] @ Phi[k], Phi1[k] - K1 @ H1[k] @ Phi1[k]
             B = np.zeros((count, n))  # of the noise that drives the errors
             B[e], B[x1], G[x1] = np.eye(n), K1 @ H[k], K1
             if two is not None and P2 is not None:
                 H2 = F1[k, DV, : two.model.states]
-                settled = (begin + k) * part.interval >= SETTLING - 1e-6  # before that filter 2 listens to nothing
-                H2 = H2 * settled
+                settled = (begin + k) * part.interval >= SETTLING - 1e-6
+                H2 = H2 * (
+                    settled and not silent[begin + k + 1]
+                )  # until filter 1 has settled nothing goes into filter 2
                 K2, P2 = _gain(P2, Phi1[k], Q1, H2, two.sigma**2 / (stride if two.overlap else 1) * np.eye(2))
                 A[x2, x2] = Phi1[k] - K2 @ H2 @ Phi1[k]
                 A[x2] += K2 @ A[v1] / part.interval

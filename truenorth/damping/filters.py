@@ -263,7 +263,7 @@ def run_filters(
     z = course.v_n[:, :2] - reference
     interval = course.interval
     settling = max(1, round(SETTLING / interval))
-    firm = ~_silences(np.asarray(np.isnan(z).any(axis=1)), settling)
+    firm = ~silences(np.asarray(np.isnan(z).any(axis=1)), settling)
 
     def change(of: Array, stream: _Stream, begin: int, end: int, since: int) -> Array:
         """(end - begin, 2) of the epochs after `begin`; windows that begin before `since` or in a silence are absent."""
@@ -298,7 +298,7 @@ def run_filters(
     return {name: stream.estimate(start) for name, stream in streams.items()}
 
 
-def _silences(absent: NDArray[np.bool_], settling: int) -> NDArray[np.bool_]:
+def silences(absent: NDArray[np.bool_], settling: int) -> NDArray[np.bool_]:
     """(K+1,) epochs in a silence as long as filter 1 takes to settle, or before it has settled again."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], absent.astype(np.int8), [0]])))
     out = np.zeros(len(absent), dtype=bool)

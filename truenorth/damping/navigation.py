@@ -306,7 +306,8 @@ def _damped(
         known = fused.weight[:, MOTION], (estimate.x - estimates["filter2"].x)[:, MOTION]
         estimate = fused
     x[start:] = estimate.x[:, MOTION]
-    return _Found(x, filter_bands(rest, whole, one, two, known), estimate, None)
+    absent = np.asarray(np.isnan(reference.velocity[start:]).any(axis=1))
+    return _Found(x, filter_bands(rest, whole, one, two, known, absent), estimate, None)
 
 
 def _change(one: Filter, errors: LogErrors, interval: float) -> Filter:

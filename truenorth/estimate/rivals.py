@@ -42,6 +42,10 @@ class Along(Protocol):
     """What of a track is compared."""
 
     @property
+    def time(self) -> Array:
+        """(K,) s."""
+
+    @property
     def C_nb(self) -> Array:
         """(K, 3, 3) attitudes."""
 
@@ -206,18 +210,28 @@ def _ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> float:
 
 
 def moved(first: Along, other: Along) -> Effect:
-    """By how much two tracks differ: the RMS, in sigmas of the first, of the later half, as sizes at the last epoch."""
+    """By how much two tracks differ: the RMS, in sigmas of the first, of the later half, as sizes at the last epoch.
+
+    Epochs that a delay has moved are compared with the other's nearest.
+    """
     half = slice(len(first.C_nb) // 2, None)
-    turn = np.abs(rotation_vector_from_dcm(first.C_nb[half] @ np.swapaxes(other.C_nb[half], 1, 2)))
+    near = _nearest(other.time, first.time[half])
+    turn = np.abs(rotation_vector_from_dcm(first.C_nb[half] @ np.swapaxes(other.C_nb[near], 1, 2)))
     lat, _, alt = first.position[half].T
-    dlat, dlon, dalt = (first.position[half] - other.position[half]).T
+    dlat, dlon, dalt = (first.position[half] - other.position[near]).T
     R_M, R_N = radii(lat)
     dp = np.stack([dlon * (R_N + alt) * np.cos(lat), dlat * (R_M + alt), dalt], axis=1)
-    off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[half]), np.abs(dp)], axis=1)
+    off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[near]), np.abs(dp)], axis=1)
     sigma = first.sigma[half, :9]
     known = sigma > 0.0
     ratio = np.sqrt(np.mean(np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2, axis=0))
     return _of_states(ratio * first.sigma[-1, :9])
+
+
+def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
+    """Rows of ascending times that lie nearest to those wanted."""
+    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    return after - (wanted - time[after - 1] < time[after] - wanted)
 
 
 def _effect(first: Along, rival: Along) -> Effect:

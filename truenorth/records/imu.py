@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
@@ -78,18 +79,24 @@ class ImuRecord(Record):
                 )
 
     def check_rate(self) -> None:
-        """Refuse a record whose rows are too far apart to be integrated.
+        """Refuse a record whose rows are too far apart to be integrated; increments may be, where they add up to gravity.
 
         Raises
         ------
         DataError
             More than a second between two rows.
         """
-        if self.interval > SLOWEST:
+        whole = self.kind == "increments" and self._adds_up_to_gravity()
+        if self.interval > SLOWEST and not whole:
             raise DataError(
                 f"{self.source}: a row every {self.interval:.4g} s; expected {SLOWEST:g} s at most: time is probably in "
                 "milliseconds, microseconds or ticks; convert it to seconds, or give the rate"
             )
+
+    def _adds_up_to_gravity(self) -> bool:
+        """Whether the increments, over the time that the record says, are a specific force near gravity's."""
+        force = np.linalg.norm(self.accel, axis=1).sum() / self.duration
+        return bool(0.5 * STANDARD_GRAVITY < force < 2.0 * STANDARD_GRAVITY)
 
     @property
     def jitter(self) -> float:
