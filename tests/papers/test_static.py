@@ -193,7 +193,9 @@ def test_the_command(tmp_path):
     drawings = {"figures_1_to_6.png", "convergence.png", "observability.png", "large_180.png", "open_choices.png"}
     assert names == {"figures.csv", "claims.md", "report.html"} | drawings
     table = pd.read_csv(tmp_path / "figures.csv")
-    assert set(table["case"]) == {
+    swept = {case for case in table["case"] if case.startswith("literal_")}
+    assert {case.split("_")[1] for case in swept} == {"R", "P0", "start"}
+    assert set(table["case"]) - swept == {
         "literal",
         "still",
         "sway",
