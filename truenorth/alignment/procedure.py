@@ -26,8 +26,9 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
 from truenorth.alignment.turning import infer_turning, turning_align, turns_blindly
-from truenorth.alignment.verdict import base_evidence, judged, leaves
+from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
+from truenorth.coarse.analytic import static_covariance
 from truenorth.coarse.uncertainty import base_velocity
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
@@ -190,10 +191,13 @@ def _align_analytic(task: Task, spec: ImuSpec | None) -> _Found:
 def _align_level(task: Task, spec: ImuSpec | None) -> _Found:
     """Level alone, from the mean specific force of a base that does not turn; heading zero by convention."""
     task = last_part(task)
+    if not task.record.gyro.any():
+        raise no_attitude(task.record.source)
     check = check_means(task.means, task.position.lat, task.gravity)
     used, where = _specification(spec, check, allan_noise(task.record))
     C_nb = level_of(task.means.f_b)
-    _, covariance, floor = analytic(task.means, task.position.lat, task.position.alt, task.bias_prior(used, C_nb.T))
+    P = task.bias_prior(used, C_nb.T)
+    covariance, floor = static_covariance(C_nb, task.means, task.position.lat, task.position.alt, P)
     # What the base moved about its mean attitude within ten seconds is not known at the epoch.
     wander = float(np.max(task.motion.wander, initial=0.0)) if task.motion.overall != "still" else 0.0
     covariance = without_heading(covariance + wander**2 * np.eye(3))

@@ -26,6 +26,11 @@ WALKING = 2.0  # m/s: nobody takes what moves faster for a base that stays
 FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
 
 
+def no_attitude(source: str) -> AlignmentError:
+    """What a log is refused with that gives no attitude at all."""
+    return AlignmentError(f"{source}: the log gives no attitude: are sensors dead, or all their values the same?")
+
+
 def judged(
     answer: Alignment,
     evidence: Sequence[Evidence],
@@ -53,9 +58,7 @@ def judged(
         The attitude is no number.
     """
     if not (np.isfinite(answer.C_nb).all() and np.isfinite(answer.phi_covariance).all()):
-        raise AlignmentError(
-            f"{answer.source}: the log gives no attitude: are sensors dead, or all their values the same?"
-        )
+        raise no_attitude(answer.source)
     _, floor = azimuth_sigmas(answer)
     lat = answer.position.lat
     bias = float(np.max(answer.gyro_bias_prior))

@@ -84,6 +84,11 @@ def analytic(m: Means, lat: float, alt: float, P_bias: Array) -> tuple[Array, Ar
         Of the misalignment; the floor holds the biases alone.
     """
     C_nb = triad(m.f_b, m.w_ib_b, UP, np.asarray(earth_rate_n(lat)))
+    return C_nb, *static_covariance(C_nb, m, lat, alt, P_bias)
+
+
+def static_covariance(C_nb: Array, m: Means, lat: float, alt: float, P_bias: Array) -> tuple[Array, Array]:
+    """Covariance of the misalignment of an attitude from means, and its floor, (3, 3); arguments as for :func:`analytic`."""
     J = static_jacobian(lat, float(normal_gravity(lat, alt)))
     biases, noise = np.zeros((6, 6)), np.zeros((6, 6))
     for block, P_block, scatter in (
@@ -92,7 +97,7 @@ def analytic(m: Means, lat: float, alt: float, P_bias: Array) -> tuple[Array, Ar
     ):
         biases[block, block] = C_nb @ P_block @ C_nb.T
         noise[block, block] = C_nb @ scatter @ C_nb.T
-    return C_nb, J @ (biases + noise) @ J.T, J @ biases @ J.T
+    return J @ (biases + noise) @ J.T, J @ biases @ J.T
 
 
 def two_position(

@@ -138,6 +138,8 @@ def _clock(columns: Columns, layout: Layout, choice: Choice, rows: int, guesses:
 
 
 def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:
+    if len(raw) < 3:
+        return "s"
     steps = np.diff(raw)
     step = float(np.median(steps))
     readings = clock_readings(step, float(raw[0]))
@@ -148,7 +150,7 @@ def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:
             options,
             guesses,
         )
-    if len(raw) < 3 or not readings:
+    if not readings:
         return "s"
     options = [{"units": {"time": reading.unit}} for reading in readings]
     return take("unit of time", readings, options, source, guesses).unit
@@ -281,11 +283,12 @@ def _no_gravity(level: float, accel: Array, kind: Kind, interval: float) -> str:
 
 def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str, guesses: list[Guess]) -> None:
     """Ask where documented names, which mean SI, stand over numbers that look like another unit."""
-    interval = float(np.median(np.diff(time)))
     unit = "rad/s" if kind == "rates" else "rad"
     force = "m/s^2" if kind == "rates" else "m/s"
     guesses.append(Guess("units", f"{unit}, {force}", "the documented names mean SI"))
-    if len(time) < FEWEST or not accel_readings(gravity_level(accel), interval, (kind,), (force,)):
+    if len(time) < FEWEST:
+        return
+    if not accel_readings(gravity_level(accel), float(np.median(np.diff(time))), (kind,), (force,)):
         return  # what is no gravity in SI, the checks of plausibility name
     readings = gyro_readings(gyro_facts(time, gyro, accel, kind), kind, force)
     if readings and readings[0].unit != unit:
