@@ -41,6 +41,9 @@ DIMENSION_OF: dict[Kind, dict[str, str]] = {
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # a cell may hold 1e200: what is too large for any sensor is refused at the end
 def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     """The record of a log of named columns.
 
