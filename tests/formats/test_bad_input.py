@@ -239,3 +239,13 @@ def test_whatever_is_damaged_is_a_record_or_an_error_of_ours(suffix, data, tmp_p
     path.write_bytes(content)
     with contextlib.suppress(DataError, UsageError):
         assert np.isfinite(read_imu(path).gyro).all()
+
+
+def test_gyros_that_are_none_are_named(tmp_path):
+    """Columns under a gyro's names with numbers of no unit: a message, found by the fuzzer as a crash."""
+    rows = "".join(
+        f"{k * 0.01:.2f},{1e20 * (1 + k % 3):g},0,0,0.0,0.0,{9.8 + 0.001 * (k % 5):.4f}\n" for k in range(500)
+    )
+    (tmp_path / "log.csv").write_text("t,wx,wy,wz,ax,ay,az\n" + rows)
+    with pytest.raises(DataError, match="of a gyro in no usual unit"):
+        read_imu(tmp_path / "log.csv")

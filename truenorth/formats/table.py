@@ -261,6 +261,10 @@ def _units(
     if "gyro" not in said:
         facts = gyro_facts(time, gyro, accel, kind)
         readings = gyro_readings(facts, kind, said["accel"])
+        if not readings:
+            raise DataError(
+                f"{source}: the gyros' values are those of a gyro in no usual unit; say the unit, or check that these are the gyros"
+            )
         said["gyro"] = take(
             "unit of the gyros", readings, [{"units": {"gyro": r.unit}} for r in readings], source, guesses, SURE_GYRO
         ).unit
