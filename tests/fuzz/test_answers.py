@@ -27,7 +27,13 @@ from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(45.0, 10.0)
 LONGEST = 10.0  # s of one input
-settled = settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+settled = settings(
+    max_examples=EXAMPLES,
+    derandomize="FUZZ" not in os.environ,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    database=None,
+)
 
 SCENARIO = b"""name: quay
 duration: 60 s

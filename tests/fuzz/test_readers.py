@@ -67,7 +67,13 @@ def test_what_is_damaged_is_a_record_or_an_error_of_ours(name, whole, tmp_path_f
     # Reading .mat starts a process each time.
     examples = max(3, EXAMPLES // 8) if name == "log.mat" else EXAMPLES
 
-    @settings(max_examples=examples, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+    @settings(
+        max_examples=examples,
+        derandomize="FUZZ" not in os.environ,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+        database=None,
+    )
     @given(data=st.data())
     def attempt(data):
         content = bytearray(whole[name])
