@@ -9,11 +9,13 @@ import pytest
 from tests.formats.corpus.truth import truth
 from truenorth.core.errors import DataError, TruenorthError
 from truenorth.formats import read_gnss, read_imu, read_trajectory
+from truenorth.formats.magnetometer import read_magnetometer
 
 SWAY = truth("swaying", "tactical", 100.0, 10.0)
 TIME = SWAY.time
 TOW = 208800.0
 LAT, LON, ALT = 48.1, 11.5, 500.0
+FIELD = SWAY.accel * 4.8e-6  # T, of the size of the earth's; it turns as gravity does, which is enough to see axes
 FRD = lambda v: v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]  # noqa: E731
 
 
@@ -22,6 +24,11 @@ def assert_is_sway(record, atol_gyro, atol_accel, start):
     np.testing.assert_allclose(record.time - start, TIME, atol=1e-4)
     np.testing.assert_allclose(record.gyro, SWAY.gyro, atol=atol_gyro)
     np.testing.assert_allclose(record.accel, SWAY.accel, atol=atol_accel)
+
+
+def assert_is_field(record, every=10):
+    np.testing.assert_allclose(record.time, TIME[::every], atol=1e-4)
+    np.testing.assert_allclose(record.field, FIELD[::every], atol=1e-7)
 
 
 def assert_is_at_home(record, count, velocity=(2.0, 1.0, -0.5)):
@@ -57,6 +64,34 @@ def test_ublox(tmp_path):
     fixes = read_gnss(path)
     assert_is_at_home(fixes, 50)
     np.testing.assert_allclose(fixes.position_sigma[0], [0.7071, 0.7071, 2.0], atol=1e-3)
+
+
+@pytest.mark.parametrize("moving", [1, 0])
+def test_ublox_with_two_antennas(tmp_path, moving):
+    """A moving base's heading; that of a base which stays is where the vehicle is from there, and no heading."""
+    pyubx2 = pytest.importorskip("pyubx2")
+    parts = []
+    for k in range(10):
+        tow = round((TOW + k) * 1e3)
+        fix = {"lat": LAT, "lon": LON, "height": 500000, "velE": 2000, "velN": 1000, "velD": 500, "fixType": 3}
+        pair = {"relPosHeading": 123.4, "accHeading": 0.2, "gnssFixOK": 1, "relPosHeadingValid": int(k != 4)}
+        parts.append(pyubx2.UBXMessage("NAV", "NAV-PVT", pyubx2.GET, iTOW=tow, **fix, hAcc=1000, vAcc=2000, sAcc=100))
+        parts.append(
+            pyubx2.UBXMessage("NAV", "NAV-RELPOSNED", pyubx2.GET, version=1, iTOW=tow, isMoving=moving, **pair)
+        )
+    (path := tmp_path / "log.ubx").write_bytes(b"".join(message.serialize() for message in parts))
+    record = read_gnss(path)
+    assert_is_at_home(record, 10)
+    if not moving:
+        assert record.heading is None
+        return
+    assert np.flatnonzero(np.isnan(record.heading)).tolist() == [4]
+    np.testing.assert_allclose(np.degrees(np.delete(record.heading, 4)), 123.4)
+    np.testing.assert_allclose(np.degrees(np.delete(record.heading_sigma, 4)), 0.2)
+    path.write_bytes(b"".join(message.serialize() for message in parts[1::2]))
+    alone = read_gnss(path)
+    assert len(alone) == 9
+    assert not alone.has_position.any()
 
 
 def test_septentrio(tmp_path):
@@ -115,14 +150,18 @@ def ulog_bytes():
 
     parts = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
     parts.append(message("F", b"sensor_combined:uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;"))
+    parts.append(message("F", b"vehicle_magnetometer:uint64_t timestamp;float[3] magnetometer_ga;"))
     parts.append(message("F", b"sensor_gps:uint64_t timestamp;double latitude_deg;double longitude_deg;double altitude_ellipsoid_m;"
                          b"float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;float eph;float epv;uint8_t fix_type;"))  # fmt: skip
     parts += [
         message("A", struct.pack("<BH", 0, 0) + b"sensor_combined"),
         message("A", struct.pack("<BH", 0, 1) + b"sensor_gps"),
     ]
-    gyro, accel = FRD(SWAY.gyro), FRD(SWAY.accel)
+    parts.append(message("A", struct.pack("<BH", 0, 2) + b"vehicle_magnetometer"))
+    gyro, accel, gauss = FRD(SWAY.gyro), FRD(SWAY.accel), FRD(FIELD) * 1e4
     for k, t in enumerate(TIME):
+        if k % 10 == 0:
+            parts.append(message("D", struct.pack("<HQ3f", 2, round(t * 1e6), *gauss[k])))
         parts.append(message("D", struct.pack("<HQ6f", 0, round(t * 1e6), *gyro[k], *accel[k])))
         if k % 100 == 0:
             values = (LAT, LON, ALT, 1.0, 2.0, 0.5, 1.0, 2.0, 3)
@@ -139,8 +178,12 @@ def dataflash_bytes():
     parts = [form(0x80, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")]
     parts.append(form(0x81, 3 + 8 + 1 + 24, b"IMU", b"QBffffff", b"TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"))
     parts.append(form(0x82, 3 + 8 + 2 + 8 + 4 + 12, b"GPS", b"QBBLLefff", b"TimeUS,I,Status,Lat,Lng,Alt,Spd,GCrs,VZ"))
-    gyro, accel = FRD(SWAY.gyro), FRD(SWAY.accel)
+    parts.append(form(0x83, 3 + 8 + 1 + 12 + 1, b"MAG", b"QBfffB", b"TimeUS,I,MagX,MagY,MagZ,Health"))
+    gyro, accel, mgauss = FRD(SWAY.gyro), FRD(SWAY.accel), FRD(FIELD) * 1e7
     for k, t in enumerate(TIME):
+        if k % 10 == 0:
+            for i in (0, 1):  # a second compass, which is not read
+                parts.append(struct.pack("<BBBQB3fB", 0xA3, 0x95, 0x83, round(t * 1e6), i, *mgauss[k] * (1 - 2 * i), 1))
         parts.append(struct.pack("<BBBQB6f", 0xA3, 0x95, 0x81, round(t * 1e6), 0, *gyro[k], *accel[k]))
         if k % 100 == 0:
             course = np.degrees(np.arctan2(2.0, 1.0))
@@ -160,20 +203,22 @@ def test_flight_controllers(tmp_path, module, name, content):
     path.write_bytes(content())
     assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
     assert_is_at_home(read_gnss(path), 10)
+    assert_is_field(read_magnetometer(path))
 
 
 def test_mavlink(tmp_path):
     mavutil = pytest.importorskip("pymavlink.mavutil")
     path = tmp_path / "log.tlog"
     link = mavutil.mavlink.MAVLink(SimpleNamespace(write=lambda _: None), srcSystem=1, srcComponent=1)
-    gyro, accel = FRD(SWAY.gyro), FRD(SWAY.accel)
+    gyro, accel, gauss = FRD(SWAY.gyro), FRD(SWAY.accel), FRD(FIELD) * 1e4
     with path.open("wb") as file:
 
         def write(message, t):
             file.write(struct.pack(">Q", 1_700_000_000_000_000 + round(t * 1e6)) + message.pack(link))
 
         for k, t in enumerate(TIME):
-            write(link.highres_imu_encode(round(t * 1e6), *accel[k], *gyro[k], 0, 0, 0, 0, 0, 0, 0, 63), t)
+            held = gauss[k // 10 * 10]  # the board sends its last reading again
+            write(link.highres_imu_encode(round(t * 1e6), *accel[k], *gyro[k], *held, 0, 0, 0, 0, 511), t)
             if k % 100 == 0:
                 course = round(np.degrees(np.arctan2(2.0, 1.0)) * 100)
                 place = (round(LAT * 1e7), round(LON * 1e7), round(ALT * 1e3))
@@ -185,6 +230,7 @@ def test_mavlink(tmp_path):
                 )
     assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
     assert_is_at_home(read_gnss(path), 10, (2.0, 1.0))
+    assert_is_field(read_magnetometer(path))
 
 
 def novatel_line(name, body, tow):

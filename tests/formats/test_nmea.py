@@ -53,6 +53,19 @@ def test_the_example_of_the_standard(tmp_path):
     assert record.quality.tolist() == [1, 1]
 
 
+@pytest.mark.parametrize("leads", [False, True])
+def test_headings_of_two_antennas(tmp_path, leads):
+    """They have no time: an epoch's stands with its sentences, after them or, where the log begins so, before."""
+    epochs = [[gga(f"12351{k}"), sentence(f"GPHDT,{10.0 * k},T")] for k in range(5)]
+    epochs[2].insert(2, sentence("GPHDT,77.0,T"))  # a second one in an epoch is late
+    epochs[3][1] = sentence("GPTHS,,V")
+    lines = [line for epoch in epochs for line in (reversed(epoch[:2]) if leads else epoch)]
+    record = read(tmp_path, lines)
+    np.testing.assert_allclose(np.degrees(record.heading), [0.0, 10.0, 20.0, np.nan, 40.0])
+    assert record.heading_sigma is None
+    assert read(tmp_path, [gga("123519"), gga("123520")]).heading is None
+
+
 def test_standing_no_fix_and_midnight(tmp_path):
     lines = [
         rmc("", "V", "", ""),

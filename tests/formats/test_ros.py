@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_gnss, read_imu, read_velocity
+from truenorth.formats.magnetometer import read_magnetometer
 
 KINDS = ["ros1", "sqlite3", "mcap"]
 N = 30
@@ -66,6 +67,30 @@ def test_the_file_in_a_bag(kind, suffix, alone, tmp_path):
     if alone:
         path = path.rename(tmp_path / f"other.{suffix}")
     assert len(read_imu(path)) == N
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_magnetic_field(kind, tmp_path):
+    first = kind == "ros1"
+    store = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
+    T = store.types
+    Field, Vector, Header = T["sensor_msgs/msg/MagneticField"], T["geometry_msgs/msg/Vector3"], T["std_msgs/msg/Header"]
+    path = tmp_path / ("log.bag" if first else "log")
+    plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+    with Writer1(path) if first else Writer2(path, version=9, storage_plugin=plugin) as writer:
+        connection = writer.add_connection("/mag", Field.__msgtype__, typestore=store)
+        for stamp in STAMPS.tolist():
+            stamped = Header(
+                *((0,) if first else ()), T["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9), ""
+            )
+            message = Field(stamped, Vector(20e-6, 3e-6, -40e-6), np.zeros(9))  # forward, left, up
+            serialize = store.serialize_ros1 if first else store.serialize_cdr
+            writer.write(connection, stamp, serialize(message, Field.__msgtype__))
+    record = read_magnetometer(path)
+    np.testing.assert_allclose(record.field, np.tile([-3e-6, 20e-6, -40e-6], (N, 1)))
+    np.testing.assert_allclose(record.time, STAMPS * 1e-9, rtol=0, atol=3e-7)
+    with pytest.raises(DataError, match=r"no topic with sensor_msgs/msg/Imu messages; found /mag"):
+        read_imu(path)
 
 
 @pytest.mark.parametrize("kind", KINDS)

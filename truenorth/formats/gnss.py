@@ -64,7 +64,7 @@ def read_gnss(
 ) -> GnssRecord:
     """Read the log of a GNSS receiver.
 
-    A table of named columns, NMEA 0183 (GGA, RMC, VTG), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's own log
+    A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's own log
     (u-blox, Septentrio, NovAtel, PX4, ArduPilot, ROS).
 
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
@@ -134,7 +134,7 @@ def _heading(found: Found) -> dict[str, Any]:
         across = np.hypot(north * sigma[:, 0], east * sigma[:, 1]) / np.where(level > 0.0, level, np.nan) ** 2
         return {"heading": np.where(level > 0.0, np.arctan2(east, north), np.nan), "heading_sigma": known(across)}
     sure = found.has("heading", "sigma_heading") or "heading" in found.asked
-    if not (found.has("heading") and sure):
+    if not (found.has("heading") and sure and np.isfinite(found.values["heading"]).any()):
         return {}
     return {"heading": found.values["heading"], "heading_sigma": known(found.values.get("sigma_heading"))}
 

@@ -1,4 +1,4 @@
-"""NMEA 0183: sentences GGA (position), RMC (position, speed, course, date) and VTG (speed, course) of any talker."""
+"""NMEA 0183 of any talker: GGA (position), RMC (position, speed, course, date), VTG (speed, course), HDT and THS (true heading)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ NMEA_SUFFIXES = (".nmea", ".nma")
 KNOT = 1852.0 / 3600.0
 DAY = 86400.0
 HEAD = 4096
-KINDS = (b"GGA", b"RMC", b"VTG")
+KINDS = (b"GGA", b"RMC", b"VTG", b"HDT", b"THS")
+HEADINGS = ("HDT", "THS")  # true ones, without a time of their own
 
 
 def is_nmea(path: Path) -> bool:
@@ -29,10 +30,12 @@ def is_nmea(path: Path) -> bool:
 
 
 def read_nmea(path: Path) -> GnssRecord:
-    """Read a log of NMEA sentences; what is not GGA, RMC or VTG is passed over, and so are broken sentences at both ends.
+    """Read a log of NMEA sentences; what is none of `KINDS` is passed over, and so are broken sentences at both ends.
 
     Sentences of one epoch make one row: position, height above the ellipsoid (height above the geoid plus the geoid's), quality
-    and HDOP from GGA, velocity from RMC (or from the VTG that follows). Time is in seconds from midnight UTC of the first day.
+    and HDOP from GGA, velocity from RMC (or from the VTG that follows), heading from HDT or THS: of the epoch whose sentences stand
+    before it, or after it where the log begins with a heading. Of several in an epoch the first is taken. Time is in
+    seconds from midnight UTC of the first day.
 
     Raises
     ------
@@ -42,8 +45,19 @@ def read_nmea(path: Path) -> GnssRecord:
     rows: dict[float, dict[str, float]] = {}
     lines: dict[float, int] = {}
     time, day, clock = math.nan, 0.0, math.nan
+    ahead: float | None = None  # a heading whose epoch follows
+    leads: bool | None = None  # whether headings stand before the sentences of their epoch
     for number, kind, cells in _sentences(path):
         where = f"{path.name}: line {number}, {kind}"
+        if kind in HEADINGS:
+            heading = _heading(cells, where)
+            leads = True if leads is None else leads
+            if leads:
+                ahead = heading
+            elif math.isfinite(time):
+                rows[time].setdefault("heading", heading)
+            continue
+        leads = False if leads is None else leads
         if kind == "VTG":
             if math.isfinite(time) and len(cells) > 6:
                 _velocity(rows[time], _number(cells[5], where, "speed"), _number(cells[1], where, "course"))
@@ -60,6 +74,9 @@ def read_nmea(path: Path) -> GnssRecord:
         time = day + now
         row = rows.setdefault(time, {})
         lines.setdefault(time, number)
+        if ahead is not None:
+            row.setdefault("heading", ahead)
+            ahead = None
         if kind == "GGA":
             row |= _place(cells, 2, where)
             row["quality"] = _number(cells[6], where, "quality")
@@ -87,7 +104,7 @@ def _record(rows: dict[float, dict[str, float]], lines: list[int], source: str) 
     v_n = np.column_stack([column("VE"), column("VN"), np.full(len(rows), math.nan)])
     hdop = column("hdop")
     dop = np.column_stack([np.where(hdop > 0, hdop, math.nan), np.full(len(rows), math.nan)])
-    quality = column("quality")
+    quality, heading = column("quality"), column("heading")
     return GnssRecord(
         time=time[order],
         lat=column("lat"),
@@ -96,6 +113,7 @@ def _record(rows: dict[float, dict[str, float]], lines: list[int], source: str) 
         v_n=v_n if np.isfinite(v_n).any() else None,
         dop=dop if np.isfinite(dop).any() else None,
         quality=quality if np.isfinite(quality).any() else None,
+        heading=heading if np.isfinite(heading).any() else None,
         source=source,
         late=late,
     )
@@ -121,7 +139,7 @@ def _sentences(path: Path) -> Iterator[tuple[int, str, list[str]]]:
                 )
         cells = body.decode("ascii", "replace").split(",")
         kind = line[start + 3 : start + 6].decode()
-        wanted = {"GGA": 12, "RMC": 9, "VTG": 6}[kind]
+        wanted = {"GGA": 12, "RMC": 9, "VTG": 6, "HDT": 3, "THS": 3}[kind]
         if len(cells) >= wanted and cells[0][2:] == kind:
             yield number, kind, cells
         elif not end:
@@ -144,6 +162,12 @@ def _clock(text: str, where: str) -> float:
     if not (0 <= hours < 24 and minutes < 60 and seconds < 61):
         raise DataError(f"{where}: time {text!r}; expected hhmmss.ss")
     return 3600.0 * hours + 60.0 * minutes + seconds
+
+
+def _heading(cells: list[str], where: str) -> float:
+    """Radians of ``HDT,123.4,T`` or ``THS,123.4,A``; NaN where it is not true, or THS not autonomous."""
+    sound = cells[2] in ("T", "A")
+    return math.radians(_number(cells[1], where, "heading")) if sound else math.nan
 
 
 def _place(cells: list[str], first: int, where: str) -> dict[str, float]:

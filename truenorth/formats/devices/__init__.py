@@ -5,8 +5,8 @@ A module of this folder has
 - `SUFFIXES` and `BEGINNINGS`: how its files are named and begin;
 - `EXTRA`: what installs its decoder, ``pip install 'truenorth[EXTRA]'``;
 - `AXES`: where x, y and z of its IMU point;
-- ``tables(path, topic)``: tables by what they hold, ``imu``, ``gnss``, ``velocity``, ``poses``; each maps headings with their
-  units, such as ``gyro_x [rad/s]``, to arrays. The clock is one and the same in all of them;
+- ``tables(path, topic)``: tables by what they hold, ``imu``, ``gnss``, ``velocity``, ``poses``, ``mag``; each maps headings with
+  their units, such as ``gyro_x [rad/s]``, to arrays. The clock is one and the same in all of them;
 - where messages need what came before them, `Memory`: a stream hands one over, ``tables(path, topic, memory=...)``.
 
 A new format is a new file here, and a line in `DEVICES`.
@@ -50,7 +50,13 @@ BEGINNINGS = {
     b"\x89MCAP": "ros",
     b"SQLite format 3": "ros",
 }
-WANTED = {"imu": "rates and specific forces", "gnss": "positions", "velocity": "velocities", "poses": "attitudes"}
+WANTED = {
+    "imu": "rates and specific forces",
+    "gnss": "positions",
+    "velocity": "velocities",
+    "poses": "attitudes",
+    "mag": "magnetic field",
+}
 
 
 def module_of(format: str) -> ModuleType:

@@ -1,4 +1,4 @@
-"""ArduPilot DataFlash (.bin) by pymavlink: IMU of the first instance (axes FRD), GPS. Time is the board's, s."""
+"""ArduPilot DataFlash (.bin) by pymavlink: IMU and MAG of the first instance (axes FRD), GPS. Time is the board's, s."""
 
 from __future__ import annotations
 
@@ -15,22 +15,27 @@ FIX_2D = 2
 
 
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
-    """Rates and specific forces; position and velocity (height above mean sea level, as the board writes it)."""
+    """Rates and specific forces; position and velocity (height above mean sea level, as the board has it); magnetic field."""
     from pymavlink import DFReader
 
     log = DFReader.DFReader_binary(str(path), zero_time_base=True)
     imu: list[list[float]] = []
     gnss: list[list[float]] = []
+    field: list[list[float]] = []
     try:
-        while (m := log.recv_match(type=["IMU", "GPS"])) is not None:
+        while (m := log.recv_match(type=["IMU", "GPS", "MAG"])) is not None:
             if m.get_type() == "IMU" and getattr(m, "I", 0) == 0:
                 imu.append([m.TimeUS * 1e-6, m.GyrX, m.GyrY, m.GyrZ, m.AccX, m.AccY, m.AccZ])
+            elif m.get_type() == "MAG" and getattr(m, "I", 0) == 0 and getattr(m, "Health", 1):
+                field.append([m.TimeUS * 1e-6, m.MagX, m.MagY, m.MagZ])
             elif m.get_type() == "GPS" and getattr(m, "I", 0) == 0 and m.Status >= FIX_2D:
                 gnss.append([m.TimeUS * 1e-6, m.Lat, m.Lng, m.Alt, m.Spd, m.GCrs, -m.VZ, m.Status])
     finally:
         log.close()
     names = ["time [s]", *(f"gyro_{x} [rad/s]" for x in "xyz"), *(f"accel_{x} [m/s^2]" for x in "xyz")]
-    found = {"imu": dict(zip(names, np.array(imu).T)) if imu else {}, "gnss": {}}
+    found = {"imu": dict(zip(names, np.array(imu).T)) if imu else {}, "gnss": {}, "mag": {}}
+    if field:
+        found["mag"] = dict(zip(["time [s]", *(f"mag_{x} [mgauss]" for x in "xyz")], np.array(field).T))
     if gnss:
         t, lat, lon, alt, speed, course, vu, quality = np.array(gnss).T
         found["gnss"] = {

@@ -1,5 +1,6 @@
-"""ROS 1 and ROS 2 bags (sqlite3, MCAP) by rosbags: Imu (axes FLU, REP 103), NavSatFix, TwistStamped, Odometry.
+"""ROS 1 and ROS 2 bags (sqlite3, MCAP) by rosbags: sensors' messages as tables.
 
+Imu, MagneticField (axes FLU, REP 103), NavSatFix, TwistStamped, Odometry.
 Time is that of the headers' stamps, in seconds since 1970: a double holds it to a quarter of a microsecond.
 """
 
@@ -39,6 +40,11 @@ def _twist(m: Any) -> list[float]:
     return [v.x, v.y, v.z]
 
 
+def _field(m: Any) -> list[float]:
+    b = m.magnetic_field
+    return [b.x, b.y, b.z]
+
+
 def _odometry(m: Any) -> list[float]:
     v = m.twist.twist.linear
     return [v.y * -1.0, v.x, v.z]  # REP 103: x forward, y left, of the child frame
@@ -57,6 +63,7 @@ MESSAGES: dict[str, dict[str, tuple[Callable[[Any], list[float]], tuple[str, ...
             ("lat [deg]", "lon [deg]", "alt [m]", "sigma_E [m]", "sigma_N [m]", "sigma_U [m]", "quality"),
         ),
     },
+    "mag": {"sensor_msgs/msg/MagneticField": (_field, tuple(f"mag_{x} [T]" for x in "xyz"))},
     "velocity": {
         "nav_msgs/msg/Odometry": (_odometry, ("v_right [m/s]", "v_forward [m/s]", "v_up [m/s]")),
         "geometry_msgs/msg/TwistStamped": (_twist, ("VE [m/s]", "VN [m/s]", "VU [m/s]")),

@@ -57,4 +57,6 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
             values = np.array([float(getattr(known[tow], theirs)) if tow in known else np.nan for tow in fixes])
             values = np.where(values > NONE, values, np.nan)
             table[ours] = np.sqrt(values) if theirs.startswith("Cov") else values
+    if "heading [deg]" in table:  # with a column of sigmas, known or not, it is no course over ground
+        table.setdefault("sigma_heading [deg]", np.full(len(fixes), np.nan))
     return {"gnss": table}

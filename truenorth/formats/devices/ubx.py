@@ -3,6 +3,9 @@
 Time is the GPS time of week, s. The inertial messages carry counts of the sensor's own clock, which are carried over to it by
 the NAV-PVT around them: no message comes before its data, so the clock is the one that lies below all arrivals. Scales: u-blox
 F9 interface description, ESF-MEAS data types (2^-12 deg/s, 2^-10 m/s^2, 24 bits).
+
+Heading of two antennas is that of NAV-RELPOSNED of a moving base; that of a base which stays says where the vehicle is, not how it
+points, and is passed over. It belongs to the NAV-PVT of its epoch; a log without them holds headings alone.
 """
 
 from __future__ import annotations
@@ -41,12 +44,15 @@ def tables(path: Path, part: str, topic: str | None = None, memory: Memory | Non
 
     m = memory or Memory()
     fixes: list[tuple[float, ...]] = []
+    headings: dict[float, tuple[float, float]] = {}
     with path.open("rb") as stream:
         for _, message in UBXReader(stream, protfilter=UBX_PROTOCOL, quitonerror=ERR_IGNORE):
             kind = getattr(message, "identity", "")
             if kind == "NAV-PVT" and message.fixType >= 2:
                 fixes.append(_fix(message))
                 m.time = fixes[-1][0]
+            elif kind == "NAV-RELPOSNED" and _points(message):
+                headings[_tow(message, 4)] = message.relPosHeading, message.accHeading
             elif kind in ("ESF-RAW", "ESF-MEAS"):
                 for tag, key, value in _values(message):
                     m.samples.setdefault(tag, {})[key] = value
@@ -55,14 +61,23 @@ def tables(path: Path, part: str, topic: str | None = None, memory: Memory | Non
     if m.clock is None and (memory is None or len({when for _, when in m.arrivals}) >= FIXES):
         m.clock, m.arrivals = _clock(m.arrivals), []
     if memory is not None and m.clock is None:
-        return {"gnss": _gnss(fixes), "imu": {}}
-    return {"gnss": _gnss(fixes), "imu": _imu(m)}
+        return {"gnss": _gnss(fixes, headings), "imu": {}}
+    return {"gnss": _gnss(fixes, headings), "imu": _imu(m)}
+
+
+def _tow(message: Any, first: int) -> float:
+    """Time of week, s: the library makes a time of day of it."""
+    return int.from_bytes(message.payload[first : first + 4], "little") * 1e-3
+
+
+def _points(m: Any) -> bool:
+    """Whether a relative position is that of a second antenna on the vehicle, and its heading is said to be valid."""
+    return bool(m.version >= 1 and m.gnssFixOK and m.isMoving and m.relPosHeadingValid)
 
 
 def _fix(m: Any) -> tuple[float, ...]:
-    tow = int.from_bytes(m.payload[:4], "little") * 1e-3  # the library makes a time of day of it
     return (
-        tow, m.lat, m.lon, m.height * 1e-3, m.velE * 1e-3, m.velN * 1e-3, -m.velD * 1e-3,
+        _tow(m, 0), m.lat, m.lon, m.height * 1e-3, m.velE * 1e-3, m.velN * 1e-3, -m.velD * 1e-3,
         m.hAcc * 1e-3, m.vAcc * 1e-3, m.sAcc * 1e-3, float(m.fixType),
     )  # fmt: skip
 
@@ -85,15 +100,17 @@ def _values(message: Any) -> list[tuple[int, tuple[str, int], float]]:
     return found
 
 
-def _gnss(fixes: list[tuple[float, ...]]) -> dict[str, Array]:
+def _gnss(fixes: list[tuple[float, ...]], headings: dict[float, tuple[float, float]]) -> dict[str, Array]:
     if not fixes:
-        return {}
+        t, (heading, sigma) = np.array(list(headings)), np.array(list(headings.values())).reshape(-1, 2).T
+        return {"time [s]": t, "heading [deg]": heading, "sigma_heading [deg]": sigma} if headings else {}
     t, lat, lon, alt, ve, vn, vu, h, v, s, quality = np.array(fixes).T
+    heading, heading_sigma = np.array([headings.get(tow, (np.nan, np.nan)) for tow in t]).T
     return {
         "time [s]": t, "lat [deg]": lat, "lon [deg]": lon, "alt [m]": alt, "VE [m/s]": ve, "VN [m/s]": vn, "VU [m/s]": vu,
         "sigma_E [m]": h / np.sqrt(2.0), "sigma_N [m]": h / np.sqrt(2.0), "sigma_U [m]": v,
         "sigma_VE [m/s]": s / np.sqrt(3.0), "sigma_VN [m/s]": s / np.sqrt(3.0), "sigma_VU [m/s]": s / np.sqrt(3.0),
-        "quality": quality,
+        "quality": quality, "heading [deg]": heading, "sigma_heading [deg]": heading_sigma,
     }  # fmt: skip
 
 

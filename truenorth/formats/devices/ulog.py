@@ -1,4 +1,7 @@
-"""PX4 ULog by pyulog: sensor_combined (IMU, axes FRD), sensor_gps or vehicle_gps_position. Time is the board's, s."""
+"""PX4 ULog by pyulog: sensor_combined (IMU), sensor_gps or vehicle_gps_position, vehicle_magnetometer or sensor_mag.
+
+Axes FRD. Time is the board's, s.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +16,27 @@ Array = NDArray[np.float64]
 EXTRA = "px4"
 AXES = "FRD"
 GNSS = ("sensor_gps", "vehicle_gps_position")
+FIELD = {"vehicle_magnetometer": "magnetometer_ga[{}]", "sensor_mag": "{}"}  # columns of x, y, z: gauss in both
 
 
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
-    """Rates and specific forces; position and velocity."""
+    """Rates and specific forces; position and velocity; the magnetic field."""
     from pyulog import ULog
 
-    log = ULog(str(path), ["sensor_combined", *GNSS])
+    log = ULog(str(path), ["sensor_combined", *GNSS, *FIELD])
     data = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
     return {
         "imu": _imu(data.get(("sensor_combined", 0))),
         "gnss": _gnss(next((data[n, 0] for n in GNSS if (n, 0) in data), None)),
+        "mag": next((_field(data[n, 0], FIELD[n]) for n in FIELD if (n, 0) in data), {}),
     }
+
+
+def _field(data: dict[str, Any], name: str) -> dict[str, Array]:
+    names = [name.format(i if "[" in name else axis) for i, axis in enumerate("xyz")]
+    table = {"time [s]": data["timestamp"] * 1e-6}
+    table |= {f"mag_{axis} [gauss]": data[theirs] for axis, theirs in zip("xyz", names)}
+    return {ours: np.asarray(column, dtype=np.float64) for ours, column in table.items()}
 
 
 def _imu(data: dict[str, Any] | None) -> dict[str, Array]:
