@@ -13,7 +13,6 @@ from benchmarks.honesty.voyage import HOUR, SPEC, scaled, voyage
 from truenorth.aiding.aids import VelocityLog
 from truenorth.damping.options import Damper
 from truenorth.errors.log import LogErrors
-from truenorth.navigation import navigate
 from truenorth.records.specs import ImuSpec
 
 BODY = LogErrors(scale=0.005, mounting=math.radians(0.3), bias=0.1)
@@ -27,18 +26,7 @@ def damped(
     def run(seed: int, number: int) -> Outcome:
         ship = voyage(seed, number, spec=spec)
         aid = VelocityLog(ship.log(true, frame), errors=assumed)
-        result = navigate(
-            ship.record,
-            ship.start,
-            aid=aid,
-            altitude="fixed",
-            imu=spec,
-            damping=Damper(method),
-            interval=4.0,
-            output=4.0,
-            **options,
-        )
-        return ship.outcome(result)
+        return ship.outcome(ship.navigated(aid, imu=spec, damping=Damper(method), output=4.0, **options))
 
     return run
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty.frame import Case, Outcome, main
-from benchmarks.honesty.voyage import HOUR, SPEC, Voyage, voyage
+from benchmarks.honesty.voyage import HOUR, Voyage, voyage
 from truenorth.aiding.aids import Gnss, VelocityLog
 from truenorth.core.earth import radii
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.log import LogErrors
-from truenorth.navigation import Mounting, navigate
+from truenorth.navigation import Mounting
 from truenorth.records import GnssRecord
 
 PLUMB = Deflection()
@@ -41,17 +41,7 @@ def navigated(true: Deflection, assumed: Deflection, aided: str = "", hours: flo
     def run(seed: int, number: int) -> Outcome:
         ship = voyage(seed, number, hours=hours, turns=bool(aided), deflection=true)
         aid = [fixes(ship)] if aided else []
-        result = navigate(
-            ship.record,
-            ship.start,
-            aid=aid,
-            altitude="fixed",
-            imu=SPEC,
-            errors=assumed.groups,
-            interval=4.0,
-            output=60.0,
-            check_clocks=False,
-        )
+        result = ship.navigated(aid, errors=assumed.groups, check_clocks=False)
         return ship.outcome(result, tuple(hours * share for share in (0.4, 0.6, 0.8, 1.0)))
 
     return run
@@ -63,10 +53,7 @@ def with_log(true: LogErrors, assumed: LogErrors) -> Any:
     def run(seed: int, number: int) -> Outcome:
         ship = voyage(seed, number, hours=12.0)
         aid = VelocityLog(ship.log(true, "body"), Mounting(noise=0.05 / math.sqrt(ship.truth.interval)), assumed)
-        result = navigate(
-            ship.record, ship.start, aid=aid, altitude="fixed", imu=SPEC, interval=4.0, output=60.0, check_clocks=False
-        )
-        return ship.outcome(result, (3.0, 6.0, 9.0, 12.0))
+        return ship.outcome(ship.navigated(aid, check_clocks=False), (3.0, 6.0, 9.0, 12.0))
 
     return run
 

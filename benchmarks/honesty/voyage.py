@@ -18,7 +18,7 @@ from truenorth.damping.course import Course, errors_of
 from truenorth.errors.deflection import STANDARD_GRAVITY, Deflection
 from truenorth.errors.log import LogErrors, log_rows
 from truenorth.errors.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI
-from truenorth.navigation import Start
+from truenorth.navigation import Start, navigate
 from truenorth.records import ImuRecord, VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import ideal_log, simulate
@@ -91,6 +91,12 @@ class Voyage:
         if frame == "body":
             v = np.einsum("kij,ki->kj", truth.C_nb, v)
         return VelocityRecord(truth.time, v, frame)  # type: ignore[arg-type]  # one of the two
+
+    def navigated(self, aid: Any, *, imu: ImuSpec = SPEC, output: float = 60.0, **options: Any) -> Any:
+        """The record navigated from its start, its height held."""
+        return navigate(
+            self.record, self.start, aid=aid, altitude="fixed", imu=imu, interval=INTERVAL, output=output, **options
+        )
 
     def outcome(self, result: Any, hours: tuple[float, ...] = (6.0, 12.0, 18.0, 24.0)) -> Outcome:
         """Errors of a navigation over its sigmas at some hours."""

@@ -16,14 +16,11 @@ from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
-from truenorth.core.position import Position
 from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel, master_errors
 from truenorth.filters import kalman
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
-from truenorth.simulation.course import course
-from truenorth.simulation.manoeuvres import s_turn, straight
 
 DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
 SPAN = 60.0
@@ -33,18 +30,6 @@ ARM_TRUE, MOUNT_TRUE, TAU_TRUE = (0.5, 1.0, -0.3), (0.02, -0.01, 0.015), 0.04
 MASTER = MasterSpec(
     latency=TAU_TRUE, lever_arm=ARM_TRUE, mounting=MOUNT_TRUE, velocity_noise=0.05, attitude_noise=2 * ARCMIN
 )
-
-
-@pytest.fixture(scope="module")
-def flight():
-    """An S-turn at 60 m/s, banked: everything is told apart."""
-    legs = [*straight(10.0), *s_turn(25 * DEG, 4 * DEG), *straight(40.0)]
-    return course(Position(np.radians(45.0), 0.2, 500.0), legs, heading=0.5, speed=60.0)
-
-
-@pytest.fixture(scope="module")
-def ideal(flight):
-    return ideal_log(flight, rate=100.0, duration=SPAN)
 
 
 def _phi(result, flight):

@@ -10,26 +10,12 @@ from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, transfer_filter
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
-from truenorth.core.position import Position
 from truenorth.errors.master import DELAY, TransferModel
-from truenorth.simulation import MasterSpec, ideal_log, simulate, simulate_sensor
-from truenorth.simulation.course import course
+from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.gnss import moved
-from truenorth.simulation.manoeuvres import s_turn, straight
 
 ARM_TRUE = np.array([0.5, 1.0, -0.3])
 NOISE = {"position": 1.0, "acceleration": 0.02}
-
-
-@pytest.fixture(scope="module")
-def flight():
-    legs = [*straight(10.0), *s_turn(25 * DEG, 4 * DEG), *straight(40.0)]
-    return course(Position(np.radians(45.0), 0.2, 500.0), legs, heading=0.5, speed=60.0)
-
-
-@pytest.fixture(scope="module")
-def ideal(flight):
-    return ideal_log(flight, rate=100.0, duration=SPAN)
 
 
 def master_of(flight, tau, arm, run=None):

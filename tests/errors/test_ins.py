@@ -6,6 +6,7 @@ import pytest
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
+from truenorth.errors.intervals import Intervals
 from truenorth.errors.model import InsModel
 from truenorth.records import ImuRecord
 from truenorth.simulation import ideal_log
@@ -88,7 +89,7 @@ def test_jacobian_is_the_derivative_of_the_mechanisation(flight, state, altitude
     moved = mechanise(wrong, start, altitude=altitude)
 
     T, C, f, v, lat, alt, every = _nominal(record, base)
-    Phi, _ = InsModel(0.0, 0.0, fixed_altitude=altitude == "fixed").linearise(T, C, f, v, lat, alt)
+    Phi, _ = InsModel(0.0, 0.0, fixed_altitude=altitude == "fixed").linearise(Intervals(T, C, f, v, lat, alt))
     expected = _errors(moved, base)[every - 1 :: every]
     predicted = np.empty((len(Phi), STATES))
     x = dx

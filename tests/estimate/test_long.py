@@ -7,6 +7,7 @@ from tests.helpers import assert_lines
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity, radii, transport_rate_n
 from truenorth.core.position import Position
+from truenorth.errors.intervals import Intervals
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord
@@ -110,7 +111,7 @@ def test_error_model_of_48_hours_is_the_navigation(speeds, dx):
     eye = np.broadcast_to(np.eye(3), (count, 3, 3))
     f = np.cross(2 * earth_rate_n(at) + transport_rate_n(at, 0 * at, np.tile(v, (count, 1))), v)
     f[:, 2] += normal_gravity(at, 0.0)
-    Phi, _ = MODEL.linearise(T / 6, eye, f, np.tile(v, (count, 1)), at, 0 * at)  # 10 s steps, six a row
+    Phi, _ = MODEL.linearise(Intervals(T / 6, eye, f, np.tile(v, (count, 1)), at, 0 * at))  # 10 s steps, six a row
     x = dx.copy()
     predicted = [x]
     for k in range(count):

@@ -16,6 +16,7 @@ TIME = SWAY.time
 TOW = 208800.0
 LAT, LON, ALT = 48.1, 11.5, 500.0
 FIELD = SWAY.accel * 4.8e-6  # T, of the size of the earth's; it turns as gravity does, which is enough to see axes
+SBF_HOME = {"Latitude": np.radians(LAT), "Longitude": np.radians(LON), "Height": ALT, "Vn": 1.0, "Ve": 2.0, "Vu": -0.5}
 FRD = lambda v: v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]  # noqa: E731
 
 
@@ -100,15 +101,7 @@ def test_septentrio(tmp_path):
     with path.open("wb") as file:
         for k in range(10):
             fix = {"TOW": round(TOW * 1e3) + 1000 * k, "WNc": 2300}
-            place = {
-                "Latitude": np.radians(LAT),
-                "Longitude": np.radians(LON),
-                "Height": ALT,
-                "Vn": 1.0,
-                "Ve": 2.0,
-                "Vu": -0.5,
-            }
-            file.write(pysbf2.SBFMessage("PVTGeodetic", Error=0, **fix, **place).serialize())
+            file.write(pysbf2.SBFMessage("PVTGeodetic", Error=0, **fix, **SBF_HOME).serialize())
             file.write(
                 pysbf2.SBFMessage("PosCovGeodetic", **fix, Cov_latlat=4.0, Cov_lonlon=1.0, Cov_hgthgt=9.0).serialize()
             )

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.formats.test_devices import FRD, SWAY, TIME, TOW, novatel_line, ubx_bytes
-from tests.formats.test_devices import LAT as LAT
+from tests.formats.test_devices import ALT, FRD, LAT, LON, SBF_HOME, SWAY, TIME, TOW, novatel_line, ubx_bytes
 from truenorth.core.errors import UsageError
 from truenorth.formats import read_gnss, read_imu
 from truenorth.formats.layout import Layout
@@ -16,8 +15,6 @@ from truenorth.live import GnssFeed, OdometerFeed, VelocityFeed
 from truenorth.live.aid_sources import open_aid
 from truenorth.live.decode import Decoder
 from truenorth.live.listening import Listener
-
-LON, ALT = 11.5, 500.0
 
 
 def in_pieces(data, hear, seed=0, longest=700):
@@ -67,17 +64,8 @@ def test_septentrio_and_novatel_in_pieces():
     pysbf2, _ = pytest.importorskip("pysbf2"), pytest.importorskip("novatel_edie")
     blocks, lines = [], []
     for k in range(10):
-        place = {
-            "Latitude": np.radians(LAT),
-            "Longitude": np.radians(LON),
-            "Height": ALT,
-            "Vn": 1.0,
-            "Ve": 2.0,
-            "Vu": -0.5,
-        }
-        blocks.append(
-            pysbf2.SBFMessage("PVTGeodetic", Error=0, TOW=round(TOW * 1e3) + 1000 * k, WNc=2300, **place).serialize()
-        )
+        of_week = {"TOW": round(TOW * 1e3) + 1000 * k, "WNc": 2300}
+        blocks.append(pysbf2.SBFMessage("PVTGeodetic", Error=0, **of_week, **SBF_HOME).serialize())
         fix = f'SOL_COMPUTED,SINGLE,{LAT},{LON},455.0,45.0,WGS84,2.0,1.0,3.0,"",0.0,0.0,12,12,12,0,00,06,00,33'
         lines.append(novatel_line("BESTPOSA", fix, TOW + k).encode())
     for data in (b"".join(blocks), b"".join(lines)):

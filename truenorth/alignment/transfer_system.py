@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.transfer_filter import Matching, SlaveStart, master_aiding
+from truenorth.errors.intervals import Intervals
 from truenorth.errors.master import TransferModel
 from truenorth.estimate.linear import rows_along
 from truenorth.filters import LinearSystem
@@ -49,7 +50,7 @@ def system_along(
     """The model along a motion that is known at the middle and at the end of K intervals."""
     f_n = np.einsum("kij,kj->ki", middle.C_nb, middle.f_b)
     ins = model.ins
-    Phi, Q = ins.linearise(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b)
+    Phi, Q = ins.linearise(Intervals(T, middle.C_nb, f_n, middle.v_n, middle.lat, middle.alt, middle.w_ib_b))
     r = np.zeros(3) if arm is None else np.asarray(arm, dtype=np.float64)
     master = _master_of(at, model, r, np.eye(3) if C_mb is None else np.asarray(C_mb), translation)
     _, H = rows_along(at, master, ins)

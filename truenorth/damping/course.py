@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.errors import DataError
+from truenorth.errors.intervals import Intervals
 from truenorth.errors.marine import DP, DV, PHI, MarineModel, position_in_angles
 
 Array = NDArray[np.float64]
@@ -79,7 +80,7 @@ class Course:
         lat, alt = position[:, 0], position[:, 2]
         w = 2.0 * earth.earth_rate_n(lat) + earth.transport_rate_n(lat, alt, v)
         f = np.diff(self.v_n, axis=0) / self.interval + np.cross(w, v) - earth.gravity_n(lat, alt)
-        return model.linearise(np.full(self.epochs, self.interval), C, f, v, lat, alt)
+        return model.linearise(Intervals(np.full(self.epochs, self.interval), C, f, v, lat, alt))
 
     def corrected(self, x: Array) -> Course:
         """The course with errors (K+1, 7) or (7,) taken off, in the model's states (metres for position)."""

@@ -186,6 +186,13 @@ def measurement(x: Array, p: Array, out: Array) -> None:
         out[i] = found[i]
 
 
+@compiled(forceinline=True)
+def _put(out: Array, column: int, factor: float, ahead: Any, behind: Any) -> None:
+    """Column of a Jacobian: a difference of two tuples times a factor."""
+    for i in range(len(ahead)):
+        out[i, column] = factor * (ahead[i] - behind[i])
+
+
 @matrix_function
 def transition_jacobian(x: Array, p: Array, out: Array) -> None:
     """Exact, from the model itself: linear in all states but the azimuth, and a polynomial of second degree in its sine and cosine.
@@ -195,12 +202,8 @@ def transition_jacobian(x: Array, p: Array, out: Array) -> None:
     s, c = math.sin(x[2]), math.cos(x[2])
     zero = _dynamics(s, c, _unit(-1), p)
     for j in range(16):
-        column = _dynamics(s, c, _unit(j), p)
-        for i in range(16):
-            out[i, j] = column[i] - zero[i]
-    ahead, behind = _dynamics(s + c, c - s, _state(x), p), _dynamics(s - c, c + s, _state(x), p)
-    for i in range(16):
-        out[i, 2] = 0.5 * (ahead[i] - behind[i])
+        _put(out, j, 1.0, _dynamics(s, c, _unit(j), p), zero)
+    _put(out, 2, 0.5, _dynamics(s + c, c - s, _state(x), p), _dynamics(s - c, c + s, _state(x), p))
     out[2, 2] += 1.0
 
 
@@ -210,12 +213,8 @@ def measurement_jacobian(x: Array, p: Array, out: Array) -> None:
     s, c = math.sin(x[2]), math.cos(x[2])
     zero = _odometer(s, c, _unit(-1), p)
     for j in range(16):
-        column = _odometer(s, c, _unit(j), p)
-        for i in range(3):
-            out[i, j] = column[i] - zero[i]
-    ahead, behind = _odometer(s + c, c - s, _state(x), p), _odometer(s - c, c + s, _state(x), p)
-    for i in range(3):
-        out[i, 2] = 0.5 * (ahead[i] - behind[i])
+        _put(out, j, 1.0, _odometer(s, c, _unit(j), p), zero)
+    _put(out, 2, 0.5, _odometer(s + c, c - s, _state(x), p), _odometer(s - c, c + s, _state(x), p))
 
 
 def correction(x: Array) -> Array:

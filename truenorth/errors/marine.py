@@ -39,6 +39,7 @@ from truenorth.errors.deflection import STANDARD_GRAVITY
 from truenorth.errors.dynamics import Dynamics, dynamics_of
 from truenorth.errors.group import Group
 from truenorth.errors.ins import error_dynamics, transition
+from truenorth.errors.intervals import Intervals
 from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state import layout as ins
@@ -139,32 +140,14 @@ class MarineModel(Walks):
             density = density + np.linalg.norm(np.asarray(v_n)[:, :2], axis=1)[:, None] * wander
         return np.asarray(T * density[:, :, None] * np.eye(self.states))
 
-    def linearise(
-        self, T: ArrayLike, C_nb: ArrayLike, f_n: ArrayLike, v_n: ArrayLike, lat: ArrayLike, alt: ArrayLike
-    ) -> tuple[Array, Array]:
-        """Stack the model over K intervals of a trajectory.
-
-        Parameters
-        ----------
-        T : (K,) array, s
-        C_nb : (K, 3, 3) array
-            Mean over each interval, as all that follow.
-        f_n : (K, 3) array, m/s^2
-        v_n : (K, 3) array, m/s
-        lat, alt : (K,) arrays, rad and m
-
-        Returns
-        -------
-        F, Phi : (K, n, n) arrays
-            Of ``x' = F x + w``, and the transition over each interval.
-        """
-        T, C, f, v, lat, alt = (np.ascontiguousarray(a, dtype=np.float64) for a in (T, C_nb, f_n, v_n, lat, alt))
-        axis = np.stack([np.zeros_like(lat), np.cos(lat), np.sin(lat)], axis=-1)
+    def linearise(self, along: Intervals) -> tuple[Array, Array]:
+        """``F`` and ``Phi``, (K, n, n), of ``x' = F x + w`` and of the transition over each interval."""
+        T, v = along.T, along.v_n
         decay = np.zeros(ins.STATES)
         decay[ins.BG], decay[ins.BA] = 1.0 / self.gyro_time, 1.0 / self.accel_time
         n = self.states
         F, Phi = np.zeros((len(T), n, n)), np.zeros((len(T), n, n))
-        _stack(padded(ins.STATES), T, C, f, v, axis, alt, decay, OF_INS, F, Phi)
+        _stack(padded(ins.STATES), T, along.C_nb, along.f_n, v, along.axis, along.alt, decay, OF_INS, F, Phi)
         d = self.dynamics
         rate = d.decay[ins.STATES :] + np.linalg.norm(v[:, :2], axis=1)[:, None] * d.along[ins.STATES :]
         behind = np.arange(STATES, n)

@@ -14,6 +14,7 @@ from truenorth.core.linalg import padded
 from truenorth.errors.dynamics import Dynamics, couple_pairs, dynamics_of, noise_of_pairs
 from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME, couple_sensors, error_dynamics, transition
+from truenorth.errors.intervals import Intervals
 from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
@@ -107,37 +108,12 @@ class InsModel(Walks):
             P[STATES:, STATES:] = np.diag(np.concatenate([group.prior for group in self.groups]) ** 2)
         return P
 
-    def linearise(
-        self,
-        T: ArrayLike,
-        C_nb: ArrayLike,
-        f_n: ArrayLike,
-        v_n: ArrayLike,
-        lat: ArrayLike,
-        alt: ArrayLike,
-        w_ib_b: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> tuple[Array, Array]:
-        """Stack the model over K intervals of a trajectory, in ENU, for :class:`truenorth.filters.LinearSystem`.
+    def linearise(self, along: Intervals) -> tuple[Array, Array]:
+        """``Phi`` and ``Q``, (K, n, n), for :class:`truenorth.filters.LinearSystem`.
 
-        Parameters
-        ----------
-        T : (K,) array, s
-        C_nb : (K, 3, 3) array
-            Mean over each interval, as all that follow.
-        f_n : (K, 3) array, m/s^2
-        v_n : (K, 3) array, m/s
-        lat, alt : (K,) arrays, rad and m
-        w_ib_b : (K, 3) array, rad/s
-            Needed for scale factors and misalignments of the gyros.
-
-        Returns
-        -------
-        Phi, Q : (K, n, n) arrays
-            ``Q = (Phi q Phi' + q) T/2``: the noise's density by the trapezoid.
+        ``Q = (Phi q Phi' + q) T/2``: the noise's density by the trapezoid.
         """
-        T, C, f, v, lat, alt = (np.ascontiguousarray(a, dtype=np.float64) for a in (T, C_nb, f_n, v_n, lat, alt))
-        axis = np.stack([np.zeros_like(lat), np.cos(lat), np.sin(lat)], axis=-1)
-        w_b = np.ascontiguousarray(np.broadcast_to(np.asarray(w_ib_b, dtype=np.float64), f.shape))
+        T, C, f, v, w_b = along.T, along.C_nb, along.f_n, along.v_n, along.w_ib_b
         f_b = np.einsum("kij,ki->kj", C, f)
         n = self.states
         Phi = np.empty((len(T), n, n))
@@ -145,7 +121,7 @@ class InsModel(Walks):
         dynamics = self.dynamics
         pairs = np.zeros((len(T), n, n))
         speed = np.ascontiguousarray(np.linalg.norm(v, axis=1))
-        _stack(padded(n), T, C, f, f_b, w_b, v, speed, axis, alt, fixed, at, dynamics, Phi, pairs)
+        _stack(padded(n), T, C, f, f_b, w_b, v, speed, along.axis, along.alt, fixed, at, dynamics, Phi, pairs)
         q = np.zeros((len(T), n, n))
         q[:, range(n), range(n)] = dynamics.noise + speed[:, None] * dynamics.wander
         square = w_b**2

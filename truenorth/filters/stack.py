@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -20,7 +21,7 @@ NEGATIVE = 1e-9  # of a covariance's smallest pivot, relative to its variance: r
 SOUND, NEGATIVE_VARIANCE, ASYMMETRIC, NEGATIVE_MINOR, NEGATIVE_PIVOT = range(5)  # what a covariance can be
 
 
-class System:
+class System(ABC):
     """Base of frozen dataclasses with fields that are arrays of numbers: leading axes are runs, then time, then rows.
 
     A subclass says by `axes` which fields are arrays and what their axes behind the runs are, a letter each: K is time
@@ -32,9 +33,9 @@ class System:
     z: Array
 
     @property
+    @abstractmethod
     def axes(self) -> Mapping[str, str]:
         """Axes of each array behind the leading (run) axes."""
-        raise NotImplementedError
 
     def __post_init__(self) -> None:
         """Convert and check all arrays."""

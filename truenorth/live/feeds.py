@@ -6,6 +6,7 @@ at a time, as measurements for the closed loop.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, Literal
@@ -28,7 +29,7 @@ MOVES = 1.0  # m/s: faster than an antenna on a swaying mast
 LASTING = 3  # rows in a line
 
 
-class Feed:
+class Feed(ABC):
     """Rows ``time, columns`` of one sensor in ascending time, SI units and radians; see its `push`.
 
     Parameters
@@ -52,17 +53,17 @@ class Feed:
         self._rows = np.empty((0, 1 + len(self.columns)))
         self._waiting: list[Array] = []
 
+    @abstractmethod
     def rows_of(self, record: Any) -> Array:
         """A whole record as rows; what its rows mean is then what those of the feed mean."""
-        raise NotImplementedError
 
+    @abstractmethod
     def aid_of(self, rows: Array) -> Aid:
         """These rows as an aid."""
-        raise NotImplementedError
 
+    @abstractmethod
     def speed_of(self, rows: Array) -> Array:
         """(K,) speed that a row says, m/s; NaN where it says none."""
-        raise NotImplementedError
 
     def dummy(self) -> Array:
         """Two rows in which every number is there: what this sensor may measure."""

@@ -8,6 +8,7 @@ compensates shows the truth of a little while ago. Every random term draws from 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
@@ -72,7 +73,7 @@ STREAMS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class AidingSpec(UnitSpec, Generic[R]):
+class AidingSpec(UnitSpec, ABC, Generic[R]):
     """What every aiding sensor has: a name for its random streams, and :meth:`sense`, which makes its record.
 
     Attributes
@@ -86,9 +87,9 @@ class AidingSpec(UnitSpec, Generic[R]):
     rate: float = value("frequency", "Hz", 1.0, sign="positive")
     latency: float = value("time", "s", sign="any")
 
+    @abstractmethod
     def sense(self, body: Any, times: Array, draws: Draws) -> Aided[R]:
         """The sensor on a body (of an encoder: an indexer), sampled at some times (N,)."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
