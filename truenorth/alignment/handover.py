@@ -1,4 +1,4 @@
-"""What an alignment hands to navigation: how the errors of attitude and of what acts as a bias are correlated.
+"""What an alignment hands on: its filter to the rows that come; to navigation how what it found hangs together.
 
 Heading error and east gyro bias of an alignment at rest cancel each other, and so do tilt and accelerometer bias: what
 is left of them in navigation is far less than either. The fine filter knows both with their covariance.
@@ -12,10 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.swaying import SwayAlignment
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION
-from truenorth.errors.staying import STATES
+from truenorth.errors.staying import STATES, StaticModel
+from truenorth.errors.sway import sway_trend
+from truenorth.estimate.ongoing import Ongoing, block_limits
 from truenorth.navigation.handover import Handover
 from truenorth.strapdown.inertial import earth_rotation
 
@@ -37,3 +40,31 @@ def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:
     P = turn @ P @ turn.T + deflected @ deflected.T
     P[:3, :3] = answer.phi_covariance
     return Handover(answer.C_nb, fine.bias[3:], P, np.diag(fine.system.P0)[6:STATES].copy())
+
+
+def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
+    """The filter's end, from which it goes on."""
+    integrals = fine.integrals
+    trend = sway_trend(integrals.C_mean), sway_trend(integrals.C_late)
+    return Ongoing(
+        position=task.position,
+        noise=noise,
+        interval=task.interval,
+        form=fine.form,
+        C_n0_i=fine.C_n0_i,
+        bias=fine.nominal_bias,
+        R=fine.disturbance**2,
+        arm=fine.arm - fine.x[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
+        motion=fine.motion if isinstance(fine, SwayAlignment) else (),
+        trend=trend if isinstance(fine, SwayAlignment) else None,
+        epochs=len(integrals.intervals),
+        fitted=len(integrals.intervals),
+        start=integrals.start,
+        elapsed=float(integrals.time[-1]),
+        C_ib=integrals.C_ib[-1],
+        velocity=integrals.velocity[-1],
+        place=integrals.position[-1],
+        x=fine.x,
+        P=fine.P,
+        largest=block_limits(fine.estimates),
+    )

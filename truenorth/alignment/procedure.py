@@ -19,7 +19,7 @@ from truenorth.alignment.check import LogCheck, check_filter, check_means, impli
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
-from truenorth.alignment.handover import hand_over
+from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
 from truenorth.alignment.published import FADING, STATIONARY, Published, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
@@ -254,7 +254,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     sways = method == "swaying"
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
-    answer = answer_of(task, fine, used, where, P, sways)
+    answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
     if spec is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from truenorth.alignment.moving import Moving
     from truenorth.alignment.table import TurntableErrors
     from truenorth.alignment.transfer_result import Transfer
+    from truenorth.estimate.ongoing import Ongoing
     from truenorth.navigation.handover import Handover
     from truenorth.quality import Inspection
 
@@ -139,6 +140,8 @@ class Alignment(Shown):
         Of an alignment over positions of a turntable.
     handover : Handover or None
         Joint covariance of attitude and biases, from which navigation goes on.
+    ongoing : Ongoing or None
+        The end of the filter, which goes on with the rows that come.
     """
 
     status: Status
@@ -168,6 +171,7 @@ class Alignment(Shown):
     transfer: Transfer | None = field(default=None, repr=False)
     table: TurntableErrors | None = field(default=None, repr=False)
     handover: Handover | None = field(default=None, repr=False)
+    ongoing: Ongoing | None = field(default=None, repr=False)
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:

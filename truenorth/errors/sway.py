@@ -227,16 +227,26 @@ def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> Ine
         Attitude of the base in the IMU at the integrals' times; the two are one when left out.
     """
     turned = None if C_sb is None else _half_way(C_sb)
-    t = np.linspace(-1.0, 1.0, len(integrals.C_mean))
-    basis, root = np.stack([np.ones_like(t), t], axis=1), np.sqrt(1.0 - t**2 + 1e-9)
+    basis = _line(len(integrals.C_mean))
 
     def slow(C: Array) -> Array:
-        base = (C if turned is None else C @ turned).reshape(len(t), 9)
-        coefficients = np.linalg.lstsq(root[:, None] * basis, root[:, None] * base, rcond=None)[0]
-        mean = (basis @ coefficients).reshape(-1, 3, 3)
+        mean = (basis @ sway_trend(C if turned is None else C @ turned)).reshape(-1, 3, 3)
         return mean if turned is None else mean @ np.swapaxes(turned, 1, 2)
 
     return replace(integrals, C_mean=slow(integrals.C_mean), C_late=slow(integrals.C_late))
+
+
+def sway_trend(C: Array) -> Array:
+    """(2, 9) the straight line, over -1 to 1, about which attitudes (K, 3, 3) sway; the ends of the log count less."""
+    basis = _line(len(C))
+    root = np.sqrt(1.0 - basis[:, 1] ** 2 + 1e-9)
+    return np.asarray(np.linalg.lstsq(root[:, None] * basis, root[:, None] * C.reshape(len(C), 9), rcond=None)[0])
+
+
+def _line(count: int) -> Array:
+    """(count, 2) one and time from -1 to 1."""
+    t = np.linspace(-1.0, 1.0, count)
+    return np.stack([np.ones_like(t), t], axis=1)
 
 
 def _half_way(C: Array) -> Array:

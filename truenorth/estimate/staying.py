@@ -169,13 +169,11 @@ class StayingLog:
     def linearise(self) -> LinearSystem:
         """The system of the errors that are left; of the base's own motion R holds the least that it can be."""
         lat, alt, groups = self.position.lat, self.position.alt, self.prior.groups
-        integrals = without_sway(self.integrals, self.C_sb) if self.sways else self.integrals
+        slow = without_sway(self.integrals, self.C_sb) if self.sways else self.integrals
         P0 = self.prior.P
-        system = self.noise.linearise(
-            integrals, self.C_n0_i, lat, alt, P0[:STATES, :STATES], np.full(3, QUIETEST_BASE**2)
+        system = core_system(
+            self.noise, slow, self.integrals, self.C_n0_i, self.position, P0[:STATES, :STATES], self.form
         )
-        if self.form == "force":
-            system = force_system(system, self.integrals, self.C_n0_i, lat, alt)
         if "matrices" in groups:
             system = with_matrices(system, self._without_errors(), self.integrals, self.C_n0_i, lat)
             self._turns = system.Phi[:, PHI, groups["matrices"]]
@@ -207,3 +205,24 @@ class StayingLog:
         if "matrices" in self.prior.groups:
             return integrate(self._without_errors(), self.interval, rows_at=self.rows)
         return integrate(self.record, self.interval, self.bias[:3], self.bias[3:], self.rows)
+
+
+def core_system(
+    noise: StaticModel,
+    slow: InertialIntegrals,
+    integrals: InertialIntegrals,
+    C_n0_i: Array,
+    position: Position,
+    P0: Array,
+    form: Form,
+) -> LinearSystem:
+    """The system of the first twelve states; of the base's own motion R holds the least that it can be.
+
+    Parameters
+    ----------
+    slow, integrals : InertialIntegrals
+        With the attitude by which biases act, and as they are.
+    """
+    lat, alt = position.lat, position.alt
+    system = noise.linearise(slow, C_n0_i, lat, alt, P0, np.full(3, QUIETEST_BASE**2))
+    return force_system(system, integrals, C_n0_i, lat, alt) if form == "force" else system

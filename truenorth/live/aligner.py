@@ -1,10 +1,10 @@
 """`Aligner`: rows in, an answer at any time.
 
 The procedure that aligns a whole log looks back: it fits the motion of the base and passes over the log more than once. It runs
-again on all rows so far whenever the log has grown by a tenth, within a share of one core. Between two runs the gyros carry the
-last answer on, and its uncertainty with it; on the move the closed loop does, aided by what comes. :meth:`Aligner.finish` is that
-procedure on all rows, so that the last answer is that of :func:`truenorth.align` on the same log, to the bit as long as the rows
-fit into memory one by one (see :mod:`.log`).
+again on all rows so far whenever the log has grown by a tenth, within a share of one core. Between two runs its filter goes on
+about the last solution, and sigma comes down with every ten seconds; on the move the closed loop does, aided by what comes.
+:meth:`Aligner.finish` is that procedure on all rows, so that the last answer is that of :func:`truenorth.align` on the same log, to
+the bit as long as the rows fit into memory one by one (see :mod:`.log`).
 
 With aiding sensors the regime is watched: as long as they say that the vehicle stays where it is, it is aligned as a base that
 stays; once they say that it moves, as a vehicle on the move, from all rows.
@@ -13,10 +13,8 @@ stays; once they say that it moves, as a vehicle on the move, from all rows.
 from __future__ import annotations
 
 import threading
-import time as clock
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -29,15 +27,16 @@ from truenorth.alignment import Alignment, align
 from truenorth.alignment.in_motion import usual_antenna
 from truenorth.alignment.recipes import RECIPES
 from truenorth.core.attitude import euler_sigma
-from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.live.answer import Answer, Motion
 from truenorth.live.carry import Carry
 from truenorth.live.feeds import FEEDS, Feed
-from truenorth.live.intake import Intake, as_rows
+from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.navigator import Navigator
+from truenorth.live.solving import Solving
 from truenorth.navigation.procedure import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -58,9 +57,12 @@ KEPT = (
     "log",
     "intake",
     "left",
+    "_gap_before",
     "failure",
     "solutions",
     "_solution",
+    "_carry",
+    "_earlier",
     "_newest",
     "_due",
 )
@@ -113,6 +115,7 @@ class Aligner:
         self.on_taken(None)
         self.intake = Intake()
         self.left: float | None = None
+        self._gap_before = -np.inf  # s: the last gap before the base left
         self.failure = ""
         self.solutions = 0
         self._solution: Alignment | None = None
@@ -120,10 +123,8 @@ class Aligner:
         self._earlier: Carry | None = None  # of the solution before, which knows no row of a drive that has just begun
         self._mover: Navigator | None = None  # on the move
         self._newest: deque[Array] = deque()  # blocks as they came: `RECENT`, and what a running solution lacks
-        self._solving = np.inf  # s: last row of the solution that runs
-        self._pool = ThreadPoolExecutor(1, "align") if background else None
-        self._running: Future[Alignment] | None = None
-        self._due, self._cost, self._free_at = -np.inf, 0.0, 0.0
+        self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
+        self._due = -np.inf
         self._lock = threading.Lock()
 
     def push(self, time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
@@ -194,8 +195,7 @@ class Aligner:
                 )  # fmt: skip
             time, C_nb, phi = at.time, at.C_nb, at.phi_covariance
             if carry is not None:
-                carry.advance()
-                time, C_nb, phi = carry.time, carry.C_nb, carry.phi_covariance
+                time, C_nb, phi = carry.now()
             return Answer(
                 time=time,
                 C_nb=C_nb,
@@ -265,16 +265,14 @@ class Aligner:
         state = kept(path, "Aligner")
         found = cls(state["place"], state["imu"], background=background, share=state["share"], method=state["method"])
         vars(found).update(state)
-        if found._solution is not None and found._newest[0][0, 0] <= found._solution.time:
+        if found._solution is not None and found._solution.moving is not None:
             found._take_over(found._solution)
         return found
 
     def close(self) -> None:
         """Wait for a running solution, and let the thread end."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True)
-            self._collect()
-            self._pool = None
+        self._solving.end()
+        self._collect()
 
     def __enter__(self) -> Aligner:
         return self
@@ -288,8 +286,11 @@ class Aligner:
             self.intake.counts.too_late += len(block)
             return
         self._taken(block)
+        if self._lost(self._solution) and self.log.end - self.log.start > LATE:
+            self._solution = self._carry = self._earlier = None
+            self._due = -np.inf
         self._newest.append(block)
-        oldest = min(self.log.end - RECENT, self._solving)
+        oldest = min(self.log.end - RECENT, self._newest_in)
         while self._newest[0][-1, 0] < oldest:
             self._newest.popleft()
         if self._mover is not None:
@@ -299,27 +300,22 @@ class Aligner:
                 continue
             carry.add(block)
             if self.left is None and carry.left is not None:
-                self.left, self._carry = carry.left, carry
-                self._solution = carry.solution
+                self.left, self._carry, self._earlier = carry.left, carry, None
+                self._solution, self._gap_before = carry.solution, self.log.last_gap
+
+    def _lost(self, found: Alignment | None) -> bool:
+        """Whether a solution of a base that stays lies before a gap in the rows: what the base did in it, nobody knows."""
+        return found is not None and found.moving is None and found.time <= self.log.last_gap
 
     def _start_when_due(self) -> None:
-        if self._running is not None or self.duration < FIRST or self.log.end < self._due:
-            return
-        if self._pool is not None and clock.monotonic() < self._free_at:
+        if not self._solving.free or self.duration < FIRST or self.log.end < self._due:
             return
         aids = self._aids()
         if self.left is not None and not aids:
             return
         record = self._record(aids)
-        self._solving = float(record.time[-1])
-        if self._pool is not None:
-            self._running = self._pool.submit(self._solve, record, aids)
-            return
-        self._running = Future()
-        try:
-            self._running.set_result(self._solve(record, aids))
-        except (AlignmentError, DataError) as error:
-            self._running.set_exception(error)
+        self._newest_in = float(record.time[-1])
+        self._solving.start(lambda: self._solve(record, aids))
         self._collect()
 
     def _aids(self) -> list[Any]:
@@ -331,7 +327,7 @@ class Aligner:
 
     def _record(self, aids: Sequence[Any], until: float = np.inf) -> ImuRecord:
         """The rows since the last gap that cannot be bridged."""
-        since = self.log.last_gap
+        since = self.log.last_gap if self.left is None else self._gap_before
         if aids:
             time = self.log.rows[:, 0]
             wide = np.flatnonzero(np.diff(time) > LONGEST_BRIDGE)
@@ -339,12 +335,8 @@ class Aligner:
         return self.log.record(since, until)
 
     def _solve(self, record: ImuRecord, aids: Sequence[Any]) -> Alignment:
-        begun = clock.thread_time()
-        try:
-            place = self.place or (None if aids else self._place())
-            return align(record, place, self.imu, aid=list(aids), method=self.method)
-        finally:
-            self._cost = clock.thread_time() - begun
+        place = self.place or (None if aids else self._place())
+        return align(record, place, self.imu, aid=list(aids), method=self.method)
 
     def _place(self) -> Position | None:
         """Of a vehicle that stays: the median of its fixes."""
@@ -358,19 +350,16 @@ class Aligner:
 
     def _collect(self) -> None:
         """Take over a solution that is ready."""
-        if self._running is None or not self._running.done():
+        ended = self._solving.ready(first=not self.solutions)
+        if ended is None:
             return
-        running, self._running, self._solving = self._running, None, np.inf
-        if self.solutions:  # the first one loads the compiled code as well
-            self._free_at = clock.monotonic() + self._cost * (1.0 / self.share - 1.0)
+        self._newest_in = np.inf
         self._due = self.log.end + (GROWTH - 1.0) * max(self.duration, FIRST)
-        try:
-            found = running.result()
-        except (AlignmentError, DataError) as error:
-            self.failure = str(error)
+        found, self.failure = ended
+        if found is None:
             return
-        self.failure, self.solutions = "", self.solutions + 1
-        if self.left is None or found.moving is not None:
+        self.solutions += 1
+        if found.moving is not None or (self.left is None and not self._lost(found)):
             self._take_over(found)
 
     def _take_over(self, found: Alignment) -> None:

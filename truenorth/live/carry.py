@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
 from truenorth.core.earth import normal_gravity
+from truenorth.live.going import Going
 from truenorth.live.log import Kind, record_of
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial import earth_rotation, gravity_velocity
@@ -25,7 +26,9 @@ MARGIN = 2.0  # s, before the last quiet row: a drive may begin slower than can 
 
 
 class Carry:
-    """Attitude carried on from an alignment by the gyros, its biases taken off.
+    """Attitude carried on from an alignment: by its filter, or by the gyros alone, the biases taken off.
+
+    The filter takes rows in that came before the base was last seen in its place, and no others.
 
     Parameters
     ----------
@@ -45,10 +48,13 @@ class Carry:
         self._window_start, self._velocity = alignment.time, np.zeros(3)
         self._quiet_at = alignment.time
         self._gone_since: float | None = None
+        self.going = None if alignment.ongoing is None else Going(alignment, kind)
 
     def add(self, rows: Array) -> None:
         """Take rows ``time, gyro (3), accel (3)`` in; they are gone through in blocks of `BLOCK`, or by :meth:`advance`."""
         self._waiting.append(rows)
+        if self.going is not None:
+            self.going.add(rows)
         if rows[-1, 0] - self.time > BLOCK:
             self.advance()
 
@@ -75,6 +81,15 @@ class Carry:
         self._before = both[-2:].copy()
         self.time = float(rows[-1, 0])
         self._watch()
+        if self.going is not None:
+            self.going.advance(self._quiet_at - MARGIN)
+            if self.left is not None:
+                self.going.advance(self.time - MARGIN, measured=False)
+
+    def now(self) -> tuple[float, Array, Array]:
+        """Time, attitude (3, 3) and covariance (3, 3) of the misalignment (E, N, U), at the newest row."""
+        self.advance()
+        return (self.time, self.C_nb, self.phi_covariance) if self.going is None else self.going.now()
 
     @property
     def elapsed(self) -> float:

@@ -11,12 +11,14 @@ from typing import Any
 from truenorth.core.archive import read_archive, write_archive
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError
+from truenorth.live.carry import Carry
 from truenorth.live.feeds import FEEDS
+from truenorth.live.going import Going
 from truenorth.live.intake import Intake
 from truenorth.live.log import Log
 from truenorth.live.past import Past
 
-PLAIN: dict[str, type[Any]] = {kind.__name__: kind for kind in (Log, Intake, Past)}
+PLAIN: dict[str, type[Any]] = {kind.__name__: kind for kind in (Log, Intake, Past, Carry, Going)}
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
 

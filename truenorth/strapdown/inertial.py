@@ -90,6 +90,7 @@ def integrate(
     gyro_bias: Array | None = None,
     accel_bias: Array | None = None,
     rows_at: ArrayLike = (),
+    context: int = 0,
 ) -> InertialIntegrals:
     """Integrate a log in the inertial frame, known biases taken off.
 
@@ -102,6 +103,8 @@ def integrate(
     accel_bias : (3,) array, m/s^2, optional
     rows_at : sequence of int
         Rows after which the attitude is wanted besides.
+    context : int
+        Rows at the beginning that only serve the integration rules: the integrals begin after them.
 
     Raises
     ------
@@ -117,6 +120,7 @@ def integrate(
 
     # Edges: edge r stands before row r, at the end of row r - 1.
     edges = np.concatenate(([0.0], np.cumsum(steps)))
+    edges -= edges[context]
     count = int((edges[-1] + 0.5 * record.interval) // interval)
     if count < 2:
         raise AlignmentError(
@@ -129,6 +133,9 @@ def integrate(
     extra = np.asarray(rows_at, dtype=np.int64) + 1
     every, back = np.unique(np.concatenate((epochs, extra)), return_inverse=True)
     C_all, v_all, p_all = inertial_integrals(dtheta, dvel, steps, every)
+    if context:  # every[0] is the edge after the context: epochs begin there
+        C_0, v_0, since = C_all[0].T, v_all[0], (edges[every] - edges[every[0]])[:, None]
+        C_all, v_all, p_all = C_0 @ C_all, (v_all - v_0) @ C_0.T, (p_all - p_all[0] - since * v_0) @ C_0.T
 
     on_grid, at = back[: len(epochs)], back[len(epochs) :]
     t, C = edges[epochs], C_all[on_grid]
@@ -144,7 +151,7 @@ def integrate(
     C_sub = C[index]
     ends = slice(None, None, sub)
     return InertialIntegrals(
-        start=float(record.time[0] - steps[0]),
+        start=float(record.time[context] - steps[context]),
         time=t[ends],
         C_ib=C[ends],
         velocity=v_all[on_grid][ends],

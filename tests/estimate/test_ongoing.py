@@ -1,0 +1,101 @@
+"""The filter of a base that stays, going on: that of the whole log about the same nominal solution, whatever the chunks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from truenorth.alignment import align
+from truenorth.core.position import Position
+from truenorth.errors.staying import QUIETEST_BASE, StaticModel
+from truenorth.errors.sway import with_motion
+from truenorth.estimate.ongoing import CONTEXT
+from truenorth.estimate.staying import StayingLog, prior_of
+from truenorth.filters import FilterState, kalman
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import rest, simulate
+
+PLACE = Position.from_degrees(45.0, 10.0)
+SPEC = imu_spec("navigation")
+FIRST = 120.0  # s
+
+
+@pytest.fixture(scope="module")
+def record():
+    return simulate(rest(PLACE, 0.7, 0.02, -0.03), rate=50.0, duration=200.0, imu=SPEC, seed=3).record
+
+
+def rows(record, first, last):
+    part = slice(max(first, 0), last)
+    return replace(record, time=record.time[part], gyro=record.gyro[part], accel=record.accel[part])
+
+
+def after(ongoing, record, **options):
+    """All rows after the filter's end."""
+    first = int(np.searchsorted(record.time, ongoing.time + 0.5 * record.interval))
+    return ongoing.after(rows(record, first - CONTEXT, None), CONTEXT, **options)
+
+
+def whole_log(end, record):
+    """The system of all rows, linearised about what the first part found."""
+    sways = end.arm is not None
+    prior = prior_of(np.diag(SPEC.bias_variance), arm=end.arm, arm_sigma=30.0 if sways else 0.0)
+    taken = np.concatenate([np.zeros(6), end.bias, *([end.arm] if sways else [])])
+    noise = StaticModel.of(SPEC)
+    log = StayingLog(record, end.C_n0_i, PLACE, noise, prior, end.interval, sways=sways, form=end.form, taken=taken)
+    system = log.linearise()
+    if sways:
+        return with_motion(system, end.interval, end.motion)
+    return replace(system, R=system.R + np.diag(end.R - QUIETEST_BASE**2))
+
+
+@pytest.mark.parametrize("method", ["kalman", "swaying"])
+def test_it_is_the_filter_of_the_whole_log_about_the_same_nominal_solution(record, method):
+    end = align(record.between(None, FIRST), PLACE, "navigation", method=method).ongoing
+    went_on = after(end, record)
+    assert went_on.disturbed == 0
+    assert went_on.time == pytest.approx(190.0, abs=0.03)
+    system = whole_log(end, record.between(None, went_on.time + 0.5 * record.interval))
+    later = {name: getattr(system, name)[end.epochs :] for name in ("Phi", "Q", "H", "R", "S", "z")}
+    found = kalman(replace(system, **later), FilterState(end.x, end.P, np.zeros(()), np.zeros(0)))
+    assert went_on.epochs == len(system.z)
+    # Of a sigma; the attitude about which a base sways is a line fitted to another log.
+    tolerance = 1e-3 if method == "swaying" else 1e-7
+    x, sigma = found.x[-1], np.sqrt(np.diag(found.P[-1]))
+    assert np.max(np.abs(went_on.x - x)[:12] / sigma[:12]) < tolerance
+    np.testing.assert_allclose(np.diag(went_on.P)[:12], sigma[:12] ** 2, rtol=tolerance)
+
+
+def test_chunks_give_the_same(record):
+    end = align(record.between(None, FIRST), PLACE, "navigation").ongoing
+    whole, now = after(end, record), end
+    for stop in (141.0, 141.3, 177.77, 200.0):
+        now = after(now, record.between(None, stop))
+    assert now.time == whole.time
+    np.testing.assert_allclose(now.x, whole.x, rtol=0.0, atol=1e-9 * np.sqrt(np.diag(whole.P)).max())
+    np.testing.assert_allclose(now.P, whole.P, rtol=1e-9, atol=1e-12 * np.abs(whole.P).max())
+
+
+def test_attitude_between_epochs_is_that_of_the_integration(record):
+    end = align(record.between(None, FIRST), PLACE, "navigation").ongoing
+    first = int(np.searchsorted(record.time, end.time + 0.5 * record.interval))
+    part = rows(record, first - CONTEXT, first + 333)
+    time, C_nb, P = end.attitude(part, CONTEXT)
+    assert time == part.time[-1]
+    wanted = align(record.between(None, FIRST), PLACE, "navigation").C_nb  # the base is still
+    np.testing.assert_allclose(C_nb, wanted, atol=5e-6)
+    _, _, before = end.attitude(None, 0)
+    assert np.all(np.diag(P)[:2] >= np.diag(before)[:2])
+
+
+def test_a_base_that_is_shaken_now_counts_less(record):
+    end = align(record.between(None, FIRST), PLACE, "navigation").ongoing
+    accel = record.accel.copy()
+    then = (record.time > 135.0) & (record.time < 150.0)
+    accel[then, 1] += 0.05 * record.interval * np.sin(2.0 * record.time[then])  # increments
+    calm, shaken = after(end, record), after(end, replace(record, accel=accel))
+    assert 1 <= shaken.disturbed <= 3
+    sigma = np.sqrt(np.diag(end.P))
+    assert np.max(np.abs(shaken.x - calm.x)[:3] / sigma[:3]) < 1.0
+    silent = after(end, record, measured=False)
+    assert silent.P[2, 2] > 1.3 * calm.P[2, 2]

@@ -1,0 +1,228 @@
+"""The filter of a base that stays, at the end of a log: it goes on as rows come.
+
+What a batch has found (nominal attitude, biases taken off, how the base moves) stays as it is; the rows that come are linearised
+about it and filtered. The state after some more rows is that of the batch's own filter on all of them, about the same nominal
+solution. Only a new batch finds the motion anew. A base that moves more, or otherwise, than in the log would make the filter too
+sure. So rows are filtered in blocks of ten intervals, and a block is filtered again, with as much noise as it shows, when its
+innovations are larger, or more of one sign, than chance makes them and than those of any ten intervals of the log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.position import Position
+from truenorth.errors.arm import arm_rows, with_arm
+from truenorth.errors.staying import BG, PHI, QUIETEST_BASE, STATES, Form, StaticModel
+from truenorth.errors.sway import AxisMotion, with_motion
+from truenorth.estimate.staying import core_system
+from truenorth.filters import Estimates, FilterState, LinearSystem, kalman
+from truenorth.records import ImuRecord
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
+from truenorth.strapdown.inertial_integration import inertial_integrals
+
+Array = NDArray[np.float64]
+
+BLOCK = 10  # intervals
+# Chi-square of 3 BLOCK and of 3 degrees of freedom exceeds these in one block of a thousand.
+LARGE, COLOURED = 59.7, 16.3
+CONTEXT = 3  # rows before the first one that the integration rules look back to
+STEPS = 50  # points at which an attitude between two epochs is summed up
+
+
+@dataclass(frozen=True)
+class Ongoing:
+    """A filter's end.
+
+    Attributes
+    ----------
+    position : Position
+    noise : StaticModel
+    interval : float, s
+    form : {"velocity", "force"}
+    C_n0_i : (3, 3) array
+        Nominal attitude; the states are errors of it.
+    bias : (6,) array
+        Gyro and accelerometer bias that are taken off.
+    R : (3,) array, (m/s)^2
+        Variance of the base's own velocity, east, north, up.
+    arm : (3,) array, m, or None
+        Nominal lever arm, where it is a state.
+    motion : tuple of AxisMotion
+        Of the base, where it is a state; else empty.
+    trend : (2, 9) arrays, two of them, or None
+        Of the attitude by which biases act on a base that sways.
+    epochs, fitted : int
+        So far, and of the batch.
+    start, elapsed : float, s
+        When the inertial frame was frozen, and since then.
+    C_ib, velocity, place : (3, 3), (3,) and (3,) arrays
+        The inertial integrals at the last epoch.
+    x, P : (n,) and (n, n) arrays
+    largest : (2,) array
+        Size and colour of a block of innovations, beyond which the base moves more than in the log.
+    disturbed : int
+        Blocks since the batch, in which it did.
+    """
+
+    position: Position
+    noise: StaticModel
+    interval: float
+    form: Form
+    C_n0_i: Array
+    bias: Array
+    R: Array
+    arm: Array | None
+    motion: tuple[AxisMotion, ...]
+    trend: tuple[Array, Array] | None
+    epochs: int
+    fitted: int
+    start: float
+    elapsed: float
+    C_ib: Array
+    velocity: Array
+    place: Array
+    x: Array
+    P: Array
+    largest: Array
+    disturbed: int = 0
+
+    @property
+    def time(self) -> float:
+        """Of the last epoch, s."""
+        return self.start + self.elapsed
+
+    def after(self, record: ImuRecord, context: int, *, measured: bool = True) -> Ongoing:
+        """Go on over as many whole blocks as there are rows.
+
+        Parameters
+        ----------
+        record : ImuRecord
+            Rows after the last epoch.
+        context : int
+            Rows at its beginning that are older, `CONTEXT` at the most.
+        measured : bool
+            Whether the base is where it was; else attitude and its uncertainty alone go on.
+        """
+        now = self
+        length = BLOCK * self.interval
+        while record.time[-1] - now.time >= length + 0.5 * record.interval:
+            stop = int(np.searchsorted(record.time, now.time + length + 0.5 * record.interval))
+            part = replace(record, time=record.time[:stop], gyro=record.gyro[:stop], accel=record.accel[:stop])
+            now = now._block(part, context, measured)
+            first = int(np.searchsorted(record.time, now.time + 0.5 * record.interval))
+            context = min(first, CONTEXT)
+            kept = slice(first - context, None)
+            record = replace(record, time=record.time[kept], gyro=record.gyro[kept], accel=record.accel[kept])
+            if len(record) < context + 2:
+                break
+        return now
+
+    def attitude(self, record: ImuRecord | None, context: int) -> tuple[float, Array, Array]:
+        """Attitude at the last of some rows after the last epoch.
+
+        Returns
+        -------
+        time : float, s
+        C_nb : (3, 3) array
+        covariance : (3, 3) array, rad^2
+            Of the misalignment, east, north, up.
+        """
+        elapsed, C_ib, J = self.elapsed, self.C_ib, np.hstack([np.eye(3), np.zeros((3, 3))])
+        if record is not None and len(record) > context:
+            turn, total = _turned(record, context, self.bias)
+            elapsed = float(record.time[-1]) - self.start
+            J[:, 3:] = -self.C_n0_i @ C_ib @ total
+            C_ib = C_ib @ turn
+        states = np.r_[PHI, BG]
+        P = J @ self.P[np.ix_(states, states)] @ J.T
+        P += self.noise.gyro_random_walk**2 * (elapsed - self.elapsed) * np.eye(3)
+        C_n_n0 = earth_rotation(elapsed, self.position.lat).T
+        C_n0_b = dcm_from_rotation_vector(J @ self.x[states]) @ self.C_n0_i @ C_ib
+        return self.start + elapsed, C_n_n0 @ C_n0_b, C_n_n0 @ P @ C_n_n0.T
+
+    def _block(self, record: ImuRecord, context: int, measured: bool) -> Ongoing:
+        found = integrate(record, self.interval, self.bias[:3], self.bias[3:], context=context)
+        C, T = self.C_ib, found.time[:, None]
+        whole = InertialIntegrals(
+            start=self.start,
+            time=self.elapsed + found.time,
+            C_ib=C @ found.C_ib,
+            velocity=self.velocity + found.velocity @ C.T,
+            position=self.place + T * self.velocity + found.position @ C.T,
+            C_mean=C @ found.C_mean,
+            C_late=C @ found.C_late,
+            C_ib_at=found.C_ib_at,
+        )
+        system = self._linearise(whole)
+        if not measured:
+            system = replace(system, z=np.full_like(system.z, np.nan))
+        state = FilterState(self.x, self.P, np.zeros(()), np.zeros(0))
+        estimates = kalman(system, state, innovations=True)
+        disturbed = measured and bool(np.any(_sizes(estimates)[0] > self.largest))
+        if disturbed:
+            estimates = kalman(replace(system, R=system.R + _disturbance(estimates)), state)
+        return replace(
+            self,
+            epochs=self.epochs + len(found.intervals),
+            elapsed=float(whole.time[-1]),
+            C_ib=whole.C_ib[-1],
+            velocity=whole.velocity[-1],
+            place=whole.position[-1],
+            x=estimates.x[-1],
+            P=estimates.P[-1],
+            disturbed=self.disturbed + disturbed,
+        )
+
+    def _linearise(self, integrals: InertialIntegrals) -> LinearSystem:
+        place, slow = self.position, integrals
+        if self.trend is not None:
+            t = -1.0 + 2.0 * (self.epochs + np.arange(len(integrals.C_mean))) / (self.fitted - 1)
+            basis = np.stack([np.ones_like(t), t], axis=1)
+            C_mean, C_late = ((basis @ coefficients).reshape(-1, 3, 3) for coefficients in self.trend)
+            slow = replace(integrals, C_mean=C_mean, C_late=C_late)
+        P0 = np.zeros((STATES, STATES))
+        system = core_system(self.noise, slow, integrals, self.C_n0_i, place, P0, self.form)
+        if self.arm is not None:
+            system = with_arm(system, arm_rows(integrals, self.C_n0_i, place.lat), self.arm)
+        if self.motion:
+            return with_motion(system, float(np.mean(integrals.intervals)), self.motion)
+        return replace(system, R=system.R + np.diag(self.R - QUIETEST_BASE**2))
+
+
+def block_limits(estimates: Estimates) -> Array:
+    """(2,) size and colour of ten innovations that neither chance nor this filter's log exceeds."""
+    return np.maximum(_sizes(estimates).max(axis=0, initial=0.0), [LARGE, COLOURED])
+
+
+def _sizes(estimates: Estimates) -> Array:
+    """(B, 2) of each block: sum of the squared innovations, and squares of their sums, in sigmas."""
+    sigma = np.sqrt(np.einsum("kii->ki", estimates.innovation_covariance))
+    e = estimates.innovation / sigma
+    e = e[: len(e) // BLOCK * BLOCK].reshape(-1, BLOCK, e.shape[1])
+    return np.stack([np.sum(e**2, axis=(1, 2)), np.sum(e.sum(axis=1) ** 2, axis=1) / BLOCK], axis=1)
+
+
+def _disturbance(estimates: Estimates) -> Array:
+    """(3, 3) noise besides that of the filter, which the innovations of a block show in their size and at low frequency."""
+    expected = np.einsum("kii->ki", estimates.innovation_covariance)
+    e = estimates.innovation / np.sqrt(expected)
+    ratio = np.maximum(np.mean(e**2, axis=0), np.sum(e, axis=0) ** 2 / len(e))
+    return np.diag(np.maximum(ratio - 1.0, 0.0) * expected.mean(axis=0))
+
+
+def _turned(record: ImuRecord, context: int, bias: Array) -> tuple[Array, Array]:
+    """Attitude after the last row in the body axes before the first, (3, 3), and its integral, s."""
+    dtheta, dvel = increments(record)
+    steps = record.steps
+    points = np.unique(np.linspace(context, len(record), STEPS).astype(np.int64))
+    C, _, _ = inertial_integrals(dtheta - steps[:, None] * bias[:3], dvel - steps[:, None] * bias[3:], steps, points)
+    C = C[0].T @ C
+    edges = np.concatenate([[0.0], np.cumsum(steps)])[points]
+    total = np.einsum("k,kij->ij", 0.5 * np.diff(edges), C[1:] + C[:-1])
+    return C[-1], total
