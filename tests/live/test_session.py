@@ -15,6 +15,7 @@ import pytest
 
 import truenorth as tn
 from truenorth.formats import write_imu
+from truenorth.live.feeds import FEEDS
 from truenorth.live.journal import Journal
 from truenorth.live.session import START, Session
 from truenorth.simulation.scenario import read_scenario
@@ -40,8 +41,6 @@ def sources(folder):
 
 
 def session(logs, speed, **options):
-    from truenorth.live.feeds import FEEDS
-
     aids = sources(logs)
     return Session(
         f"replay:{logs / 'log.csv'}@{speed}",
@@ -78,6 +77,28 @@ def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
     # The rows of both parts are kept.
     kept = sum(len(rows) for _, rows in Journal(tmp_path, resume=True).earlier())
     assert kept == len(tn.read_imu(logs / "log.csv"))
+
+
+def test_rows_of_aids_are_kept_and_a_resumed_run_needs_no_log_of_them(logs, tmp_path):
+    """The first 50 s, then a run to which only what came after them is given: the answer of the whole to the bit."""
+    for half, (first, last) in {"first": (None, 50.0), "second": (50.0, None)}.items():
+        (tmp_path / half).mkdir()
+        write_imu(tn.read_imu(logs / "log.csv").between(first, last), tmp_path / half / "log.csv")
+        for name in ("gnss", "odometer"):
+            lines = (logs / f"{name}.csv").read_text().splitlines()
+            header = lines[0].split(",").index("time")
+            times = [float(line.split(",")[header]) for line in lines[1:]]
+            kept = [line for line, t in zip(lines[1:], times) if (t <= 50.0 if half == "first" else t > 50.0)]
+            (tmp_path / half / f"{name}.csv").write_text("\n".join([lines[0], *kept]) + "\n")
+    folder = tmp_path / "out"
+    session(tmp_path / "first", "max", folder=folder).run()
+    found = session(tmp_path / "second", "max", folder=folder, resume=True).run()
+    whole = session(logs, "max").run()
+    assert np.array_equal(found.C_nb, whole.C_nb)
+    assert np.array_equal(found.phi_covariance, whole.phi_covariance)
+    journal = Journal(folder, [FEEDS[key]() for key in sources(logs)], resume=True)
+    assert len(journal.aids["gnss"].earlier) == len(tn.read_gnss(logs / "gnss.csv"))
+    assert journal.aids["odometer"]._feed.pulse_size == 0.04
 
 
 def live(*arguments):

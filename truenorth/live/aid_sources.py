@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import TruenorthError, UsageError
 from truenorth.live.feeds import Feed
+from truenorth.live.journal import AidJournal
 from truenorth.live.listening import READERS, Listener
 from truenorth.live.sources import open_bytes
 
@@ -33,24 +34,26 @@ class AidSource(Protocol):
 
 
 class Replayed:
-    """A log, in step with the IMU's rows.
+    """Rows of a log, in step with those of the IMU.
 
     Parameters
     ----------
-    feed : Feed
-    record : Record
+    rows : (N, 1 + columns) array
+        Of a feed.
+    add : callable
+        Takes them.
     """
 
     note = ""
 
-    def __init__(self, feed: Feed, record: Any) -> None:
-        self._feed, self._rows, self._at = feed, feed.rows_of(record), 0
+    def __init__(self, rows: Array, add: Callable[[Array], None]) -> None:
+        self._rows, self._add, self._at = rows, add, 0
 
     def advance(self, newest: float) -> None:
         """See :class:`AidSource`."""
         last = int(np.searchsorted(self._rows[:, 0], newest, side="right"))
         if last > self._at:
-            self._feed.add(self._rows[self._at : last])
+            self._add(self._rows[self._at : last])
             self._at = last
 
 
@@ -97,8 +100,20 @@ class Streamed:
         return "; ".join(text for text in found if text)
 
 
-def open_aid(text: str, feed: Feed, *, by_arrival: bool = False, **options: Any) -> tuple[AidSource, Listener | None]:
+def open_aid(
+    text: str, feed: Feed, kept: AidJournal | None = None, *, by_arrival: bool = False, **options: Any
+) -> tuple[AidSource, Listener | None]:
     """The source that a text names, as :func:`truenorth.live.sources.open_source`; ``same``: that of the IMU's rows.
+
+    Parameters
+    ----------
+    feed : Feed
+    kept : AidJournal, optional
+        Where the rows are kept; a log is passed over up to the last row there.
+    by_arrival : bool
+        Time is that of arrival, whatever the rows say.
+    **options
+        Of the reader.
 
     Returns
     -------
@@ -113,10 +128,13 @@ def open_aid(text: str, feed: Feed, *, by_arrival: bool = False, **options: Any)
     DataError
         A log that cannot be read.
     """
+    add = feed.add if kept is None else kept.add
     if text.startswith("replay:"):
         path = Path(text.removeprefix("replay:"))
         if not path.exists():
             raise UsageError(f"source {text}: there is no file {path}")
-        return Replayed(feed, READERS[feed.key](path, **options)), None
-    listener = Listener(feed, text, shared=text == SAME, by_arrival=by_arrival, **options)
+        rows = feed.rows_of(READERS[feed.key](path, **options))
+        after = -np.inf if kept is None else kept.earlier[:, 0].max(initial=-np.inf)
+        return Replayed(rows[rows[:, 0] > after], add), None
+    listener = Listener(feed, text, shared=text == SAME, by_arrival=by_arrival, add=add, **options)
     return Streamed(listener, None if text == SAME else open_bytes(text)), listener if text == SAME else None

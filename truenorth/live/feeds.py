@@ -40,6 +40,7 @@ class Feed(ABC):
 
     key: ClassVar[str]
     columns: ClassVar[tuple[str, ...]]
+    says: ClassVar[tuple[str, ...]] = ()  # attributes that say what the columns mean
 
     def __init__(self, mounting: Mounting | None = None) -> None:
         self.mounting = mounting
@@ -64,6 +65,11 @@ class Feed(ABC):
     @abstractmethod
     def speed_of(self, rows: Array) -> Array:
         """(K,) speed that a row says, m/s; NaN where it says none."""
+
+    @property
+    def meaning(self) -> dict[str, Any]:
+        """What the columns mean."""
+        return {name: getattr(self, name) for name in self.says}
 
     def dummy(self) -> Array:
         """Two rows in which every number is there: what this sensor may measure."""
@@ -255,6 +261,7 @@ class OdometerFeed(Feed):
 
     key = "odometer"
     columns = ("values",)
+    says = ("kind", "pulse_size", "signed")
 
     def __init__(
         self,
@@ -306,6 +313,7 @@ class VelocityFeed(Feed):
 
     key = "velocity"
     columns = ("v_1", "v_2", "v_3", "sigma_1", "sigma_2", "sigma_3")
+    says = ("frame",)
 
     def __init__(self, frame: Literal["body", "navigation"] = "body", *, mounting: Mounting | None = None) -> None:
         super().__init__(mounting)

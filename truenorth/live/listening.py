@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import tempfile
 import time as clock
+from collections.abc import Callable
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,8 @@ class Listener:
         The stream is another sensor's as well: lines of text are not ours.
     by_arrival : bool
         Time is that of arrival, whatever the rows say.
+    add : callable, optional
+        Takes the rows in the place of the feed.
     options : mapping
         Of the reader, such as columns and units.
 
@@ -53,9 +56,16 @@ class Listener:
     """
 
     def __init__(
-        self, feed: Feed, source: str, *, shared: bool = False, by_arrival: bool = False, **options: Any
+        self,
+        feed: Feed,
+        source: str,
+        *,
+        shared: bool = False,
+        by_arrival: bool = False,
+        add: Callable[[Array], None] | None = None,
+        **options: Any,
     ) -> None:
-        self.feed, self._source, self._options = feed, source, options
+        self.feed, self._source, self._options, self._add = feed, source, options, add or feed.add
         self._shared, self._by_arrival = shared, by_arrival
         self._half = b""
         self._messages: Messages | None = None
@@ -156,7 +166,7 @@ class Listener:
     def _give(self, rows: Array) -> None:
         if self._by_arrival and len(rows):
             rows[:, 0] += clock.monotonic() - rows[-1, 0]
-        self.feed.add(rows)
+        self._add(rows)
 
 
 def _sound(sentence: bytes) -> bool:

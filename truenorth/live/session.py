@@ -21,7 +21,7 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import load, save
 from truenorth.formats.layout import Layout
-from truenorth.live.aid_sources import AidSource, open_aid
+from truenorth.live.aid_sources import AidSource, Replayed, open_aid
 from truenorth.live.aligner import SHARE, UNKNOWN, Aligner
 from truenorth.live.answer import Answer
 from truenorth.live.feeds import Feed
@@ -76,11 +76,11 @@ class Session:
         AlignmentError
             Too few rows for any answer.
         """
-        journal = None if self.folder is None else Journal(self.folder, resume=self.resume)
+        journal = None if self.folder is None else Journal(self.folder, self.feeds, resume=self.resume)
         earlier = [] if journal is None else list(journal.earlier())
         last = max((float(rows[-1, 0]) for _, rows in earlier), default=-np.inf)
         source = open_source(self.source, self.layout, last, by_arrival=self.by_arrival)
-        aids = self._open_aids(source)
+        aids = self._open_aids(source, journal)
         self.opened(self.source)
         run: Run | None = None
         due = 0.0
@@ -112,11 +112,14 @@ class Session:
         self._publish(listeners, run, run.answer, _notes(source, aids))
         return found
 
-    def _open_aids(self, source: Source) -> list[AidSource]:
+    def _open_aids(self, source: Source, journal: Journal | None) -> list[AidSource]:
         feeds = {feed.key: feed for feed in self.feeds}
-        found = []
+        found: list[AidSource] = []
         for key, text in self.aids.items():
-            aid, listener = open_aid(text, feeds[key], by_arrival=self.by_arrival)
+            kept = None if journal is None else journal.aids[key]
+            if kept is not None:
+                found.append(Replayed(kept.earlier, feeds[key].add))
+            aid, listener = open_aid(text, feeds[key], kept, by_arrival=self.by_arrival)
             if listener is not None:
                 if not isinstance(source, Stream):
                     raise UsageError(
@@ -141,13 +144,12 @@ class Session:
             run = Aligner(self.place, self.imu, aid=self.feeds, kind=kind, method=self.method, share=self.share)
         for _, rows in earlier:
             _give(run, rows, aids)
-        run.on_taken(None if journal is None else lambda rows: journal.add(rows, kind))
+        run.on_taken(None if journal is None else journal.taker(kind))
         return run
 
     def _go_on(self, aligner: Aligner, journal: Journal | None) -> Navigator:
         navigator = aligner.navigator()
-        kind = aligner.log.source_kind
-        navigator.on_taken(None if journal is None else lambda rows: journal.add(rows, kind))
+        navigator.on_taken(None if journal is None else journal.taker(aligner.log.source_kind))
         if self.folder is not None and navigator.solution is not None:
             save(navigator.solution, self.folder / START)
         return navigator
