@@ -116,6 +116,34 @@ def test_a_start_from_a_row_of_a_master(files):
     assert sigma < 0.5
 
 
+def test_clocks_by_sensor(files, tmp_path):
+    """A receiver and a magnetometer, each off by its own: corrected by name the answer is that of sound clocks to the bit."""
+    folder = files[0]
+    moved = []
+    for name, by in (("plain.csv", 0.5), ("mag.csv", -2.0)):
+        head, *rows = (folder / name).read_text().splitlines()
+        cells = np.array([row.split(",") for row in rows], dtype=object)
+        cells[:, 0] = [repr(float(t) + by) for t in cells[:, 0]]  # half seconds are exact
+        (tmp_path / name).write_text("\n".join([head, *map(",".join, cells)]) + "\n")
+        moved.append(tmp_path / name)
+
+    def aligned(gnss, magnetometer, *more):
+        sensors = ("--gnss", gnss, "--magnetometer", magnetometer, *MAGNETOMETER)
+        return call("align", folder / "imu.parquet", *IMU, *sensors, *more, "--json")
+
+    sound = json.loads(aligned(folder / "plain.csv", folder / "mag.csv").stdout)
+    mended = json.loads(aligned(*moved, "--offset", "gnss=-0.5,magnetometer=2").stdout)
+    assert mended["heading_deg"] == sound["heading_deg"]
+    for offset, words in (
+        ("odometer=1", "odometer is not given"),
+        ("gnss=x", "expected 1 numbers"),
+        ("1,gnss=2", "gnss is named twice"),
+    ):
+        result = aligned(*moved, "--offset", offset)
+        assert isinstance(result.exception, UsageError)
+        assert words in str(result.exception)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

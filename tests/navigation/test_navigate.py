@@ -101,7 +101,10 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
     words = [reason for reason in found.reasons if reason.startswith("warning: the clock")]
     assert len(words) == 1
     assert "late" in words[0]
-    assert "by -0.3" in words[0] or "by -0.29" in words[0]
+    assert "latency of 0.3" in words[0] or "latency of 0.29" in words[0]
+    early = navigate(record, start, aid=Gnss(late.shifted(-0.6)), imu=SPEC)
+    words = [reason for reason in early.reasons if "early: shift the times of that log by 0." in reason]
+    assert words[0].split(" by ")[1][:4] in ("0.29", "0.30")
     aids = Gnss(late.shifted(-0.3)), Gnss(late, Mounting(latency=0.3)), Gnss(late, Mounting(latency_sigma=0.5))
     for aid in aids:
         result = navigate(record, start, aid=aid, imu=SPEC)

@@ -31,6 +31,37 @@ Baseline = Annotated[
 ]
 
 
+Offset = Annotated[
+    str | None,
+    option("Added to the times of the aiding logs, s: '-0.35' to all of them, or by sensor 'gnss=-0.1,odometer=0.02'."),
+]
+
+
+def shifted(aids: Sequence[Any], offset: str | None) -> list[Any]:
+    """Sensors with the times of their logs as --offset corrects them.
+
+    Raises
+    ------
+    UsageError
+        No number, or a sensor that is not there.
+    """
+    from dataclasses import replace
+
+    from truenorth.core.errors import UsageError
+
+    clocks = [aid.key for aid in aids if hasattr(aid, "record")]
+    late: dict[str, float] = {}
+    for part in () if offset is None else offset.split(","):
+        name, equals, seconds = part.rpartition("=")
+        (number,) = numbers_of(seconds, f"--offset {offset}:", 1, "seconds")
+        for key in [name.strip()] if equals else clocks:
+            if key not in clocks or key in late:
+                wrong = "named twice" if key in late else "not given"
+                raise UsageError(f"--offset {offset}: {key} is {wrong}; expected, once each, of: {', '.join(clocks)}")
+            late[key] = number
+    return [replace(aid, record=aid.record.shifted(late[aid.key])) if aid.key in late else aid for aid in aids]
+
+
 def arm_of(text: str, option: str) -> Any:
     """A lever arm: right, forward, up, m."""
     import numpy as np
@@ -183,7 +214,7 @@ class OnTheMove:
         Path | None,
         option("Log of a Doppler or speed log in body axes (v_right, v_forward, v_up), in place of an odometer."),
     ] = None
-    offset: Annotated[float, option("Added to the times of those logs, s.")] = 0.0
+    offset: Offset = None
     wheel_arm: Annotated[
         str | None,
         option("IMU to the odometer's wheel or the velocity log, m: right,forward,up; estimated without it."),
@@ -226,11 +257,11 @@ class OnTheMove:
             wheel = replace(wheel, lever_arm=arm_of(self.wheel_arm, "--wheel-arm"), lever_arm_sigma=0.0)
         if self.odometer is not None:
             counted = replace(wheel, noise=self.odometer_noise)
-            found.append(Odometer(read_odometer(self.odometer).shifted(self.offset), counted))
+            found.append(Odometer(read_odometer(self.odometer), counted))
         if self.velocity is not None:
-            found.append(VelocityLog(read_velocity(self.velocity).shifted(self.offset), wheel))
+            found.append(VelocityLog(read_velocity(self.velocity), wheel))
         if self.gnss is not None:
-            receiver = read_gnss(self.gnss).shifted(self.offset)
+            receiver = read_gnss(self.gnss)
             antenna = usual_antenna(receiver)
             if self.antenna_arm is not None:
                 antenna = replace(antenna, lever_arm=arm_of(self.antenna_arm, "--antenna-arm"))
@@ -284,7 +315,7 @@ class Sensors:
     ] = None
     estimate: Annotated[str | None, option(f"What is not known and estimated, of: {', '.join(PARTS)}.")] = None
     odometer_noise: Annotated[float | None, option("One-sigma noise of the odometer's speed, m/s.")] = None
-    offset: Annotated[float, option("Added to the times of all aiding logs, s.")] = 0.0
+    offset: Offset = None
     latency: Annotated[float, option("GNSS measurements are older than their stamps by this, s.")] = 0.0
     gnss_drift: Annotated[
         str | None,
@@ -360,15 +391,15 @@ class Sensors:
         sits = replace(wheel if told or found is None else found, noise=self.odometer_noise) if known else None
         aids: list[Any] = []
         if self.gnss is not None:
-            aids.append(Gnss(read_gnss(self.gnss).shifted(self.offset), antenna))
+            aids.append(Gnss(read_gnss(self.gnss), antenna))
         if self.odometer is not None:
-            aids.append(Odometer(read_odometer(self.odometer).shifted(self.offset), sits))
+            aids.append(Odometer(read_odometer(self.odometer), sits))
         if self.velocity is not None:
             log = replace(wheel, lever_arm_sigma=0.0)
-            record = read_velocity(self.velocity).shifted(self.offset)
+            record = read_velocity(self.velocity)
             aids.append(VelocityLog(record, log, self.log_errors(record.frame)))
         if self.baro is not None:
-            aids.append(Barometer(read_height(self.baro).shifted(self.offset), loop=self.baro_loop))
+            aids.append(Barometer(read_height(self.baro), loop=self.baro_loop))
         if self.fix or self.azimuth:
             aids.append(_fixes(self.fix or (), self.azimuth or ()))
         for text in self.aid or ():

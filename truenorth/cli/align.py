@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable
+from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable, shifted
 from truenorth.cli.align_options import check_options
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import make_console, stages
@@ -105,10 +105,11 @@ def align(
                 "on the move the errors of the IMU cannot be found from the log; expected --imu navigation, tactical, industrial, "
                 "consumer or a YAML file"
             )
+        found = moving.aids() if master.master is None else []
+        start = _first_place(record, found)
         aids: list[Any] = [
             *master.aids(indexer.arm, moving.mounting, moving.mounting_sigma),
-            *(found := moving.aids() if master.master is None else []),
-            *(pointing.aids(record, place or _first_place(record, found)) if pointing.given else []),
+            *shifted([*found, *(pointing.aids(record, place or start) if pointing.given else [])], moving.offset),
             *table.aids(),
             *indexer.aids(),
         ]

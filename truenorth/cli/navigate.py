@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from truenorth.cli.aiding_options import Sensors
+from truenorth.cli.aiding_options import Sensors, shifted
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import make_console, print_written, stages
 from truenorth.cli.options import AsJson, command, option
@@ -34,7 +34,7 @@ Examples:
   truenorth navigate log.csv --start start --gnss gnss.csv --lever-arm 0.3,1.2,0.8 --smooth -o track
   truenorth navigate log.csv --start start --odometer odo.csv --estimate scale,mounting --zupt auto
   truenorth navigate log.csv --start start --velocity dvl.csv --altitude fixed --json
-  truenorth navigate log.csv --start start --baro baro.csv --altitude baro --offset -0.35
+  truenorth navigate log.csv --start start --baro baro.csv --altitude baro --offset baro=-0.35
   truenorth navigate log.csv --master ins.csv --master-sigma 0.1,0.02 --imu tactical --gnss gnss.csv
   truenorth navigate log.csv --start start --attitude ahrs.csv --attitude-sigma 0.1,0.3,300
   truenorth navigate log.csv --heading 123,1 --position 48.1,11.5,520 --imu consumer --gnss gnss.csv
@@ -218,7 +218,7 @@ def navigate(
         result = navigate_record(
             record,
             begin if known.heading is not None or start is None else start,
-            aid=[*sensors.aids(begin.wheel), *pointing.aids(record, place)],
+            aid=shifted([*sensors.aids(begin.wheel), *pointing.aids(record, place)], sensors.offset),
             altitude=altitude,  # type: ignore[arg-type]  # checked there, with the choices in the message
             zupt=stops,
             smooth=smooth,

@@ -64,7 +64,7 @@ def read_gnss(
 ) -> GnssRecord:
     """Read the log of a GNSS receiver.
 
-    A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's own log
+    A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's log
     (u-blox, Septentrio, NovAtel, PX4, ArduPilot, ROS).
 
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,

@@ -1,8 +1,9 @@
 """A start of which the heading is known: from a survey, a compass, two antennas, a painted line.
 
-An alignment that knows its heading's error together with its biases takes a given heading as a measurement: heading and east gyro
-bias of a base at rest hide each other, and to know the one tells the other. An alignment that has levelled only is turned to the
-heading; the level part of the earth's rate, which it could not tell from gyro bias, is then known too.
+An alignment that knows its heading's error together with its biases, even where its heading was refused, takes a given heading as
+a measurement: heading and east gyro bias of a base at rest hide each other, and to know the one tells the other. An alignment that
+has levelled only is turned to the heading; of a mean rate that it took for the gyros' bias the level part of the earth's rate,
+which it could not tell from gyro bias, is then known too.
 """
 
 from __future__ import annotations
@@ -69,33 +70,48 @@ def with_heading(alignment: Alignment, heading: float, sigma: float) -> Alignmen
         raise AlignmentError(
             f"{alignment.source}: the alignment is inconsistent; its level is not to be trusted either"
         )
-    known = _measured if alignment.handover is not None and alignment.heading_known else _turned
+    known = _measured if alignment.handover is not None else _turned
     answer = known(alignment, heading, sigma)
     said = note("heading.given", heading=math.degrees(heading % (2.0 * math.pi)), sigma=sigma)
     return replace(answer, status="aligned", evidence=(*answer.evidence, said), history=None)
 
 
 def _measured(alignment: Alignment, heading: float, sigma: float) -> Alignment:
-    """A Kalman update of the joint estimate; at level ``heading_hat - heading = phi_U``."""
+    """An update of the joint estimate, along the curve on which heading and biases leave the same rates to be measured.
+
+    At level ``heading_hat - heading = phi_U``. What goes with a turn of heading goes with it in navigation axes: the east gyro bias
+    by the earth's rate. Over a large turn that direction turns in the body; for a small one this is the Kalman update.
+    """
     joint = alignment.handover
     assert joint is not None  # asked before
     off = math.remainder(alignment.heading - heading, 2.0 * math.pi)
-    H = np.concatenate([euler_jacobian(alignment.C_nb)[0], np.zeros(len(joint.P) - 3)])
-    gain = joint.P @ H / (H @ joint.P @ H + sigma**2)
-    x = gain * off
-    left = np.eye(len(gain)) - np.outer(gain, H)
-    P = left @ joint.P @ left.T + sigma**2 * np.outer(gain, gain)
-    C_nb = dcm_from_rotation_vector(x[:3]) @ alignment.C_nb
+    P, n = joint.P, len(joint.P)
+    H = np.concatenate([euler_jacobian(joint.C_nb)[0], np.zeros(n - 3)])
+    variance = float(H @ P @ H)
+    along = P @ H / variance  # what goes with an error of heading by one radian
+    moved = variance / (variance + sigma**2) * off
+    rest = P - variance * np.outer(along, along)
+    # The bulk of the turn is one about the vertical; the body then has another attitude to the same errors in n.
+    turn = dcm_from_rotation_vector(np.array([0.0, 0.0, moved]))
+    turned = np.eye(n)
+    turned[:3, :3] = turn
+    C_nb = turn @ joint.C_nb
+    half = dcm_from_rotation_vector(np.array([0.0, 0.0, 0.5 * moved])) @ joint.C_nb
+    chord = np.sinc(0.5 * moved / math.pi)  # of the arc that the horizontal bias runs through
+    in_n = joint.C_nb @ along[3:6]
+    biases = along[3:9] * moved
+    biases[:3] = half.T @ (in_n * [chord, chord, 1.0]) * moved
+    tilt = dcm_from_rotation_vector(turn @ (along[:3] - [0.0, 0.0, 1.0]) * moved)
+    along = np.concatenate([turn @ along[:3], C_nb.T @ in_n, along[6:]])
+    P = turned @ rest @ turned.T + variance * sigma**2 / (variance + sigma**2) * np.outer(along, along)
     return replace(
         alignment,
-        C_nb=C_nb,
+        C_nb=tilt @ turn @ alignment.C_nb,
         phi_covariance=P[:3, :3],
         phi_floor=_lowered(alignment.phi_floor, float(P[2, 2])),
-        gyro_bias=alignment.gyro_bias + x[3:6],
+        gyro_bias=alignment.gyro_bias + biases[:3],
         gyro_bias_sigma=np.sqrt(np.diag(P)[3:6]),
-        handover=replace(
-            joint, C_nb=dcm_from_rotation_vector(x[:3]) @ joint.C_nb, accel_bias=joint.accel_bias + x[6:9], P=P
-        ),
+        handover=replace(joint, C_nb=tilt @ C_nb, accel_bias=joint.accel_bias + biases[3:], P=P),
     )
 
 
@@ -110,7 +126,7 @@ def _turned(alignment: Alignment, heading: float, sigma: float) -> Alignment:
     P[2, 2] = sigma**2
     P = of_heading @ P @ of_heading.T  # of phi, from that of the level and the heading
     gyro_bias, gyro_sigma = alignment.gyro_bias, alignment.gyro_bias_sigma
-    if not alignment.heading_known:
+    if not alignment.heading_known and alignment.history is None and alignment.gyro_bias.any():  # the mean rate
         rate, level = EARTH_RATE * math.cos(alignment.position.lat), 1.0 - C_nb[2] ** 2
         gyro_bias = gyro_bias - rate * C_nb[1]  # north part of the earth's rate along each axis
         variance = gyro_sigma**2 - 0.5 * rate**2 * level + (rate * min(sigma, 1.0)) ** 2 * level

@@ -169,14 +169,19 @@ def _loosened(name: str, mounting: Mounting) -> Mounting:
 def _contradiction(role: Role, name: str, key: str, given: Mounting, value: Array, sigma: Array) -> Evidence:
     """What the data say of one property, without its effect."""
     if role == "lag":
-        late = "late" if value[0] > 0 else "early"
-        figures: dict[str, Figure] = {
-            "name": name,
-            "size": abs(float(value[0])),
-            "sigma": float(sigma[0]),
-            "offset": -float(value[0]),
-        }
-        return Evidence(f"second_look.{late}", figures, remedies=("offset", "estimate.lag"), urgent=True)
+        found = float(value[0])
+        figures: dict[str, Figure] = {"name": name, "sensor": key, "size": abs(found), "sigma": float(sigma[0])}
+        if found > 0.0 and key == "gnss":  # of a receiver that is late, its latency; the lag is what is left of it
+            return Evidence(
+                "second_look.late",
+                figures | {"latency": given.latency + found},
+                remedies=("latency", "estimate.lag"),
+                urgent=True,
+            )
+        late = "late" if found > 0.0 else "early"
+        return Evidence(
+            f"second_look.{late}", figures | {"offset": -found}, remedies=("offset", "estimate.lag"), urgent=True
+        )
     if role == "lever arm":
         arm = given.lever_arm + value
         figures = {"name": name, "given": ",".join(f"{x:.4g}" for x in given.lever_arm)}

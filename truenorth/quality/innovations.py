@@ -99,12 +99,10 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
         rejected = int(np.sum(~source.used))
         if rejected > limit("rejected") * count:
             size = float(np.median(np.sqrt(np.nansum(source.innovation**2, axis=1))))
-            away = _elsewhere(source)
+            where = _elsewhere(source)
             found.append(
-                contradiction(
-                    "innovations.elsewhere", "place", name=source.name, rejected=rejected, count=count, distance=away
-                )
-                if away > 0.0
+                contradiction(where[0], where[1], name=source.name, rejected=rejected, count=count, distance=where[2])
+                if where is not None
                 else contradiction(
                     "innovations.rejected",
                     "source",
@@ -155,13 +153,18 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
     return found
 
 
-def _elsewhere(source: Residuals) -> float:
-    """How far places lie from the track, m, where all of them do in one direction and by one distance; else 0."""
-    first = source.innovation[: max(FEWEST // 3, len(source.time) // 4), :2]
-    if source.unit != "m" or len(first) < 2 or not np.isfinite(first).all():
-        return 0.0
-    away = float(np.linalg.norm(first.mean(axis=0)))
-    return away if away > ONE_PLACE * float(np.linalg.norm(first.std(axis=0))) else 0.0
+def _elsewhere(source: Residuals) -> tuple[str, str, float] | None:
+    """What places say, its remedy, and how far they lie from the track, m, where all do in one direction and by one distance."""
+    first = source.innovation[: max(FEWEST // 3, len(source.time) // 4)]
+    if source.unit != "m" or len(first) < 2:
+        return None
+    for key, remedy, axes in (("elsewhere", "place", slice(0, 2)), ("height", "height", slice(2, 3))):
+        off = first[:, axes]
+        if off.size and np.isfinite(off).all():
+            away = float(np.linalg.norm(off.mean(axis=0)))
+            if away > ONE_PLACE * float(np.linalg.norm(off.std(axis=0))):
+                return f"innovations.{key}", remedy, away
+    return None
 
 
 def _growth(source: Residuals, sigma: Effect, by_motion: bool) -> list[Evidence]:

@@ -197,6 +197,10 @@ SENTENCES = {
     "innovations.elsewhere": (
         "{name}: {rejected} of {count} measurements rejected: all of them lie about {distance:.3g} m from where the track began"
     ),
+    "innovations.height": (
+        "{name}: {rejected} of {count} measurements rejected: all of them lie about {distance:.3g} m above or below the height of "
+        "the start"
+    ),
     "innovations.outliers": "{name}: {rejected} of {count} measurements rejected as outliers",
     "innovations.size": (
         "{name}: innovations are {factor:.1f} times as large as their sigma says: sigma is not to be trusted"
@@ -303,6 +307,7 @@ REMEDIES = {
     "estimate.lag": "let it be estimated",
     "estimate.scale": "let it be estimated",
     "estimate.mounting": "let it be estimated",
+    "latency": "give it a latency of {latency:.3f} s",
     "offset": "shift the times of that log by {offset:.3f} s",
     "arm_unit": "was it given in {unit}?",
     "arm.gnss": "check the arm; metres are expected",
