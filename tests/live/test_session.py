@@ -111,12 +111,13 @@ def test_navigation_killed_and_resumed_goes_on_from_the_same_alignment(logs, tmp
     aids = [text for key, source in sources(logs).items() for text in (f"--{key}", source)]
     arguments = [*aids, "--imu", "tactical", "--until", "0.5 deg", "--navigate", "-o", tmp_path, "--json", "--resume"]
     for _ in range(3):
-        process = live(f"replay:{logs / 'log.csv'}@10x", *arguments)
-        for _ in range(300):
+        process = live(f"replay:{logs / 'log.csv'}@4x", *arguments, "--share", "1")
+        for _ in range(600):
             if (tmp_path / START).exists() or process.poll() is not None:
                 break
             time.sleep(0.1)
         time.sleep(1.0)
+        assert process.poll() is None, process.communicate()
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
     process = live(f"replay:{logs / 'log.csv'}@max", *arguments)

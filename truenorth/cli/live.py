@@ -34,6 +34,8 @@ Examples:
   truenorth live replay:log.csv@max --lat 34.246 -o quay --resume
   truenorth live udp://:9000 --gnss udp://:9001 --imu industrial --until "0.5 deg" --navigate -o trip
   truenorth live replay:log.csv@20x --gnss replay:gnss.csv --odometer replay:odo.csv --imu tactical
+  truenorth live bag:rosbag2_today?topic=/imu --gnss bag:rosbag2_today --imu tactical
+  truenorth live "zenoh:imu/data?type=sensor_msgs/msg/Imu" --lat 48.1
 
 Rows are CSV lines (a header with our names, or time and six numbers), binary rows or the messages of a device, see docs/live.md.
 Ctrl-C ends a run: the rows so far are aligned as `truenorth align` would.
@@ -77,7 +79,8 @@ def live(
     source: Annotated[
         str,
         argument(
-            "replay:FILE@10x, follow:FILE, - (standard input), udp://:PORT, tcp://HOST:PORT, serial:/dev/NAME?baud=RATE."
+            "replay:FILE@10x, follow:FILE, - (standard input), udp://:PORT, tcp://HOST:PORT, serial:/dev/NAME?baud=RATE, "
+            "bag:BAG?topic=NAME, zenoh:KEY."
         ),
     ],
     where: Place,

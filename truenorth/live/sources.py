@@ -1,7 +1,8 @@
-"""Where rows come from: a log replayed or still being written, standard input, UDP, TCP, a serial line.
+"""Where rows come from: a log replayed or still being written, standard input, UDP, TCP, a serial line, ROS 2.
 
 ``replay:log.csv@10x``, ``follow:log.csv`` (a file that another program goes on writing), ``-``, ``udp://:9000``,
-``tcp://host:port``, ``serial:/dev/ttyUSB0?baud=921600``.
+``tcp://host:port``, ``serial:/dev/ttyUSB0?baud=921600``, ``bag:folder?topic=/imu`` (a ROS 2 bag that is being written),
+``zenoh:key``.
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.formats.layout import Layout
+from truenorth.live.bags import open_bag
 from truenorth.live.decode import Decoder
 from truenorth.live.log import Kind
+from truenorth.live.zenoh_source import open_zenoh
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -31,7 +34,10 @@ CHUNK = 0.02  # s of a replayed log in a chunk
 BYTES = 65536
 WAIT = 0.5  # s: a silent line is asked again after it, so that an interrupt is noticed
 POLL = 0.05  # s, between two looks at a file that grows
-EXAMPLES = "replay:log.csv@10x, follow:log.csv, -, udp://:9000, tcp://host:port or serial:/dev/ttyUSB0?baud=921600"
+EXAMPLES = (
+    "replay:log.csv@10x, follow:log.csv, -, udp://:9000, tcp://host:port, serial:/dev/ttyUSB0?baud=921600, bag:folder?topic=/imu "
+    "or zenoh:key"
+)
 
 
 class Source(Protocol):
@@ -162,6 +168,10 @@ def open_bytes(text: str) -> Callable[[], bytes | None]:
             return _tcp(address.hostname or "127.0.0.1", address.port)
         if address.scheme == "serial" and address.path:
             return _serial(address.path, parse_qs(address.query))
+        if address.scheme == "bag" and address.path:
+            return open_bag(Path(address.path), parse_qs(address.query).get("topic", []))
+        if address.scheme == "zenoh" and address.path:
+            return open_zenoh(address.path, parse_qs(address.query))
         if address.scheme == "follow" and address.path:
             return _follow(Path(address.path))
     except OSError as error:

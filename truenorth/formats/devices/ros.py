@@ -6,7 +6,10 @@ Time is that of the headers' stamps, in seconds since 1970: a double holds it to
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,8 +74,28 @@ MESSAGES: dict[str, dict[str, tuple[Callable[[Any], list[float]], tuple[str, ...
 }  # fmt: skip
 
 
-def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
-    """The messages of one topic: that of the name, or the only one that holds this part.
+KNOWN = frozenset(kind for kinds in MESSAGES.values() for kind in kinds)  # types that are read
+SYNC, LENGTHS = b"TNRM", struct.Struct("<IHH")  # of a frame: its length, and those of topic and type
+
+
+@dataclass
+class Memory:
+    """Of a stream: the topic that each part is taken from."""
+
+    topics: dict[str, str] = field(default_factory=dict)
+
+
+def frame(topic: str, kind: str, data: bytes) -> bytes:
+    """A message of a stream, serialised (CDR), with its topic and its type, such as ``sensor_msgs/msg/Imu``."""
+    names = topic.encode(), kind.encode()
+    size = len(SYNC) + LENGTHS.size + sum(map(len, names)) + len(data)
+    return SYNC + LENGTHS.pack(size, *map(len, names)) + b"".join(names) + data
+
+
+def tables(
+    path: Path, part: str, topic: str | None = None, memory: Memory | None = None
+) -> dict[str, dict[str, Array]]:
+    """The messages of one topic: that of the name, or the only one that holds this part; with a memory, of frames.
 
     Raises
     ------
@@ -82,21 +105,61 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
         None does; the message lists those there are.
     """
     from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
 
     kinds = MESSAGES.get(part, {})
-    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+    if memory is not None:
+        return _of_frames(path, part, memory)
+    with AnyReader([path], default_typestore=_types()) as reader:
         chosen = _topic(reader, topic, part, path.name)
         connections = [c for c in reader.connections if c.topic == chosen and c.msgtype in kinds]
-        stamps, rows = [], []
-        for connection, _, raw in reader.messages(connections=connections):
-            message: Any = reader.deserialize(raw, connection.msgtype)
-            stamps.append(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
-            rows.append(kinds[connection.msgtype][0](message))
-    if not rows:
+        messages = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections=connections)]
+    if not messages:
         raise DataError(f"{path.name}: topic {chosen} holds no messages")
-    names = kinds[connections[0].msgtype][1]
-    return {part: {"time [s]": np.array(stamps, dtype=np.int64) * 1e-9, **dict(zip(names, np.array(rows).T))}}
+    return {part: _table(messages, *kinds[connections[0].msgtype])}
+
+
+def _table(messages: list[Any], values: Callable[[Any], list[float]], names: tuple[str, ...]) -> dict[str, Array]:
+    stamps = [m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec for m in messages]
+    rows = np.array([values(m) for m in messages])
+    return {"time [s]": np.array(stamps, dtype=np.int64) * 1e-9, **dict(zip(names, rows.T))}
+
+
+def _of_frames(path: Path, part: str, memory: Memory) -> dict[str, dict[str, Array]]:
+    """Whole frames, of which those of one topic count.
+
+    Raises
+    ------
+    UsageError
+        A second topic holds this part.
+    """
+    kinds, messages = MESSAGES.get(part, {}), []
+    for topic, kind, data in _frames(path.read_bytes()):
+        if kind not in kinds:
+            continue
+        chosen = memory.topics.setdefault(part, topic)
+        if topic != chosen:
+            raise UsageError(f"several topics hold {part}: {chosen}, {topic}; choose them: ?topic=NAME in the source")
+        messages.append((kind, _types().deserialize_cdr(data, kind)))
+    if not messages:
+        return {}
+    return {part: _table([message for _, message in messages], *kinds[messages[0][0]])}
+
+
+def _frames(data: bytes) -> Iterator[tuple[str, str, bytes]]:
+    at = 0
+    while at < len(data):
+        size, topic, kind = LENGTHS.unpack_from(data, at + len(SYNC))
+        first = at + len(SYNC) + LENGTHS.size
+        ends = first + topic, first + topic + kind
+        yield data[first : ends[0]].decode(), data[ends[0] : ends[1]].decode(), data[ends[1] : at + size]
+        at += size
+
+
+@cache
+def _types() -> Any:
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE)
 
 
 def _topic(reader: AnyReader, wanted: str | None, part: str, source: str) -> str:
