@@ -46,6 +46,9 @@ def failing(monkeypatch, number):
     with monkeypatch.context() as patch:
         for name in ("replace", "link", "fsync"):
             patch.setattr(os, name, fail_at(getattr(os, name), lambda *args, **kwargs: True))
+        # A hidden temporary name that cannot be removed stays, and is no result.
+        visible = fail_at(os.unlink, lambda path, **kwargs: not os.path.basename(path).startswith("."))
+        patch.setattr(os, "unlink", visible)
         opened = fail_at(builtins.open, writes)
         patch.setattr(builtins, "open", opened)
         patch.setattr(io, "open", opened)

@@ -12,7 +12,7 @@ from pathlib import Path
 from truenorth.campaign.fault_limits import UNSEEN
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
 from truenorth.core.atomic import atomic_path
-from truenorth.core.errors import DataError
+from truenorth.core.errors import DataError, UsageError
 
 
 def read_trials(path: Path) -> list[Trial]:
@@ -45,10 +45,13 @@ def keeper(path: Path, done: Sequence[Trial]) -> Callable[[Trial], None]:
         csv.writer(file).writerows([Trial._fields, *done])
 
     def keep(trial: Trial) -> None:
-        with path.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(trial)
-            file.flush()
-            os.fsync(file.fileno())
+        try:
+            with path.open("a", newline="", encoding="utf-8") as file:
+                csv.writer(file).writerow(trial)
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise UsageError(f"{path}: a trial could not be kept ({error.strerror})") from None
 
     return keep
 

@@ -181,8 +181,12 @@ def _claim(store: Store, plan: Plan) -> None:
 def _locked(path: Path) -> Iterator[None]:
     """Hold a lock that the system takes back when the process ends, however it ends."""
     lock = _system_lock()
-    # Not "w": on Windows emptying a file that another process has locked would fail with a message of its own.
-    with path.open("a") as file:
+    try:
+        # Not "w": on Windows emptying a file that another process has locked would fail with a message of its own.
+        opened = path.open("a")
+    except OSError as error:
+        raise UsageError(f"{path}: could not be written ({error.strerror})") from None
+    with opened as file:
         try:
             lock(file.fileno())
         except OSError:

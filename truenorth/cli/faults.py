@@ -41,7 +41,7 @@ def faults(
 
     from truenorth.campaign.fault_pages import keeper, page, read_trials
     from truenorth.campaign.faults import OUTCOMES, run_faults, table
-    from truenorth.core.atomic import atomic_path, writable_folder
+    from truenorth.core.atomic import atomic_files, writable_folder
 
     folder = None if output is None else writable_folder(output)
     done = [] if folder is None else read_trials(folder / "trials.csv")
@@ -59,10 +59,10 @@ def faults(
     console.print(shown)
     if folder is not None:
         whole = read_trials(folder / "trials.csv")
-        with atomic_path(folder / "faults.csv") as path:
-            pd.DataFrame(table(whole)).to_csv(path, index=False)
-        with atomic_path(folder / "faults.md") as path:
-            path.write_text(page(whole, [] if before is None else read_trials(before)), encoding="utf-8")
+        with atomic_files() as file:
+            pd.DataFrame(table(whole)).to_csv(file(folder / "faults.csv"), index=False)
+            text = page(whole, [] if before is None else read_trials(before))
+            file(folder / "faults.md").write_text(text, encoding="utf-8")
         print_written(folder / name for name in ("trials.csv", "faults.csv", "faults.md"))
     if any(row["silent"] or row["crash"] for row in rows):
         raise typer.Exit(1)

@@ -9,7 +9,7 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -75,12 +75,13 @@ def atomic_path(target: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_files() -> Iterator[Callable[[str | os.PathLike[str]], Path]]:
+def atomic_files() -> Iterator[Callable[..., Path]]:
     """Write several files that belong together: all of them stand at the end, or what stood there before.
 
     Gives a function from a target to the temporary path to write to. A temporary name keeps the suffix of its target, since some
     writers choose their format by it, and is another one for each writer, so that two threads or processes can write the same
-    files: the last one to finish wins.
+    files: the last one to finish wins. A target with
+    `gone` is removed as the others take their names: the new set has no such file.
 
     Raises
     ------
@@ -88,50 +89,59 @@ def atomic_files() -> Iterator[Callable[[str | os.PathLike[str]], Path]]:
         A folder does not take a file, or a target is an input of the running command.
     """
     written: dict[Path, Path] = {}
+    removed: set[Path] = set()
 
-    def temporary(target: str | os.PathLike[str]) -> Path:
+    def temporary(target: str | os.PathLike[str], *, gone: bool = False) -> Path:
         path = Path(target)
         folder = writable_folder(path.parent)
         if _inputs and path.resolve() in _inputs:
             raise UsageError(
                 f"{path}: this file is an input of the command and would be overwritten; expected another output folder"
             )
+        if gone:
+            removed.add(path)
+            return path
         written[path] = _nameless(folder, path, "part")
         return written[path]
 
     try:
         yield temporary
-        _put_in_place(written)
+        _put_in_place(written, removed)
     except OSError as error:
         where = next(iter(written), "output") if len(written) < 2 else f"results in {next(iter(written)).parent}"
         raise UsageError(f"{where}: could not be written ({error.strerror or error})") from error
     finally:
         for path in written.values():
-            path.unlink(missing_ok=True)
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
 
 
-def _put_in_place(written: dict[Path, Path]) -> None:
+def _put_in_place(written: Mapping[Path, Path], removed: Iterable[Path]) -> None:
     """Rename all temporary files to their targets; where one cannot be renamed, put back what stood at the others."""
     for path in written.values():
         _onto_disk(path)
     old: dict[Path, Path | None] = {}
     try:
-        for target, path in written.items():
+        for target in (*written, *removed):
             old[target] = _second_name(target) if target.is_file() else None
-            os.replace(path, target)
-        for folder in {target.parent for target in written}:
+            if target in written:
+                os.replace(written[target], target)
+            else:
+                target.unlink(missing_ok=True)
+        for folder in {target.parent for target in old}:
             _onto_disk(folder)
     except BaseException:
         for target, kept in old.items():
             if kept is not None:
                 os.replace(kept, target)
                 kept.unlink(missing_ok=True)  # renaming one name of a file to its other name does nothing
-            elif not written[target].exists():  # it was renamed, and nothing stood there before
+            elif target in written and not written[target].exists():  # it was renamed, and nothing stood there before
                 target.unlink(missing_ok=True)
         raise
     for kept in old.values():
         if kept is not None:
-            kept.unlink(missing_ok=True)
+            with suppress(OSError):  # the new set stands: a hidden second name that cannot go is no failure
+                kept.unlink(missing_ok=True)
 
 
 def _second_name(target: Path) -> Path:

@@ -139,11 +139,9 @@ def save(result: Any, folder: str | PathLike[str]) -> list[Path]:
     target = writable_folder(folder)
     with atomic_files() as file:
         for name, write in files.items():
+            path = file(target / name, gone=write is None)
             if write is not None:
-                write(file(target / name))
-    for name, write in files.items():
-        if write is None:
-            (target / name).unlink(missing_ok=True)
+                write(path)
     return [target / name for name, write in files.items() if write is not None]
 
 

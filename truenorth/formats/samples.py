@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.atomic import atomic_files
 from truenorth.core.errors import UsageError
 from truenorth.formats.gnss import read_gnss
 from truenorth.formats.writing import write_record
@@ -74,8 +75,9 @@ def write_sample(name: str, folder: str | PathLike[str]) -> list[Path]:
     for path in paths:
         if path.exists():
             raise UsageError(f"{path}: is there already; name another folder")
-    for path, record in paths.items():
-        write_record(record, path)
+    with atomic_files() as file:
+        for path, record in paths.items():
+            write_record(record, file(path))
     return list(paths)
 
 

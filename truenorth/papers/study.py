@@ -68,19 +68,22 @@ class Study:
         UsageError
             The folder cannot be written to.
         """
-        target = writable_folder(folder)
-        paths: list[Path] = []
         with atomic_files() as file:
+            return self.write(writable_folder(folder), file)
 
-            def place(name: str) -> Path:
-                paths.append(target / name)
-                return file(paths[-1])
+    def write(self, folder: Path, file: Callable[[Path], Path]) -> list[Path]:
+        """The same into files of a larger set, whose temporary paths `file` gives."""
+        paths: list[Path] = []
 
-            write_figures(self.figures, place("figures.csv"))
-            place("claims.md").write_text(markdown(self.title, self.claims, self.remarks), encoding="utf-8")
-            for name, drawing in self.drawings.items():
-                drawing.savefig(place(f"{name}.png"))
-            place("report.html").write_text(self._page(), encoding="utf-8")
+        def place(name: str) -> Path:
+            paths.append(folder / name)
+            return file(paths[-1])
+
+        write_figures(self.figures, place("figures.csv"))
+        place("claims.md").write_text(markdown(self.title, self.claims, self.remarks), encoding="utf-8")
+        for name, drawing in self.drawings.items():
+            drawing.savefig(place(f"{name}.png"))
+        place("report.html").write_text(self._page(), encoding="utf-8")
         return paths
 
     def _page(self) -> str:
@@ -149,7 +152,7 @@ def save_all(studies: Mapping[str, Study], folder: str | PathLike[str]) -> list[
     from truenorth.report.study import index_page
 
     target = writable_folder(folder)
-    paths = [path for name, study in studies.items() for path in study.save(target / name)]
     with atomic_files() as file:
+        paths = [path for name, study in studies.items() for path in study.write(target / name, file)]
         file(target / "index.html").write_text(index_page(studies), encoding="utf-8")
     return [*paths, target / "index.html"]
