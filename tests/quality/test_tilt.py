@@ -1,0 +1,47 @@
+"""Tilt by gyros against tilt by accelerometers: a long arm is no scale factor, and one piece alone shows none."""
+
+import numpy as np
+import pytest
+
+from truenorth.quality.tilt import _changes, check_tilt
+from truenorth.simulation.scenario import read_scenario
+
+
+def test_changes_over_cells_are_exact_for_a_cubic():
+    """The change of a cubic over each cell, by its means in the cells; at both ends of a piece, too."""
+    edges = np.linspace(0.0, 1.1, 12)
+    a = np.array([0.3, -1.0, 2.0, 1.5])
+    whole = np.polynomial.Polynomial(a).integ()
+    means = np.diff(whole(edges)) / np.diff(edges)
+    exact = np.diff(np.polynomial.Polynomial(a)(edges))
+    assert np.allclose(_changes(means[None, :, None])[0, :, 0], exact, atol=1e-12)
+
+
+def ship(seed, scale=0.0):
+    """A ship that sways by 8, 4 and 6 deg, its IMU 14 m from its centre."""
+    tones = {
+        name: [{"amplitude": f"{a} deg", "period": f"{T} s"}]
+        for name, a, T in (("roll", 8.0, 11.2), ("pitch", 4.0, 6.9), ("heading", 6.0, 5.1))
+    }
+    scenario = {
+        "name": "ship",
+        "duration": "200 s",
+        "position": {"lat": "-20 deg", "lon": "10 deg"},
+        "motion": {"kind": "sway", "heading": "130 deg", "tones": tones},
+        "lever_arm": ["9 m", "-8 m", "7.2 m"],
+        "imu": "navigation",
+    }
+    record = read_scenario(scenario).simulate(seed=seed).record
+    gyro = record.gyro * [1.0 + scale, 1.0, 1.0]
+    return type(record)(record.time, gyro, record.accel, record.kind, record.source)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_long_arm_is_no_scale_factor(seed):
+    """Its acceleration, 2 m/s^2, is taken off to a thousandth: gyros of navigation grade are not off by a per cent."""
+    tilt = check_tilt(ship(seed))
+    assert np.all(np.abs(tilt.scale) < 2e-3), tilt
+    assert tilt.evidence() == []
+    off = check_tilt(ship(seed, 0.02))
+    assert off.scale[0] == pytest.approx(0.02, rel=0.15)  # the arm takes a part of it, or gives
+    assert [item.key for item in off.evidence()] == ["tilt.scale"]
