@@ -99,3 +99,13 @@ def test_a_base_that_is_shaken_now_counts_less(record):
     assert np.max(np.abs(shaken.x - calm.x)[:3] / sigma[:3]) < 1.0
     silent = after(end, record, measured=False)
     assert silent.P[2, 2] > 1.3 * calm.P[2, 2]
+
+
+@pytest.mark.parametrize(("rate", "first"), [(1000.0, 21.0), (128.2, 45.3), (33.0, 30.03)])
+def test_rates_whose_rows_do_not_fall_on_the_intervals(rate, first):
+    record = simulate(rest(PLACE, 0.7), rate=rate, duration=75.0, imu=SPEC, seed=2).record
+    end = align(record.between(None, first), PLACE, "navigation").ongoing
+    went_on = after(end, record)
+    assert record.time[-1] - went_on.time < 11.5 * end.interval
+    sigma = np.sqrt(np.diag(end.P))
+    assert np.all(np.abs(went_on.x - end.x)[:3] < 5.0 * sigma[:3])

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pty
 import random
 import signal
 import socket
@@ -173,6 +174,25 @@ def test_every_source_gives_the_answer_of_the_file(how, record, log):
     assert answers
 
 
+def test_a_serial_line(record, log):
+    """A pair of pseudo-terminals: what is written on one is read on the other."""
+    pytest.importorskip("serial")
+    ours, theirs = pty.openpty()
+    try:
+        source = iter(open_source(f"serial:{os.ttyname(theirs)}?baud=921600", Layout()))
+        data, found = log.read_bytes()[:30_000], []
+        for at in range(0, len(data), 1000):
+            os.write(ours, data[at : at + 1000])
+            found.append(next(source))
+        while sum(map(len, found)) < data.count(b"\n") - 1:  # but for the header
+            found.append(next(source))
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    rows = np.vstack(found)
+    assert np.array_equal(rows, rows_of(record)[: len(rows)])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kills", [3, 20])
 def test_killed_and_resumed_the_last_answer_is_the_same_to_the_bit(kills, record, log, tmp_path):
@@ -226,6 +246,37 @@ def test_nmea_has_its_checksum_and_heading(log):
     ]
 
 
+@pytest.mark.parametrize("kind", ["udp", "tcp"])
+def test_lines_go_to_a_socket(kind, log):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM) as line:
+        line.settimeout(60.0)
+        line.bind(("127.0.0.1", 0))
+        port = line.getsockname()[1]
+        if kind == "tcp":
+            line.close()
+        process = live(f"replay:{log}@20x", *WHERE, "--json", "--every", "0.1", "--to", f"{kind}://127.0.0.1:{port}")
+        assert "rows from" in process.stderr.readline()
+        if kind == "udp":
+            answers = [json.loads(line.recv(65536))]
+        else:
+            with socket.create_connection(("127.0.0.1", port), timeout=60.0) as client:
+                lines = client.makefile().read().splitlines()
+            answers = [json.loads(text) for text in lines]
+            assert answers[-1]["final"]
+        out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    assert out == ""
+    assert answers[0]["status"] in ("aligned", "not_converged", "level_only")
+
+
+@pytest.mark.parametrize("text", ["udp://:9000", "tcp://", "http://127.0.0.1:80", "tcp://192.0.2.1:9000"])
+def test_places_for_lines_that_cannot_be(text):
+    from truenorth.live.sending import open_sink
+
+    with pytest.raises(UsageError, match=r"expected udp|cannot be opened"):
+        open_sink(text)
+
+
 def test_the_page_shows_answers_to_its_own_origin_alone(log):
     pytest.importorskip("uvicorn")
     from truenorth.live.page import serve
@@ -246,7 +297,9 @@ def test_the_page_shows_answers_to_its_own_origin_alone(log):
                 events.append(json.loads(line[6:]))
         assert events[-1]["status"] in ("aligned", "not_converged", "level_only")
         seen = events[-1]["number"]
-        again = urllib.request.Request(page.address + "events", headers={"Last-Event-ID": str(seen)})
+        again = urllib.request.Request(
+            page.address + "events", headers={"Last-Event-ID": f"{events[-1]['run']}-{seen}"}
+        )
         later = urllib.request.urlopen(again, timeout=30)
         run.join()
         numbers = []

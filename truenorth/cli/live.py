@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -114,6 +115,10 @@ def live(
         bool, option("Print each answer as a JSON object on one line.", "--json", panel="Shown as")
     ] = False,
     nmea: Annotated[bool, option("Print each heading as NMEA HDT and PASHR.", "--nmea", panel="Shown as")] = False,
+    to: Annotated[
+        str | None,
+        option("Where these lines go: udp://HOST:PORT, or tcp://:PORT at which clients may listen.", panel="Shown as"),
+    ] = None,
     page: Annotated[
         str | None, option("Show a page in the browser, at this address such as :8080 (loopback).", panel="Shown as")
     ] = None,
@@ -122,12 +127,15 @@ def live(
     from truenorth.core.errors import UsageError
     from truenorth.core.units import parse
     from truenorth.formats.layout import layout_for
+    from truenorth.live.sending import open_sink
     from truenorth.live.session import Session
 
     if resume and output is None:
         raise UsageError("--resume needs the folder of the earlier run; expected -o FOLDER")
     if as_json and nmea:
         raise UsageError("--json and --nmea both print on standard output; expected one of them")
+    if to is not None and not (as_json or nmea):
+        raise UsageError(f"--to {to}: nothing to send; expected --json or --nmea with it")
     if not (every > 0.0 and 0.0 < share <= 1.0):
         raise UsageError(f"--every {every:g}, --share {share:g}: expected seconds above 0, and a part of 1")
     if clock not in ("device", "arrival"):
@@ -136,6 +144,7 @@ def live(
     if place is None and aids.gnss is None:
         raise UsageError("no place; expected --lat (and --lon), or --gnss SOURCE")
     goal = None if until is None else parse(until, "angle")
+    say = partial(print, flush=True) if to is None else open_sink(to)
     given = {"units": rows.units, "axes": rows.axes, "columns": names_of(rows.columns), "kind": rows.kind}
     session = Session(
         source,
@@ -154,11 +163,12 @@ def live(
         resume=resume,
         opened=lambda name: print(f"truenorth: rows from {name}; Ctrl-C ends the run", file=sys.stderr, flush=True),
     )
-    with _listeners(session, as_json, nmea, page, goal) as listeners:
+    lines = None if not (as_json or nmea) else _line_listener(say, as_json)
+    with _listeners(session, lines, page, goal) as listeners:
         alignment = session.run(listeners)
     result: Alignment | Navigation = session.navigation or alignment
     if as_json:
-        print(json.dumps({"final": True} | result.summary(), allow_nan=False), flush=True)
+        say(json.dumps({"final": True} | result.summary(), allow_nan=False))
     paths = [] if output is None else result.save(output)
     if not (as_json or nmea):
         from truenorth.cli.print_alignment import print_alignment
@@ -172,22 +182,25 @@ def live(
         raise typer.Exit(4)
 
 
-@contextmanager
-def _listeners(
-    session: Session, as_json: bool, nmea: bool, page: str | None, goal: float | None
-) -> Iterator[list[Listener]]:
-    from truenorth.live.outputs import json_line, nmea_lines, view
+def _line_listener(say: Callable[[str], None], as_json: bool) -> Listener:
+    from truenorth.live.outputs import json_line, nmea_lines
 
-    found: list[Listener] = []
-    wished = math.radians(0.1) if goal is None else goal
-
-    def printed(run: Run, answer: Answer | None, note: str) -> None:
+    def listener(run: Run, answer: Answer | None, note: str) -> None:
         if answer is not None:
             for line in [json_line(answer)] if as_json else nmea_lines(answer):
-                print(line, flush=True)
+                say(line)
 
-    if as_json or nmea:
-        found.append(printed)
+    return listener
+
+
+@contextmanager
+def _listeners(
+    session: Session, lines: Listener | None, page: str | None, goal: float | None
+) -> Iterator[list[Listener]]:
+    from truenorth.live.outputs import view
+
+    found: list[Listener] = [] if lines is None else [lines]
+    wished = math.radians(0.1) if goal is None else goal
     server = None
     if page is not None:
         from truenorth.live.page import serve
@@ -196,7 +209,7 @@ def _listeners(
         found.append(server.publish)
         print(f"page: {server.address}", file=sys.stderr, flush=True)
     try:
-        if as_json or nmea or not sys.stderr.isatty():
+        if lines is not None or not sys.stderr.isatty():
             yield found
             return
         from rich.live import Live

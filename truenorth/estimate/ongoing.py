@@ -164,7 +164,7 @@ class Ongoing:
             system = replace(system, z=np.full_like(system.z, np.nan))
         state = FilterState(self.x, self.P, np.zeros(()), np.zeros(0))
         estimates = kalman(system, state, innovations=True)
-        disturbed = measured and bool(np.any(_sizes(estimates)[0] > self.largest))
+        disturbed = measured and bool(np.any(_sizes(estimates, len(system.z))[0] > self.largest))
         if disturbed:
             estimates = kalman(replace(system, R=system.R + _disturbance(estimates)), state)
         return replace(
@@ -197,15 +197,15 @@ class Ongoing:
 
 def block_limits(estimates: Estimates) -> Array:
     """(2,) size and colour of ten innovations that neither chance nor this filter's log exceeds."""
-    return np.maximum(_sizes(estimates).max(axis=0, initial=0.0), [LARGE, COLOURED])
+    return np.maximum(_sizes(estimates, BLOCK).max(axis=0, initial=0.0), [LARGE, COLOURED])
 
 
-def _sizes(estimates: Estimates) -> Array:
-    """(B, 2) of each block: sum of the squared innovations, and squares of their sums, in sigmas."""
+def _sizes(estimates: Estimates, length: int) -> Array:
+    """(B, 2) of each block of so many epochs: sum of the squared innovations, and squares of their sums, in sigmas."""
     sigma = np.sqrt(np.einsum("kii->ki", estimates.innovation_covariance))
     e = estimates.innovation / sigma
-    e = e[: len(e) // BLOCK * BLOCK].reshape(-1, BLOCK, e.shape[1])
-    return np.stack([np.sum(e**2, axis=(1, 2)), np.sum(e.sum(axis=1) ** 2, axis=1) / BLOCK], axis=1)
+    e = e[: len(e) // length * length].reshape(-1, length, e.shape[1])
+    return np.stack([np.sum(e**2, axis=(1, 2)), np.sum(e.sum(axis=1) ** 2, axis=1) / length], axis=1)
 
 
 def _disturbance(estimates: Estimates) -> Array:

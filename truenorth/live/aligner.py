@@ -40,6 +40,7 @@ from truenorth.live.solving import Solving
 from truenorth.navigation.procedure import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 
@@ -49,23 +50,9 @@ SHARE = 0.1  # of one core, for solutions
 SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "place",
-    "imu",
-    "method",
-    "share",
-    "feeds",
-    "log",
-    "intake",
-    "left",
-    "_gap_before",
-    "failure",
-    "solutions",
-    "_solution",
-    "_carry",
-    "_earlier",
-    "_newest",
-    "_due",
-)
+    "place", "imu", "method", "share", "feeds", "log", "intake", "left", "_gap_before", "failure", "solutions", "_solution",
+    "_carry", "_earlier", "_newest", "_due",
+)  # fmt: skip
 UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
 
@@ -171,6 +158,11 @@ class Aligner:
     def first_answer(self) -> float:
         """Length of log from which there is an answer, s."""
         return FIRST
+
+    @property
+    def residuals(self) -> tuple[Residuals, ...]:
+        """The newest innovations of the loop, under way."""
+        return () if self._mover is None else self._mover.residuals
 
     @property
     def duration(self) -> float:

@@ -38,7 +38,7 @@ from truenorth.records.base import GAP_FACTOR
 from truenorth.records.specs import ImuSpec
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
-from truenorth.state.track import Track
+from truenorth.state.track import Residuals, Track
 from truenorth.strapdown.increments import ImuRows
 
 Array = NDArray[np.float64]
@@ -135,6 +135,11 @@ class Navigator:
     def on_taken(self, taken: Callable[[Array], None] | None) -> None:
         """Call this with each block of rows from now on."""
         self._taken = taken or (lambda rows: None)
+
+    @property
+    def residuals(self) -> tuple[Residuals, ...]:
+        """The newest innovations of each source."""
+        return self.past.residuals
 
     @property
     def duration(self) -> float:

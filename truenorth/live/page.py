@@ -22,6 +22,7 @@ import numpy as np
 from truenorth.core.errors import UsageError
 from truenorth.live.aligner import Aligner
 from truenorth.live.answer import Answer
+from truenorth.live.innovations import newest_innovations
 from truenorth.live.navigator import Navigator
 from truenorth.live.outputs import waiting
 from truenorth.live.spectrum import motion_spectrum
@@ -47,6 +48,7 @@ class Page:
 
     def __init__(self, host: str, port: int, goal: float, go: threading.Event | None) -> None:
         self._goal, self._go, self._token = goal, go, secrets.token_urlsafe(16)
+        self._run = secrets.token_hex(4)  # a page of an earlier run loads itself anew
         self._events: deque[tuple[int, str]] = deque(maxlen=HISTORY)
         self._number = 0
         self._closing = False
@@ -61,7 +63,8 @@ class Page:
     def publish(self, aligner: Aligner | Navigator, answer: Answer | None, note: str) -> None:
         """Show an answer; a listener of :class:`truenorth.live.session.Session`."""
         self._number += 1
-        event: dict[str, Any] = {"number": self._number, "rows": aligner.intake.counts.taken, "note": note}
+        event: dict[str, Any] = {"run": self._run, "number": self._number, "note": note}
+        event["rows"] = aligner.intake.counts.taken
         event["log_s"] = aligner.duration
         event["left_out"] = aligner.intake.counts.words()
         event["may_go"] = self._go is not None and not self._go.is_set() and isinstance(aligner, Aligner)
@@ -72,6 +75,7 @@ class Page:
             }
             if self._number % 5 == 1:
                 event["spectrum"] = motion_spectrum(aligner.log)
+                event["innovations"] = newest_innovations(answer.solution, aligner.residuals)
         self._events.append((self._number, json.dumps(event, allow_nan=False)))
 
     def close(self) -> None:
@@ -89,7 +93,7 @@ class Page:
         except ImportError:
             raise UsageError("a page needs Starlette and uvicorn: pip install 'truenorth[live]'") from None
         text = (resources.files("truenorth.live") / "page.html").read_text(encoding="utf-8")
-        text = text.replace("TOKEN", self._token)
+        text = text.replace("TOKEN", self._token).replace("THIS_RUN", self._run)
 
         def refused(request: Any) -> bool:
             """A page of another origin, or a name that some other server gave this address."""
@@ -110,8 +114,9 @@ class Page:
         async def events(request: Any) -> Any:
             if refused(request):
                 return Response(status_code=403)
-            seen = request.headers.get("last-event-id", "0")
-            stream = self._stream(int(seen) if seen.isdigit() else 0, request.is_disconnected)
+            run, _, number = request.headers.get("last-event-id", "").partition("-")
+            seen = int(number) if run == self._run and number.isdigit() else 0
+            stream = self._stream(seen, request.is_disconnected)
             return StreamingResponse(stream, media_type="text/event-stream", headers=HEADERS)
 
         application = Starlette(routes=[Route("/", home), Route("/events", events), Route("/go", go, methods=["POST"])])
@@ -124,7 +129,7 @@ class Page:
         while not (self._closing or await gone()):
             new = [(number, text) for number, text in list(self._events) if number > seen]
             for number, text in new:
-                yield f"id: {number}\ndata: {text}\n\n"
+                yield f"id: {self._run}-{number}\ndata: {text}\n\n"
                 seen = number
             if new:
                 spoken = clock.monotonic()
