@@ -14,6 +14,7 @@ import typer
 from truenorth.cli.advise import advise
 from truenorth.cli.align import align
 from truenorth.cli.campaign import campaign
+from truenorth.cli.console import explain_compiling
 from truenorth.cli.example import example
 from truenorth.cli.faults import faults
 from truenorth.cli.files import FORCE, check_output, inputs
@@ -92,6 +93,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still printed
             stream.reconfigure(errors="replace")
+    explain_compiling()
     try:
         words = sys.argv[1:]
         forced = FORCE in words

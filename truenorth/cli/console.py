@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Progress = Callable[[int, int], None]  # done and total
+COMPILING = "truenorth.core.kernel_store"  # the log that has a line for each kernel that is compiled
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -31,6 +33,29 @@ def stages(quiet: bool) -> Iterator[Callable[[str], None]]:
 
     with make_console(stderr=True).status("starting") as status:
         yield lambda stage: status.update(Text(stage))
+
+
+class _Compiling(logging.Handler):
+    """Says once why the first answer on a computer takes a minute."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the note where the first kernel is compiled."""
+        log = logging.getLogger(COMPILING)
+        log.removeHandler(self)
+        log.setLevel(logging.NOTSET)
+        make_console(stderr=True).print(
+            "compiling, once on this computer: the first answer takes up to a minute longer "
+            "(truenorth warm compiles for all commands)"
+        )
+
+
+def explain_compiling() -> None:
+    """Where a person looks at standard error, say what the wait is for when something has to be compiled."""
+    if sys.stderr.isatty():
+        log = logging.getLogger(COMPILING)
+        log.addHandler(_Compiling())
+        log.setLevel(logging.INFO)
+        log.propagate = False
 
 
 def print_written(paths: Iterable[Path]) -> None:

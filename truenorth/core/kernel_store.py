@@ -9,6 +9,7 @@ code under the wrong number.
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import pickle
 import re
@@ -30,6 +31,7 @@ from truenorth.core.fingerprint import UnknownValueError, fingerprint
 PACKAGE = Path(__file__).parents[1]
 BOUND = 512 * 2**20  # bytes that the kernels of all versions may take, before the longest unused go
 DAY = 86400.0  # s
+LOG = logging.getLogger(__name__)  # one line of level INFO for each kernel that has to be compiled
 SUM = 32  # bytes of the checksum that a file begins with
 
 
@@ -66,6 +68,7 @@ class KernelStore:
         if name and "<locals>" in self.function.__code__.co_qualname:
             # The linker takes what has one name for one function, and a function made anew has the name of the last.
             self.function.__qualname__ = f"{self.function.__code__.co_qualname}.{Path(name).stem[-16:]}"
+        LOG.info("compiling %s", self.function.__qualname__)
         return None
 
     def save_overload(self, signature: Any, kernel: Any) -> None:
