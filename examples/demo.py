@@ -29,7 +29,9 @@ def main() -> int:
         up_tones=(Tone(0.3, 8.0, 2.0),),
         lever_arm=(1.0, 3.0, 1.0),
     )
-    print("the first time on a computer the filters are compiled, which takes a minute; after that the demo takes seconds")
+    print(
+        "the first time on a computer the filters are compiled, which takes a minute; after that the demo takes seconds"
+    )
     print("simulating 600 s at 100 Hz of a navigation-grade SINS on a swaying ship ...")
     simulation = simulate(ship, rate=100.0, duration=600.0, imu=truenorth.imu_spec("navigation"), seed=1)
     log = FOLDER / "ship.csv"
