@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.formats.corpus.dialects import Log, logs
+from tests.formats.corpus.drawn import drawn
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.formats import read_imu, write_layout
 from truenorth.records import ImuRecord
@@ -80,6 +81,32 @@ def test_a_log_is_read_right_or_not_at_all(log, tmp_path):
         assert result == "refused"
     elif not log.answer:
         assert result == "as it is"
+
+
+def verdict(log: Log, folder) -> str:
+    """``right``, ``asked``, ``refused`` where the numbers contradict what is said, or what is wrong, of a drawn log."""
+    path = folder / log.name
+    log.write(path)
+    try:
+        record = read_imu(path)
+    except TruenorthError:
+        return "asked" if is_right(log, read_imu(path, **log.answer)) else "wrong after the answer"
+    if is_right(log, record):
+        return "right"
+    from truenorth.quality import inspect
+
+    said = any(finding.severity == "error" for finding in inspect(record).findings)
+    return "refused" if said and is_right(log, read_imu(path, **log.answer)) else "read wrong in silence"
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(5), pytest.param(range(5, 400), marks=pytest.mark.slow)], ids=["some", "many"]
+)
+def test_a_drawn_dialect_is_read_right_or_not_at_all(seeds, tmp_path):
+    """Names, units, clocks, separators, orders at random; what a log says of itself may be wrong, as our names over deg/s."""
+    found = {seed: verdict(drawn(seed), tmp_path) for seed in seeds}
+    assert not {seed: said for seed, said in found.items() if said not in ("right", "asked", "refused")}
+    assert sum(said == "right" for said in found.values()) > 0.3 * len(found)
 
 
 def test_the_corpus_is_as_large_as_it_should_be():

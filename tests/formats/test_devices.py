@@ -1,6 +1,7 @@
 """Logs of devices, written by the decoders' own encoders where they have one, read back as the truth they hold."""
 
 import struct
+import zlib
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,9 @@ SWAY = truth("swaying", "tactical", 100.0, 10.0)
 TIME = SWAY.time
 TOW = 208800.0
 LAT, LON, ALT = 48.1, 11.5, 500.0
-FIELD = SWAY.accel * 4.8e-6  # T, of the size of the earth's; it turns as gravity does, which is enough to see axes
+# T by m/s^2: a field of the earth's size that turns as gravity does, which is enough to see axes
+FIELD_OF_FORCE = 4.8e-6
+FIELD = SWAY.accel * FIELD_OF_FORCE
 SBF_HOME = {"Latitude": np.radians(LAT), "Longitude": np.radians(LON), "Height": ALT, "Vn": 1.0, "Ve": 2.0, "Vu": -0.5}
 FRD = lambda v: v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]  # noqa: E731
 
@@ -40,16 +43,16 @@ def assert_is_at_home(record, count, velocity=(2.0, 1.0, -0.5)):
     np.testing.assert_allclose(record.v_n[:, : len(velocity)], np.tile(velocity, (count, 1)), atol=2e-2)
 
 
-def ubx_bytes(pyubx2):
+def ubx_bytes(pyubx2, log=SWAY):
     parts = []
-    for k, t in enumerate(TIME):
+    for k, t in enumerate(log.time):
         if k % 20 == 0:
             fix = pyubx2.UBXMessage(
                 "NAV", "NAV-PVT", pyubx2.GET, iTOW=round((TOW + t) * 1e3), lat=LAT, lon=LON, height=500000, velE=2000,
                 velN=1000, velD=500, hAcc=1000, vAcc=2000, sAcc=100, fixType=3,
             )  # fmt: skip
             parts.append(fix.serialize())
-        counts = [*np.degrees(SWAY.gyro[k]) * 2**12, *SWAY.accel[k] * 2**10]
+        counts = [*np.degrees(log.gyro[k]) * 2**12, *log.accel[k] * 2**10]
         words = [kind << 24 | round(value) % (1 << 24) for kind, value in zip((14, 13, 5, 16, 17, 18), counts)]
         payload = bytes(4) + b"".join(struct.pack("<II", word, k * 256) for word in words)
         parts.append(pyubx2.UBXMessage("ESF", "ESF-RAW", pyubx2.GET, payload=payload).serialize())
@@ -135,7 +138,7 @@ def test_septentrio_earth_fixed_with_two_antennas(tmp_path):
     np.testing.assert_allclose(np.degrees(record.heading_sigma), 0.2, rtol=1e-5)
 
 
-def ulog_bytes():
+def ulog_bytes(log=SWAY):
     """A ULog as PX4 writes it: header, flags, formats, subscriptions, data."""
 
     def message(kind, body):
@@ -151,8 +154,8 @@ def ulog_bytes():
         message("A", struct.pack("<BH", 0, 1) + b"sensor_gps"),
     ]
     parts.append(message("A", struct.pack("<BH", 0, 2) + b"vehicle_magnetometer"))
-    gyro, accel, gauss = FRD(SWAY.gyro), FRD(SWAY.accel), FRD(FIELD) * 1e4
-    for k, t in enumerate(TIME):
+    gyro, accel, gauss = FRD(log.gyro), FRD(log.accel), FRD(log.accel) * FIELD_OF_FORCE * 1e4
+    for k, t in enumerate(log.time):
         if k % 10 == 0:
             parts.append(message("D", struct.pack("<HQ3f", 2, round(t * 1e6), *gauss[k])))
         parts.append(message("D", struct.pack("<HQ6f", 0, round(t * 1e6), *gyro[k], *accel[k])))
@@ -162,7 +165,7 @@ def ulog_bytes():
     return b"".join(parts)
 
 
-def dataflash_bytes():
+def dataflash_bytes(log=SWAY):
     """A DataFlash log as ArduPilot writes it: formats, then messages."""
 
     def form(kind, length, name, types, names):
@@ -172,8 +175,8 @@ def dataflash_bytes():
     parts.append(form(0x81, 3 + 8 + 1 + 24, b"IMU", b"QBffffff", b"TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ"))
     parts.append(form(0x82, 3 + 8 + 2 + 8 + 4 + 12, b"GPS", b"QBBLLefff", b"TimeUS,I,Status,Lat,Lng,Alt,Spd,GCrs,VZ"))
     parts.append(form(0x83, 3 + 8 + 1 + 12 + 1, b"MAG", b"QBfffB", b"TimeUS,I,MagX,MagY,MagZ,Health"))
-    gyro, accel, mgauss = FRD(SWAY.gyro), FRD(SWAY.accel), FRD(FIELD) * 1e7
-    for k, t in enumerate(TIME):
+    gyro, accel, mgauss = FRD(log.gyro), FRD(log.accel), FRD(log.accel) * FIELD_OF_FORCE * 1e7
+    for k, t in enumerate(log.time):
         if k % 10 == 0:
             for i in (0, 1):  # a second compass, which is not read
                 parts.append(struct.pack("<BBBQB3fB", 0xA3, 0x95, 0x83, round(t * 1e6), i, *mgauss[k] * (1 - 2 * i), 1))
@@ -199,17 +202,16 @@ def test_flight_controllers(tmp_path, module, name, content):
     assert_is_field(read_magnetometer(path))
 
 
-def test_mavlink(tmp_path):
-    mavutil = pytest.importorskip("pymavlink.mavutil")
-    path = tmp_path / "log.tlog"
+def write_tlog(path, mavutil, log=SWAY):
+    """HIGHRES_IMU and GPS_RAW_INT, each with its stamp, as ground stations write them."""
     link = mavutil.mavlink.MAVLink(SimpleNamespace(write=lambda _: None), srcSystem=1, srcComponent=1)
-    gyro, accel, gauss = FRD(SWAY.gyro), FRD(SWAY.accel), FRD(FIELD) * 1e4
+    gyro, accel, gauss = FRD(log.gyro), FRD(log.accel), FRD(log.accel) * FIELD_OF_FORCE * 1e4
     with path.open("wb") as file:
 
         def write(message, t):
             file.write(struct.pack(">Q", 1_700_000_000_000_000 + round(t * 1e6)) + message.pack(link))
 
-        for k, t in enumerate(TIME):
+        for k, t in enumerate(log.time):
             held = gauss[k // 10 * 10]  # the board sends its last reading again
             write(link.highres_imu_encode(round(t * 1e6), *accel[k], *gyro[k], *held, 0, 0, 0, 0, 511), t)
             if k % 100 == 0:
@@ -221,21 +223,30 @@ def test_mavlink(tmp_path):
                     ),
                     t,
                 )
+
+
+def test_mavlink(tmp_path):
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    path = tmp_path / "log.tlog"
+    write_tlog(path, mavutil)
     assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
     assert_is_at_home(read_gnss(path), 10, (2.0, 1.0))
     assert_is_field(read_magnetometer(path))
 
 
 def novatel_line(name, body, tow):
-    """An ASCII log with its checksum, as an OEM7 receiver writes it."""
-    head = f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,cdba,16809;"
+    """An ASCII log with its checksum, as an OEM7 receiver writes it; RAWIMUS has a short header."""
+    short = name.startswith("RAWIMUS")
+    head = (
+        f"{name},2300,{tow:.3f};" if short else f"{name},COM1,0,55.0,FINESTEERING,2300,{tow:.3f},02000020,cdba,16809;"
+    )
     text = head + body
-    crc = 0
-    for byte in text.encode():
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xEDB88320 if crc & 1 else crc >> 1
-    return f"#{text}*{crc:08x}\r\n"
+    return f"{'%' if short else '#'}{text}*{novatel_crc(text.encode()):08x}\r\n"
+
+
+def novatel_crc(content):
+    """CRC-32 that begins with zero and ends without a complement."""
+    return zlib.crc32(content, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def test_novatel(tmp_path):

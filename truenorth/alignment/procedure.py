@@ -26,7 +26,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
 from truenorth.alignment.turning import infer_turning, turning_align, turns_blindly
-from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
+from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.analytic import static_covariance
 from truenorth.coarse.uncertainty import base_velocity
@@ -192,7 +192,9 @@ def _align_level(task: Task, spec: ImuSpec | None) -> _Found:
     """Level alone, from the mean specific force of a base that does not turn; heading zero by convention."""
     task = last_part(task)
     if not task.record.gyro.any():
-        raise no_attitude(task.record.source)
+        raise AlignmentError(
+            f"{task.record.source}: all gyros read zero in every row: are they dead, or written too coarsely to see any motion?"
+        )
     check = check_means(task.means, task.position.lat, task.gravity)
     used, where = _specification(spec, check, allan_noise(task.record))
     C_nb = level_of(task.means.f_b)

@@ -202,8 +202,11 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         "rates": (found["gyro"], found["accel"]),
         "increments": (found["dtheta"], found["dvel"]),
     }
-    for kind, (gyros, accels) in sets.items():
-        if not gyros or not accels or layout.kind not in (None, kind):
+    for kind in sorted(
+        sets, key=lambda kind: kind != layout.kind
+    ):  # the caller's first: it wins over names that say another
+        gyros, accels = sets[kind]
+        if not gyros or not accels:
             continue
         accels = _with_gravity(columns, accels) if len(accels) > 1 else accels
         if len(gyros) > 1 or len(accels) > 1:
@@ -223,7 +226,7 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         ours = COLUMNS[kind]
         guess = Guess("columns", ", ".join(names), "their names", 1.0, {"columns": dict(zip(ours, names))})
         told = kind if kind == "increments" or said is not None else None
-        return Choice(told, (), [(name, 1.0) for name in names], _units(headings, kind), guesses=[guess])
+        return Choice(told, (), [(name, 1.0) for name in names], _units(headings, layout.kind or kind), guesses=[guess])
     return None
 
 
