@@ -99,9 +99,7 @@ def verdict(log: Log, folder) -> str:
     return "refused" if said and is_right(log, read_imu(path, **log.answer)) else "read wrong in silence"
 
 
-@pytest.mark.parametrize(
-    "seeds", [range(5), pytest.param(range(5, 400), marks=pytest.mark.slow)], ids=["some", "many"]
-)
+@pytest.mark.parametrize("seeds", [range(5), pytest.param(range(5, 400), marks=pytest.mark.slow)], ids=["some", "many"])
 def test_a_drawn_dialect_is_read_right_or_not_at_all(seeds, tmp_path):
     """Names, units, clocks, separators, orders at random; what a log says of itself may be wrong, as our names over deg/s."""
     found = {seed: verdict(drawn(seed), tmp_path) for seed in seeds}

@@ -99,6 +99,24 @@ def test_a_start_from_heading_and_place(poor):
     assert np.all(np.abs(error(result.C_nb[-1], poor.truth.C_nb[-1])) < 4.0 * np.sqrt(np.diag(result.track.P[-1])[:3]))
 
 
+@pytest.mark.parametrize("acceleration", [1.5, 4.0])
+def test_a_level_is_taken_before_the_vehicle_drives_off(acceleration):
+    """Motion is found in whole seconds: the last of them before it may hold its onset, which tilts a level by degrees."""
+    motion = course(PLACE, [*straight(30.0), *accelerate(15.0, acceleration, 0.0), *straight(20.0)], heading=HEADING)
+    log = simulate(motion, rate=50.0, duration=50.0, imu="navigation", seed=2).record
+    start = tn.known_start(log, PLACE, "navigation", HEADING, SIGMA)
+    assert 25.0 < start.time <= 30.0
+    off = error(start.C_nb, motion.states(start.time).C_nb)
+    assert np.all(np.abs(off[:2]) < 4.0 * np.sqrt(np.diag(start.P)[:2]))
+    refused = tn.align(log, PLACE, "navigation")
+    until = refused.evidence[0].figures["end"]
+    assert tn.align(log.between(None, until), PLACE, "navigation").status == "aligned"
+    time = np.arange(28.0, 49.0)
+    s = motion.states(time)
+    fixes = tn.GnssRecord(time, s.lat, s.lon, s.alt, s.v_n)
+    assert tn.navigate(log, start, aid=tn.Gnss(fixes), imu="navigation").status == "navigated"
+
+
 def test_what_is_refused(poor):
     level = tn.align(poor.record, PLACE, "consumer")
     with pytest.raises(tn.UsageError, match="positive sigma"):

@@ -15,6 +15,7 @@ from truenorth.alignment.result import Alignment, Status
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
 from truenorth.core.errors import AlignmentError
+from truenorth.quality.regimes import SEEN_LATE
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
 from truenorth.state.limits import limit
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 
 WALKING = 2.0  # m/s: nobody takes what moves faster for a base that stays
 FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
+HEIGHTS = (-500.0, 9000.0)  # m, at which bases stay
 
 
 def no_attitude(source: str) -> AlignmentError:
@@ -152,10 +154,16 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
                 {"residual": check.force_residual, "allowed": accel, "imu": answer.imu_source},
                 "bounded",
                 Effect(level=abs(check.force_residual) / g),
-                ("height", "units", "specification"),
+                (*_height(place.lat, g + check.force_residual), "units", "specification"),
             )
         )
     return found + base_speed(answer) + _taken_to_stay(answer) + model_evidence(drift, settled=settled)
+
+
+def _height(lat: float, gravity: float) -> tuple[str, ...]:
+    """The remedy of a wrong height, where one at which a base stays has this gravity."""
+    most, least = (float(normal_gravity(lat, alt)) for alt in HEIGHTS)
+    return ("height",) if least < gravity < most else ()
 
 
 def _taken_to_stay(answer: Alignment) -> list[Evidence]:
@@ -210,7 +218,7 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
 
 def leaves(time: float | None) -> list[Evidence]:
     """That a base moves from a time (s) on; nothing where it stays."""
-    return [] if time is None else [contradiction("base.moves", "end_before", until=time)]
+    return [] if time is None else [contradiction("base.moves", "end_before", until=time, end=time - SEEN_LATE)]
 
 
 def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple[str, ...]) -> list[Evidence]:

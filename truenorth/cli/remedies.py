@@ -7,7 +7,7 @@ from typing import Any
 from truenorth.cli.wording import in_options
 
 OPTIONS = {
-    "end_before": "--to {until:.0f}",
+    "end_before": "--to {end:.0f}",
     "still_part": "--from, --to",
     "begin_after": "--from {after:.0f}",
     "latitude": "--lat",
@@ -39,10 +39,12 @@ OPTIONS = {
     "flexure": "--flexure",
     "log_error": "--log-drift",
 }
+OF_A_START = {"place": "--position", "height": "--position"}  # of a navigation, which has no place but its start's
 
 
 def reasons_of(result: Any) -> tuple[str, ...]:
     """The evidence of an alignment or a navigation in words, with the options of this program."""
     from truenorth.state.wording import sentences
 
-    return tuple(in_options(text) for text in sentences(result.evidence, OPTIONS))
+    options = OPTIONS | (OF_A_START if hasattr(result, "track") else {})
+    return tuple(in_options(text) for text in sentences(result.evidence, options))

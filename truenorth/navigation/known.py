@@ -23,7 +23,7 @@ from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.navigation.start import moving_start, positive, start_from_alignment
-from truenorth.quality.regimes import motion_summary
+from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import note
@@ -68,7 +68,7 @@ def with_heading(alignment: Alignment, heading: float, sigma: float) -> Alignmen
         raise UsageError("a heading is given for an alignment on the move; expected one of a base that stays")
     if alignment.status == "inconsistent":
         raise AlignmentError(
-            f"{alignment.source}: the alignment is inconsistent; its level is not to be trusted either"
+            f"{alignment.source}: the alignment is inconsistent; its level is not to be trusted either: {alignment.reasons[0]}"
         )
     known = _measured if alignment.handover is not None else _turned
     answer = known(alignment, heading, sigma)
@@ -280,7 +280,7 @@ def _resting(record: ImuRecord) -> ImuRecord:
     """The beginning of the log, in which the vehicle goes nowhere."""
     begin = float(record.time[0])
     goes = [r.start for r in motion_summary(record).regimes if r.kind in ("moving", "rotating")]
-    end = min([begin + LONGEST_LEVEL, float(record.time[-1]), *goes])
+    end = min([begin + LONGEST_LEVEL, float(record.time[-1]), *(start - SEEN_LATE for start in goes)])
     if end - begin < SHORTEST_LEVEL:
         raise AlignmentError(
             f"{record.source}: the vehicle moves from {end:.1f} s on; {SHORTEST_LEVEL:g} s at rest are needed: give pitch and roll"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import earth_rate_n, normal_gravity
 from truenorth.core.errors import DataError
-from truenorth.quality.regimes import motion_summary
+from truenorth.quality.regimes import MOVING_ACCELERATION, motion_summary
 from truenorth.records import ImuRecord
 from truenorth.state.layout import BA, BG, PHI, STATES
 from truenorth.state.state import Start
@@ -90,6 +90,9 @@ def check_start_at_rest(start: Start, record: ImuRecord) -> None:
     motion = motion_summary(part)
     rest = motion.longest("still", "disturbed")
     if rest is None or rest.duration < LEAST or rest.start > part.time[0] + 1.0:
+        return
+    force = motion.specific_force[motion.time <= rest.stop]
+    if np.any(np.ptp(force, axis=0) > MOVING_ACCELERATION):  # a log that begins just before its vehicle drives off
         return
     part = part.between(None, rest.stop)
     scale = part.interval if part.kind == "increments" else 1.0

@@ -51,6 +51,7 @@ LEAST_GAIN = 0.04  # m/s^2 over WINDOW: waves that come and go within it leave l
 NOISY_BIAS = 200.0  # sqrt(Hz): the same of a noisier one, in its noise ...
 LARGEST_BIAS = 1.0  # m/s^2: ... at the most
 SWAY_ACCELERATION = 0.2  # m/s^2 over WINDOW: a rocking base with less gains no speed
+SEEN_LATE = 3.0  # s: motion is found in whole seconds, and its onset is gentle
 MOVING_PAUSE = 60  # s between two accelerations, without rest, that counts as moving too (cruising)
 TURNED_BIAS = 0.5  # m/s^2 for a radian: level error and bias of a cheap sensor that a turn shows as acceleration
 SHORTEST_SWAY = 30  # s; accelerations during a shorter rocking are not put down to it
