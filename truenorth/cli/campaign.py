@@ -8,7 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Annotated
 
-from truenorth.cli.console import bar, make_console, print_written
+from truenorth.cli.console import bar, drawing, make_console, print_written
 from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
@@ -72,6 +72,7 @@ def campaign(
             f"{row['name']}, {row['method']}: heading RMS {row['rms']:.3g} arcmin over {row['runs']} runs, {honest}",
             soft_wrap=True,
         )
+    drawing()
     print_written(result.save())
 
 

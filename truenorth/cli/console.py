@@ -23,6 +23,16 @@ def make_console(*, stderr: bool = False) -> Console:
     return Console(stderr=stderr, highlight=False, markup=False, emoji=False)
 
 
+def drawing() -> bool:
+    """Whether figures can be drawn; where not, it says so once: the rest is written all the same."""
+    from truenorth.core.shown import NO_FIGURES, can_draw
+
+    able = can_draw()
+    if not able:
+        print(f"truenorth: {NO_FIGURES}; none is written", file=sys.stderr)
+    return able
+
+
 @contextmanager
 def stages(quiet: bool) -> Iterator[Callable[[str], None]]:
     """A spinner with the stage's name on standard error, where a person looks at it."""

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from truenorth.cli.console import make_console, print_written
+from truenorth.cli.console import drawing, make_console, print_written
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, ReadingWindow
 
@@ -91,10 +91,7 @@ def _figures(gyro: NoiseCoefficients, accel: NoiseCoefficients) -> list[dict[str
 
 
 def _write(output: Path, found: Inspection, like: str | None) -> list[Path]:
-    from matplotlib import rc_context
-
     from truenorth.core.atomic import atomic_files, writable_folder
-    from truenorth.figures.noise import plot_noise
     from truenorth.quality.noise import noise_from_log
     from truenorth.records.kalibr import write_kalibr
 
@@ -102,12 +99,23 @@ def _write(output: Path, found: Inspection, like: str | None) -> list[Path]:
     record, rest = found.record, found.noise_from
     assert record is not None and rest is not None  # noqa: PT018  # checked before
     spec = noise_from_log(record.between(rest.start, rest.stop), like, record.source).spec
-    paths = [folder / name for name in ("imu.yaml", "kalibr.yaml", "noise.svg")]
-    with atomic_files() as file, rc_context({"svg.hashsalt": "noise"}):  # the same log makes the same bytes
+    paths = [folder / name for name in ("imu.yaml", "kalibr.yaml", "noise.svg")[: 3 if drawing() else 2]]
+    with atomic_files() as file:
         spec.to_yaml(file(paths[0]))
         write_kalibr(spec, record.rate, file(paths[1]))
-        plot_noise(found).savefig(file(paths[2]), metadata={"Date": None})
+        for path in paths[2:]:
+            _draw(found, file(path))
     return paths
+
+
+def _draw(found: Inspection, path: Path) -> None:
+    """The figure; the same log makes the same bytes."""
+    from matplotlib import rc_context
+
+    from truenorth.figures.noise import plot_noise
+
+    with rc_context({"svg.hashsalt": "noise"}):
+        plot_noise(found).savefig(path, metadata={"Date": None})
 
 
 def _print(source: str, start: float, stop: float, figures: list[dict[str, Any]], paths: list[Path]) -> None:

@@ -43,9 +43,13 @@ def reproduce(
 ) -> None:
     """Reproduce a published system: figures.csv, the paper's figures, and claims.md with what holds."""
     from truenorth.core.atomic import writable_folder
+    from truenorth.core.errors import UsageError
+    from truenorth.core.shown import NO_FIGURES, can_draw
     from truenorth.papers import STUDIES, save_all
     from truenorth.papers import reproduce as reproduced
 
+    if not can_draw():
+        raise UsageError(f"a study draws its figures: {NO_FIGURES}")
     writable_folder(output)  # before the work, not after it
     names = list(STUDIES) if name == "all" else [name]
     with stages(False) as progress:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
-from truenorth.cli.console import make_console, print_written
+from truenorth.cli.console import drawing, make_console, print_written
 from truenorth.cli.options import argument, command, option
 
 # The \b keeps the lines as they are, ready to be copied.
@@ -64,6 +64,7 @@ def simulate(
     from truenorth.simulation.folder import save_run
 
     writable_folder(output)  # before the work, not after it
+    plot = plot and drawing()
     drawn_with = chosen.seed if seed is None else seed
     numbers = range(run, run + (1 if runs is None else runs))
     shared = None if chosen.is_drawn or len(numbers) == 1 else chosen.ideal()

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
+from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ TABLE = "truenorth.results"
 ARCHIVE = "result.npz"
 REPORT = "report.html"
 PICTURE_DPI = 80
+NO_FIGURES = "figures need matplotlib: pip install 'truenorth[plot]'"
 
 
 @dataclass(frozen=True)
@@ -91,11 +93,21 @@ def plot(result: Any, **options: Any) -> Figure:
     Raises
     ------
     UsageError
-        A type that nothing draws.
+        A type that nothing draws; matplotlib is not installed.
     """
+    if not can_draw():
+        raise UsageError(NO_FIGURES)
     drawn: Figure = _view(result, "plot")(result, **options)
     _shown_in_notebooks()
     return drawn
+
+
+def can_draw() -> bool:
+    """Whether matplotlib is installed, which figures need and nothing else does."""
+    try:
+        return find_spec("matplotlib") is not None
+    except ValueError:  # taken out of sys.modules
+        return False
 
 
 def _shown_in_notebooks() -> None:

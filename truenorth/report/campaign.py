@@ -37,7 +37,7 @@ COLUMNS = {
 def campaign_files(campaign: Campaign) -> dict[str, Write]:
     """Tables (summary, comparison, outcomes, convergence), figures as PNG and report.html; see :func:`truenorth.save`."""
     from truenorth.campaign.summary import outcomes
-    from truenorth.figures.campaign import plot_campaign
+    from truenorth.core.shown import can_draw
 
     tables = {
         "summary.csv": campaign.summary,
@@ -45,9 +45,11 @@ def campaign_files(campaign: Campaign) -> dict[str, Write]:
         "outcomes.csv": outcomes(campaign.table, campaign.case_names),
         "convergence.csv": campaign.convergence,
     }
-    figures = plot_campaign(campaign)
     files: dict[str, Write] = {name: partial(table.to_csv, index=False) for name, table in tables.items()}
-    files |= {f"{name}.png": figure.savefig for name, figure in figures.items()}
+    if can_draw():
+        from truenorth.figures.campaign import plot_campaign
+
+        files |= {f"{name}.png": figure.savefig for name, figure in plot_campaign(campaign).items()}
     files["report.html"] = lambda path: path.write_text(campaign_page(campaign, tables), encoding="utf-8")
     return files
 

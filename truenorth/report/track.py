@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
 from truenorth.core.language import translated as _
-from truenorth.figures.navigation import ellipses, track_unit
 from truenorth.figures.thinning import evenly
+from truenorth.figures.track import ellipses, track_unit
 from truenorth.report.chart import POINTS, Chart
 from truenorth.report.coast import WIDE, coast_within
 from truenorth.report.document import Panel
