@@ -31,7 +31,8 @@ LAGS, MOST_LAGS = 5, 60
 SCHULER = 5064.0  # s
 MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 LEAST_CORRELATION = 0.05  # mean over the first lags
-BODY = ("odometer", "velocity log", "zero velocity", "zero rotation")
+REST = ("zero velocity", "zero rotation")
+BODY = ("odometer", "velocity log", *REST)
 
 
 def mean_nis(source: Residuals) -> float | None:
@@ -92,12 +93,12 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
         Whether heading comes from motion alone: velocities in body axes then have no part in it.
     """
     found: list[Evidence] = []
+    sources = [source for source in sources if len(source.time)]
+    at_rest = any(source.name in REST and _mostly_rejected(source) for source in sources)
     for source in sources:
         count = len(source.time)
-        if count == 0:
-            continue
         rejected = int(np.sum(~source.used))
-        if rejected > limit("rejected") * count:
+        if _mostly_rejected(source):
             size = float(np.median(np.sqrt(np.nansum(source.innovation**2, axis=1))))
             where = _elsewhere(source)
             found.append(
@@ -105,8 +106,7 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
                 if where is not None
                 else contradiction(
                     "innovations.rejected",
-                    "source",
-                    "specification",
+                    *_suspects(source, at_rest),
                     name=source.name,
                     rejected=rejected,
                     count=count,
@@ -151,6 +151,17 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
             figures: dict[str, Figure] = {"name": source.name, "size": size}
             found.append(Evidence("innovations.left", figures, "known", effect))
     return found
+
+
+def _mostly_rejected(source: Residuals) -> bool:
+    return int(np.sum(~source.used)) > limit("rejected") * len(source.time)
+
+
+def _suspects(source: Residuals, at_rest: bool) -> tuple[str, ...]:
+    """What to look at first: rest has no axes, unit or clock, and where it contradicts the track, so does the IMU."""
+    if source.name in REST:
+        return ("specification",)
+    return ("specification", "source") if at_rest else ("source", "specification")
 
 
 def _elsewhere(source: Residuals) -> tuple[str, str, float] | None:
