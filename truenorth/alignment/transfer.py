@@ -17,7 +17,7 @@ from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
 from truenorth.alignment.transfer_answer import assemble_transfer, final_attitudes
-from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, transfer_filter
+from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, delay_found, transfer_filter
 from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
@@ -206,7 +206,8 @@ def _passes(
         rows = Matching(FIRST_NOISE["velocity"], noise[1]) if velocity else Matching(*noise, kind)
         track = transfer_filter(part, master, model, start, rows, linear=linear)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
-        linear = _linear(part, master, model, track)
+        begin = linear.begin if linear is not None else delay_found(model, track) if velocity else None
+        linear = _linear(part, master, model, track, begin)
     return noise, linear
 
 
@@ -244,7 +245,13 @@ def _three(values: Sequence[float], name: str, meaning: str) -> Array:
     return array
 
 
-def _linear(slave: ImuRecord, master: MasterRecord, model: TransferModel, track: TransferTrack) -> Linear:
+def _linear(
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    track: TransferTrack,
+    begin: tuple[float, float] | None = None,
+) -> Linear:
     """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master tells its own."""
     C_nb = np.full((len(master), 3, 3), np.nan)
     C_nb[track.row] = final_attitudes(slave, track)
@@ -252,7 +259,7 @@ def _linear(slave: ImuRecord, master: MasterRecord, model: TransferModel, track:
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
     tau = model.slice_of(DELAY)
-    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.aux[-1][tau][0]))
+    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.aux[-1][tau][0]), begin)
 
 
 def _refitted(

@@ -40,6 +40,8 @@ Integers = NDArray[np.int64]
 
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
 SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
+SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
+WIDER = 3.0  # the same master's velocity and force are not quite news to each other
 TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
 
@@ -78,6 +80,8 @@ class Linear:
     C_nm: Array
     C_nb: Array
     delay: float = 0.0  # s; beyond the known one
+    # s: what the filter begins with of it, and the sigma of that; as the start says when left out
+    begin: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -139,9 +143,12 @@ def transfer_filter(
     """
     values = np.zeros(model.states)
     values[BG], values[BA] = start.gyro_bias, start.accel_bias
+    P = start.P.copy()
+    if linear is not None and linear.begin is not None and (tau := model.slice_of(DELAY)) is not None:
+        values[tau], P[tau, tau] = linear.begin[0], linear.begin[1] ** 2
     begin = float(slave.time[0] - slave.steps[0])
     place = start.lat, start.lon, start.alt
-    at = Start(begin, start.C_nb, start.v_n, *place, start.gyro_bias, start.accel_bias, start.P[:15, :15])
+    at = Start(begin, start.C_nb, start.v_n, *place, start.gyro_bias, start.accel_bias, P[:15, :15])
     track = navigate_track(
         slave,
         at,
@@ -149,7 +156,7 @@ def transfer_filter(
         master_aiding(master, model, start, matching, linear, slave),
         interval=LONGEST_STEP,
         every=0,
-        prior=(start.P, values),
+        prior=(P, values),
     )
     if len(track.time) == 0:
         raise DataError(
@@ -157,6 +164,19 @@ def transfer_filter(
             f"runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s): check that both logs have the same clock"
         )
     return _by_rows(track, master.time - start.delay, model, start)
+
+
+def delay_found(model: TransferModel, track: TransferTrack) -> tuple[float, float] | None:
+    """The delay that a pass by velocity tells, with `WIDER` times its sigma, to begin the matching of acceleration with.
+
+    Over the onset of a manoeuvre (some tenths of a second) a force is no straight line: with a delay off by 50 ms its column is
+    wrong by several sigmas of a row, and the first rows would settle the delay falsely. None: there is no such state.
+    """
+    tau = model.slice_of(DELAY)
+    if tau is None:
+        return None
+    first, last = (float(np.sqrt(P[tau, tau][0, 0])) for P in (track.P[0], track.P[-1]))
+    return float(track.aux[-1][tau][0]), min(first, WIDER * last)
 
 
 def master_aiding(
@@ -269,15 +289,28 @@ def _quaternions(C: Array) -> Array:
 
 
 def _slopes(slave: ImuRecord, times: Array) -> Array:
-    """(M, 6) derivatives of the slave's rate and specific force, from means over `SLOPE` before and after; NaN at the ends."""
+    """(M, 6) derivatives of the slave's rate and specific force; NaN at the ends.
+
+    From means over `SLOPE` before and after; where those over `SHARP` differ by more than their noise, these: a mean that looks
+    ahead would see a manoeuvre begin before it does, and take the agreement of both forces until then for knowledge of the delay.
+    """
     edges = np.append(slave.time[0] - slave.steps[0], slave.time)
     whole = np.vstack([np.zeros(6), np.cumsum(np.column_stack(increments(slave)), axis=0)])
-    before, now, after = (
-        np.column_stack([np.interp(times + shift, edges, column) for column in whole.T])
-        for shift in (-SLOPE, 0.0, SLOPE)
-    )
+
+    def over(h: float) -> Array:
+        before, now, after = (
+            np.column_stack([np.interp(times + shift, edges, column) for column in whole.T]) for shift in (-h, 0.0, h)
+        )
+        return np.asarray((after - 2.0 * now + before) / h**2)
+
+    smooth, sharp = over(SLOPE), over(max(SHARP, slave.interval))
     inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
-    return np.where(inside[:, None], (after - 2.0 * now + before) / SLOPE**2, np.nan)
+    apart = np.abs(sharp - smooth)
+    noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
+    moved = np.any(apart > APART * noise, axis=1)[
+        :, None
+    ]  # all six alike: delay and arm are told apart by their columns
+    return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 
 def _acceleration(master: MasterRecord, place: Array | None) -> Array:

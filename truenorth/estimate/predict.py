@@ -126,26 +126,29 @@ def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: A
         t += done * samples.step[i]
     slow_gyro, slow_accel = model.sensors[0], model.sensors[1]
     for j in range(3):
-        before, after, force = 0.0, 0.0, 0.0
+        before, after, pushed, pushes = 0.0, 0.0, 0.0, 0.0
         T_before, T_after = 0.0, 0.0
         for k in range(first, last):
-            force += samples.dvel[k, j]
             if k < middle:
                 before += samples.dtheta[k, j]
+                pushed += samples.dvel[k, j]
                 T_before += samples.step[k]
             else:
                 after += samples.dtheta[k, j]
+                pushes += samples.dvel[k, j]
                 T_after += samples.step[k]
         T = T_before + T_after
         spin = (after / T_after - before / T_before) / (0.5 * T)
-        rate, force = (before + after) / T - aux[_BG + j], force / T - aux[_BA + j]
+        growth = (pushes / T_after - pushed / T_before) / (0.5 * T)
+        rate, force = (before + after) / T - aux[_BG + j], (pushed + pushes) / T - aux[_BA + j]
         if slow_gyro >= 0:
             rate -= aux[slow_gyro + j]
         if slow_accel >= 0:
             force -= aux[slow_accel + j]
-        now[NOW_RATE + j] = rate + spin * (t - at - 0.5 * (T_after - T_before))
+        since = t - at - 0.5 * (T_after - T_before)
+        now[NOW_RATE + j] = rate + spin * since
         now[NOW_SPIN + j] = spin
-        now[NOW_FORCE + j] = force
+        now[NOW_FORCE + j] = force + growth * since
 
 
 @compiled

@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Translation
-from truenorth.alignment.transfer_filter import Matching, SlaveStart, TransferTrack, transfer_filter
+from truenorth.alignment.transfer_filter import (
+    Linear,
+    Matching,
+    SlaveStart,
+    TransferTrack,
+    delay_found,
+    transfer_filter,
+)
 from truenorth.analysis.consistency import nees
 from truenorth.core.attitude import misalignment
 from truenorth.errors.master import ARM, DELAY, TransferModel
@@ -217,7 +224,13 @@ def _track(flights: Flights, run: Run, method: Method) -> TransferTrack:
     master = run.master if kind == "velocity" else run.felt
     if method.late == "extrapolated":
         master = extrapolated(master, flights.case.extra_delay)
-    return transfer_filter(run.slave, master, model, start, matching)
+    linear = None
+    if kind == "acceleration" and method.delay:
+        found = delay_found(model, transfer_filter(run.slave, master, model, start, Matching(VELOCITY_NOISE)))
+        assert found is not None
+        assert master.C_nb is not None
+        linear = Linear(master.C_nb, master.C_nb, found[0], found)
+    return transfer_filter(run.slave, master, model, start, matching, linear=linear)
 
 
 def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:

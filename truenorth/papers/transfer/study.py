@@ -140,7 +140,8 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "10.5 m/s^2 for 25 s, and a rock of 47 deg (g tan 47 deg = 10.5 m/s^2).",
         "banked_turn_flexed: the slave's seat bends by 3, 3 and 6 arcmin (pitch, roll, heading) with a correlation time of 5 s; "
         "`flexure` has second-order Gauss-Markov states for it, 25 in all.",
-        "position and acceleration: noise 1 m and .02 m/s^2 (ours). In acceleration matching the arm is considered, not estimated.",
+        "position and acceleration: noise 1 m and .02 m/s^2 (ours). In acceleration matching the arm is considered, not estimated, "
+        "and the delay begins with what velocity tells of it, at three times its sigma.",
         "late_known, late_rough: 200 ms known, and 30 ms more that are not, with the paper's arm. `extrapolated`: along a line "
         "through the rows of the last second; `past_state`: the row is taken at its own time and the state carried on from there; "
         "`augmented`: nothing is known of the delay, .25 s in P0.",
