@@ -1,11 +1,12 @@
 """The matrix of mismatch: every procedure, each error on and off, in one table with marks.
 
-Run: ``python -m benchmarks.honesty --runs 20 --markdown``; ``--only damping`` for a part. The worlds are drawn from seed and run.
+Run: ``python -m benchmarks.honesty --runs 20 --markdown``; ``--only damping`` for a part, ``--page docs/honesty.md`` puts the rows
+into the page. The worlds are drawn from seed and run.
 """
 
 from __future__ import annotations
 
-from benchmarks.honesty import damping, navigation, staying, transfer, turning
+from benchmarks.honesty import circling, damping, navigation, staying, transfer, turning
 from benchmarks.honesty.frame import main
 from benchmarks.honesty.harness import framed
 
@@ -15,6 +16,7 @@ CASES = (
     *transfer.CASES,
     *damping.CASES,
     *navigation.CASES,
+    *circling.CASES,
 )
 
 if __name__ == "__main__":

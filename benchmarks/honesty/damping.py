@@ -6,6 +6,7 @@ Run: ``python -m benchmarks.honesty.damping --runs 20``.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from benchmarks.honesty.frame import Case, Outcome, main
@@ -19,16 +20,34 @@ BODY = LogErrors(scale=0.005, mounting=math.radians(0.3), bias=0.1)
 
 
 def damped(
-    method: str, true: LogErrors, assumed: Any = None, frame: str = "navigation", spec: ImuSpec = SPEC, **options: Any
+    method: str,
+    true: LogErrors,
+    assumed: Any = None,
+    frame: str = "navigation",
+    spec: ImuSpec = SPEC,
+    fixed: bool = False,
 ) -> Any:
     """A run of a method: a log with errors drawn from `true`, taken for `assumed`; None: as it is by default."""
 
     def run(seed: int, number: int) -> Outcome:
         ship = voyage(seed, number, spec=spec)
-        aid = VelocityLog(ship.log(true, frame), errors=assumed)
-        return ship.outcome(ship.navigated(aid, imu=spec, damping=Damper(method), output=4.0, **options))
+        aid = [VelocityLog(ship.log(true, frame), errors=assumed), *([ship.fixes()] if fixed else [])]
+        result = ship.navigated(aid, imu=spec, damping=Damper(method), output=8.0)
+        return ship.outcome(result, drifts=fixed)
 
     return run
+
+
+def switched(seed: int, number: int) -> Outcome:
+    """Internal damping in hard turns, switched; its RMS of velocity, undamped and always damped compared."""
+    ship = voyage(seed, number)
+    none, on, found = (
+        ship.navigated(damping=damper, output=8.0)
+        for damper in (Damper("none"), Damper("internal", switching=False), Damper("internal"))
+    )
+    sizes = (ship.velocity_error(result) for result in (none, on, found))
+    words = "undamped {:.2f}, always damped {:.2f}, switched {:.2f} m/s".format(*sizes)
+    return replace(ship.outcome(found), said=words)
 
 
 def current(hours: float) -> LogErrors:
@@ -54,9 +73,12 @@ CASES = (
         for method in ("external", "kalman", "double")
         for name, true in (("constant error .3 m/s", CONSTANT), ("current .5 m/s, 3 h", current(3.0)))
     ),
+    Case(
+        "damping augmented", "fixes at 10 and 20 h; current .5 m/s, 3 h", damped("augmented", current(3.0), fixed=True)
+    ),
     Case("damping double", "IMU five times worse", damped("double", CONSTANT, CONSTANT, spec=scaled(5.0))),
     Case("damping double", "IMU five times better", damped("double", CONSTANT, CONSTANT, spec=scaled(0.2))),
-    Case("damping internal", "hard turns", damped("internal", CONSTANT)),
+    Case("damping internal", "hard turns, switched", switched),
 )
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,16 +116,37 @@ def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> Line:
 def as_markdown(lines: Sequence[Line]) -> str:
     """The table for the documents."""
     rows = [HEADER, ["---"] * len(HEADER), *(line.cells() for line in lines)]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    return "\n".join(_row(row) for row in rows)
+
+
+def onto_page(page: Path, line: Line) -> None:
+    """Put a row into the page's table: in its old place, or at the end of its procedure's."""
+    text = page.read_text("utf-8").splitlines()
+    rule = text.index(_row(["---"] * len(HEADER)))
+    first = last = rule + 1
+    while last < len(text) and text[last].startswith("|"):
+        last += 1
+    own = [_row([*line.cells()[:n], ""]).rstrip("| ") + " |" for n in (1, 2)]
+    of_procedure, same = ([k for k in range(first, last) if text[k].startswith(start)] for start in own)
+    if same:
+        text[same[0]] = _row(line.cells())
+    else:
+        text.insert(of_procedure[-1] + 1 if of_procedure else last, _row(line.cells()))
+    page.write_text("\n".join(text) + "\n", "utf-8")
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
 
 
 def main(cases: Sequence[Case], about: str = "RMS of error over sigma, refusals, and the worst run") -> None:
-    """Command line: ``--runs``, ``--seed``, ``--only`` part of a name or procedure, ``--markdown``, ``--verbose``."""
+    """Command line: ``--runs``, ``--seed``, ``--only`` part of a name or procedure, ``--markdown``, ``--page``, ``--verbose``."""
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="cases with this in their procedure or name")
     parser.add_argument("--markdown", action="store_true", help="the table as the documents have it")
+    parser.add_argument("--page", type=Path, help="a page whose table gets each row as it is done: docs/honesty.md")
     parser.add_argument("--verbose", action="store_true")
     given = parser.parse_args()
     lines = []
@@ -133,6 +155,8 @@ def main(cases: Sequence[Case], about: str = "RMS of error over sigma, refusals,
             continue
         line = run_case(case, given.seed, given.runs, given.verbose)
         lines.append(line)
+        if given.page is not None:
+            onto_page(given.page, line)
         print("  ".join([*line.cells(), f"{line.seconds:.1f} s each"]), flush=True)
         for why in line.refused if given.verbose else line.refused[:2]:
             print(f"    refused: {why}", flush=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty.frame import Case, Outcome, main
-from benchmarks.honesty.voyage import HOUR, Voyage, voyage
+from benchmarks.honesty.voyage import HOUR, PLUMB, Voyage, voyage
 from truenorth.aiding.aids import Gnss, VelocityLog
 from truenorth.core.earth import radii
 from truenorth.errors.deflection import Deflection
@@ -19,7 +19,6 @@ from truenorth.errors.log import LogErrors
 from truenorth.navigation import Mounting
 from truenorth.records import GnssRecord
 
-PLUMB = Deflection()
 NONE = Deflection(0.0)
 LOG = LogErrors(drift=0.5, drift_time=3.0 * HOUR, scale=0.005, mounting=math.radians(0.3), bias=0.1)
 
@@ -39,12 +38,28 @@ def navigated(true: Deflection, assumed: Deflection, aided: str = "", hours: flo
     """A run: free, or aided by GNSS, with a plumb line that is deflected."""
 
     def run(seed: int, number: int) -> Outcome:
-        ship = voyage(seed, number, hours=hours, turns=bool(aided), deflection=true)
+        ship = voyage(seed, number, hours=hours, turns=bool(aided), plumb=true)
         aid = [fixes(ship)] if aided else []
-        result = ship.navigated(aid, errors=assumed.groups, check_clocks=False)
+        result = ship.navigated(aid, deflection=assumed, check_clocks=False)
         return ship.outcome(result, tuple(hours * share for share in (0.4, 0.6, 0.8, 1.0)))
 
     return run
+
+
+def fixed(seed: int, number: int) -> Outcome:
+    """A run: free for 30 h, two places and azimuths from outside."""
+    ship = voyage(seed, number)
+    result = navigate(
+        ship.record,
+        ship.start,
+        aid=ship.fixes(),
+        altitude="fixed",
+        imu=SPEC,
+        interval=4.0,
+        output=60.0,
+        check_clocks=False,
+    )
+    return ship.outcome(result, drifts=True)
 
 
 def with_log(true: LogErrors, assumed: LogErrors) -> Any:
@@ -53,7 +68,8 @@ def with_log(true: LogErrors, assumed: LogErrors) -> Any:
     def run(seed: int, number: int) -> Outcome:
         ship = voyage(seed, number, hours=12.0)
         aid = VelocityLog(ship.log(true, "body"), Mounting(noise=0.05 / math.sqrt(ship.truth.interval)), assumed)
-        return ship.outcome(ship.navigated(aid, check_clocks=False), (3.0, 6.0, 9.0, 12.0))
+        result = ship.navigated(aid, check_clocks=False)
+        return ship.outcome(result, (3.0, 6.0, 9.0, 12.0))
 
     return run
 
@@ -70,6 +86,7 @@ CASES = (
         left_out=True,
     ),
     Case("navigation, GNSS", "deflection 6 arcsec over 20 km", navigated(PLUMB, PLUMB, "gnss", 6.0)),
+    Case("navigation, fixes", "place and azimuth at 10 and 20 h", fixed),
     Case("navigation, speed log", "current, scale, mounting, bias", with_log(LOG, LOG)),
     Case("navigation, speed log", "none of them", with_log(LogErrors(), LogErrors())),
 )

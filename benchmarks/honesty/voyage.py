@@ -1,17 +1,20 @@
-"""Voyages for the cases of damping and navigation: a ship at 20 deg N that turns hard, its IMU, its start, its log."""
+"""Voyages for the cases of damping and navigation: a ship that turns hard, its IMU, its start, its log; all drawn in each run.
+
+The plumb line is deflected along the way, and the INS has levelled itself by it: the earth has it, the simulator does not.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.honesty.frame import Outcome
+from truenorth.aiding.fixes import AzimuthFix, Fixes, PositionFix
+from truenorth.core.earth import radii
 from truenorth.core.position import Position
 from truenorth.core.units import parse
 from truenorth.damping.course import Course, errors_of
@@ -25,6 +28,7 @@ from truenorth.simulation import ideal_log, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
 from truenorth.simulation.processes import gauss_markov
+from truenorth.state import layout as ins
 
 Array = NDArray[np.float64]
 HOUR, DEG = 3600.0, math.radians(1.0)
@@ -38,6 +42,7 @@ SPEC = ImuSpec(
 )
 INTERVAL = 4.0  # s, of the IMU: turns of 1 deg/s are smooth in it
 NOISE = 0.05  # m/s, of the log in a second
+PLUMB = Deflection()
 
 
 def scaled(factor: float) -> ImuSpec:
@@ -46,10 +51,13 @@ def scaled(factor: float) -> ImuSpec:
     return replace(SPEC, **{name: factor * getattr(SPEC, name) for name in names})
 
 
-@cache
-def passage(hours: float, lat: float, turns: bool) -> tuple[Any, Course]:
-    """Ideal log and true course: 10 m/s, a turn of 60 to 170 deg at 1 deg/s every 20 to 80 minutes, or straight on."""
-    rng = np.random.default_rng([17, round(hours)])
+def passage(rng: np.random.Generator, hours: float, turns: bool = True) -> tuple[Any, Course]:
+    """Ideal log and true course: from a place up to 60 deg N or S, on any heading, at 4 to 12 m/s.
+
+    A turn of 60 to 170 deg at 1 deg/s every 20 to 80 minutes, or straight on.
+    """
+    place = Position.from_degrees(rng.uniform(-60.0, 60.0), rng.uniform(-180.0, 180.0))
+    heading, speed = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(4.0, 12.0)
     legs, length = [], 0.0
     while turns and length < hours * HOUR:
         part = straight(rng.uniform(1200.0, 4800.0)) + turn(
@@ -57,7 +65,7 @@ def passage(hours: float, lat: float, turns: bool) -> tuple[Any, Course]:
         )
         legs += part
         length += sum(leg.duration for leg in part)
-    way = course(Position.from_degrees(lat, 115.0), legs, heading=0.9, speed=10.0)
+    way = course(place, legs, heading=heading, speed=speed)
     ideal = ideal_log(way, rate=1.0 / INTERVAL, duration=hours * HOUR)
     at = way.states(ideal.edges)
     return ideal, Course(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
@@ -70,6 +78,7 @@ class Voyage:
     record: ImuRecord
     start: Start
     truth: Course
+    gyro_bias: Array  # (3,) rad/s
     rng: np.random.Generator  # for its sensors
 
     def log(self, errors: LogErrors, frame: str = "navigation") -> VelocityRecord:
@@ -92,19 +101,43 @@ class Voyage:
             v = np.einsum("kij,ki->kj", truth.C_nb, v)
         return VelocityRecord(truth.time, v, frame)  # type: ignore[arg-type]  # one of the two
 
-    def navigated(self, aid: Any, *, imu: ImuSpec = SPEC, output: float = 60.0, **options: Any) -> Any:
+    def navigated(self, aid: Any = (), *, imu: ImuSpec = SPEC, output: float = 60.0, **options: Any) -> Any:
         """The record navigated from its start, its height held."""
         return navigate(
             self.record, self.start, aid=aid, altitude="fixed", imu=imu, interval=INTERVAL, output=output, **options
         )
 
-    def outcome(self, result: Any, hours: tuple[float, ...] = (6.0, 12.0, 18.0, 24.0)) -> Outcome:
-        """Errors of a navigation over its sigmas at some hours."""
+    def fixes(self, hours: tuple[float, ...] = (10.0, 20.0)) -> Fixes:
+        """Places to 100 m and azimuths to .05 deg at some hours."""
+        positions, azimuths = [], []
+        for h in hours:
+            k = round(h * HOUR / self.truth.interval)
+            time, (lat, lon, _), C = float(self.truth.time[k]), self.truth.position[k], self.truth.C_nb[k]
+            (north, east, turn), (R_M, R_N) = self.rng.standard_normal(3), radii(lat)
+            lat, lon = lat + 100.0 * north / R_M, lon + 100.0 * east / (R_N * math.cos(lat))
+            positions.append(PositionFix(time, float(lat), float(lon), 100.0))
+            azimuths.append(AzimuthFix(time, math.atan2(C[0, 1], C[1, 1]) + 0.05 * DEG * turn, 0.05 * DEG))
+        return Fixes(tuple(positions), tuple(azimuths))
+
+    def _errors(self, result: Any) -> tuple[Array, Array]:
+        """Times and errors (K, 7) of a navigation."""
         found = Course(result.time, result.C_nb, result.v_n, result.position)
         rows = np.round((found.time - self.truth.time[0]) / self.truth.interval).astype(int)
         truth = Course(*(a[rows] for a in (self.truth.time, self.truth.C_nb, self.truth.v_n, self.truth.position)))
-        k = np.unique([int(np.argmin(np.abs(found.time - h * HOUR))) for h in hours])
-        e, s = errors_of(found, truth)[k], result.track.sigma[k]
+        return found.time, errors_of(found, truth)
+
+    def velocity_error(self, result: Any, after: float = 6.0) -> float:
+        """RMS of an axis, m/s, from some hours on."""
+        time, e = self._errors(result)
+        return float(np.sqrt(np.mean(e[time >= after * HOUR, DV] ** 2)))
+
+    def outcome(
+        self, result: Any, hours: tuple[float, ...] = (6.0, 12.0, 18.0, 24.0, 30.0), drifts: bool = False
+    ) -> Outcome:
+        """Errors of a navigation over its sigmas at some hours."""
+        time, e = self._errors(result)
+        k = np.unique([int(np.argmin(np.abs(time - h * HOUR))) for h in hours])
+        e, s = e[k], result.track.sigma[k]
         sigma = s[:, OF_INS[MOTION]]
         ratio = e / sigma
         ratios = {
@@ -113,6 +146,9 @@ class Voyage:
             "heading": ratio[:, PHI][:, 2],
             "level": ratio[:, PHI][:, :2],
         }
+        if drifts:
+            off = result.track.sensors[-1, ins.BG] - self.gyro_bias
+            ratios["gyro drift"] = off / result.track.sigma[-1, ins.BG]
         bad = "" if result.status == "navigated" else f"{result.status}: {result.reasons[0]}"
         said = f"of {np.round(e[-1, DP])} m, sigma {np.round(sigma[-1, DP])} m"
         return Outcome(ratios, bad, said)
@@ -122,35 +158,41 @@ def voyage(
     seed: int,
     run: int,
     *,
-    hours: float = 24.0,
-    lat: float = 20.0,
+    hours: float = 30.0,
     turns: bool = True,
     spec: ImuSpec = SPEC,
-    deflection: Deflection | None = None,
-    sigmas: Mapping[int, float] | None = None,
+    plumb: Deflection = PLUMB,
 ) -> Voyage:
-    """A voyage, errors drawn from the specification and `SIGMA`.
-
-    With a deflection the plumb line is deflected along the way; at the start the INS is levelled by it.
-    """
+    """A voyage, errors drawn from the specification and `SIGMA`, and the plumb line from `plumb`."""
+    ideal, truth = passage(np.random.default_rng([seed, run, 17]), hours, turns)
     rng = np.random.default_rng([seed, run, 3])
-    ideal, truth = passage(hours, lat, turns)
     sigma = SIGMA.copy()
     sigma[BG], sigma[BA] = spec.gyro_bias, spec.accel_bias
     x0 = sigma * rng.standard_normal(13)
     walks = ImuSpec(gyro_random_walk=spec.gyro_random_walk, accel_random_walk=spec.accel_random_walk)
     record = simulate(ideal, imu=walks, seed=seed, run=run, errors={"gyro_bias": x0[BG], "accel_bias": x0[BA]}).record
-    if deflection is not None:
-        xi = deflected_along(truth, deflection, rng)
+    P = np.zeros((15, 15))
+    P[np.ix_(OF_INS, OF_INS)] = np.diag(sigma**2)
+    if plumb.sigma > 0.0:
+        xi = deflected_along(truth, plumb, rng)
         mean = 0.5 * (xi[1:] + xi[:-1]) * STANDARD_GRAVITY
         pushed = np.einsum("kij,ki->kj", truth.C_nb[1:, :2], mean)
         record = replace(record, accel=record.accel + pushed * (1.0 if record.kind == "rates" else INTERVAL))
+        levelled = at_rest_columns(truth.C_nb[0], float(truth.position[0, 0]))
+        x0[PHI] += levelled[ins.PHI] @ xi[0]
+        P += plumb.sigma**2 * levelled @ levelled.T
     begin = truth.between(0, 1).corrected(-x0[:7])
-    P = np.zeros((15, 15))
-    P[np.ix_(OF_INS, OF_INS)] = np.diag(sigma**2)
-    lat0, lon0, alt0 = begin.position[0]
-    start = Start(0.0, begin.C_nb[0], begin.v_n[0], lat0, lon0, alt0, np.zeros(3), np.zeros(3), P)
-    return Voyage(record, start, truth, rng)
+    lat, lon, alt = begin.position[0]
+    start = Start(0.0, begin.C_nb[0], begin.v_n[0], lat, lon, alt, np.zeros(3), np.zeros(3), P, plumb=plumb.sigma)
+    return Voyage(record, start, truth, x0[BG], rng)
+
+
+def at_rest_columns(C_nb: Array, lat: float) -> Array:
+    """(15, 2) what a deflection east, north does to an INS that levels itself: it tilts, and takes it for an accelerometer bias."""
+    tilt = np.array([[0.0, -1.0], [1.0, 0.0], [math.tan(lat), 0.0]])
+    out = np.zeros((15, 2))
+    out[ins.PHI], out[ins.BA] = tilt, STANDARD_GRAVITY * C_nb[:2].T
+    return out
 
 
 def deflected_along(truth: Course, deflection: Deflection, rng: np.random.Generator) -> Array:

@@ -13,7 +13,6 @@ from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.prior import carried_prior, paper_prior
 from truenorth.errors.log import LogErrors
 from truenorth.errors.marine import BA, BG, DP, DV, OF_INS, PHI, REF, MarineModel
-from truenorth.papers.damping.truth import drawn
 from truenorth.simulation import simulate
 from truenorth.strapdown.level import NavigationState, mechanise
 
@@ -145,7 +144,7 @@ def test_the_augmented_filter_is_honest():
     nees = {hours: [] for hours in (4, 8, 24)}
     for run in range(runs):
         rng = np.random.default_rng([17, run])
-        x0 = SIGMA * drawn(rng.standard_normal(13))
+        x0 = SIGMA * rng.standard_normal(13)
         c = 0.3 * rng.standard_normal(2)
         course = _navigated(ideal, truth, x0, spec, run)
         found = run_filters(

@@ -7,14 +7,15 @@ import pytest
 
 from tests.damping.marine_case import HOUR, ideal_and_truth
 from tests.damping.test_filters import SIGMA, WALKS, reference
+from tests.runs import few_and_all
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
 from truenorth.damping.bands import filter_bands
 from truenorth.damping.drift import likely_drift
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
+from truenorth.damping.navigation import change_filter
 from truenorth.errors.log import BIAS, LOGS, LogErrors, log_errors, log_rows
-from truenorth.errors.marine import BG, DP, PHI, MarineModel
-from truenorth.papers.damping.truth import drawn
+from truenorth.errors.marine import BA, BG, DP, PHI, MarineModel
 from truenorth.simulation.processes import gauss_markov
 
 
@@ -46,9 +47,9 @@ def truth():
     return ideal_and_truth(hours=12.0)[1]
 
 
-def free(truth, model, rng):
-    """A course with errors of the linear model, drawn from `SIGMA`."""
-    x = SIGMA * drawn(rng.standard_normal(13))
+def free(truth, model, rng, sigma=SIGMA):
+    """A course with errors of the linear model, drawn from `sigma`."""
+    x = sigma * rng.standard_normal(13)
     _, Phi = truth.linearise(MarineModel(**WALKS))
     noise = np.sqrt(model.noise[:13] * truth.interval)
     states = [x]
@@ -145,28 +146,35 @@ def test_two_fixes_calibrate_the_gyros(truth):
     assert np.abs(found.x[first - 1, DP] - x[first - 1, DP]).max() > 100.0  # before the fix it was off
 
 
-@pytest.mark.parametrize("factor", [0.2, 5.0])
-def test_bands_of_the_double_filter_follow_the_imu(truth, factor):
-    """Filters 1 and 2 fused, driven by an IMU five times better or worse: RMS over 12 voyages, all states, against the bands.
+@few_and_all(24)
+def test_bands_of_the_double_filter_follow_imu_and_place(runs):
+    """Filters 1 and 2 fused, as `navigate` runs them: place, heading, IMU (five times better to worse) drawn in each voyage.
 
-    The states hang together; some four of seven are independent: 99.9 % of ``sqrt(chi2/n)`` with 48 degrees of freedom.
+    RMS against the bands, all states at the end: some four of seven are independent, 99.9 % of ``sqrt(chi2/n)``. Against the
+    fusion's own sigma, which knows of no error of the log, they would be tens off.
     """
-    walks = {name: factor * value for name, value in WALKS.items()}
-    errors = LogErrors(0.3, math.inf)
-    model, whole_model = MarineModel(**walks), MarineModel(**walks, groups=errors.groups())
-    P0 = np.diag(SIGMA**2)
-    one = Filter(model, P0, 0.05)
-    two = Filter(model, P0, walks["accel_random_walk"] / math.sqrt(10.0), window=10.0)
-    whole = Filter(whole_model, whole_model.prior(P0), 0.05)
-    ratios = []
-    for run in range(12):
+    errors, ratios, own = LogErrors(0.3, math.inf), [], []
+    for run in range(runs):
         rng = np.random.default_rng([6, run])
-        x, course = free(truth, model, rng)
+        truth = ideal_and_truth.__wrapped__(rng.uniform(-70.0, 70.0), rng.uniform(0.0, 360.0), hours=12.0)[1]
+        factor = 5.0 ** rng.uniform(-1.0, 1.0)
+        walks, sigma = {name: factor * value for name, value in WALKS.items()}, SIGMA.copy()
+        sigma[[*range(13)[BG], *range(13)[BA]]] *= factor
+        model, whole_model = MarineModel(**walks), MarineModel(**walks, groups=errors.groups())
+        x, course = free(truth, model, rng, sigma)
         ref = reference(truth, 0.3 * rng.standard_normal(2), seed=run)
+        P0 = np.diag(sigma**2)
+        one = Filter(model, P0, 0.05, relinearise=True)
+        two = change_filter(one, errors, truth.interval)
+        whole = Filter(whole_model, whole_model.prior(P0), 0.05, relinearise=True)
         found = run_filters(course, ref, start=0, kinds={"filter1": one, "filter2": two})
         fused = Fusion(samples=360)(found["filter1"], found["filter2"], truth.interval)
         apart = (found["filter1"].x - found["filter2"].x)[:, :7]
-        bands = filter_bands(truth, whole, one, two, (fused.weight[:, :7], apart))
-        ratios.append((fused.x[-1, :7] - x[-1, :7]) / bands.errors[-1])
-    rms = float(np.sqrt(np.mean(np.array(ratios) ** 2)))
-    assert 0.69 < rms < 1.33
+        bands = filter_bands(course, whole, one, two, (fused.weight[:, :7], apart))
+        off = fused.x[-1, :7] - x[-1, :7]
+        ratios.append(off / bands.errors[-1])
+        own.append(off / fused.sigma[-1, :7])
+    rms, own_rms = (float(np.sqrt(np.mean(np.array(r) ** 2))) for r in (ratios, own))
+    room = 3.3 / math.sqrt(8 * runs)
+    assert 1.0 - room < rms < 1.0 + room
+    assert own_rms > 3.0

@@ -178,8 +178,8 @@ def navigate(
     smooth: Annotated[bool, option("Estimate each epoch from the whole log.", "--smooth", panel="The track")] = False,
     imu: Annotated[str | None, option("Specification; the alignment's own without it.")] = None,
     deflection: Annotated[
-        str | None, option("The vertical is deflected under way: '6 arcsec, 20 km', one sigma and over which distance.")
-    ] = None,
+        str, option("Of the vertical along the way: one sigma and over which distance, or none.")
+    ] = "6 arcsec, 20 km",
     every: Annotated[float | None, option("Seconds between rows of the track.", panel="The track")] = None,
     calibration: Annotated[Path | None, option("YAML file of known errors of the IMU, taken off first.")] = None,
     output: Annotated[
@@ -224,7 +224,8 @@ def navigate(
             smooth=smooth,
             imu=imu or known.imu_of(start),
             scale_factors="scale_factors" in sensors.parts,
-            errors=(*(sensors.error or ()), *_deflection(deflection).groups),
+            errors=tuple(sensors.error or ()),
+            deflection=_deflection(deflection),
             calibration=None if calibration is None else Calibration.from_file(calibration),
             output=every,
             damping=damper,
@@ -244,16 +245,16 @@ def navigate(
         raise typer.Exit(4)
 
 
-def _deflection(text: str | None) -> Deflection:
+def _deflection(text: str) -> Deflection:
     from truenorth.core.errors import UsageError
     from truenorth.core.units import parse
     from truenorth.errors.deflection import Deflection
 
-    if text is None:
+    if text == "none":
         return Deflection(0.0)
     first, comma, second = text.partition(",")
     if not comma:
-        raise UsageError(f"--deflection {text!r}: expected an angle and a distance, such as '6 arcsec, 20 km'")
+        raise UsageError(f"--deflection {text!r}: expected an angle and a distance, such as '6 arcsec, 20 km', or none")
     return Deflection(parse(first, "angle"), parse(second, "length"))
 
 

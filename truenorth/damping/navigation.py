@@ -295,7 +295,7 @@ def _damped(
         return _Found(x, None, estimate, None)
     model = MarineModel.from_spec(spec)
     one = Filter(model, whole.P0[:STATES, :STATES], reference.noise, relinearise=True)
-    two = None if damper.method == "kalman" else _change(one, errors, course.interval)
+    two = None if damper.method == "kalman" else change_filter(one, errors, course.interval)
     kinds = {"filter1": one} if two is None else {"filter1": one, "filter2": two}
     estimates = run_filters(course, reference.velocity, start=start, kinds=kinds)
     estimate, known = estimates["filter1"], None
@@ -310,7 +310,7 @@ def _damped(
     return _Found(x, filter_bands(rest, whole, one, two, known, absent), estimate, None)
 
 
-def _change(one: Filter, errors: LogErrors, interval: float) -> Filter:
+def change_filter(one: Filter, errors: LogErrors, interval: float) -> Filter:
     """Filter 2, of changes of the velocity that filter 1 smooths.
 
     What filter 1 takes in of noise changes its velocity as a random walk of the INS's own density ``q`` does, so that a change

@@ -31,7 +31,7 @@ from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
-from truenorth.navigation.procedure import FINE, LONGEST_BRIDGE, kept_altitude, start_of
+from truenorth.navigation.procedure import FINE, LONGEST_BRIDGE, PLUMB_LINE, kept_altitude, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
@@ -240,7 +240,8 @@ class Navigator:
         for key, feed in self.feeds.items():
             sources += feed.sources(self.altitude, self._mountings.get(key))
         sources.append(Aiding("gap", "velocity", np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), does="disturbance"))
-        model = InsModel.from_spec(self.spec.with_random_walks(self._interval), fixed_altitude=self.altitude == "fixed")
+        noise, fixed = self.spec.with_random_walks(self._interval), self.altitude == "fixed"
+        model = InsModel.from_spec(noise, groups=PLUMB_LINE.groups, fixed_altitude=fixed)
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
         return Setting(with_states(model, sources), tuple(sources), stride, every)
 

@@ -16,6 +16,7 @@ from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.rivals import counted_once, jump_evidence, wandering_evidence
@@ -54,6 +55,7 @@ LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may
 AIDS = (Gnss, Odometer, VelocityLog, Barometer)
 USUAL = {"baro": WEATHER}
 NEVER = Late(0, 0.0)
+PLUMB_LINE = Deflection()
 
 
 def navigate(
@@ -67,6 +69,7 @@ def navigate(
     imu: ImuSpec | str | None = None,
     scale_factors: bool = False,
     errors: Sequence[Group | str] = (),
+    deflection: Deflection = PLUMB_LINE,
     calibration: Calibration | None = None,
     check_clocks: bool = True,
     interval: float | None = None,
@@ -96,8 +99,9 @@ def navigate(
     scale_factors : bool
         Estimate the IMU's scale factors.
     errors : sequence of Group or str
-        Further error states of the INS, such as :class:`truenorth.errors.deflection.Deflection`'s, or names of plug-ins that make
-        them.
+        Further error states of the INS, or names of plug-ins that make them.
+    deflection : Deflection
+        Of the vertical along the way, a property of the earth; ``Deflection(0.0)``: there is none, as in a simulation.
     calibration : Calibration, optional
         Known errors, taken off first.
     check_clocks : bool
@@ -136,7 +140,7 @@ def navigate(
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     found = _sits_as_found(given, begin)
     height, why = kept_altitude(altitude, given)
-    fixed, groups = height == "fixed", groups_of(errors, noise)
+    fixed, groups = height == "fixed", groups_of((*errors, *deflection.groups), noise)
     model = InsModel.from_spec(noise, scale_factors=scale_factors, groups=groups, fixed_altitude=fixed)
     plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output))
     aiding = plan.sources(given)
