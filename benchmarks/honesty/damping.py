@@ -66,6 +66,11 @@ CASES = (
         for h in (1.0, 3.0, 12.0)
     ),
     Case("damping augmented", "body log: scale, mounting, bias; nothing said", damped("augmented", BODY, None, "body")),
+    Case(
+        "damping augmented",
+        "body log: current .5 m/s, 3 h, scale, mounting, bias; nothing said",
+        damped("augmented", replace(BODY, drift=0.5, drift_time=3.0 * HOUR), None, "body"),
+    ),
     Case("damping augmented", "body log: scale, mounting, bias; said", damped("augmented", BODY, BODY, "body")),
     Case("damping augmented", "constant error .3 m/s, nothing said", damped("augmented", CONSTANT)),
     *(
