@@ -49,16 +49,7 @@ def navigated(true: Deflection, assumed: Deflection, aided: str = "", hours: flo
 def fixed(seed: int, number: int) -> Outcome:
     """A run: free for 30 h, two places and azimuths from outside."""
     ship = voyage(seed, number)
-    result = navigate(
-        ship.record,
-        ship.start,
-        aid=ship.fixes(),
-        altitude="fixed",
-        imu=SPEC,
-        interval=4.0,
-        output=60.0,
-        check_clocks=False,
-    )
+    result = ship.navigated(ship.fixes(), check_clocks=False)
     return ship.outcome(result, drifts=True)
 
 
