@@ -35,6 +35,11 @@ def test_place_in_degrees_and_a_table(still):
         tn.align(still, (40.0,), "navigation")
     with pytest.raises(tn.UsageError, match="place is missing"):
         tn.align(still)
+    with pytest.raises(tn.UsageError, match="as `place`, not as position"):
+        tn.align(still, position=(40.0, 118.0))
+    with pytest.raises(tn.UsageError, match="'passes' is no option of an alignment of a base that stays"):
+        tn.align(still, PLACE, "navigation", passes=3)
+    assert tn.inspect(still.to_frame()).samples == len(still)
     with pytest.raises(tn.UsageError, match="gyro_x"):
         tn.align(still.to_frame().rename(columns=lambda name: f"my_{name}"), PLACE)
 

@@ -244,3 +244,10 @@ def test_what_no_sensor_measures_is_refused(kind, value):
     gyro[2, 0] = value
     with pytest.raises(DataError, match=r"row 3, column .*_x.*check the units"):
         ImuRecord(time, gyro, accel, kind)
+
+
+def test_a_record_is_shown_in_a_line():
+    record = GnssRecord(
+        np.array([1.0, 2.0]), *np.radians([[48.0, 48.0], [11.0, 11.0]]), np.array([5.0, 5.0]), source="g.csv"
+    )
+    assert repr(record) == "GnssRecord(g.csv: 2 rows, 1 to 2 s, 1 Hz; lat, lon, alt)"

@@ -238,6 +238,8 @@ _SUBMODULES = (
     "estimate",
     "filters",
     "formats",
+    "live",
+    "papers",
     "quality",
     "records",
     "simulation",

@@ -68,7 +68,10 @@ class Request:
             None was given.
         """
         if self.place is None:
-            raise UsageError("place is missing; expected a Position, or (lat, lon, alt) in degrees and metres")
+            instead = f" as `place`, not as {', '.join(self.options)}" if self.options else ""
+            raise UsageError(
+                f"place is missing; expected a Position, or (lat, lon, alt) in degrees and metres{instead}"
+            )
         return self.place
 
 
@@ -315,7 +318,13 @@ def align(
         raise UsageError(
             f"at={at:g}: with {recipe.name} the attitude holds at the log's end; cut the log there instead"
         )
-    return recipe(request)
+    try:
+        return recipe(request)
+    except TypeError as error:
+        wrong = next((name for name in options if f"unexpected keyword argument '{name}'" in str(error)), None)
+        if wrong is None:
+            raise
+        raise UsageError(f"{wrong!r} is no option of an alignment of {recipe.name}") from None
 
 
 def _recipe(kinds: set[type]) -> Recipe:

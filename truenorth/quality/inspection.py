@@ -205,10 +205,11 @@ def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
 
     Parameters
     ----------
-    record : ImuRecord
+    record : ImuRecord or DataFrame
     lat : float, rad, optional
         Latitude; lets the earth's rate be checked by its vertical part too.
     """
+    record = ImuRecord.of(record)
     motion = motion_summary(record)
     sampling, findings = check_sampling(record)
     turning, doubts = check_plausibility(record, motion, lat)

@@ -102,6 +102,11 @@ class Record(_Ordered):
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        held = ", ".join(name for name in self.groups() if self._holds(name))
+        span = f"{len(self)} rows, {self.time[0]:.10g} to {self.time[-1]:.10g} s, {self.rate:.4g} Hz"
+        return f"{type(self).__name__}({self.source}: {span}; {held})"
+
     @cached_property
     def interval(self) -> float:
         """Nominal sampling interval, s: the median step."""

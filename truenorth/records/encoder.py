@@ -13,7 +13,7 @@ from truenorth.records.base import Record
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class EncoderRecord(Record):
     """Angles of the axes of an indexer (rotation mechanism), the outermost first.
 

@@ -18,7 +18,7 @@ PLACE = {"lat": ("lat",), "lon": ("lon",), "alt": ("alt",)}
 HEIGHTS = (-12_000.0, 1_000_000.0)  # m
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class GnssRecord(Record):
     """Fixes of a GNSS receiver. What is absent in a row is NaN.
 
@@ -104,7 +104,7 @@ class GnssRecord(Record):
         return in_degrees(super().columns())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class HeightRecord(Record):
     """Heights of a barometer, or of any other sensor of height alone.
 

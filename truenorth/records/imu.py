@@ -25,7 +25,7 @@ COLUMNS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ImuRecord(Record):
     """Angular rates and specific forces of one IMU, or their increments.
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 WEAKEST, STRONGEST = 5e-6, 5e-4  # T: the earth's field is 22 to 67 uT, and iron adds to it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MagnetometerRecord(Record):
     """What a magnetometer of three axes measures.
 

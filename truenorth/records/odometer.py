@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 KINDS = ("distance", "pulses", "speed")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class OdometerRecord(Record):
     """What a wheel or transmission sensor counts.
 

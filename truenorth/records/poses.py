@@ -108,7 +108,7 @@ class Poses(Record):
         return table | {"roll": roll, "pitch": pitch, "heading": np.mod(heading, 360.0)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trajectory(Poses):
     """Attitude, velocity and position over time: the truth, or a solution.
 
@@ -136,7 +136,7 @@ class Trajectory(Poses):
     source: str = field(default="trajectory", compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MasterRecord(Poses):
     """The solution of another INS on the same vehicle, in its own axes and on its own clock.
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 COLUMNS = {"body": ("v_right", "v_forward", "v_up"), "navigation": ("VE", "VN", "VU")}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class VelocityRecord(Record):
     """Velocity over the ground (or through the water) from an external sensor.
 
