@@ -16,7 +16,13 @@ from truenorth.report.words import WORDS
 from truenorth.state.english import REMEDIES, SENTENCES, TERMS, TITLES
 
 HOME = Path(truenorth.__file__).parent
-METHODS = [("report/**.py", "python"), ("state/wording.py", "python"), ("report/templates/**.html", "jinja2")]
+METHODS = [
+    ("report/**.py", "python"),
+    ("cli/**.py", "python"),
+    ("quality/inspection.py", "python"),
+    ("state/wording.py", "python"),
+    ("report/templates/**.html", "jinja2"),
+]
 KEYWORDS = {"_": None, "translated": None}
 OTHERS = [code for code in LANGUAGES if code != "en"]
 

@@ -77,6 +77,7 @@ def test_the_program_speaks_the_language_it_is_asked_for(tmp_path):
         speak("en")
     assert done.exit_code == 0, done.output
     assert "航向不予给出" in done.output
+    assert "陀螺零偏，deg/h" in done.output
     page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
     assert '<html lang="zh">' in page
     for words in ("已调平；航向不予给出", "姿态", "陀螺零偏"):

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from truenorth.core.language import translated as _
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -72,7 +74,7 @@ def print_written(paths: Iterable[Path]) -> None:
     """Say which files were written."""
     console = make_console()
     for path in paths:
-        console.print(f"wrote {path}", soft_wrap=True)
+        console.print(_("wrote {path}").format(path=path), soft_wrap=True)
 
 
 @contextmanager

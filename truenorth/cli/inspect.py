@@ -10,6 +10,7 @@ from truenorth.cli.console import make_console, print_written
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, ReadingWindow, in_line
 from truenorth.cli.wording import in_options
+from truenorth.core.language import translated as _
 
 FIGURES = (".png", ".svg", ".pdf")
 
@@ -65,12 +66,12 @@ def inspect(
         return
     console = make_console()
     for guess in record.taken_for:
-        console.print(f"taken for {in_line(guess)}", soft_wrap=True)
+        console.print(_("taken for {guess}").format(guess=in_line(guess)), soft_wrap=True)
     console.print(found.table())
     colours = {"error": "red", "warning": "yellow", "note": "cyan"}
     for finding in found.findings:
         console.print(finding.severity, end=" ", style=colours[finding.severity])
         console.print(in_options(finding.message), soft_wrap=True)
     if not found.findings:
-        console.print("nothing wrong was found")
+        console.print(_("nothing wrong was found"))
     print_written(path for path in (plot, written) if path is not None)

@@ -17,6 +17,7 @@ from truenorth.cli.console import make_console, print_written, stages
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
+from truenorth.core.language import translated as _
 
 if TYPE_CHECKING:
     from truenorth.damping.options import Damper
@@ -286,27 +287,31 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     for reason in reasons_of(result):
         console.print(f"  {reason}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
-    for title in (f"at {s['end_s']:.1f} s", "", "one sigma"):
-        table.add_column(title, justify="left" if title.startswith("at") else "right")
+    table.add_column(_("at {time:.1f} s").format(time=s["end_s"]))
+    for title in ("", _("one sigma")):
+        table.add_column(title, justify="right")
     sigma = s["position_sigma_m"]
-    table.add_row("latitude", f"{s['lat_deg']:.7f} deg", f"{sigma[1]:.2f} m")
-    table.add_row("longitude", f"{s['lon_deg']:.7f} deg", f"{sigma[0]:.2f} m")
-    table.add_row("height", f"{s['alt_m']:.2f} m", f"{sigma[2]:.2f} m")
-    for name, v, v_sigma in zip(("east", "north", "up"), s["v_n_m_s"], s["v_n_sigma_m_s"]):
-        table.add_row(f"velocity {name}", f"{v:.3f} m/s", f"{v_sigma:.3f} m/s")
+    table.add_row(_("latitude"), f"{s['lat_deg']:.7f} deg", f"{sigma[1]:.2f} m")
+    table.add_row(_("longitude"), f"{s['lon_deg']:.7f} deg", f"{sigma[0]:.2f} m")
+    table.add_row(_("height"), f"{s['alt_m']:.2f} m", f"{sigma[2]:.2f} m")
+    names = _("velocity east"), _("velocity north"), _("velocity up")
+    for name, v, v_sigma in zip(names, s["v_n_m_s"], s["v_n_sigma_m_s"]):
+        table.add_row(name, f"{v:.3f} m/s", f"{v_sigma:.3f} m/s")
     for name in ("heading", "pitch", "roll"):
-        table.add_row(name, f"{s[f'{name}_deg']:.4f} deg", f"{s[f'{name}_sigma_deg']:.4f} deg")
+        table.add_row(_(name), f"{s[f'{name}_deg']:.4f} deg", f"{s[f'{name}_sigma_deg']:.4f} deg")
     console.print(table)
     for name, told in s["aiding"].items():
-        nis = "none used" if told["nis_over_rows"] is None else f"NIS over rows {told['nis_over_rows']:.2f}"
-        console.print(
-            f"{name}: {told['measurements']} measurements, {told['rejected']} rejected, {nis}", soft_wrap=True
-        )
+        used = told["nis_over_rows"] is not None
+        nis = _("NIS over rows {nis:.2f}").format(nis=told["nis_over_rows"]) if used else _("none used")
+        counts = _("{name}: {count} measurements, {rejected} rejected, {nis}")
+        said = counts.format(name=_(name), count=told["measurements"], rejected=told["rejected"], nis=nis)
+        console.print(said, soft_wrap=True)
     for name, told in s["estimated"].items():
         if not name.startswith("slow"):
             shown = ", ".join(f"{v:.4g} ± {e:.2g}" for v, e in zip(told["value"], told["sigma"]))
-            console.print(f"{name}: {shown}", soft_wrap=True)
+            console.print(f"{_(name)}: {shown}", soft_wrap=True)
     if result.damping is not None:
-        console.print(f"damping: {result.damping.in_words()}", soft_wrap=True)
-    console.print(f"height: {result.altitude}; IMU: {result.imu_source}", soft_wrap=True)
+        console.print(_("damping: {how}").format(how=result.damping.in_words()), soft_wrap=True)
+    height = _("height: {how}; IMU: {source}").format(how=_(result.altitude), source=_(result.imu_source))
+    console.print(height, soft_wrap=True)
     print_written(paths)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truenorth.core.language import translated as _
 from truenorth.core.shown import Shown
 from truenorth.core.units import parse_unit
 from truenorth.quality.plausibility import Turning, check_plausibility
@@ -161,8 +162,8 @@ class Inspection(Shown):
             "to_s": self.noise_from.stop,
             "motion": self.noise_from.kind,
         }
-        for key, _, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
-            factor, _ = parse_unit(unit)
+        for key, _words, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
+            factor = parse_unit(unit)[0]
             table[key] = [_figure(value / factor) for value in getattr(noise, name)]
             table[f"{key}_sigma"] = [_figure(value / factor) for value in getattr(noise, f"{name}_sigma")]
         return table
@@ -173,30 +174,31 @@ class Inspection(Shown):
 
         table = Table("figure", "value", title=self.source, title_justify="left", show_header=False)
         sampling, motion = self.sampling, self.motion
-        table.add_row("duration", f"{self.duration:.3f} s, {self.samples} samples from {self.start:.3f} s")
-        table.add_row(
-            "rate",
-            f"{1.0 / self.interval:.4g} Hz, jitter {sampling.jitter_rms * 1e3:.3f} ms RMS, "
-            f"{sampling.jitter_max * 1e3:.3f} ms at most",
-        )
-        table.add_row("gaps", str(sampling.gap_times.size))
-        table.add_row("repeated rows", f"{sampling.repeated_rows} ({sampling.repeated_rows / self.samples:.1%})")
-        table.add_row("saturated rows", str(int(sampling.saturated_rows.sum())))
+        span = _("{duration:.3f} s, {samples} samples from {start:.3f} s")
+        table.add_row(_("duration"), span.format(duration=self.duration, samples=self.samples, start=self.start))
+        pace = _("{rate:.4g} Hz, jitter {rms:.3f} ms RMS, {most:.3f} ms at most")
+        jitter = {"rms": sampling.jitter_rms * 1e3, "most": sampling.jitter_max * 1e3}
+        table.add_row(_("rate"), pace.format(rate=1.0 / self.interval, **jitter))
+        table.add_row(_("gaps"), str(sampling.gap_times.size))
+        table.add_row(_("repeated rows"), f"{sampling.repeated_rows} ({sampling.repeated_rows / self.samples:.1%})")
+        table.add_row(_("saturated rows"), str(int(sampling.saturated_rows.sum())))
         shares = {kind: motion.fraction(kind) for kind in (*KINDS, "unknown")}
-        table.add_row("motion", ", ".join(f"{kind} {share:.0%}" for kind, share in shares.items() if share > 0.0))
+        table.add_row(_("motion"), ", ".join(f"{_(kind)} {share:.0%}" for kind, share in shares.items() if share > 0.0))
         if motion.time.size:
-            table.add_row("angular amplitude", f"{np.degrees(motion.angular_amplitude):.3g} deg")
-            table.add_row("rate, RMS of 1 s means", f"{np.degrees(motion.rate_rms):.3g} deg/s")
-            table.add_row("acceleration, RMS of 1 s means", f"{motion.acceleration_rms:.3g} m/s^2")
+            table.add_row(_("angular amplitude"), f"{np.degrees(motion.angular_amplitude):.3g} deg")
+            table.add_row(_("rate, RMS of 1 s means"), f"{np.degrees(motion.rate_rms):.3g} deg/s")
+            table.add_row(_("acceleration, RMS of 1 s means"), f"{motion.acceleration_rms:.3g} m/s^2")
         if self.gyro_noise is not None and self.accel_noise is not None and self.noise_from is not None:
-            where = f"{self.noise_from.kind}, {round(self.noise_from.start)} to {round(self.noise_from.stop)} s"
-            table.add_row("noise x, y, z from", where)
-            for _, words, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
-                factor, _ = parse_unit(unit)
+            rest = self.noise_from
+            where = _("{kind}, {start} to {stop} s")
+            where = where.format(kind=_(rest.kind), start=round(rest.start), stop=round(rest.stop))
+            table.add_row(_("noise x, y, z from"), where)
+            for _key, words, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
+                factor = parse_unit(unit)[0]
                 values = getattr(noise, name) / factor
                 if np.any(values > 0.0):
                     shown = ", ".join(f"{value:.3g}" if value > 0.0 else "-" for value in values)
-                    table.add_row(f"  {words}", f"{shown} {unit}")
+                    table.add_row(f"  {_(words)}", f"{shown} {unit}")
         return table
 
 

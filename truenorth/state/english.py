@@ -47,7 +47,7 @@ SENTENCES = {
         "{bias:deg/h|} deg/h hide true north there"
     ),
     "heading.bias": (
-        "gyro bias can be {bias:deg/h|} deg/h ({imu}); a heading within {limit:deg|g} deg at latitude {lat:deg|.1f} deg needs "
+        "gyro bias can be {bias:deg/h|} deg/h ({imu:term}); a heading within {limit:deg|g} deg at latitude {lat:deg|.1f} deg needs "
         "{needed:deg/h|.2g} deg/h or better: heading is refused"
     ),
     "heading.short": (
@@ -86,15 +86,15 @@ SENTENCES = {
         "ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
     "rate.misses": (
-        "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification ({imu}) "
-        "allows {allowed:deg/h|} deg/h"
+        "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification "
+        "({imu:term}) allows {allowed:deg/h|} deg/h"
     ),
     "rate.doubtful": (
-        "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification ({imu}) "
-        "allows {allowed:deg/h|} deg/h: a miss of that size towards east is in sigma"
+        "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification "
+        "({imu:term}) allows {allowed:deg/h|} deg/h: a miss of that size towards east is in sigma"
     ),
     "force.misses": (
-        "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu}) allows "
+        "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu:term}) allows "
         "{allowed:ug|} ug"
     ),
     "table.touched": (
@@ -126,10 +126,10 @@ SENTENCES = {
         "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers"
     ),
     "bias.gyro": (
-        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu}) allows {allowed:deg/h|} deg/h"
+        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:term}) allows {allowed:deg/h|} deg/h"
     ),
     "bias.accel": (
-        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu}) allows {allowed:ug|} ug"
+        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:term}) allows {allowed:ug|} ug"
     ),
     "bias.gyro_steps": (
         "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
@@ -157,11 +157,11 @@ SENTENCES = {
     ),
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
-        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu}) says {said:deg/sqrt(h)|}: "
-        "it is another sensor's, and so may be what it says of biases"
+        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:term}) says "
+        "{said:deg/sqrt(h)|}: it is another sensor's, and so may be what it says of biases"
     ),
     "specification.accel_noise": (
-        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu}) says "
+        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:term}) says "
         "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
     ),
     "bias.vertical_steps": (
@@ -236,7 +236,7 @@ SENTENCES = {
     ),
     "transfer.lopsided": (
         "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
-        "specification ({imu}) allows, or the master drifts"
+        "specification ({imu:term}) allows, or the master drifts"
     ),
     "transfer.jumps": "the master's solution jumps {count} times: it does not fit this slave",
     "transfer.absolute": (
@@ -337,6 +337,7 @@ REMEDIES = {
 }
 
 TERMS = {
+    "inferred from the log": "inferred from the log",
     "exchanged": "their axes exchanged",
     "first_reversed": "the other sign of the first angle",
     "last_reversed": "the other sign of the last angle",
