@@ -215,3 +215,12 @@ def test_words_of_the_table():
     assert set(OF_RUNS) <= set(STATISTICS)
     with pytest.raises(ValueError, match="no figure"):
         Table().value("a", "b", "c", "average", 1.0, "arcmin")
+
+
+def test_a_number_of_its_own_is_not_that_of_the_runs_next_to_it():
+    """A scatter about a reference stands under `value` where single runs stand too: the words once showed the runs' RMS."""
+    table = Table()
+    table.errors("case", "method", "heading", np.array([3.0, -4.0]), "arcmin", statistics=("rms",))
+    table.value("case", "method", "heading", "value", 0.5, "arcmin", runs=2)
+    assert table.number_of("case method heading value") == 0.5
+    assert table.number_of("case method heading") == pytest.approx(math.sqrt(12.5))

@@ -218,20 +218,17 @@ class Table:
         UsageError
             There is no such number.
         """
+        of_runs = reference.statistic in (*OF_RUNS, "sigma", "rms_over_sigma")
+        for f in () if of_runs else self.figures:  # a number of its own, which single runs may stand next to
+            if _means(f, reference):
+                return f.value, f.unit, f.runs
         sample = self.sample(reference)
         if sample is not None and (values := sample.of(reference.statistic)) is not None:
             kind = reference.statistic if reference.statistic in OF_RUNS else "rms"
             unit = "1" if reference.statistic == "rms_over_sigma" else sample.unit
             return OF_RUNS[kind](values), unit, len(values)
         for f in self.figures:
-            same = (f.case, f.method, f.quantity, f.statistic) == (
-                reference.case,
-                reference.method,
-                reference.quantity,
-                reference.statistic,
-            )
-            times = _times(f.window_start_s, f.time_s) == _times(reference.start, reference.time)
-            if same and times and reference.noise in (None, f.noise):
+            if _means(f, reference):
                 return f.value, f.unit, f.runs
         raise UsageError(f"the table has no {reference.statistic} of {reference}")
 
@@ -242,6 +239,13 @@ class Table:
     def to_frame(self) -> pd.DataFrame:
         """The figures, with the documented columns."""
         return to_frame(self.figures)
+
+
+def _means(f: Figure, reference: Reference) -> bool:
+    """Whether a figure is what a reference names."""
+    names = (reference.case, reference.method, reference.quantity, reference.statistic)
+    times = _times(f.window_start_s, f.time_s) == _times(reference.start, reference.time)
+    return (f.case, f.method, f.quantity, f.statistic) == names and times and reference.noise in (None, f.noise)
 
 
 def _times(*times: float) -> tuple[float | None, ...]:

@@ -10,10 +10,18 @@ from numpy.typing import NDArray
 
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
+from truenorth.papers.drawing import marked
 from truenorth.papers.odometer.loop import Errors
 
 Array = NDArray[np.float64]
 ARCMIN = np.radians(1.0) / 60.0
+SINGLE_METHOD, SINGLE = "sgkf3", 10  # runs drawn one by one
+PANELS = (
+    ("velocity", "1: velocity, m/s", 1.0, "ENU", (0.5, 0.5, 0.1)),
+    ("phi", "2: attitude, arcmin", ARCMIN, "ENU", (1.0, 1.0, 30.0)),
+    ("accel_bias", "3: accelerometer bias, ug", MICRO_G, "xyz", (150.0, 150.0, 50.0)),
+    ("gyro_bias", "4: gyro bias, deg/h", DEG_PER_HOUR, "xyz", (0.06, 0.06, 0.06)),
+)
 SHOWN = {"sgkf3": "SGKF (order 3)", "ckf": "CKF", "invariant_ekf": "invariant EKF"}
 STARTS = {
     "invariant_ekf": "invariant EKF",
@@ -26,31 +34,28 @@ STARTS = {
 
 
 def draw_paper_figures(found: Mapping[tuple[str, str], Errors], case: str) -> Figure:
-    """RMS over runs of velocity, attitude, accelerometer and gyro bias errors."""
-    panels = (
-        ("velocity", "1: velocity, m/s", 1.0, "ENU"),
-        ("phi", "2: attitude, arcmin", ARCMIN, "ENU"),
-        ("accel_bias", "3: accelerometer bias, ug", MICRO_G, "xyz"),
-        ("gyro_bias", "4: gyro bias, deg/h", DEG_PER_HOUR, "xyz"),
-    )
+    """Velocity, attitude, accelerometer and gyro bias: signed errors of single runs, and the RMS over all; linear axes."""
     with style():
         figure = new_figure(12.0, 10.0)
         axes = figure.subplots(4, 3, sharex=True)
-        for row, (name, title, unit, letters) in zip(axes, panels, strict=True):
+        for row, (name, title, unit, letters, wide) in zip(axes, PANELS, strict=True):
             for i, ax in enumerate(row):
+                limits = (-wide[i], wide[i])
+                single = getattr(found[case, SINGLE_METHOD], name)[:SINGLE, :, i] / unit
+                time = found[case, SINGLE_METHOD].time
+                for k, run in enumerate(single):
+                    label = f"single runs, {SHOWN[SINGLE_METHOD]}" if k == 0 else None
+                    ax.plot(time, run, color=COLOURS[0], linewidth=0.4, alpha=0.5, label=label)
                 for (method, label), colour in zip(SHOWN.items(), COLOURS, strict=False):
-                    errors = found[case, method]
-                    rms = np.sqrt(np.mean(getattr(errors, name)[:, :, i] ** 2, axis=0)) / unit
-                    ax.plot(errors.time, rms, color=colour, linewidth=1.0, label=label)
-                ax.set(title=f"{title}, {letters[i]}", yscale="linear" if name == "gyro_bias" else "log")
-                ax.set_xlim(0.0, errors.time[-1])
-                if name == "gyro_bias":
-                    ax.set_ylim(0.0, None)
+                    rms = np.sqrt(np.mean(getattr(found[case, method], name)[:, :, i] ** 2, axis=0)) / unit
+                    marked(ax, time, rms, limits, color=colour, linewidth=1.2, label=f"RMS, {label}")
+                ax.axhline(0.0, color=REFERENCE, linewidth=0.5)
+                ax.set(title=f"{title}, {letters[i]}", xlim=(0.0, time[-1]))
         for ax in axes[-1]:
             ax.set_xlabel("time, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
-        runs = len(found[case, "ckf"].phi)
-        headed(figure, f"RMS errors over {runs} runs, from 10 deg of azimuth error")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
+        runs = len(found[case, SINGLE_METHOD].phi)
+        headed(figure, f"Errors of single runs and RMS over {runs}, from 10 deg of azimuth error")
     return figure
 
 
