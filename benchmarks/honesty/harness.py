@@ -7,7 +7,7 @@ which the simulator does not do: drawn in each run, it turns the truth.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -35,6 +35,8 @@ class Log:
     encoder: EncoderRecord | None
     position: Position  # where the IMU is in the mean
     C_nb: Callable[[float], Array]  # true attitude of the body at a time, s, against the level at that place
+    aiding: Mapping[str, Any] = field(default_factory=dict)  # records of the sensors besides the IMU, by their keys
+    start: Position | None = None  # where the log begins
 
 
 @dataclass(frozen=True)
@@ -68,16 +70,20 @@ def simulated(scenario: Mapping[str, Any], seed: int, run: int, of_imu: bool = F
     record = simulation.record
     at = simulation.motion.states(record.time[:: max(1, round(read.rate))])
     here = Position(float(at.lat.mean()), float(at.lon.mean()), float(at.alt.mean()))
+    moves = bool(aiding) and "indexer" not in scenario  # its level is that of where it is
     turned = "indexer" in scenario and not of_imu
     body = getattr(simulation.motion, "motion", simulation.motion) if turned else simulation.motion
 
     def C_nb(when: float) -> Array:
         then = body.states(np.asarray(when))
+        if moves:
+            return np.asarray(then.C_nb)
         C: Array = ecef_axes(here.lat, here.lon).T @ ecef_axes(then.lat, then.lon) @ then.C_nb
         return C
 
-    encoder = aiding["encoder"].record if "encoder" in aiding else None
-    return Log(record, encoder, here, C_nb)
+    records = {key: sensed.record for key, sensed in aiding.items()}
+    start = Position(float(at.lat[0]), float(at.lon[0]), float(at.alt[0]))
+    return Log(record, records.get("encoder"), here, C_nb, records, start)
 
 
 def outcome(case: Case, seed: int, run: int) -> Outcome:
@@ -93,6 +99,8 @@ def outcome(case: Case, seed: int, run: int) -> Outcome:
     ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
     known = answer.status != "level_only" or "level_only" not in case.good
     ratios = {"heading": ratio[2:], "level": ratio[:2]} if known else {"level": ratio[:2]}
+    if answer.status == "inconsistent" and "inconsistent" in case.good:
+        ratios = {}  # it claims nothing
     refused = "" if answer.status in case.good else f"{answer.status}: {answer.reasons[0]}"
     return Outcome(ratios, refused, f"{answer.status} {answer.method} {np.degrees(phi) * 60} arcmin")
 

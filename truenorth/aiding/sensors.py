@@ -82,7 +82,9 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
             measured[:, 2] = np.nan
         states = states_of(mounting, "GNSS", "lever arm", "lag")
         if mounting.bias_sigma > 0.0:
-            states |= state("GNSS", "bias", np.full(3, mounting.bias_sigma), mounting.bias_time)
+            # Heights err more than places, and so do their slow errors.
+            axes = np.array([1.0, 1.0, _vertical(sigma[place])])
+            states |= state("GNSS", "bias", mounting.bias_sigma * axes, mounting.bias_time)
         found.append(rows_of("position", place, measured, sigma, states))
     moving = record.has_velocity & sound
     if moving.any() and record.v_n is not None:
@@ -240,6 +242,19 @@ def from_height(record: HeightRecord, mounting: Mounting, loop: float = 0.0) -> 
             loop=loop,
         )
     ]
+
+
+def place_sigma(record: GnssRecord) -> float:
+    """What a receiver says of its fixes, east and north alike, m; usual where it says nothing."""
+    sigma = _position_sigma(record, POSITION_SIGMA)[record.has_position, :2]
+    return float(np.median(sigma)) if sigma.size else float(POSITION_SIGMA[0])
+
+
+def _vertical(sigma: Array) -> float:
+    """Sigma of heights by that of places, of sigmas (M, 3); at least 1."""
+    level = np.hypot(sigma[:, 0], sigma[:, 1]) / math.sqrt(2.0)
+    known = np.isfinite(sigma[:, 2]) & (level > 0.0)
+    return max(1.0, float(np.median(sigma[known, 2] / level[known]))) if known.any() else 1.0
 
 
 def _position_sigma(record: GnssRecord, default: Array) -> Array:

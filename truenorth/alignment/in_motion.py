@@ -4,48 +4,52 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
-from typing import Any, Literal, TypeGuard, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import BASELINE
-from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
+from truenorth.alignment.in_motion_learnt import (
+    delay_of,
+    learnt_evidence,
+)
 from truenorth.alignment.in_motion_start import (
     Guess,
     backtracked,
-    coarse_guess,
     departures,
     guesses_all_round,
-    start_at,
+)
+from truenorth.alignment.in_motion_task import (
+    NO_LOG_ERRORS,
+    MovingTask,
+    has_fixes,
+    in_body_axes,
+    moving_task,
 )
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.moving import fifteen, moving_of
-from truenorth.alignment.result import Alignment, History
+from truenorth.alignment.result import NOT_ESTIMATED, Alignment, History
+from truenorth.alignment.suspect import name_specification
 from truenorth.alignment.task import deflection_covariance
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity
-from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.rivals import jump_evidence, misfit, wandering_evidence
-from truenorth.estimate.run import navigate_track, with_states
-from truenorth.navigation.procedure import bridge_gaps
-from truenorth.navigation.stops import seconds_at_rest, updates_at
-from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
-from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.mounting import Mounting
@@ -55,67 +59,9 @@ Array = NDArray[np.float64]
 Method = Literal["auto", "gyrocompass", "motion"]
 
 HEADING_LIMIT = math.radians(5.0)
-SHORTEST = 10.0  # s
-INTERVAL = 0.5  # s, of the filter's prediction
-OUTPUT = 1.0  # s, of the history
 GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros are asked for north first
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
-NO_LOG_ERRORS = LogErrors()
-WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
-PASSES = 2
-SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
-POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
-RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
-LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What all passes share."""
-
-    record: ImuRecord
-    spec: ImuSpec
-    model: InsModel
-    position: Position
-    odometer: OdometerRecord | VelocityRecord | None  # what shows velocity in body axes
-    gnss: GnssRecord | None
-    wheel: Mounting
-    antenna: Mounting
-    stops: Sequence[Aiding]  # and gaps of the log
-    more: Sequence[Aiding]
-    slow: LogErrors = NO_LOG_ERRORS
-
-    def aiding(self, *, gated: bool) -> list[Aiding]:
-        """Of all sensors; without gates as long as the filter may be wrong itself."""
-        wheel, antenna = (m if gated else replace(m, gate=0.0) for m in (self.wheel, self.antenna))
-        found = list(self.stops)
-        if self.odometer is not None:
-            log = self.odometer
-            found += (
-                from_odometer(log, wheel) if isinstance(log, OdometerRecord) else from_velocity(log, wheel, self.slow)
-            )
-        if self.gnss is not None:
-            found += from_gnss(self.gnss, antenna)
-        return found + [source if gated else replace(source, gate=0.0) for source in self.more]
-
-    def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
-        """One pass from a guess of the attitude at the start."""
-        record = self.record if until is None else self.record.between(self.record.time[0], until)
-        used = self.aiding(gated=gated)
-        start = start_at(self.record, guess, self.position, self.spec, self.odometer, self.gnss, self.wheel)
-        return navigate_track(
-            record,
-            start,
-            with_states(self.model, used),
-            used,
-            interval=INTERVAL,
-            every=max(1, round(OUTPUT / INTERVAL)),
-            invariant=self.odometer is not None,
-        )
-
-    def by_the_earth(self) -> Guess:
-        """Coarse alignment."""
-        return coarse_guess(self.record, self.position, self.odometer, self.gnss, self.wheel, self.antenna)
+PASSES, MORE_PASSES = 2, 2  # over the log, and where what was learnt of the sensors still changes
 
 
 def align_in_motion(
@@ -192,10 +138,9 @@ def align_in_motion(
         Too short a log.
     """
     tell = progress or (lambda stage: None)
-    body = _in_body_axes(odometer, velocity)
-    task = _task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
-    model = replace(task.model, groups=(*task.model.groups, *groups_of(errors, task.spec)))
-    task = replace(task, model=model, slow=velocity_errors)
+    body = in_body_axes(odometer, velocity)
+    task = moving_task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
+    task = replace(task, model=InsModel.from_spec(task.spec, groups=groups_of(errors, task.spec)), slow=velocity_errors)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
         raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")
     if not heading_limit > 0.0 or passes < 1:
@@ -205,10 +150,23 @@ def align_in_motion(
     if method in AZIMUTH_METHODS:
         tell(f"aligning: {method}")
         return _published(task, method, heading_limit, [n for log in (body, gnss) if log for n in notes(log.notes)])
+    unknown = position is None and not has_fixes(gnss)
+
+    def aligned(spec: ImuSpec) -> Alignment:
+        other = InsModel.from_spec(spec, groups=groups_of(errors, spec))
+        return _aligned(replace(task, spec=spec, model=other), method, heading_limit, passes, unknown, tell)
+
+    answer = _aligned(task, method, heading_limit, passes, unknown, tell)
+    return name_specification(answer, aligned)
+
+
+def _aligned(
+    task: MovingTask, method: str, heading_limit: float, passes: int, unknown: bool, tell: Callable[[str], None]
+) -> Alignment:
+    """Coarse alignment or a bank, passes over the log, verdict; `unknown`: nobody gave the latitude."""
     bias = float(np.sqrt(task.spec.bias_variance[0]))
     level_rate = EARTH_RATE * math.cos(task.position.lat)
     able = bias < level_rate * math.sin(GYROCOMPASS)
-    unknown = position is None and not _has_fixes(gnss)
     if unknown and able:
         tell("latitude")
         task = replace(task, position=find_latitude(lambda lat: _cost_at(task, lat)))
@@ -229,18 +187,23 @@ def align_in_motion(
         guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
         best, track, spread = _best_of_bank(task, guesses, tell)
         guess = guesses[best]
-    for number in range(1, passes):
-        tell(f"pass {number + 1}")
-        guess = replace(guess, C_nb=backtracked(task.record, track))
-        track = task.run(guess, gated=True)
+    number, much = 1, False
+    while number < passes or (much and passes > 1 and number < passes + MORE_PASSES):
+        task, much = task.learnt(track)
+        if number < passes or much:
+            tell(f"pass {number + 1}")
+            guess = replace(guess, C_nb=backtracked(task.record, track))
+            track = task.run(guess, gated=True)
+        number += 1
     answer = _answer(task, track, method, why, spread)
-    more = [item for log in (body, gnss) if log is not None for item in notes(log.notes)]
+    more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
+    more += learnt_evidence(task.factors, answer.moving.delays) if answer.moving is not None else []
     more += _seen(task, track, guess, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)
 
 
-def _seen(task: _Task, track: Track, guess: Guess, *, gated: bool) -> list[Evidence]:
+def _seen(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[Evidence]:
     """What the receiver, the log itself and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
@@ -254,7 +217,7 @@ def _seen(task: _Task, track: Track, guess: Guess, *, gated: bool) -> list[Evide
     )
 
 
-def _published(task: _Task, method: str, heading_limit: float, more: list[Evidence]) -> Alignment:
+def _published(task: MovingTask, method: str, heading_limit: float, more: list[Evidence]) -> Alignment:
     """By a published filter of an odometer."""
     if not isinstance(task.odometer, OdometerRecord):
         raise UsageError(f"method {method!r} is that of an odometer; expected one, or auto, gyrocompass, motion")
@@ -263,7 +226,7 @@ def _published(task: _Task, method: str, heading_limit: float, more: list[Eviden
     return judge_moving(answer, track, heading_limit, more)
 
 
-def _cost_at(task: _Task, lat: float) -> float:
+def _cost_at(task: MovingTask, lat: float) -> float:
     """Minus twice the log-likelihood of the log at a latitude."""
     task = replace(task, position=Position(lat, horizontal_sigma=0.0))
     try:
@@ -282,106 +245,7 @@ def _of_latitude(answer: Alignment, able: bool) -> Evidence:
     return note("latitude.assumed", lat=lat)
 
 
-def _in_body_axes(
-    odometer: OdometerRecord | None, velocity: VelocityRecord | None
-) -> OdometerRecord | VelocityRecord | None:
-    """The one sensor that shows velocity in body axes."""
-    if odometer is not None and velocity is not None:
-        raise UsageError("an odometer and a velocity log; expected one of them, and the other as a further source")
-    if velocity is not None and velocity.frame != "body":
-        raise UsageError(
-            f"{velocity.source}: velocities east, north, up; alignment on the move takes those of a GNSS log, with positions, or "
-            "velocities in body axes (v_right, v_forward, v_up)"
-        )
-    return odometer or velocity
-
-
-def _task(
-    record: ImuRecord,
-    imu: Any,
-    odometer: OdometerRecord | VelocityRecord | None,
-    gnss: GnssRecord | None,
-    position: Position | None,
-    wheel: Mounting | None,
-    antenna: Mounting | None,
-    more: Sequence[Aiding],
-    zupt: bool,
-    calibration: Calibration | None,
-    offset: float,
-) -> _Task:
-    if odometer is None and gnss is None:
-        raise UsageError(
-            "alignment on the move without an odometer, a velocity log and GNSS; expected odometer= or velocity=, gnss= or both"
-        )
-    if imu is None:
-        raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
-    if calibration is not None:
-        record = calibration.apply(record)
-    record, _, gaps = bridge_gaps(record)
-    if record.duration < SHORTEST:
-        raise AlignmentError(f"{record.source}: {record.duration:g} s; at least {SHORTEST:g} s are needed on the move")
-    odometer = None if odometer is None else odometer.shifted(offset)
-    gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
-    if position is None:
-        position = first_fix(record, gnss) if _has_fixes(gnss) else Position(SOMEWHERE)
-    elif gnss is not None:
-        check_fixes(gnss, position, float(record.time[0]))
-    spec = imu_spec(imu).seen_in(record)
-    stops: list[Aiding] = list(gaps)
-    if zupt:
-        still, disturbed = seconds_at_rest(record, odometer, gnss)
-        stops += updates_at(record, still, disturbed, INTERVAL)
-    return _Task(
-        record,
-        spec,
-        InsModel.from_spec(spec),
-        position,
-        odometer,
-        gnss,
-        WHEEL if wheel is None else wheel,
-        usual_antenna(gnss) if antenna is None else antenna,
-        stops,
-        more,
-    )
-
-
-def _with_floors(gnss: GnssRecord) -> GnssRecord:
-    """A receiver's own sigma leaves out clocks, and what moves between its antenna and the IMU."""
-
-    def floored(sigma: Array | None, floor: float) -> Array | None:
-        return None if sigma is None else np.where(np.isfinite(sigma), np.hypot(sigma, floor), sigma)
-
-    return replace(
-        gnss,
-        position_sigma=floored(gnss.position_sigma, POSITION_FLOOR),
-        velocity_sigma=floored(gnss.velocity_sigma, VELOCITY_FLOOR),
-    )
-
-
-def usual_antenna(gnss: GnssRecord | None) -> Mounting:
-    """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes.
-
-    By how much: what the receiver says of a fix; it is right about the size, and silent about how its errors are correlated.
-    """
-    told = None if gnss is None or gnss.position_sigma is None else gnss.position_sigma[:, :2]
-    told = None if told is None else told[np.isfinite(told)]
-    bias = RECEIVER_BIAS if told is None or not told.size else float(np.median(told))
-    return Mounting(latency_sigma=LATENCY_SIGMA, bias_sigma=bias, bias_time=RECEIVER_TIME, angle_sigma=BASELINE)
-
-
-def _has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
-    return gnss is not None and bool(gnss.has_position.any())
-
-
-def first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
-    """Where a log begins, by GNSS."""
-    fixes = np.flatnonzero(gnss.has_position)
-    nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
-    alt = float(gnss.alt[nearest])
-    return Position(float(gnss.lat[nearest]), float(gnss.lon[nearest]), alt if np.isfinite(alt) else 0.0, 10.0, 20.0)
-
-
-def _best_of_bank(task: _Task, guesses: Sequence[Guess], tell: Callable[[str], None]) -> tuple[int, Track, float]:
+def _best_of_bank(task: MovingTask, guesses: Sequence[Guess], tell: Callable[[str], None]) -> tuple[int, Track, float]:
     """Which heading explains the measurements best, its track, and the spread of those that explain them as well, rad."""
     until = float(task.record.time[0]) + BANK_TIME
     until = until if until < task.record.time[-1] else None  # type: ignore[assignment]
@@ -405,7 +269,7 @@ def _turn_between(C: Array, D: Array) -> float:
     return float(math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
 
 
-def _answer(task: _Task, track: Track, method: str, why: str, spread: float) -> Alignment:
+def _answer(task: MovingTask, track: Track, method: str, why: str, spread: float) -> Alignment:
     place = track.position[-1]
     sigma = track.sigma[-1]
     position = Position(float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8]))
@@ -418,6 +282,12 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float) -> 
     distance = float(np.trapezoid(speed, track.time))
     prior = np.sqrt(task.spec.bias_variance)
     moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting)
+    delays = {
+        name: (sensor.latency + found[0], found[1])
+        for name, sensor in (("GNSS", task.antenna), ("odometer", task.wheel), ("velocity log", task.wheel))
+        if (found := delay_of(track, name)) is not None and found[1] < NOT_ESTIMATED * found[2]
+    }
+    moving = replace(moving, delays=delays)
     return Alignment(
         status="not_converged",
         evidence=(),
@@ -444,7 +314,7 @@ def _answer(task: _Task, track: Track, method: str, why: str, spread: float) -> 
     )
 
 
-def _history(track: Track, task: _Task) -> History:
+def _history(track: Track, task: MovingTask) -> History:
     P = fifteen(track)
     sigma = np.sqrt(np.maximum(np.einsum("kii->ki", P), 0.0))
     g = float(normal_gravity(task.position.lat, task.position.alt))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.sensors import place_sigma
 from truenorth.alignment.task import level_of
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
@@ -83,6 +84,7 @@ def start_at(
     odometer: OdometerRecord | VelocityRecord | None,
     gnss: GnssRecord | None,
     wheel: Mounting,
+    antenna: Mounting,
 ) -> Start:
     """The state before the first sample: velocity by the wheel through the guessed attitude, else by GNSS."""
     time = float(record.time[0] - record.steps[0])
@@ -91,7 +93,7 @@ def start_at(
         v_b = _velocity_b(odometer, wheel, np.array([time]))[0]
         v_n, sigma = guess.C_nb @ v_b, math.hypot(ODOMETER_START, wheel.angle_sigma * float(np.linalg.norm(v_b)))
     elif gnss is not None:
-        v_n, sigma = gnss_track(gnss, np.array([time, time + 1e-3, record.time[-1]]))[0][0], GNSS_START
+        v_n, sigma = _by_gnss(gnss, antenna, time, float(record.time[-1]))
     # Slow parts of the biases are states of their own.
     angles = guess.level_sigma, guess.level_sigma, guess.heading_sigma
     P = prior_covariance(angles, sigma, position.sigma, spec.constant_variance)
@@ -101,6 +103,18 @@ def start_at(
         P = turn @ P @ turn.T
     zero = np.zeros(3)
     return Start(time, guess.C_nb, v_n, position.lat, position.lon, position.alt, zero, zero, P)
+
+
+def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tuple[Array, float]:
+    """Velocity (3,) at a time by a receiver, m/s, and one sigma of it: what delays and differences of places do counts."""
+    at = np.array([time, time + max(antenna.latency_sigma, 1e-3), end])
+    v = gnss_track(gnss, at, antenna.latency)[0]
+    change = float(np.linalg.norm(v[1] - v[0]))
+    fixes = gnss.time[gnss.has_position]
+    by_places = 0.0
+    if not gnss.has_velocity.any() and len(fixes) > 1:
+        by_places = math.sqrt(2.0) * place_sigma(gnss) / float(np.median(np.diff(fixes)))
+    return v[0], math.sqrt(GNSS_START**2 + by_places**2 + change**2)
 
 
 def _velocity_b(log: OdometerRecord | VelocityRecord, mounting: Mounting, at: Array) -> Array:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,6 +64,8 @@ class Moving:
         Of the vehicle's forward axis; the IMU's own where no odometer says how it sits.
     track : Track
         The whole way.
+    delays : mapping of sensor to (delay, sigma), s
+        By which a sensor's stamps are late, where that was left open and the data show it.
     """
 
     v_n: Array
@@ -74,6 +77,7 @@ class Moving:
     vehicle_heading: float
     vehicle_heading_sigma: float
     track: Track
+    delays: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """In datasheet units, ready for JSON."""
@@ -86,6 +90,7 @@ class Moving:
             "rejected": {name: list(counts) for name, counts in self.rejected.items()},
             "vehicle_heading_deg": math.degrees(self.vehicle_heading),
             "vehicle_heading_sigma_deg": math.degrees(self.vehicle_heading_sigma),
+            "delays_s": {name: list(delay) for name, delay in self.delays.items()},
         }
         if self.wheel is not None:
             w = self.wheel

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.aids import Gnss, Indexer, Master, Odometer
 from truenorth.alignment import align
-from truenorth.alignment.in_motion import WHEEL as ON_WHEEL
-from truenorth.alignment.in_motion import usual_antenna
+from truenorth.alignment.in_motion_task import WHEEL as ON_WHEEL
+from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.transfer import DELAY_SIGMA, LEVER_ARM_SIGMA, MOUNTING_SIGMA
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm

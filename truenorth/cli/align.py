@@ -151,7 +151,7 @@ def align(
 
 def _first_place(record: ImuRecord, aids: list[Any]) -> Position | None:
     """Where GNSS says that a log begins."""
-    from truenorth.alignment.in_motion import first_fix
+    from truenorth.alignment.in_motion_task import first_fix
 
     fixes = next((aid.record for aid in aids if aid.key == "gnss" and aid.record.has_position.any()), None)
     return None if fixes is None else first_fix(record, fixes)

@@ -71,6 +71,9 @@ def print_moving(console: Console, result: Alignment) -> None:
     velocity = ", ".join(f"{v:.3f}" for v in s["velocity_m_s"])
     reached = _("velocity E, N, U: {velocity} m/s, after {distance:.0f} m")
     console.print(reached.format(velocity=velocity, distance=moving.distance), soft_wrap=True)
+    for name, (delay, sigma) in moving.delays.items():
+        late = _("{name}: {delay:.0f} ± {sigma:.2g} ms late")
+        console.print(late.format(name=_(name), delay=1e3 * delay, sigma=1e3 * sigma), soft_wrap=True)
     if (wheel := moving.wheel) is None:
         return
     if result.heading_known:

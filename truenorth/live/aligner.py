@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment import Alignment, align
-from truenorth.alignment.in_motion import usual_antenna
+from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.recipes import RECIPES
 from truenorth.core.attitude import euler_sigma
 from truenorth.core.errors import UsageError

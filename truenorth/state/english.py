@@ -164,6 +164,9 @@ SENTENCES = {
         "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:term}) says "
         "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
     ),
+    "specification.suspect": (
+        "the specification ({imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
+    ),
     "bias.vertical_steps": (
         "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
         "{heading:angle}"
@@ -217,6 +220,9 @@ SENTENCES = {
         "errors of the {name}s hang together from fix to fix (correlation {correlation:.2f}), they wander by {wander:.2g} m or "
         "more: the sigma of position is too small"
     ),
+    "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
+    "delay.late": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s late, which is estimated and in sigma",
+    "delay.early": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s early, which is estimated and in sigma",
     "odometer.taken_over": "odometer: scale, mounting and wheel arm are the alignment's, and estimated on",
     "odometer.scale": "the {name} counts {scale:%|+.2f} % ({sigma:%|.2g} % one sigma)",
     # ---- a slave against its master

@@ -35,7 +35,7 @@ class Mounting:
     scale_sigma : float
         Of an odometer's or a log's scale factor; 0: known.
     bias_sigma : float, m/s or m
-        Of a slow error of a velocity log, a barometer or a receiver's positions; 0: none.
+        Of a slow error of a velocity log, a barometer or a receiver's places (of its heights in proportion to sigma); 0: none.
     bias_time : float, s
         Its correlation time.
     latency : float, s

@@ -1,0 +1,150 @@
+"""Alignment on the move against sensors with errors that the model may leave out: late, jittering, noisier than they say.
+
+A car or an underwater vehicle whose speeds, turns and course are drawn in each run. The IMU is industrial where GNSS aids (its
+heading is by motion), of navigation grade where the odometer alone does.
+
+Run: ``python -m benchmarks.honesty.moving --runs 20``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.honesty.harness import Case, Log, main, place
+from truenorth.alignment.in_motion import align_in_motion
+from truenorth.alignment.result import Alignment
+from truenorth.records import GnssRecord
+
+GOOD = ("aligned", "level_only", "not_converged")
+FLAGGED = (*GOOD, "inconsistent")  # of a wrong class of IMU: what is said must be right, and it may be refused
+
+
+def drive(rng: np.random.Generator, fastest: float, rate: float, climb: float = 0.0) -> dict[str, Any]:
+    """A stop, then legs of drawn length, speed and turns (deg/s, either way)."""
+    speed = fastest * rng.uniform(0.5, 1.0)
+    legs: list[dict[str, Any]] = [{"kind": "straight", "duration": f"{rng.uniform(5.0, 25.0):.1f} s"}]
+    legs.append({"kind": "accelerate", "to": f"{speed:.2f} m/s", "acceleration": f"{0.1 * fastest:.2f} m/s^2"})
+    for _ in range(6):
+        angle = rng.choice([-1.0, 1.0]) * rng.uniform(30.0, 120.0)
+        legs.append({"kind": "straight", "duration": f"{rng.uniform(5.0, 20.0):.1f} s"})
+        legs.append({"kind": "turn", "angle": f"{angle:.1f} deg", "rate": f"{rate * rng.uniform(0.6, 1.0):.2f} deg/s"})
+        speed = fastest * rng.uniform(0.4, 1.0)
+        legs.append({"kind": "accelerate", "to": f"{speed:.2f} m/s", "acceleration": f"{0.1 * fastest:.2f} m/s^2"})
+        if climb:
+            slope = climb * rng.uniform(-1.0, 1.0)
+            legs.append({"kind": "climb", "slope": f"{slope:.2f} deg", "duration": f"{rng.uniform(5.0, 15.0):.1f} s"})
+    legs.append({"kind": "straight", "duration": "300 s"})
+    return {"kind": "legs", "heading": f"{rng.uniform(0.0, 360.0):.2f} deg", "legs": legs}
+
+
+def vehicle(
+    imu: str, gnss: Mapping[str, Any] | None, odometer: Mapping[str, Any] | None = None, car: bool = True
+) -> Callable[[np.random.Generator], Mapping[str, Any]]:
+    """A car, or an underwater vehicle, with these sensors."""
+
+    def scenario(rng: np.random.Generator) -> Mapping[str, Any]:
+        tones = {
+            name: [{"amplitude": f"{0.2 * rng.uniform(0.3, 1.0):.3f} deg", "period": f"{rng.uniform(0.8, 3.0):.2f} s"}]
+            for name in ("roll", "pitch")
+        }
+        found: dict[str, Any] = {
+            "duration": "240 s",
+            "rate": "100 Hz",
+            "position": place(rng),
+            "motion": drive(rng, 15.0, 12.0, 3.0) if car else drive(rng, 4.0, 6.0, 5.0),
+            "disturbances": [{"kind": "sway", "tones": tones}],
+            "imu": imu,
+        }
+        if gnss is not None:
+            found["gnss"] = {"rate": "1 Hz", **gnss}
+        if odometer is not None:
+            found["odometer"] = dict(odometer)
+        return found
+
+    return scenario
+
+
+def askew(rng: np.random.Generator) -> Mapping[str, Any]:
+    """S-turns, the IMU askew in the vehicle by about a degree, the wheel's scale 2 % off."""
+    mounting = [f"{1.5 * rng.standard_normal():.3f} deg", f"{rng.standard_normal():.3f} deg"]
+    s_turns = {"kind": "s_turn", "angle": "40 deg", "rate": "8 deg/s", "times": 8, "bank": "flat"}
+    legs = [{"kind": "straight", "duration": f"{rng.uniform(10.0, 40.0):.0f} s"}]
+    legs += [{"kind": "accelerate", "to": "12 m/s", "acceleration": "1 m/s^2"}, s_turns]
+    return {
+        "duration": "300 s",
+        "rate": "100 Hz",
+        "position": place(rng),
+        "motion": {
+            "kind": "legs",
+            "heading": f"{rng.uniform(0.0, 360.0):.2f} deg",
+            "legs": [*legs, {"kind": "straight", "duration": "300 s"}],
+        },
+        "imu": "navigation",
+        "odometer": {"scale": f"{2.0 * rng.standard_normal():.3f} %", "mounting": mounting, "noise": "0.02 m/s"},
+    }
+
+
+FIXES = {"position_noise": "2 m", "velocity_noise": "0.05 m/s"}
+WANDERING = FIXES | {"position_drift": "2 m", "correlation_time": "60 s"}
+
+
+def by(imu: str, change: Callable[[GnssRecord, np.random.Generator], GnssRecord] | None = None) -> Any:
+    """Aligned with what the log has; `change` spoils the fixes."""
+
+    def call(log: Log) -> Alignment:
+        gnss = log.aiding.get("gnss")
+        if gnss is not None and change is not None:
+            gnss = change(gnss, np.random.default_rng(len(log.record) + int(1e6 * log.record.gyro[0, 0])))
+        position = log.start if gnss is None else None
+        return align_in_motion(log.record, imu, gnss=gnss, odometer=log.aiding.get("odometer"), position=position)
+
+    return call
+
+
+def places_only(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
+    """Without velocities."""
+    return replace(gnss, v_n=None, velocity_sigma=None)
+
+
+def jittering(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
+    """Stamped when they arrived, .1 to .5 s late."""
+    time = gnss.time + np.clip(0.3 + 0.1 * rng.standard_normal(len(gnss)), 0.1, 0.5)
+    return replace(gnss, time=time)
+
+
+def boasting(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
+    """Whose sigmas are three times too small."""
+    assert gnss.position_sigma is not None
+    assert gnss.velocity_sigma is not None
+    return replace(gnss, position_sigma=gnss.position_sigma / 3.0, velocity_sigma=gnss.velocity_sigma / 3.0)
+
+
+ODOMETER = {"noise": "0.02 m/s", "scale_sigma": "1 %"}
+CASES = (
+    Case("odometer, S-turns, IMU askew, scale 2 %", askew, by("navigation"), GOOD),
+    Case(
+        "odometer noisier than usual (.3 m/s)",
+        vehicle("navigation", None, {"noise": "0.3 m/s"}),
+        by("navigation"),
+        GOOD,
+    ),
+    Case("GNSS, car", vehicle("industrial", FIXES), by("industrial"), GOOD),
+    Case("GNSS, positions wander by 2 m", vehicle("industrial", WANDERING), by("industrial"), GOOD),
+    Case("GNSS late by 1 s, car", vehicle("industrial", FIXES | {"latency": "1 s"}), by("industrial"), GOOD),
+    Case(
+        "GNSS late by 1 s, underwater", vehicle("tactical", FIXES | {"latency": "1 s"}, car=False), by("tactical"), GOOD
+    ),
+    Case("GNSS stamps late by .1 to .5 s, drawn", vehicle("industrial", FIXES), by("industrial", jittering), GOOD),
+    Case("GNSS with positions only", vehicle("industrial", FIXES), by("industrial", places_only), GOOD),
+    Case("GNSS says sigmas three times too small", vehicle("industrial", FIXES), by("industrial", boasting), GOOD),
+    Case("GNSS and odometer", vehicle("industrial", WANDERING, ODOMETER), by("industrial"), GOOD),
+    Case("IMU industrial, given as tactical", vehicle("industrial", FIXES), by("tactical"), FLAGGED),
+    Case("IMU consumer, given as industrial", vehicle("consumer", FIXES), by("industrial"), FLAGGED),
+)
+
+if __name__ == "__main__":
+    main(CASES)

@@ -1,0 +1,108 @@
+"""What a pass teaches of its sensors: noise larger than said, a receiver that is late, a class of IMU that is too good."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.honesty import moving
+from benchmarks.honesty.harness import simulated
+from truenorth.aiding.sensors import from_gnss
+from truenorth.aiding.source import Aiding
+from truenorth.alignment.in_motion import align_in_motion
+from truenorth.alignment.in_motion_learnt import changed, noise_factors
+from truenorth.alignment.in_motion_task import usual_antenna
+from truenorth.alignment.suspect import poorer
+from truenorth.records.specs import imu_spec
+from truenorth.state.layout import Layout
+from truenorth.state.track import Residuals, Track
+
+SEED = 41  # any
+T = np.arange(400.0)
+
+
+def track_of(innovation, sigma):
+    yes = np.ones(len(T), bool)
+    nis = np.sum((innovation / sigma) ** 2, axis=1)
+    residuals = Residuals("log", T, innovation, sigma, nis, yes, 0, T, ~yes)
+    none = np.zeros((0, 3))
+    return Track(
+        np.zeros(0), np.zeros((0, 3, 3)), none, none, np.zeros((0, 15)), np.zeros((0, 15, 15)), Layout(), (residuals,)
+    )
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0, 6.0])
+def test_noise_is_what_is_white_in_innovations(factor):
+    """Of a source with sigmas of 1, 2 and .5, the first of them ``factor`` times too small; a slow error counts for nothing."""
+    rng = np.random.default_rng(SEED)
+    R, predicted = np.array([1.0, 2.0, 0.5]), 0.3
+    true = np.hypot(R * [factor, 1.0, 1.0], predicted)
+    slow = 5.0 * np.sin(T / 60.0)[:, None]
+    track = track_of(true * rng.standard_normal((len(T), 3)) + slow, np.tile(np.hypot(R, predicted), (len(T), 1)))
+    source = Aiding("log", "velocity", T, np.zeros((len(T), 3)), np.tile(R, (len(T), 1)))
+    found = noise_factors(track, [source], {})
+    if factor == 1.0:
+        assert found == {}
+        return
+    assert found["log"] == pytest.approx([factor, 1.0, 1.0], rel=0.15)
+    assert changed({}, found)
+    assert not changed(found, {"log": 1.05 * found["log"]})
+
+
+def car(name, run=0):
+    case = next(case for case in moving.CASES if case.name.startswith(name))
+    return simulated(case.scenario(np.random.default_rng([SEED, run])), SEED, run)
+
+
+@pytest.fixture(scope="module")
+def late():
+    return car("GNSS late by 1 s, car")
+
+
+def test_a_late_receiver_is_found_out_and_said(late):
+    answer = align_in_motion(late.record, "industrial", gnss=late.aiding["gnss"])
+    delay, sigma = answer.moving.delays["GNSS"]
+    assert abs(delay - 1.0) < 4.0 * sigma < 0.2
+    assert any(item.key == "delay.late" for item in answer.evidence)
+    assert answer.moving.summary()["delays_s"]["GNSS"] == [delay, sigma]
+
+
+def test_places_without_velocities_or_with_sigmas_too_small(late):
+    """Neither is refused, and the second says so."""
+    gnss = late.aiding["gnss"].shifted(-1.0)
+    assert align_in_motion(late.record, "industrial", gnss=moving.places_only(gnss, None)).status == "aligned"
+    answer = align_in_motion(late.record, "industrial", gnss=moving.boasting(gnss, None))
+    assert answer.status == "aligned", answer.reasons
+    said = {item.figures["name"]: item.figures["factor"] for item in answer.evidence if item.key == "noise.estimated"}
+    assert said["GNSS position"] == pytest.approx(3.0, rel=0.25)
+
+
+def test_an_odometer_noisier_than_usual_is_no_contradiction():
+    log = car("odometer noisier")
+    answer = align_in_motion(log.record, "navigation", odometer=log.aiding["odometer"], position=log.start)
+    assert answer.status == "aligned", answer.reasons
+
+
+def test_a_class_of_imu_that_is_too_good_is_the_suspect(late):
+    gnss = late.aiding["gnss"].shifted(-1.0)
+    answer = align_in_motion(late.record, "tactical", gnss=gnss)
+    assert answer.status == "inconsistent"
+    assert answer.evidence[0].key == "specification.suspect"
+    assert answer.evidence[0].remedies == ("specification",)
+
+
+def test_a_poorer_imu_has_larger_errors_alone():
+    spec = imu_spec("tactical")
+    other = poorer(spec, 10.0)
+    assert np.sqrt(other.bias_variance) == pytest.approx(10.0 * np.sqrt(spec.bias_variance))
+    assert other.correlation_time == spec.correlation_time
+    assert other.gyro_scale_factor == 10.0 * spec.gyro_scale_factor
+
+
+def test_slow_errors_of_heights_are_larger_as_the_receiver_says(late):
+    gnss = late.aiding["gnss"]
+    antenna = usual_antenna(gnss)
+    bias = from_gnss(gnss, antenna)[0].states["bias"].sigma
+    assert bias == pytest.approx(antenna.bias_sigma * np.array([1.0, 1.0, 1.5]))  # as simulated
+    silent = replace(gnss, position_sigma=None)
+    assert from_gnss(silent, antenna)[0].states["bias"].sigma[2] == pytest.approx(antenna.bias_sigma * 5.0 / 3.0)

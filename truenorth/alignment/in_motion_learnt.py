@@ -1,0 +1,106 @@
+"""What a pass over the log teaches of its sensors before the next one: how noisy they are, and how late a receiver is.
+
+Innovations of a right model are white. Errors of the model are slow beside the rows of a sensor, noise of the sensor is not: half
+the mean square of the *difference* of innovations that follow each other is the part that is white. Where it is ``q`` times as
+large as the variances ``S = H P H' + R`` say, R is ``1 + (q - 1) S / R`` times too small, and the next pass takes it as large. What
+is slow is left to the verdict (:mod:`truenorth.quality.innovations`).
+
+A delay acts as its first derivative as long as it is short against manoeuvres; the next pass begins with the delay found.
+
+Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.source import Aiding
+from truenorth.quality.innovations import FEWEST
+from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals, Track
+
+Array = NDArray[np.float64]
+
+LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
+MEDIAN = 0.4549  # of chi-square with one degree of freedom
+SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
+LEAST_DELAY = 0.1  # s: a shorter one acts as its derivative
+SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word
+
+
+def noise_factors(track: Track, aiding: Sequence[Aiding], before: Mapping[str, Array]) -> dict[str, Array]:
+    """By how much the noise of each source is larger than it says, (3,) by component; those that say enough are left out.
+
+    Parameters
+    ----------
+    track : Track
+        Of a pass with these sources.
+    aiding : sequence of Aiding
+    before : mapping
+        Factors that are in their sigmas already.
+    """
+    sources = {source.name: source for source in aiding if source.does == "measurement"}
+    found = {}
+    for residuals in track.residuals:
+        had = before.get(residuals.name, np.ones(3))
+        factor = had * _factors(residuals, sources[residuals.name], 1.0 / had)
+        if factor.max() > LEAST_FACTOR:
+            found[residuals.name] = factor
+    return found
+
+
+def _factors(residuals: Residuals, source: Aiding, least: Array) -> Array:
+    """(3,) by how much sigma is too small by the white part of the innovations; `least` where they are smaller."""
+    order = np.argsort(source.time, kind="stable")
+    row = order[np.clip(np.searchsorted(source.time[order], residuals.stamp), 0, len(order) - 1)]
+    e, S, R = residuals.innovation, residuals.sigma**2, source.sigma[row] ** 2
+    found = np.ones(3)
+    for axis in range(3):
+        difference = np.diff(e[:, axis]) ** 2 / (S[1:, axis] + S[:-1, axis])
+        there = np.isfinite(difference)
+        if int(there.sum()) < FEWEST:
+            continue
+        q = float(np.median(difference[there])) / MEDIAN
+        if abs(q - 1.0) < limit("chance") * SPREAD / math.sqrt(there.sum()):
+            continue
+        known = np.isfinite(e[:, axis]) & (R[:, axis] > 0.0)
+        share = float(np.median(S[known, axis] / R[known, axis])) if known.any() else 0.0
+        found[axis] = math.sqrt(max(1.0 + (q - 1.0) * share, least[axis] ** 2))
+    return found
+
+
+def louder(aiding: Sequence[Aiding], factors: Mapping[str, Array]) -> list[Aiding]:
+    """The same sources with sigmas so many times as large."""
+    return [replace(s, sigma=s.sigma * factors[s.name]) if s.name in factors else s for s in aiding]
+
+
+def changed(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
+    """Whether factors have changed by what matters."""
+    one = np.ones(3)
+    names = before.keys() | after.keys()
+    return any(np.abs(np.log(after.get(n, one) / before.get(n, one))).max() > math.log(LEAST_FACTOR) for n in names)
+
+
+def delay_of(track: Track, name: str) -> tuple[float, float, float] | None:
+    """Delay of a sensor as found beyond the assumed one, its sigma, and its prior, s."""
+    where = track.layout.slice_of(f"{name} lag")
+    if where is None:
+        return None
+    prior = dict(zip(track.layout.names, track.layout.priors, strict=True))[f"{name} lag"][0]
+    return float(track.sensors[-1, where.start]), float(track.sigma[-1, where.start]), prior
+
+
+def learnt_evidence(factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:
+    """What was learnt, for the reader: it is in sigma already."""
+    found = [note("noise.estimated", name=name, factor=float(factor.max())) for name, factor in factors.items()]
+    for name, (delay, sigma) in delays.items():
+        if abs(delay) > max(SHOWN_DELAY * sigma, 0.02):
+            late = "late" if delay > 0.0 else "early"
+            found.append(note(f"delay.{late}", name=name, size=abs(delay), sigma=sigma))
+    return found

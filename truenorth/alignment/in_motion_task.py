@@ -1,0 +1,215 @@
+"""What all passes of an alignment on the move share: its records, how their sensors sit, and one pass from a guess."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.aids import BASELINE
+from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity, place_sigma
+from truenorth.aiding.source import Aiding
+from truenorth.alignment.in_motion_learnt import (
+    LEAST_DELAY,
+    SHOWN_DELAY,
+    changed,
+    delay_of,
+    louder,
+    noise_factors,
+)
+from truenorth.alignment.in_motion_start import (
+    Guess,
+    coarse_guess,
+    start_at,
+)
+from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.position import Position
+from truenorth.errors.log import LogErrors
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track, with_states
+from truenorth.navigation.procedure import bridge_gaps
+from truenorth.navigation.stops import seconds_at_rest, updates_at
+from truenorth.navigation.whereabouts import check_fixes
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
+from truenorth.records.calibration import Calibration
+from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.mounting import Mounting
+from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
+
+SHORTEST = 10.0  # s
+INTERVAL = 0.5  # s, of the filter's prediction
+OUTPUT = 1.0  # s, of the history
+NO_LOG_ERRORS = LogErrors()
+WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
+SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
+POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
+RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
+LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
+
+
+@dataclass(frozen=True)
+class MovingTask:
+    """What all passes share."""
+
+    record: ImuRecord
+    spec: ImuSpec
+    model: InsModel
+    position: Position
+    odometer: OdometerRecord | VelocityRecord | None  # what shows velocity in body axes
+    gnss: GnssRecord | None
+    wheel: Mounting
+    antenna: Mounting
+    stops: Sequence[Aiding]  # and gaps of the log
+    more: Sequence[Aiding]
+    slow: LogErrors = NO_LOG_ERRORS
+    factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
+
+    def learnt(self, track: Track) -> tuple[MovingTask, bool]:
+        """The task with what a pass has taught of its sensors, and whether that is much."""
+        factors = noise_factors(track, self.aiding(gated=False), self.factors)
+        antenna, late = self.antenna, delay_of(track, "GNSS")
+        if late is not None and abs(late[0]) > max(LEAST_DELAY, SHOWN_DELAY * late[1]):
+            antenna = replace(antenna, latency=antenna.latency + late[0])
+        much = antenna is not self.antenna or changed(self.factors, factors)
+        return (replace(self, factors=factors, antenna=antenna), True) if much else (self, False)
+
+    def aiding(self, *, gated: bool) -> list[Aiding]:
+        """Of all sensors; without gates as long as the filter may be wrong itself."""
+        wheel, antenna = (m if gated else replace(m, gate=0.0) for m in (self.wheel, self.antenna))
+        found = list(self.stops)
+        if self.odometer is not None:
+            log = self.odometer
+            found += (
+                from_odometer(log, wheel) if isinstance(log, OdometerRecord) else from_velocity(log, wheel, self.slow)
+            )
+        if self.gnss is not None:
+            found += from_gnss(self.gnss, antenna)
+        found += [source if gated else replace(source, gate=0.0) for source in self.more]
+        return louder(found, self.factors)
+
+    def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
+        """One pass from a guess of the attitude at the start."""
+        record = self.record if until is None else self.record.between(self.record.time[0], until)
+        used = self.aiding(gated=gated)
+        start = start_at(
+            self.record, guess, self.position, self.spec, self.odometer, self.gnss, self.wheel, self.antenna
+        )
+        return navigate_track(
+            record,
+            start,
+            with_states(self.model, used),
+            used,
+            interval=INTERVAL,
+            every=max(1, round(OUTPUT / INTERVAL)),
+            invariant=self.odometer is not None,
+        )
+
+    def by_the_earth(self) -> Guess:
+        """Coarse alignment."""
+        return coarse_guess(self.record, self.position, self.odometer, self.gnss, self.wheel, self.antenna)
+
+
+def moving_task(
+    record: ImuRecord,
+    imu: Any,
+    odometer: OdometerRecord | VelocityRecord | None,
+    gnss: GnssRecord | None,
+    position: Position | None,
+    wheel: Mounting | None,
+    antenna: Mounting | None,
+    more: Sequence[Aiding],
+    zupt: bool,
+    calibration: Calibration | None,
+    offset: float,
+) -> MovingTask:
+    """From what is given to one task: gaps bridged, sensors on one clock, stops found."""
+    if odometer is None and gnss is None:
+        raise UsageError(
+            "alignment on the move without an odometer, a velocity log and GNSS; expected odometer= or velocity=, gnss= or both"
+        )
+    if imu is None:
+        raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
+    if calibration is not None:
+        record = calibration.apply(record)
+    record, _, gaps = bridge_gaps(record)
+    if record.duration < SHORTEST:
+        raise AlignmentError(f"{record.source}: {record.duration:g} s; at least {SHORTEST:g} s are needed on the move")
+    odometer = None if odometer is None else odometer.shifted(offset)
+    gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
+    if position is None:
+        position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
+    elif gnss is not None:
+        check_fixes(gnss, position, float(record.time[0]))
+    spec = imu_spec(imu).seen_in(record)
+    stops: list[Aiding] = list(gaps)
+    if zupt:
+        still, disturbed = seconds_at_rest(record, odometer, gnss)
+        stops += updates_at(record, still, disturbed, INTERVAL)
+    return MovingTask(
+        record,
+        spec,
+        InsModel.from_spec(spec),
+        position,
+        odometer,
+        gnss,
+        WHEEL if wheel is None else wheel,
+        usual_antenna(gnss) if antenna is None else antenna,
+        stops,
+        more,
+    )
+
+
+def in_body_axes(
+    odometer: OdometerRecord | None, velocity: VelocityRecord | None
+) -> OdometerRecord | VelocityRecord | None:
+    """The one sensor that shows velocity in body axes."""
+    if odometer is not None and velocity is not None:
+        raise UsageError("an odometer and a velocity log; expected one of them, and the other as a further source")
+    if velocity is not None and velocity.frame != "body":
+        raise UsageError(
+            f"{velocity.source}: velocities east, north, up; alignment on the move takes those of a GNSS log, with positions, or "
+            "velocities in body axes (v_right, v_forward, v_up)"
+        )
+    return odometer or velocity
+
+
+def _with_floors(gnss: GnssRecord) -> GnssRecord:
+    """A receiver's own sigma leaves out clocks, and what moves between its antenna and the IMU."""
+
+    def floored(sigma: Array | None, floor: float) -> Array | None:
+        return None if sigma is None else np.where(np.isfinite(sigma), np.hypot(sigma, floor), sigma)
+
+    return replace(
+        gnss,
+        position_sigma=floored(gnss.position_sigma, POSITION_FLOOR),
+        velocity_sigma=floored(gnss.velocity_sigma, VELOCITY_FLOOR),
+    )
+
+
+def usual_antenna(gnss: GnssRecord | None) -> Mounting:
+    """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes.
+
+    By how much: what the receiver says of a fix; it is right about the size, and silent about how its errors are correlated.
+    """
+    said = gnss is not None and (gnss.position_sigma is not None or gnss.dop is not None)
+    bias = place_sigma(gnss) if said and gnss is not None else RECEIVER_BIAS
+    return Mounting(latency_sigma=LATENCY_SIGMA, bias_sigma=bias, bias_time=RECEIVER_TIME, angle_sigma=BASELINE)
+
+
+def has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
+    """Whether there is a receiver with positions."""
+    return gnss is not None and bool(gnss.has_position.any())
+
+
+def first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
+    """Where a log begins, by GNSS."""
+    fixes = np.flatnonzero(gnss.has_position)
+    nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
+    alt = float(gnss.alt[nearest])
+    return Position(float(gnss.lat[nearest]), float(gnss.lon[nearest]), alt if np.isfinite(alt) else 0.0, 10.0, 20.0)

@@ -1,0 +1,47 @@
+"""Is it the specification that the measurements contradict? The same log once more with poorer IMUs.
+
+A class of IMU that is too good makes the filter follow its gyros where it should follow the measurements: these are rejected by the
+thousand, and seem to be at fault. Where an IMU some times poorer is contradicted no more, the specification is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from truenorth.alignment.result import Alignment
+from truenorth.core.errors import AlignmentError, DataError
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import contradiction
+
+FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
+FIELDS = ("bias", "turn_on_bias", "random_walk", "bias_instability", "rate_random_walk", "scale_factor", "misalignment")
+
+
+def poorer(spec: ImuSpec, factor: float) -> ImuSpec:
+    """A specification all of whose errors are so many times as large."""
+    names = [f"{sensor}_{field}" for sensor in ("gyro", "accel") for field in FIELDS]
+    return replace(spec, **{name: factor * getattr(spec, name) for name in names})
+
+
+def name_specification(answer: Alignment, again: Callable[[ImuSpec], Alignment]) -> Alignment:
+    """The answer, its specification named as the first suspect where a poorer one is contradicted no more.
+
+    Parameters
+    ----------
+    answer : Alignment
+    again : callable
+        The same log with another specification.
+    """
+    if answer.status != "inconsistent" or not any(item.key.startswith("innovations.") for item in answer.evidence):
+        return answer
+    for factor in FACTORS:
+        try:
+            other = again(poorer(answer.imu, factor))
+        except (AlignmentError, DataError):
+            continue
+        if other.status != "inconsistent":
+            suspect = contradiction("specification.suspect", "specification", factor=factor, imu=answer.imu_source)
+            rest = (replace(item, remedies=()) if item.kind == "unknown" else item for item in answer.evidence)
+            return replace(answer, evidence=(suspect, *rest))
+    return answer
