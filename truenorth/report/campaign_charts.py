@@ -43,20 +43,20 @@ def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
     winner, first = str(wins.index[0]), best.iloc[0]
     low, high = float(best["rms"].min()), float(best["rms"].max())
     if len(best) == 1 and len(plan.methods) == 1:
-        finding = _("{method} finds the heading to {rms} arcmin (RMS of {runs} runs).").format(
+        finding = _("“{method}” finds the heading to {rms} arcmin (RMS of {runs} runs).").format(
             method=winner, rms=short(low), runs=int(first["runs"])
         )
     elif len(best) == 1:
-        finding = _("{method} has the smallest heading error: {rms} arcmin (RMS of {runs} runs).").format(
+        finding = _("“{method}” has the smallest heading error: {rms} arcmin (RMS of {runs} runs).").format(
             method=winner, rms=short(low), runs=int(first["runs"])
         )
     elif len(plan.methods) == 1:
-        finding = _("{method} finds the heading to {low} to {high} arcmin (RMS), depending on the case.").format(
+        finding = _("“{method}” finds the heading to {low} to {high} arcmin (RMS), depending on the case.").format(
             method=winner, low=short(low), high=short(high)
         )
     else:
         finding = _(
-            "{method} has the smallest heading error in {wins} of {cases} cases. The best of each case is {low} to {high} "
+            "“{method}” has the smallest heading error in {wins} of {cases} cases. The best of each case is {low} to {high} "
             "arcmin (RMS)."
         ).format(method=winner, wins=int(wins.iloc[0]), cases=len(best), low=short(low), high=short(high))
     wanted = 60.0 * float(np.degrees(plan.converged))

@@ -160,6 +160,8 @@ class Chart:
 
     def axis(self, row: int, **options: Any) -> None:
         """Set options of a vertical axis, in plotly's terms."""
+        if options.get("type") == "log":
+            options.setdefault("nticks", 5)  # with more the numbers between decades run into each other
         self.layout[f"yaxis{row + 1}" if row else "yaxis"] |= options
 
     def across(self, **options: Any) -> None:
