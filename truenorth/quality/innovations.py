@@ -30,6 +30,7 @@ ONE_PLACE = 4.0  # mean over scatter of places that are all off alike
 LAGS, MOST_LAGS = 5, 60
 SCHULER = 5064.0  # s
 MANOEUVRE = 20.0  # s, the period of turns and changes of speed
+CHANCE = math.erfc(limit("chance") / math.sqrt(2.0))
 LEAST_CORRELATION = 0.05  # mean over the first lags
 REST = ("zero velocity", "zero rotation")
 BODY = ("odometer", "velocity log", *REST)
@@ -40,6 +41,13 @@ def mean_nis(source: Residuals) -> float | None:
     if not source.used.any():
         return None
     return float(np.sum(source.nis[source.used]) / np.sum(source.rows[source.used]))
+
+
+def largest_nis(rows: int) -> float:
+    """Beyond which a mean NIS of so many rows is neither of a sound model nor chance: a few rows scatter."""
+    from truenorth.analysis.consistency import chi_square_quantile
+
+    return max(limit("nis"), float(chi_square_quantile(1.0 - CHANCE, rows)) / rows)
 
 
 class Whiteness(NamedTuple):
@@ -117,7 +125,7 @@ def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motio
         elif rejected:
             found.append(note("innovations.outliers", name=source.name, rejected=rejected, count=count))
         nis = mean_nis(source)
-        if nis is not None and nis > limit("nis"):
+        if nis is not None and nis > largest_nis(int(source.rows[source.used].sum())):
             found.append(contradiction("innovations.size", "specification", name=source.name, factor=math.sqrt(nis)))
         else:
             found += _growth(source, sigma, by_motion)
