@@ -6,6 +6,7 @@ Run: ``python -m benchmarks.honesty.navigation --runs 20``.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,11 @@ from truenorth.records import GnssRecord
 
 NONE = Deflection(0.0)
 LOG = LogErrors(drift=0.5, drift_time=3.0 * HOUR, scale=0.005, mounting=math.radians(0.3), bias=0.1)
+
+
+def current(hours: float) -> LogErrors:
+    """All errors of a log, the current's time given."""
+    return replace(LOG, drift_time=hours * HOUR)
 
 
 def fixes(ship: Voyage, every: float = 60.0) -> Gnss:
@@ -53,7 +59,7 @@ def fixed(seed: int, number: int) -> Outcome:
     return ship.outcome(result, drifts=True)
 
 
-def with_log(true: LogErrors, assumed: LogErrors) -> Any:
+def with_log(true: LogErrors, assumed: LogErrors | None) -> Any:
     """A run aided by a speed log in body axes."""
 
     def run(seed: int, number: int) -> Outcome:
@@ -79,6 +85,14 @@ CASES = (
     Case("navigation, GNSS", "deflection 6 arcsec over 20 km", navigated(PLUMB, PLUMB, "gnss", 6.0)),
     Case("navigation, fixes", "place and azimuth at 10 and 20 h", fixed),
     Case("navigation, speed log", "current, scale, mounting, bias", with_log(LOG, LOG)),
+    *(
+        Case(
+            "navigation, speed log",
+            f"current .5 m/s, {h:g} h, and the others; nothing said",
+            with_log(current(h), None),
+        )
+        for h in (1.0, 12.0)
+    ),
     Case("navigation, speed log", "none of them", with_log(LogErrors(), LogErrors())),
 )
 
