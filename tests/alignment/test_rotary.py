@@ -199,3 +199,21 @@ def test_the_command(ship, tmp_path):
     assert abs(summary["heading_deg"] - heading) < 4 * summary["heading_sigma_deg"]
     wrong = CliRunner().invoke(app, [*arguments, "--indexer", "gyros", "--lever-arm", "10,x"])
     assert isinstance(wrong.exception, UsageError)
+
+
+@pytest.mark.parametrize("method", ["kf", "sakf", "imakf"])
+def test_published_filters_find_the_body_on_an_indexer(ship, method):
+    """The lever arm known, as their paper has it: within what they say, and far from it where the arm is left out."""
+    record = ship.record.between(None, 300.0)
+    aid = IndexerAid(ship.encoder, lever_arm=tuple(-ship.arm))
+    answer = align(record, ship.place, ship.imu, aid=aid, method=method)
+    off, sigma = error(answer, body_attitude(ship, answer.time)), np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN
+    assert answer.method == method
+    assert np.all(np.abs(off) < 4.0 * sigma)
+    without = align(record, ship.place, ship.imu, aid=IndexerAid(ship.encoder), method=method)
+    assert without.phi_covariance[2, 2] > 4.0 * answer.phi_covariance[2, 2]
+
+
+def test_a_method_of_a_base_is_refused_on_an_indexer(ship):
+    with pytest.raises(UsageError, match="method 'states10' on an indexer; choose one of auto, swaying, kf"):
+        align(ship.record, ship.place, ship.imu, aid=IndexerAid(ship.encoder), method="states10")

@@ -456,3 +456,22 @@ def test_the_bound_is_not_beaten_and_nearly_reached(tmp_path, runs):
         ratio = table.loc[quantity, "rms_over_bound"]
         assert ratio == table.loc[quantity, "rms"] / table.loc[quantity, "bound"]
         assert abs(ratio - 1) < 3.3 / np.sqrt(2 * runs)
+
+
+def test_published_filters_on_an_indexer_and_on_the_move_are_judged_by_the_truth(tmp_path):
+    """Errors within four of their own sigmas: of the body on the indexer, of the vehicle by its odometer."""
+    plan = {
+        "name": "published",
+        "runs": 2,
+        "scenarios": ["rotary_ship"],
+        "grid": {"duration": ["240 s"]},
+        "methods": ["imakf", "swaying"],
+    }
+    drive = {**plan, "scenarios": ["odometer_ring"], "methods": ["sgkf", "in_motion"]}
+    for number, content in enumerate((plan, drive)):
+        table = run_campaign(content, tmp_path / str(number)).table
+        heading = table[table["quantity"] == "phi_u"]
+        assert len(heading) == 4
+        assert (heading["value"].abs() < 4.0 * heading["sigma"]).all()
+    with pytest.raises(DataError, match="has no odometer"):
+        read_plan({**plan, "methods": ["sgkf"]})

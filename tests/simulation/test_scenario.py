@@ -22,6 +22,7 @@ BASE = {
     "motion": {"kind": "rest"},
 }
 PAPERS = {"rotary_ship", "transfer_flat_turn", "marine_damping", "marine_manoeuvres", "static_kalman", "odometer_ring"}
+RELATED = {"transfer_release", "late_sensors"}
 EVERYDAY = {"van", "quay", "take_off", "auv", "table"}
 
 
@@ -30,11 +31,11 @@ def run(*arguments: str):
 
 
 def test_the_papers_and_the_everyday_scenarios_ship():
-    assert set(shipped()) == PAPERS | EVERYDAY
+    assert set(shipped()) == PAPERS | RELATED | EVERYDAY
     assert all(shipped().values())
 
 
-@pytest.mark.parametrize("name", sorted(PAPERS | EVERYDAY))
+@pytest.mark.parametrize("name", sorted(PAPERS | RELATED | EVERYDAY))
 def test_a_shipped_scenario_runs_and_reads_back_from_its_resolved_file(name):
     scenario = read_scenario(name)
     again = read_scenario(scenario.to_mapping())

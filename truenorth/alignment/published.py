@@ -11,6 +11,8 @@ states10   an INS at rest in the local level, 10 states observed by its velocity
 states8    the same without velocity, 8 states observed by the level accelerometers; still, level IMU
 =========  =====================================================================================================
 
+On an indexer the first four take the lever arm as known, as their paper does (:func:`turned_arm_velocity`).
+
 All begin from optimisation-based alignment of the same log and go over it again from what they found, so that their start
 is not an assumption; nothing is known of the heading before. The size of what the base moves is read from the log, and the
 sigma of makf and imakf allows for what their factors moved. They are here to be compared: `kalman` and `swaying` of this
@@ -23,6 +25,7 @@ Sources: "Rotary SINS self-alignment under dynamic disturbance" (the first four;
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
@@ -62,10 +65,13 @@ class SampledLog(StayingLog):
     """A log observed by its velocity at the ends of the intervals: one state a row, as multiple factors need it."""
 
     R: float = 0.0  # (m/s)^2
+    arm_velocity: Array | None = None  # (K+1, 3) m/s: what a known lever arm makes, in the IMU's frame at the start
 
     def linearise(self) -> LinearSystem:
         """The static model with the size of what the base moves read from the log."""
         velocity = sampled_velocity(self.integrals, self.C_n0_i, self.position.lat, self.position.alt)[1:]
+        if self.arm_velocity is not None:
+            velocity = velocity - (self.arm_velocity[1:] - self.arm_velocity[0]) @ self.C_n0_i.T
         self.R = max(float(np.mean(white_variance(velocity))), QUIETEST_BASE**2)
         return sampled_system(super().linearise(), velocity, self.R)
 
@@ -79,10 +85,12 @@ def faded_align(
     interval: float,
     rows_at: Array,
     method: str,
+    arm_velocity: Array | None = None,
 ) -> FineAlignment:
-    """Align by kf, sakf, makf or imakf; arguments as :func:`truenorth.alignment.fine.fine_align`."""
+    """Align by kf, sakf, makf or imakf; arguments as :func:`truenorth.alignment.fine.fine_align` and of `SampledLog`."""
     kind, prior = FADING[method], prior_of(P_bias)
     log = SampledLog(record, C_n0_i, position, model, prior, interval, rows_at)
+    log.arm_velocity = arm_velocity
 
     def plain(system: LinearSystem) -> Filtered:
         return Filtered(system, kalman(system, history="full"))
@@ -95,6 +103,27 @@ def faded_align(
     unfaded = replace(last, found=plain(last.found.system))
     fine = FineAlignment.of(log, unfaded, prior.sensors, np.full(3, math.sqrt(log.R)))
     return replace(fine, estimates=_allowing(last.found.estimates, fine.estimates))
+
+
+def turned_arm_velocity(record: ImuRecord, C_sb: Callable[[Array], Array], arm: Array, interval: float) -> Array:
+    """(K+1, 3) velocity that a lever arm in a body makes of an IMU that turns in it, at the ends of the filter's intervals.
+
+    Parameters
+    ----------
+    C_sb : callable
+        (M, 3, 3) attitude of the body in the IMU at times (M,).
+    arm : (3,) array, m
+        From the body's centre of rotation to the IMU, body axes.
+    """
+    step = record.interval
+    ends = integrate(record, interval).time[1:]
+    rows = np.concatenate([[0], np.searchsorted(record.time, record.time[0] - step + ends + 0.5 * step) - 1])
+    around = np.clip(rows[:, None] + np.array([-1, 0, 1]), 0, len(record) - 1)
+    C_is = integrate(record, interval, rows_at=around.ravel()).C_ib_at.reshape(-1, 3, 3, 3)
+    C_bs = np.swapaxes(C_sb(record.time[around.ravel()]), 1, 2).reshape(-1, 3, 3, 3)
+    apart = record.time[around[:, 2]] - record.time[around[:, 0]]
+    C_ib = C_is @ np.swapaxes(C_bs, -1, -2)
+    return np.asarray((C_ib[:, 2] - C_ib[:, 0]) @ arm / apart[:, None])
 
 
 def _allowing(faded: Estimates, plain: Estimates) -> Estimates:

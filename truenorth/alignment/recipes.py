@@ -203,6 +203,7 @@ def on_indexer(r: Request) -> Alignment:
         axes=indexer.axes,
         lever_arm=None if indexer.lever_arm is None else -np.asarray(indexer.lever_arm, dtype=np.float64),
         at=r.at,
+        method=r.method,
         **r.common,
     )
 
@@ -221,7 +222,7 @@ RECIPES = [
     Recipe("a base that stays", on_base, methods=True, at=True),
     Recipe("a vehicle on the move", in_motion, (Odometer, VelocityLog, Gnss), methods=True, own=True),
     Recipe("a master INS", by_master, (Master,)),
-    Recipe("an IMU on an indexer", on_indexer, (Indexer,), at=True),
+    Recipe("an IMU on an indexer", on_indexer, (Indexer,), methods=True, at=True),
     Recipe("a turntable", on_table, (Positions,)),
 ]
 

@@ -24,6 +24,7 @@ from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
+from truenorth.alignment.published import FADING, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
 from truenorth.alignment.task import Task, bridged, make_task
@@ -44,6 +45,7 @@ Array = NDArray[np.float64]
 
 SHORTEST = 60.0  # s: below that sway cannot be told from tilt
 KNOWN_ARM = 0.1  # m, one sigma along each axis of an arm that was measured
+INDEXER_METHODS = ("auto", "swaying", *FADING)
 COVER = 0.05  # s by which an encoder's log may begin late or end early
 OFF_AXIS = math.radians(0.5)  # of a body that is said to be still, and an indexer of two axes
 
@@ -57,6 +59,7 @@ def align_rotary(
     axes: Sequence[str] = ("z", "x"),
     lever_arm: ArrayLike | None = None,
     at: float | None = None,
+    method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> Alignment:
@@ -74,6 +77,9 @@ def align_rotary(
         Of the indexer, the outermost first.
     lever_arm : (3,) array, m, optional
         From the body's centre of rotation to the IMU, body axes; estimated where it is left out.
+    method : str
+        ``auto`` or ``swaying``; or a published filter of this base, which takes the arm as known (none where it is left out):
+        ``kf``, ``sakf``, ``makf``, ``imakf``.
     at, heading_limit, progress
         As in :func:`truenorth.align`.
 
@@ -85,13 +91,15 @@ def align_rotary(
     Raises
     ------
     UsageError
-        Axes that do not fit the angles, or a lever arm that is not three finite numbers.
+        An unknown method, axes that do not fit the angles, or a lever arm that is not three finite numbers.
     DataError
         The encoder's log does not cover the record, or a body without encoder that is not still.
     AlignmentError
         Too short a record.
     """
     tell = progress or (lambda stage: None)
+    if method not in INDEXER_METHODS:
+        raise UsageError(f"method {method!r} on an indexer; choose one of {', '.join(INDEXER_METHODS)}")
     spec = imu_spec(imu).seen_in(record)
     record = bridged(record)
     if record.duration < SHORTEST:
@@ -102,7 +110,8 @@ def align_rotary(
     rows = np.array([task.epoch.row])
     coarse = integrate(record, task.interval, rows_at=rows)
     C_n0_i = oba(coarse, position.lat, position.alt).C_n0_i
-    tell("aligning: swaying")
+    own = method if method in FADING else "swaying"
+    tell(f"aligning: {own}")
     P_bias = np.diag(spec.bias_variance)
     if encoder is None:
         mount = Mount(np.zeros(3))
@@ -110,7 +119,12 @@ def align_rotary(
         angles = angles_at(encoder, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb)
-    fine = sway_align(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows, mount, _turned(spec))
+    start = (record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
+    if own in FADING:
+        arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)
+        fine: FineAlignment = faded_align(*start, own, arm)
+    else:
+        fine = sway_align(*start, mount, _turned(spec))
     source = f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 
@@ -125,8 +139,9 @@ def align_rotary(
     answer = replace(
         answer,
         C_nb=answer.C_nb @ C_sb_at,
-        method="swaying",
-        method_reason=f"the IMU turns on an indexer ({how}), the base may sway: its own motion is fitted to the log",
+        method=own,
+        method_reason=f"the IMU turns on an indexer ({how}), "
+        + (f"{own} was asked for" if own in FADING else "the base may sway: its own motion is fitted to the log"),
     )
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
     evidence += base_speed(answer) + bias_step_evidence(fine) + bad_stretches(fine, record)
@@ -138,6 +153,15 @@ def align_rotary(
     if len(axes) == 2:
         evidence += zero_evidence(record, given, _inner(encoder, axes))
     return judged(answer, evidence + notes(encoder.notes), heading_limit)
+
+
+def _arm_velocity(
+    record: ImuRecord, encoder: EncoderRecord | None, axes: Sequence[str], arm: Array, interval: float
+) -> Array | None:
+    """What a known arm makes of the velocity; None where there is none."""
+    if encoder is None or not np.any(arm):
+        return None
+    return turned_arm_velocity(record, _reading(encoder, axes, np.eye(len(axes))), arm, interval)
 
 
 def _orders(count: int) -> dict[str, Array]:

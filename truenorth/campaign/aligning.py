@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truenorth.aiding.aids import Gnss, Odometer
+from truenorth.aiding.aids import Gnss, Indexer, Odometer
 from truenorth.alignment import Alignment, align
+from truenorth.alignment.azimuth import AZIMUTH_METHODS
+from truenorth.alignment.rotary import INDEXER_METHODS
 from truenorth.campaign.rows import Row
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records import ImuRecord
+from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.simulation.indexer import Indexed
 
 if TYPE_CHECKING:
     from truenorth.campaign.plan import Case, MethodPlan, Plan
@@ -59,14 +63,18 @@ def _aligned(
         record = simulated.record.between(None, case.built.start + time * (1 + 1e-12))
         start = simulated.motion.states(np.array(case.built.start))
         place = Position(float(start.lat), float(start.lon), float(start.alt))
-        if method.method == "in_motion":
+        motion = simulated.motion
+        if method.method in ("in_motion", *AZIMUTH_METHODS):
             assert spec is not None  # the plan sees to it
-            answer = _in_motion(plan, case, run, spec, record, place)
+            answer = _in_motion(plan, case, run, method.method, spec, record, place)
         else:
-            answer = align(record, place, spec, method=method.method, heading_limit=plan.heading_limit)
+            aid: list[Indexer] = []
+            if isinstance(motion, Indexed) and method.method in INDEXER_METHODS:
+                aid, motion = [_indexer(plan, case, run, motion)], motion.motion  # the answer is the body's
+            answer = align(record, place, spec, aid=aid, method=method.method, heading_limit=plan.heading_limit)
         errors = [
             Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
-            for quantity, value, sigma, unit in _errors(answer, simulated)
+            for quantity, value, sigma, unit in _errors(answer, simulated, motion.states(np.array(answer.time)))
         ]
     except Exception as error:
         return [_failure(case, method.name, run, time, error)]
@@ -76,21 +84,34 @@ def _aligned(
     return [outcome, *errors]
 
 
-def _in_motion(plan: Plan, case: Case, run: int, spec: ImuSpec, record: ImuRecord, place: Position) -> Alignment:
-    """By the odometer and the receiver that the scenario has, as far as the log goes; where they sit is estimated."""
+def _indexer(plan: Plan, case: Case, run: int, motion: Indexed) -> Indexer:
+    """The encoder of a scenario's indexer, with the lever arm as the scenario has it."""
+    scenario = case.built
+    logs = scenario.simulate_aiding(seed=plan.seed, run=run, number=case.scenario_number)
+    axes = tuple(axis.direction for axis in motion.indexer.axes)
+    return Indexer(logs["encoder"].record, axes=axes, lever_arm=[-x for x in scenario.lever_arm])
+
+
+def _in_motion(
+    plan: Plan, case: Case, run: int, method: str, spec: ImuSpec, record: ImuRecord, place: Position
+) -> Alignment:
+    """By the odometer and the receiver that the scenario has, as far as the log goes; where they sit is estimated.
+
+    Published filters take the odometer alone.
+    """
     logs = case.built.simulate_aiding(seed=plan.seed, run=run, number=case.scenario_number)
     stop = float(record.time[-1])
-    kinds = {"odometer": Odometer, "gnss": Gnss}
+    kinds = {"odometer": Odometer, "gnss": Gnss} if method == "in_motion" else {"odometer": Odometer}
     aid = [kind(logs[key].record.between(None, stop)) for key, kind in kinds.items() if key in logs]
-    return align(record, place, spec, aid=aid, heading_limit=plan.heading_limit)
+    own = "auto" if method == "in_motion" else method
+    return align(record, place, spec, aid=aid, method=own, heading_limit=plan.heading_limit)
 
 
-def _errors(answer: Alignment, simulated: Simulation) -> Iterator[tuple[str, float, float, str]]:
-    """Quantity, error, sigma and unit of what an alignment found.
+def _errors(answer: Alignment, simulated: Simulation, true: MotionStates) -> Iterator[tuple[str, float, float, str]]:
+    """Quantity, error, sigma and unit of what an alignment found, against the motion at its epoch.
 
     The squares, normalised by what the method says, are means over components: 1 where it says the truth.
     """
-    true = simulated.motion.states(np.array(answer.time))
     phi = -rotation_vector_from_dcm(answer.C_nb @ true.C_nb.T)  # C_hat = (I - [phi x]) C
     sigma = np.sqrt(np.diag(answer.phi_covariance))
     usable = 3 if answer.heading_known else 2

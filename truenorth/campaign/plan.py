@@ -25,6 +25,7 @@ from typing import Any, get_args
 
 from pydantic import Field, PrivateAttr, field_validator
 
+from truenorth.alignment.azimuth import AZIMUTH_METHODS
 from truenorth.alignment.procedure import Method
 from truenorth.core.errors import DataError, TruenorthError
 from truenorth.core.plugins import plugins
@@ -45,8 +46,8 @@ class MethodPlan(Strict):
     ----------
     name : str
     method : str
-        As :func:`truenorth.align` takes it; or ``in_motion``, by the odometer and the GNSS
-        receiver that the scenario has.
+        As :func:`truenorth.align` takes it, published filters too (those on the move by the odometer alone); or ``in_motion``,
+        by the odometer and the GNSS receiver that the scenario has.
     imu : "simulated", "none", preset, file or mapping
         The specification that the method is given: that of the simulated IMU, none (it then asks the log), or another one.
     """
@@ -55,10 +56,15 @@ class MethodPlan(Strict):
     method: str
     imu: str | dict[str, Any] = "simulated"
 
+    @property
+    def moves(self) -> bool:
+        """Whether it aligns on the move."""
+        return self.method in ("in_motion", *AZIMUTH_METHODS)
+
     @field_validator("method")
     @classmethod
     def _known(cls, value: str) -> str:
-        own = (*get_args(Method), "in_motion")
+        own = (*get_args(Method), "in_motion", *AZIMUTH_METHODS)
         if value not in own and value not in plugins("truenorth.methods"):
             raise ValueError(f"{value!r}; expected {', '.join(map(repr, (*own, *plugins('truenorth.methods'))))}")
         return value
@@ -168,10 +174,10 @@ class Plan(Strict):
                 except TruenorthError as error:
                     raise DataError(f"{self._source}: {case.name}: {error}") from None
                 for method in self.methods:
-                    if method.method == "in_motion" and built.odometer is None and built.gnss is None:
+                    if method.moves and built.odometer is None and (built.gnss is None or method.method != "in_motion"):
+                        lacks = "has neither odometer nor gnss" if method.method == "in_motion" else "has no odometer"
                         raise DataError(
-                            f"{self._source}: methods: {method.name!r} aligns in motion, and {case.name} has neither odometer nor "
-                            "gnss; give it one"
+                            f"{self._source}: methods: {method.name!r} aligns in motion, and {case.name} {lacks}; give it one"
                         )
                 for time in self.times:
                     if not 0 < time <= built.duration:
@@ -261,7 +267,7 @@ def read_plan(source: str | PathLike[str] | Mapping[str, Any] | Plan) -> Plan:
         if names.count(name) > 1:
             raise DataError(f"{plan._source}: methods: two are named {name!r}; give each a name of its own")
     for method in plan.methods:
-        if method.method == "in_motion" and method.imu == "none":
+        if method.moves and method.imu == "none":
             raise DataError(
                 f"{plan._source}: methods: {method.name!r} aligns in motion without a specification, and a log on the move "
                 "cannot be asked for it; expected imu: simulated, a preset or a file"

@@ -19,6 +19,8 @@ Studies:
   odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
   networks  Internal damping networks by design, and a fuzzy damping ratio (related work)
   gyro_free Angular rate from twelve accelerometers (related work)
+  in_flight A slave calibrated in the air, and its flight after the release (related work)
+  lag_fusion  Late, asynchronous sensors in one filter (related work)
   all       All of them, and index.html: which claims hold, in part, or not
 \b
 Examples:

@@ -27,6 +27,8 @@ STUDIES = {
     "odometer": "truenorth.papers.odometer.study",
     "networks": "truenorth.papers.related.networks",
     "gyro_free": "truenorth.papers.related.gyro_free",
+    "in_flight": "truenorth.papers.related.in_flight",
+    "lag_fusion": "truenorth.papers.related.lag_fusion",
 }
 Progress = Callable[[str], None]
 

@@ -1,0 +1,221 @@
+"""`truenorth reproduce lag_fusion`: one central filter of sensors that are late and out of step. Related work of system 2.
+
+Each row is taken at its own time: what the filter knew then is carried on to now with the row in it, so that the answer is that
+of rows in the order in which they were measured. A lag that is not known is a state, seen by what the vehicle does in it:
+``z = h(x(t - tau)) + noise``, so that its column is minus the derivative of what is measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from truenorth.aiding.sensors import from_gnss, from_odometer
+from truenorth.core import earth
+from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track, with_states
+from truenorth.figures.style import COLOURS, new_figure, style
+from truenorth.papers.claims import Rule, interval, paired, settle
+from truenorth.papers.study import Study
+from truenorth.papers.table import Table
+from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.simulation.streams import stream
+from truenorth.state.layout import DP, PHI
+from truenorth.state.mounting import Mounting
+from truenorth.state.prior import prior_covariance
+from truenorth.state.state import Start
+from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
+
+TITLE = "Centralised fusion of late, asynchronous sensors"
+RUNS = 30
+STREAM = 321
+LEVEL, HEADING, VELOCITY, PLACE = math.radians(0.1), math.radians(2.0), 0.1, 1.0  # sigmas of the start
+LAG = 0.5  # s, sigma of a lag that is a state
+LATER = 100.0  # s: errors are counted from then on
+NAMES = {
+    "in_time": "no lag",
+    "own_time": "lag known",
+    "states": "lag a state",
+    "ignored": "lag ignored",
+    "shared": "two filters fused",
+}
+ARCMIN = math.radians(1.0 / 60.0)
+
+RULES = (
+    Rule(
+        "A central filter that takes late rows at their own time loses nothing to the lag.",
+        (
+            interval("traffic own_time place@100-300 < 1.05 * traffic in_time place@100-300"),
+            interval("traffic own_time heading@100-300 < 1.05 * traffic in_time heading@100-300"),
+        ),
+        "Against sensors without lag: place {traffic own_time place@100-300:.2f} and {traffic in_time place@100-300:.2f} m, "
+        "heading {traffic own_time heading@100-300:.1f}' and {traffic in_time heading@100-300:.1f}'.",
+        "related work",
+    ),
+    Rule(
+        "The lags must be considered.",
+        (
+            paired("traffic own_time place@100-300 < 0.5 * traffic ignored place@100-300"),
+            paired("traffic own_time heading@100-300 < 0.5 * traffic ignored heading@100-300"),
+        ),
+        "Ignored, 150 and 600 ms leave {traffic ignored place@100-300:.1f} m and {traffic ignored heading@100-300:.0f}'.",
+        "related work",
+    ),
+    Rule(
+        "Lags that are not known can be states.",
+        (
+            interval("traffic states place@100-300 < 1.1 * traffic own_time place@100-300"),
+            interval("traffic states heading@100-300 < 1.1 * traffic own_time heading@100-300"),
+        ),
+        "Nothing known of them (.5 s): the receiver's is found to {traffic states gnss_lag@300:.4f} s, the wheel's to "
+        "{traffic states odometer_lag@300:.4f} s.",
+        "related work",
+    ),
+    Rule(
+        "One central filter is more precise than the fusion of two filters with a sensor each.",
+        (
+            paired("traffic own_time place@100-300 < traffic shared place@100-300"),
+            paired("traffic own_time heading@100-300 < traffic shared heading@100-300"),
+        ),
+        "Two filters with the same IMU, each knowing its sensor's lag, weighed by their covariances as if they were independent: "
+        "{traffic shared place@100-300:.2f} m and {traffic shared heading@100-300:.1f}'.",
+        "related work",
+    ),
+    Rule(
+        "Its sigma can be believed.",
+        tuple(
+            interval(f"traffic {method} {name}@300 rms_over_sigma < 1.5", runs=20)
+            for method in ("own_time", "states")
+            for name in ("heading", "east", "north")
+        ),
+        by="ours",
+    ),
+)
+
+
+def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
+    """Run the study; see :func:`truenorth.papers.reproduce`."""
+    count, table, late = runs or RUNS, Table(), read_scenario("late_sensors")
+    content = late.to_mapping()
+    sensors = {name: {**content[name], "latency": "0 s"} for name in ("odometer", "gnss")}
+    prompt = read_scenario({**content, **sensors})
+    kept: dict[str, list[tuple[Array, Array, Array]]] = {name: [] for name in NAMES}
+    for run in range(count):
+        progress(f"drive {run + 1} of {count}")
+        for name, found in one(late, prompt, seed, run).items():
+            kept[name].append(found)
+    time = np.arange(1.0, late.duration + 0.5)
+    after = time > LATER
+    for name, runs_of in kept.items():
+        errors, sigmas, lags = (np.stack(part) for part in zip(*runs_of, strict=True))
+        window = {"time": float(time[-1]), "start": LATER}
+        place = np.sqrt(np.mean(np.sum(errors[:, after, :2] ** 2, axis=2), axis=1))
+        heading = np.sqrt(np.mean(errors[:, after, 2] ** 2, axis=1))
+        table.errors("traffic", name, "place", place, "m", **window)  # type: ignore[arg-type]
+        table.errors("traffic", name, "heading", heading / ARCMIN, "arcmin", **window)  # type: ignore[arg-type]
+        for i, (quantity, unit, scale) in enumerate(
+            (("east", "m", 1.0), ("north", "m", 1.0), ("heading", "arcmin", ARCMIN))
+        ):
+            last, claimed = errors[:, -1, i] / scale, sigmas[:, -1, i] / scale
+            table.errors("traffic", name, quantity, last, unit, claimed, time=float(time[-1]))
+        if name == "states":
+            for i, quantity in enumerate(("odometer_lag", "gnss_lag")):
+                table.errors("traffic", name, quantity, lags[:, i], "s", time=float(time[-1]))
+    curves = {name: np.stack([errors for errors, _, _ in runs_of]) for name, runs_of in kept.items()}
+    return Study(
+        TITLE,
+        table,
+        settle(RULES, table),
+        {"fusion": draw_fusion(time, curves)},
+        {
+            "fusion": "RMS over the drives of place and heading; all with the same odometer (7 Hz, 150 ms late) and receiver "
+            "(1 Hz, 600 ms late)."
+        },
+        [
+            "`in_time`: the same drives and noise without lag. `shared`: two filters, weighed by their covariances as if they were "
+            "independent, which they are not: they have one IMU.",
+        ],
+    )
+
+
+def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tuple[Array, Array, Array]]:
+    """Of one drive: errors (K, 3) east, north (m) and heading (rad) at each second, their sigmas, and errors of both lags (2,)."""
+    log, logs = late.simulate(seed=seed, run=run), late.simulate_aiding(seed=seed, run=run)
+    there, rng = late.build_motion(seed=seed, run=run), stream(seed, 0, run, STREAM)
+    at = there.states(np.array(0.0))
+    phi = np.array([LEVEL, LEVEL, HEADING]) * rng.standard_normal(3)
+    spec = late.imu_spec
+    P = prior_covariance((LEVEL, LEVEL, HEADING), VELOCITY, PLACE, spec.constant_variance)
+    v = at.v_n + VELOCITY * rng.standard_normal(3)
+    R_M, R_N = earth.radii(float(at.lat))
+    dp = PLACE * rng.standard_normal(3)
+    place = float(at.lat) + dp[1] / R_M, float(at.lon) + dp[0] / (R_N * math.cos(float(at.lat))), float(at.alt) + dp[2]
+    start = Start(0.0, dcm_from_rotation_vector(-phi) @ at.C_nb, v, *place, np.zeros(3), np.zeros(3), P)
+    lags = {name: float(spec.latency) for name, spec in late.aiding_specs.items()}  # type: ignore[attr-defined]
+    truth = there.states(np.arange(1.0, late.duration + 0.5))
+
+    def track(source: Scenario, use: tuple[str, ...], known: bool = True, sigma: float = 0.0) -> tuple[Track, Array]:
+        records = logs if source is late else source.simulate_aiding(seed=seed, run=run)
+        sits = {
+            name: Mounting(latency=lags[name] if known and source is late else 0.0, latency_sigma=sigma, gate=0.0)
+            for name in use
+        }
+        aiding = []
+        if "odometer" in use:
+            wheel = replace(sits["odometer"], noise=0.05, slip=0.05)
+            aiding += from_odometer(records["odometer"].record, wheel)
+        if "gnss" in use:
+            aiding += from_gnss(records["gnss"].record, sits["gnss"])
+        model = with_states(InsModel.from_spec(spec), aiding)
+        found = navigate_track(log.record, start, model, aiding, interval=0.1, every=10)
+        names = [group.name for group in model.groups]
+        states = [found.layout.slice_of(n) for n in names if "lat" in n or "lag" in n]
+        left = np.array([float(found.sensors[-1, s.start]) for s in states if s is not None])
+        return found, left
+
+    def against(found: Track) -> tuple[Array, Array]:
+        count = len(truth.lat)
+        d = np.stack(
+            [
+                (found.position[-count:, 1] - truth.lon) * R_N * np.cos(truth.lat),
+                (found.position[-count:, 0] - truth.lat) * R_M,
+            ]
+        )
+        heading = misalignment(found.C_nb[-count:], truth.C_nb)[:, 2]
+        sigma = found.sigma[-count:]
+        return np.column_stack([d.T, heading]), np.column_stack([sigma[:, DP][:, :2], sigma[:, PHI][:, 2]])
+
+    both, none = ("odometer", "gnss"), np.full(2, np.nan)
+    result = {
+        name: (*against(track(*how)[0]), none)
+        for name, how in {"in_time": (prompt, both), "own_time": (late, both), "ignored": (late, both, False)}.items()
+    }
+    found, left = track(late, both, False, LAG)
+    result["states"] = (*against(found), left - np.array([lags["odometer"], lags["gnss"]]))
+    (a, s), (b, r) = (against(track(late, (name,))[0]) for name in both)
+    weight = r**2 / (s**2 + r**2)
+    result["shared"] = (weight * a + (1.0 - weight) * b, 1.0 / np.sqrt(1.0 / s**2 + 1.0 / r**2), none)
+    return result
+
+
+def draw_fusion(time: Array, curves: Mapping[str, Array]) -> Figure:
+    """RMS of place and heading over time."""
+    with style():
+        figure = new_figure(11.0, 4.2)
+        place, heading = figure.subplots(1, 2)
+        for (name, errors), colour in zip(curves.items(), COLOURS, strict=False):
+            rms = np.sqrt(np.mean(errors**2, axis=0))
+            place.plot(time, np.hypot(rms[:, 0], rms[:, 1]), color=colour, linewidth=1.0, label=NAMES[name])
+            heading.plot(time, rms[:, 2] / ARCMIN, color=colour, linewidth=1.0)
+        place.set(yscale="log", xlabel="time, s", ylabel="place, m", xlim=(0.0, time[-1]))
+        heading.set(yscale="log", xlabel="time, s", ylabel="heading, arcmin", xlim=(0.0, time[-1]))
+        figure.legend(*place.get_legend_handles_labels(), loc="outside lower left", ncols=len(NAMES))
+    return figure
