@@ -126,7 +126,7 @@ def released(
     found : dict
         Horizontal error (K,) in m by method; errors of biases and heading at the release with their sigmas, by name.
     """
-    before = master[master.time <= RELEASE]
+    before = master[: int(np.searchsorted(master.time, RELEASE))]
     answer = align_transfer(
         record.between(None, RELEASE), before, scenario.imu_spec, matching="both", mounting_sigma=np.radians(1.0)
     )
@@ -157,23 +157,23 @@ def released(
 
 
 def _add(table: Table, case: str, found: list[dict[str, Any]], time: Array) -> None:
-    common = {"noise": "random_walk"}
+    common: dict[str, Any] = {"noise": "random_walk"}
     for method in NAMES:
         table.errors(
             case, method, "place", np.array([f[method][-1] for f in found]), "m", time=round(time[-1]), **common
-        )  # type: ignore[arg-type]
+        )
     for name, unit, scale in (("gyro", "deg/h", DEG_PER_HOUR), ("accel", "ug", MICRO_G)):
         errors, sigmas = (np.array([f[name][i] for f in found]) / scale for i in (0, 1))
         for i, axis in enumerate("xyz"):
             quantity = f"{name}_bias_{axis}"
-            table.errors(case, "calibrated", quantity, errors[:, i], unit, sigmas[:, i], time=RELEASE, **common)  # type: ignore[arg-type]
+            table.errors(case, "calibrated", quantity, errors[:, i], unit, sigmas[:, i], time=RELEASE, **common)
         whole = np.sqrt(np.mean(errors**2, axis=1))
         level = np.sqrt(np.mean(errors[:, :2] ** 2, axis=1))
-        table.errors(case, "calibrated", f"{name}_bias", whole, unit, time=RELEASE, **common)  # type: ignore[arg-type]
-        table.errors(case, "calibrated", f"{name}_bias_level", level, unit, time=RELEASE, **common)  # type: ignore[arg-type]
+        table.errors(case, "calibrated", f"{name}_bias", whole, unit, time=RELEASE, **common)
+        table.errors(case, "calibrated", f"{name}_bias_level", level, unit, time=RELEASE, **common)
     arcmin = np.radians(1.0 / 60.0)
     off, claimed = (np.array([f["heading"][i] for f in found]) / arcmin for i in (0, 1))
-    table.errors(case, "calibrated", "heading", off, "arcmin", claimed, time=RELEASE, **common)  # type: ignore[arg-type]
+    table.errors(case, "calibrated", "heading", off, "arcmin", claimed, time=RELEASE, **common)
 
 
 def draw_released(since: Array, curves: Mapping[tuple[str, str], Array]) -> Figure:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -116,11 +117,11 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     after = time > LATER
     for name, runs_of in kept.items():
         errors, sigmas, lags = (np.stack(part) for part in zip(*runs_of, strict=True))
-        window = {"time": float(time[-1]), "start": LATER}
+        window: dict[str, Any] = {"time": float(time[-1]), "start": LATER}
         place = np.sqrt(np.mean(np.sum(errors[:, after, :2] ** 2, axis=2), axis=1))
         heading = np.sqrt(np.mean(errors[:, after, 2] ** 2, axis=1))
-        table.errors("traffic", name, "place", place, "m", **window)  # type: ignore[arg-type]
-        table.errors("traffic", name, "heading", heading / ARCMIN, "arcmin", **window)  # type: ignore[arg-type]
+        table.errors("traffic", name, "place", place, "m", **window)
+        table.errors("traffic", name, "heading", heading / ARCMIN, "arcmin", **window)
         for i, (quantity, unit, scale) in enumerate(
             (("east", "m", 1.0), ("north", "m", 1.0), ("heading", "arcmin", ARCMIN))
         ):
@@ -159,7 +160,7 @@ def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tupl
     dp = PLACE * rng.standard_normal(3)
     place = float(at.lat) + dp[1] / R_M, float(at.lon) + dp[0] / (R_N * math.cos(float(at.lat))), float(at.alt) + dp[2]
     start = Start(0.0, dcm_from_rotation_vector(-phi) @ at.C_nb, v, *place, np.zeros(3), np.zeros(3), P)
-    lags = {name: float(spec.latency) for name, spec in late.aiding_specs.items()}  # type: ignore[attr-defined]
+    lags = {name: float(spec.latency) for name, spec in late.aiding_specs.items()}
     truth = there.states(np.arange(1.0, late.duration + 0.5))
 
     def track(source: Scenario, use: tuple[str, ...], known: bool = True, sigma: float = 0.0) -> tuple[Track, Array]:
@@ -195,8 +196,9 @@ def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tupl
 
     both, none = ("odometer", "gnss"), np.full(2, np.nan)
     result = {
-        name: (*against(track(*how)[0]), none)
-        for name, how in {"in_time": (prompt, both), "own_time": (late, both), "ignored": (late, both, False)}.items()
+        "in_time": (*against(track(prompt, both)[0]), none),
+        "own_time": (*against(track(late, both)[0]), none),
+        "ignored": (*against(track(late, both, known=False)[0]), none),
     }
     found, left = track(late, both, False, LAG)
     result["states"] = (*against(found), left - np.array([lags["odometer"], lags["gnss"]]))
