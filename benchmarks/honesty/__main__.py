@@ -6,13 +6,15 @@ into the page. The worlds are drawn from seed and run.
 
 from __future__ import annotations
 
-from benchmarks.honesty import circling, damping, navigation, staying, transfer, turning
+from benchmarks.honesty import circling, damping, moving, navigation, staying, transfer, turning, underway
 from benchmarks.honesty.frame import main
 from benchmarks.honesty.harness import framed
 
 CASES = (
     *framed("base that stays", staying.CASES),
     *framed("turning sensor", turning.CASES),
+    *framed("vehicle or base", underway.CASES),
+    *framed("on the move", moving.CASES),
     *transfer.CASES,
     *damping.CASES,
     *navigation.CASES,

@@ -48,6 +48,11 @@ def aircraft() -> Any:
     return course(Position.from_degrees(62.0, 20.0, 3000.0), legs, heading=0.6, speed=150.0)
 
 
+def straight_flight() -> Any:
+    """150 m/s straight on in still air."""
+    return course(Position.from_degrees(62.0, 20.0, 3000.0), straight(400.0), heading=0.6, speed=150.0)
+
+
 def transferred(motion: Any, errors: MasterErrors | None) -> Any:
     """A run against a master with these errors; None: it is taken for the truth."""
 
@@ -76,8 +81,9 @@ def transferred(motion: Any, errors: MasterErrors | None) -> Any:
         ratios = {
             "heading": ratio[2:],
             "level": ratio[:2],
-            "delay": np.array([(t.delay - tau) / t.delay_sigma]),
-            "arm": (t.lever_arm - arm) / t.lever_arm_sigma,
+            # What is printed as not estimated claims nothing.
+            "delay": np.array([(t.delay - tau) / t.delay_sigma if t.delay_estimated else np.nan]),
+            "arm": np.where(t.lever_arm_estimated, (t.lever_arm - arm) / t.lever_arm_sigma, np.nan),
         }
         return Outcome(ratios, "" if answer.status == "aligned" else f"{answer.status}: {answer.reasons[0]}")
 
@@ -86,7 +92,7 @@ def transferred(motion: Any, errors: MasterErrors | None) -> Any:
 
 CASES = tuple(
     Case("transfer", f"{name}, errors of the master {how}", transferred(motion, errors), left_out=errors is None)
-    for name, motion in (("ship", ship), ("aircraft", aircraft))
+    for name, motion in (("ship", ship), ("aircraft", aircraft), ("straight flight", straight_flight))
     for how, errors in (("considered", ERRORS), ("left out", None))
 )
 

@@ -16,11 +16,14 @@ from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
 from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel, master_errors
 from truenorth.filters import kalman
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import straight
 
 DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
 SPAN = 60.0
@@ -377,3 +380,14 @@ def test_errors_of_the_master_by_name():
     ):
         with pytest.raises(UsageError, match=message):
             master_errors(wrong)
+
+
+def test_a_delay_that_cannot_be_seen_is_not_printed_as_seen():
+    """Straight on in still air: the noise of the gyros, squared over two thousand rows, is no knowledge of a delay."""
+    way = course(Position.from_degrees(62.0, 20.0, 3000.0), straight(200.0), heading=0.6, speed=150.0)
+    spec = MasterSpec(clock_offset=0.06, velocity_noise=0.05, attitude_noise=math.radians(1.0 / 60.0))
+    slave = simulate(way, rate=100.0, duration=150.0, imu=imu_spec("tactical"), seed=4).record
+    master = simulate_sensor(way, spec, duration=150.0, seed=4).record
+    answer = align_transfer(slave, master, "tactical").transfer
+    assert not answer.delay_estimated
+    assert abs(answer.delay - 0.06) < 2.0 * answer.delay_sigma

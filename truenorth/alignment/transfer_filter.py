@@ -44,6 +44,8 @@ SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by mo
 WIDER = 3.0  # the same master's velocity and force are not quite news to each other
 TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
+RATE_NOISE = 1.25 / 4.0  # of the rate at an epoch: by a line through four samples
+
 
 @dataclass(frozen=True)
 class SlaveStart:
@@ -240,6 +242,7 @@ def master_aiding(
                 C_mb=start.C_mb,
                 states=_states(groups, roles),
                 gate=matching.gate,
+                figures=(0.0 if slave is None else RATE_NOISE * model.gyro_random_walk**2 / slave.interval,),
                 retimed=True,
                 patience=patience,
                 opens=MOUNTING if MOUNTING in groups else PHI.start,
