@@ -18,6 +18,7 @@ from truenorth.core.position import Position
 from truenorth.quality.regimes import MotionSummary, motion_summary
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.increments import across_gaps
 from truenorth.strapdown.inertial import earth_rotation
 
 Array = NDArray[np.float64]
@@ -118,11 +119,7 @@ def bridged(record: ImuRecord) -> ImuRecord:
             f"{record.time[worst - 1]:.3f} s, where samples come every {record.interval:.4f} s; what the base did in it is "
             "not known: align a part without the gap (`record.between`)"
         )
-    if record.kind == "rates":
-        return record
-    scale = np.ones(len(record))
-    scale[gaps] = steps[gaps]
-    return replace(record, gyro=record.gyro * scale[:, None], accel=record.accel * scale[:, None])
+    return across_gaps(record)
 
 
 def deflection_covariance(lat: float, g: float) -> Array:

@@ -28,6 +28,7 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals
+from truenorth.strapdown.increments import without_gaps
 
 Array = NDArray[np.float64]
 
@@ -143,23 +144,22 @@ def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRe
     first : track
         Of the record as it is.
     record : ImuRecord
+        With its gaps bridged.
     """
     gaps = record.gaps[record.gaps > 0]
     if not gaps.size:
         return []
-    missing, bridged = np.zeros(len(record)), np.ones((len(record), 1))
-    missing[gaps] = record.steps[gaps] - record.interval
-    if record.kind == "increments":  # the row after a gap was given the whole of it
-        bridged[gaps, 0] = record.interval / record.steps[gaps]
-    time = record.time - np.cumsum(missing)
-    closed = replace(record, time=time, gyro=record.gyro * bridged, accel=record.accel * bridged)
     try:
-        ratio = _ratio(first.residuals, run(closed).residuals)
+        ratio = _ratio(first.residuals, run(without_gaps(record)).residuals)
     except DataError:
         return []
     if ratio <= limit("drift"):
         return []
-    figures: dict[str, Figure] = {"count": len(gaps), "lost": float(missing.sum()), "ratio": ratio}
+    figures: dict[str, Figure] = {
+        "count": len(gaps),
+        "lost": float(np.sum(record.steps[gaps] - record.interval)),
+        "ratio": ratio,
+    }
     return [Evidence("record.clock_jumps", figures, "unknown", ANY_EFFECT, ("common_clock",))]
 
 

@@ -38,6 +38,7 @@ from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Track
+from truenorth.strapdown.increments import across_gaps
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -308,7 +309,7 @@ def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
 
 
 def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float], ...], list[Aiding]]:
-    """Gaps filled with the rate after them, and what they add to the uncertainty.
+    """Gaps bridged by rates that change evenly, and what they add to the uncertainty.
 
     What the base did in a gap is as different from that as its rates differ over the log.
     """
@@ -328,13 +329,9 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
     scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
     unrest = [np.std(values * scale, axis=0).max() for values in (record.gyro, record.accel)]
     gaps = tuple((float(record.time[row - 1]), float(length)) for row, length in zip(rows, lengths))
-    if record.kind == "increments":
-        factor = np.ones(len(record))
-        factor[rows] = lengths / record.interval
-        record = replace(record, gyro=record.gyro * factor[:, None], accel=record.accel * factor[:, None])
     turn, push = (np.tile(missing[:, None] * max(rate, 1e-9), 3) for rate in unrest)
     # The kernel's form of a disturbance: variance of velocity as measured, of attitude as variance.
-    return record, gaps, [Aiding("gap", "velocity", record.time[rows], push**2, turn, does="disturbance")]
+    return across_gaps(record), gaps, [Aiding("gap", "velocity", record.time[rows], push**2, turn, does="disturbance")]
 
 
 def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:

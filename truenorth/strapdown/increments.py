@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,6 +71,36 @@ def increments(
     third = np.flatnonzero(regular[2:] & regular[1:-1]) + 2
     result[third] = T[third] / 12.0 * (5.0 * rows[third] + 8.0 * rows[third - 1] - rows[third - 2])
     return np.ascontiguousarray(result[earlier:, :3]), np.ascontiguousarray(result[earlier:, 3:])
+
+
+def across_gaps(record: ImuRecord) -> ImuRecord:
+    """The record, whose increments after a gap hold the whole of it: between the rows next to a gap rates change evenly.
+
+    Rates are integrated so anyway. A rate that would stand still leaves ``w' T^2 / 2`` of a row that is lost, this one
+    ``w'' T^3 / 12``.
+    """
+    gaps = record.gaps[record.gaps > 0]
+    if record.kind == "rates" or not gaps.size:
+        return record
+    lost = (record.steps[gaps] / record.interval - 1.0)[:, None]
+    gyro, accel = record.gyro.copy(), record.accel.copy()
+    for out, x in ((gyro, record.gyro), (accel, record.accel)):
+        out[gaps] += 0.5 * lost * (x[gaps] + x[gaps - 1])
+    return replace(record, gyro=gyro, accel=accel)
+
+
+def without_gaps(record: ImuRecord) -> ImuRecord:
+    """The increments of each row's own interval again, of a record from :func:`across_gaps`, with the clock closed over gaps."""
+    gaps = record.gaps[record.gaps > 0]
+    missing = np.zeros(len(record))
+    missing[gaps] = record.steps[gaps] - record.interval
+    gyro, accel = record.gyro.copy(), record.accel.copy()
+    if record.kind == "increments":
+        for k in gaps:
+            half = 0.5 * missing[k] / record.interval
+            gyro[k] = (gyro[k] - half * gyro[k - 1]) / (1.0 + half)
+            accel[k] = (accel[k] - half * accel[k - 1]) / (1.0 + half)
+    return replace(record, time=record.time - np.cumsum(missing), gyro=gyro, accel=accel)
 
 
 def interval_lengths(
