@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from truenorth.estimate.ongoing import Ongoing
     from truenorth.navigation.handover import Handover
     from truenorth.quality import Inspection
+    from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 Status = Literal["aligned", "level_only", "not_converged", "not_observable", "inconsistent"]
@@ -177,6 +178,13 @@ class Alignment(Shown):
     def reasons(self) -> tuple[str, ...]:
         """The verdict in words, with figures: the evidence in plain English."""
         return sentences(self.evidence)
+
+    @property
+    def residuals(self) -> tuple[Residuals, ...]:
+        """What the aiding sensors' or the master's measurements said against the prediction; none of a base that stays."""
+        if self.transfer is not None:
+            return self.transfer.residuals
+        return () if self.moving is None else self.moving.track.residuals
 
     @property
     def attitude(self) -> Rotation:

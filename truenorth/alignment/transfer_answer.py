@@ -165,6 +165,7 @@ def _transfer(
         notes=(*notes, *silences),
         position_noise=fitted["position"],
         acceleration_noise=fitted["acceleration"],
+        residuals=track.residuals,
     )
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.state.track import Residuals
+
 Array = NDArray[np.float64]
 
 NOT_ESTIMATED = 0.9  # of its prior sigma: what stays above has not been estimated
@@ -46,6 +48,8 @@ class Transfer:
         Combinations that the motion could not tell apart, in words.
     notes : tuple of str
         What was found and mended on the way: delay of another clock, drop-outs.
+    residuals : tuple of Residuals
+        Of the master's rows, source by source.
     """
 
     matching: str
@@ -71,6 +75,7 @@ class Transfer:
     notes: tuple[str, ...] = ()
     position_noise: float = math.nan
     acceleration_noise: float = math.nan
+    residuals: tuple[Residuals, ...] = ()
 
     @property
     def delay_estimated(self) -> bool:

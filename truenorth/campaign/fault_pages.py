@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from truenorth.campaign.fault_limits import UNSEEN
+from truenorth.campaign.fault_limits import BY_LIKELIHOOD, LIKE_MOTION, UNSEEN
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError, UsageError
@@ -111,9 +111,10 @@ def _silent(trials: Sequence[Trial]) -> list[str]:
 
 def _unseen() -> list[str]:
     lines = ["| cannot be seen | by | why |", "| --- | --- | --- |"]
-    return lines + [f"| {u.fault}{_sizes(u.size)} | {', '.join(u.procedures)} | {u.why} |" for u in UNSEEN]
+    lines += [f"| {u.fault}{_sizes(u.size)} | {', '.join(u.procedures)} | {u.why} |" for u in UNSEEN]
+    return [*lines, f"| {', '.join(LIKE_MOTION)} | odometer, gnss, transfer, attitude, navigate | {BY_LIKELIHOOD} |"]
 
 
 def _sizes(size: str) -> str:
-    named = {"(?!yxz)": "all but x and y exchanged", "[xy] ": "x or y", "z ": "z", "1\\.": "below 2 m"}
+    named = {"(?!yxz)": "all but x and y exchanged", "[xy] ": "x or y", "z ": "z"}
     return f" ({named.get(size, size)})" if size else ""

@@ -11,12 +11,15 @@ from zlib import crc32
 
 import numpy as np
 
+from truenorth.alignment.result import Alignment
 from truenorth.campaign.fault import Fault
 from truenorth.campaign.fault_aids import AID_FAULTS
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
 from truenorth.campaign.fault_imu import IMU_FAULTS
 from truenorth.campaign.fault_limits import unseen
 from truenorth.core.errors import TruenorthError, UsageError
+from truenorth.estimate.rivals import likelihood_ratio
+from truenorth.navigation.result import Navigation
 
 Outcome = Literal["refused", "flagged", "harmless", "unseen", "silent", "crash"]
 FAULTS: tuple[Fault, ...] = (*IMU_FAULTS, *AID_FAULTS)
@@ -111,12 +114,12 @@ class _Draw:
         self.inputs, self.truth = bench.draw(seed, run)
 
     @cached_property
-    def sound(self) -> dict[str, Any]:
-        """Errors of the answer without a fault, in its sigmas; none where it is refused."""
+    def sound(self) -> Alignment | Navigation | None:
+        """The answer without a fault; None where it is refused."""
         try:
-            return misses(self.bench.align(self.inputs), self.truth)
+            return self.bench.align(self.inputs)
         except TruenorthError:
-            return {}
+            return None
 
     def trial(self, name: str) -> Trial | None:
         """One fault; None where it cannot happen."""
@@ -149,15 +152,25 @@ class _Draw:
             return self._ended(fault, size, "harmless" if worst <= BY_CHANCE else "silent", reason, worst)
         if warned is not None:
             return self._ended(fault, size, "flagged", warned, worst)
-        if not any(self._to_blame(name, x) for name, x in off.items()):
+        if not self._to_blame(off):
             return self._ended(fault, size, "harmless", reason, worst)
-        known = unseen(self.bench.name, fault, size)
-        return self._ended(fault, size, "silent" if known is None else "unseen", reason, worst)
+        why = unseen(self.bench.name, fault, size, self._ratio(answer))
+        return self._ended(fault, size, "silent" if why is None else "unseen", reason if why is None else why, worst)
 
-    def _to_blame(self, name: str, off: Any) -> bool:
+    def _to_blame(self, off: dict[str, Any]) -> bool:
         """Whether an output is beyond three sigmas, and would not be but for the fault."""
-        moved = np.abs(off - self.sound.get(name, 0.0))
-        return bool(np.any((np.abs(off) > HARMLESS) & (moved > OF_THE_FAULT)))
+        without = {} if self.sound is None else misses(self.sound, self.truth)
+        moved = {name: np.abs(x - without.get(name, 0.0)) for name, x in off.items()}
+        return any(bool(np.any((np.abs(x) > HARMLESS) & (moved[name] > OF_THE_FAULT))) for name, x in off.items())
+
+    def _ratio(self, answer: Alignment | Navigation) -> float | None:
+        """By how much the same measurements prefer the sound log; None where they are not the same, or there are none."""
+        if self.sound is None or not answer.residuals or not self.sound.residuals:
+            return None
+        both = zip(answer.residuals, self.sound.residuals, strict=False)
+        if not all(np.array_equal(one.stamp, other.stamp) for one, other in both):
+            return None
+        return likelihood_ratio(answer.residuals, self.sound.residuals)
 
     def _ended(self, fault: str, size: str, outcome: Outcome, reason: str, worst: float = math.nan) -> Trial:
         return Trial(self.bench.name, fault, self.seed, self.run, size, outcome, worst, reason)

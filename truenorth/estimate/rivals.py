@@ -113,7 +113,7 @@ def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: 
                 rival = run(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
             except DataError:  # the filter broke down: no explanation
                 break
-            ratio = _ratio(first.residuals, rival.residuals)
+            ratio = likelihood_ratio(first.residuals, rival.residuals)
             if ratio > limit("rival"):
                 found.append((ratio, sensor, size * sigma, _effect(first, rival)))
             elif ratio < RULED_OUT:
@@ -150,7 +150,7 @@ def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRe
     if not gaps.size:
         return []
     try:
-        ratio = _ratio(first.residuals, run(without_gaps(record)).residuals)
+        ratio = likelihood_ratio(first.residuals, run(without_gaps(record)).residuals)
     except DataError:
         return []
     if ratio <= limit("drift"):
@@ -187,7 +187,7 @@ def misfit(residuals: Iterable[Residuals]) -> float:
     return sum(float(np.sum(np.where(r.rows > 0, r.nis, 0.0)) + 2.0 * np.nansum(np.log(r.sigma))) for r in residuals)
 
 
-def _ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> float:
+def likelihood_ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> float:
     """Twice the logarithm of the likelihood ratio, of each source as far as its measurements are independent.
 
     Measurements that both take count: outliers choose no model. A source whose innovations are ``f`` times as large as they
@@ -210,9 +210,10 @@ def _ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> float:
 
 
 def moved(first: Along, other: Along) -> Effect:
-    """By how much two tracks differ: the RMS, in sigmas of the first, of the later half, as sizes at the last epoch.
+    """By how much two tracks differ: in sigmas of the first, the RMS of the later half or the last, if larger, as sizes there.
 
-    Epochs that a delay has moved are compared with the other's nearest.
+    What changes late is in the last; a last one may be small by chance. Epochs that a delay has moved are compared with the
+    other's nearest.
     """
     half = slice(len(first.C_nb) // 2, None)
     near = _nearest(other.time, first.time[half])
@@ -224,7 +225,8 @@ def moved(first: Along, other: Along) -> Effect:
     off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[near]), np.abs(dp)], axis=1)
     sigma = first.sigma[half, :9]
     known = sigma > 0.0
-    ratio = np.sqrt(np.mean(np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2, axis=0))
+    squares = np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2
+    ratio = np.sqrt(np.maximum(squares.mean(axis=0), squares[-1]))
     return _of_states(ratio * first.sigma[-1, :9])
 
 

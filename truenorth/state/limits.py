@@ -34,7 +34,7 @@ LIMITS: dict[str, Limit] = {
         "a sound IMU misses its specification by that much once in a hundred; from here on the miss is in sigma",
     ),
     "drift": Limit(
-        25.0, "1", "likelihood ratio, chi-square with 1 degree of freedom, 12 signatures: 1e-5 false alarms"
+        25.0, "1", "likelihood ratio, chi-square with 1 degree of freedom, 60 signatures: 4e-5 false alarms at most"
     ),
     "hint": Limit(
         12.0,
