@@ -7,32 +7,43 @@ import pytest
 
 from tests.estimate.test_run import SIGMA, SPEC, flight, gnss, start_at
 from truenorth.aiding.source import Aiding, state
+from truenorth.alignment.transfer_filter import LONGEST_STEP, Matching, SlaveStart, master_aiding, transfer_filter
+from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.errors import UsageError
+from truenorth.core.position import Position
 from truenorth.errors.group import Group
+from truenorth.errors.master import TransferModel
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import Setting
 from truenorth.estimate.run import begin, go_on, with_states
-from truenorth.simulation import simulate
+from truenorth.simulation import MasterSpec, simulate, simulate_sensor
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.state.layout import STATES
+from truenorth.state.state import Start
 from truenorth.strapdown.increments import ImuRows
 
 SECONDS, RATE = 40.0, 50.0
 
 
-def in_chunks(setting, start, record, size, rows):
+def some(source, rows):
+    """Some of its measurements."""
+    output = np.broadcast_to(source.output, len(source.time))[rows]
+    return replace(
+        source, time=source.time[rows], measured=source.measured[rows], sigma=source.sigma[rows], output=output
+    )
+
+
+def in_chunks(setting, start, record, size, rows, prior=None, ahead=0.0):
     """All outputs and residuals of a loop fed with so many samples at a time, and with measurements as their time comes."""
-    bare = tuple(replace(source, time=[], measured=np.zeros((0, 3)), sigma=np.zeros((0, 3))) for source in rows)
-    setting = replace(setting, sources=bare)
-    state = begin(setting, start, 0.0, record.interval)
+    setting = replace(setting, sources=tuple(some(source, slice(0)) for source in rows))
+    state = begin(setting, start, start.time, record.interval, prior)
     tracks = []
     for first in range(0, len(record), size):
         part = slice(first, first + size)
         chunk = ImuRows(record.time[part], record.gyro[part], record.accel[part], record.kind)
-        before = record.time[first - 1] if first else -1.0
-        new = []
-        for source in rows:
-            due = (source.time > before) & (source.time <= chunk.time[-1])
-            new.append(replace(source, time=source.time[due], measured=source.measured[due], sigma=source.sigma[due]))
+        before = record.time[first - 1] + ahead if first else -np.inf
+        new = [some(source, (source.time > before) & (source.time <= chunk.time[-1] + ahead)) for source in rows]
         state, track = go_on(setting, state, chunk, new, last=first + size >= len(record))
         tracks.append(track)
     return tracks
@@ -57,6 +68,15 @@ def drive():
     return record, start, replace(fixes, states=states), baro
 
 
+def assert_same(tracks, batch, size):
+    for name in ("time", "C_nb", "v_n", "position", "sensors", "P"):
+        np.testing.assert_array_equal(joined(tracks, name), getattr(batch, name), err_msg=f"{name}, {size}")
+    for number, whole in enumerate(batch.residuals):
+        parts = [track.residuals[number] for track in tracks]
+        for name in ("time", "innovation", "nis", "used"):
+            np.testing.assert_array_equal(joined(parts, name), getattr(whole, name))
+
+
 @pytest.mark.parametrize("retimed", [False, True])
 def test_chunks_give_the_bits_of_one_batch(drive, retimed):
     """With a vertical loop, a lag, a pair of second order and measurements amid samples; the re-timed ones too."""
@@ -67,13 +87,44 @@ def test_chunks_give_the_bits_of_one_batch(drive, retimed):
     setting = Setting(model, sources, stride=10, every=3)
     _, batch = go_on(setting, begin(setting, start, 0.0, record.interval), record, last=True)
     for size in (1000, 7, 1):
-        tracks = in_chunks(setting, start, record, size, sources)
-        for name in ("time", "C_nb", "v_n", "position", "sensors", "P"):
+        assert_same(in_chunks(setting, start, record, size, sources), batch, size)
+
+
+def test_chunks_of_invariant_errors_give_the_bits_of_one_batch(drive):
+    """As alignment on the move with an odometer runs the loop: from a heading 60 deg off."""
+    record, start, fixes, _ = drive
+    turn = dcm_from_rotation_vector([0.0, 0.0, np.radians(60.0)])
+    P = start.P.copy()
+    P[2, 2] = 1.0
+    start = replace(start, C_nb=turn @ start.C_nb, v_n=turn @ start.v_n, P=P)
+    setting = Setting(with_states(InsModel.from_spec(SPEC), [fixes]), (fixes,), stride=10, every=3, invariant=True)
+    _, batch = go_on(setting, begin(setting, start, 0.0, record.interval), record, last=True)
+    for size in (1000, 7, 1):
+        assert_same(in_chunks(setting, start, record, size, (fixes,)), batch, size)
+
+
+def test_chunks_of_transfer_alignment_give_the_bits_of_one_batch():
+    """A master's place, velocity and attitude, re-timed by a delay that is being found; mounting, arm and flexure."""
+    legs = [*straight(5.0), *s_turn(0.4, 0.08), *straight(SECONDS)]
+    flight = course(Position(0.8, 0.2, 500.0), legs, heading=0.5, speed=60.0)
+    slave = simulate(flight, rate=RATE, duration=SECONDS, imu=SPEC, seed=7).record
+    spec = MasterSpec(latency=0.03, lever_arm=(0.5, 1.0, -0.3), mounting=(0.02, -0.01, 0.015), velocity_noise=0.05)
+    master = simulate_sensor(flight, spec, duration=SECONDS, seed=3).record
+    model = TransferModel(1e-6, 1e-4, mounting=True, flexure_sigma=(1e-3, 1e-3, 1e-3))
+    at = flight.states(slave.time[:1] - slave.steps[0])
+    P = model.prior(0.1, 1e-3, 1e-2, 1e-5, tau=0.05, arm=1.0, mounting=0.05, C_nb=at.C_nb[0])
+    start = SlaveStart(at.C_nb[0], at.v_n[0], float(at.lat[0]), float(at.lon[0]), float(at.alt[0]), P)
+    sources = tuple(master_aiding(master, model, start, Matching(0.05, 1e-3, gate=1e-6)))
+    batch = transfer_filter(slave, master, model, start, Matching(0.05, 1e-3, gate=1e-6))
+    place, zero = (start.lat, start.lon, start.alt), np.zeros(3)
+    begun = Start(float(slave.time[0] - slave.steps[0]), start.C_nb, start.v_n, *place, zero, zero, P[:15, :15])
+    setting = Setting(model.ins, sources, stride=round(LONGEST_STEP * RATE), every=0)
+    assert len(batch.time) > 300
+    for size in (1000, 7, 1):
+        tracks = in_chunks(setting, begun, slave, size, sources, (P, np.zeros(model.states)), ahead=0.2)
+        for name in ("time", "C_nb", "v_n", "position", "P"):
             np.testing.assert_array_equal(joined(tracks, name), getattr(batch, name), err_msg=f"{name}, {size}")
-        for number, whole in enumerate(batch.residuals):
-            parts = [track.residuals[number] for track in tracks]
-            for name in ("time", "innovation", "nis", "used"):
-                np.testing.assert_array_equal(joined(parts, name), getattr(whole, name))
+        np.testing.assert_array_equal(joined(tracks, "sensors"), batch.aux)
 
 
 def test_a_state_is_left_as_it_was(drive):

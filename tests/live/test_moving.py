@@ -9,7 +9,6 @@ import truenorth as tn
 from truenorth.aiding.aids import Gnss, Odometer
 from truenorth.core.position import Position
 from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
-from truenorth.records import OdometerRecord
 from truenorth.simulation.scenario import read_scenario
 
 DURATION = 120.0
@@ -48,20 +47,26 @@ def fed(run, record, gnss, odometer, chunk, *, until=math.inf, since=-math.inf, 
             run.push(record.time[part][rows], record.gyro[part][rows], record.accel[part][rows])
 
 
-def kept(gnss, end):
-    """The fixes that have come."""
-    return gnss[: int(np.searchsorted(gnss.time, end, side="right"))]
+def kept(record, end):
+    """The rows that have come."""
+    return record[: int(np.searchsorted(record.time, end, side="right"))]
 
 
-@pytest.mark.parametrize("chunk", [1, 13, 1000])
-def test_on_the_move_the_last_answer_is_that_of_the_whole_log_to_the_bit(van, chunk):
-    sim, gnss, _ = van
-    record = sim.record
-    with Aligner(imu="tactical", aid=[GnssFeed()], kind=record.kind, background=False) as aligner:
-        fed(aligner, record, gnss, None, chunk)
+@pytest.mark.parametrize("with_odometer", [False, True])
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_on_the_move_the_last_answer_is_that_of_the_whole_log_to_the_bit(van, chunk, with_odometer):
+    """By GNSS, and by GNSS and odometer, where corrections turn velocity with attitude (invariant errors)."""
+    sim, gnss, odometer = van
+    record, end = sim.record, sim.record.time[-1] - 0.4
+    feeds, aids = [GnssFeed()], [Gnss(kept(gnss, end))]
+    if with_odometer:
+        feeds.append(OdometerFeed(odometer.kind, odometer.pulse_size))
+        aids.append(Odometer(kept(odometer, end)))
+    with Aligner(imu="tactical", aid=feeds, kind=record.kind, background=False) as aligner:
+        fed(aligner, record, gnss, odometer if with_odometer else None, chunk)
         found = aligner.finish()
         answer = aligner.answer
-    whole = tn.align(record, imu="tactical", aid=[Gnss(kept(gnss, record.time[-1] - 0.4))])
+    whole = tn.align(record, imu="tactical", aid=aids)
     assert found.moving is not None
     assert np.array_equal(found.C_nb, whole.C_nb)
     assert np.array_equal(found.phi_covariance, whole.phi_covariance)
@@ -104,13 +109,12 @@ def test_navigation_in_chunks_is_one_and_the_same_to_the_bit(van):
     record = sim.record
     start = tn.align(record.between(None, 60.06), imu="tactical", aid=[Gnss(gnss.between(None, 60.0))])
     assert start.status == "aligned"
-    runs = [navigated(start, record, gnss, odometer, chunk) for chunk in (1, 13, 1000)]
+    runs = [navigated(start, record, gnss, odometer, chunk) for chunk in (1, 7, 1000)]
     end = record.time[-1] - 0.4
-    left = odometer[: int(np.searchsorted(odometer.time, end, side="right"))]
     whole = tn.navigate(
         record,
         start,
-        aid=[Gnss(kept(gnss, end)), Odometer(OdometerRecord(left.time, left.values, left.kind, left.pulse_size))],
+        aid=[Gnss(kept(gnss, end)), Odometer(kept(odometer, end))],
         interval=0.2,
         output=1.0,
     )

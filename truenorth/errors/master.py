@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -154,7 +155,7 @@ class TransferModel(Walks):
         if not 0.0 < self.flexure_beta < math.inf:
             raise UsageError(f"flexure_beta is {self.flexure_beta}; expected a positive frequency, rad/s")
 
-    @property
+    @cached_property
     def groups(self) -> dict[str, Group]:
         """Those there are, by name, in order; the priors of delay, arm and mounting are given with :meth:`prior`."""
         of, found = self.master, []
@@ -176,7 +177,7 @@ class TransferModel(Walks):
             found.append(Group(ATTITUDE_ERROR, sigma, walk=walk, considered=True, unit="rad"))
         return {group.name: group for group in found}
 
-    @property
+    @cached_property
     def ins(self) -> InsModel:
         """The error model: fifteen states and the groups."""
         return InsModel(

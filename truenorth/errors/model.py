@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ class InsModel(Walks):
             fixed_altitude=fixed_altitude,
         )
 
-    @property
+    @cached_property
     def layout(self) -> Layout:
         """Where the states stand."""
         return Layout(tuple(g.name for g in self.groups), tuple(tuple(map(float, g.prior)) for g in self.groups))
@@ -84,7 +85,7 @@ class InsModel(Walks):
         """(4,) what :func:`couple_sensors` asks for."""
         return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL, GYRO_SCALE, ACCEL_SCALE)])
 
-    @property
+    @cached_property
     def dynamics(self) -> Dynamics:
         """How the states run by themselves, for kernels."""
         return dynamics_of(self.groups, self.noise)

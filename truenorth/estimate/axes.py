@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.compiled import compiled
 from truenorth.core.earth import radii
 from truenorth.errors.ins import DYNAMIC
 from truenorth.state.layout import DP, DV, PHI
@@ -31,9 +34,25 @@ def convergence(C_nw: Array, v_n: Array, position: Array) -> Array:
     return J
 
 
-def turned(J: Array, P: Array) -> Array:
-    """``J P J'`` of (..., n, n) covariances whose first nine states are turned by J (..., 9, 9)."""
-    P = P.copy()
-    P[..., :DYNAMIC, :] = J @ P[..., :DYNAMIC, :]
-    P[..., :, :DYNAMIC] = P[..., :, :DYNAMIC] @ np.swapaxes(J, -1, -2)
-    return P
+@compiled
+def turn(J: Any, P: Any) -> None:
+    """``P = J P J'`` in place, of (K, n, n) covariances whose first nine states are turned by J (K, 9, 9)."""
+    count, n = P.shape[0], P.shape[1]
+    work = np.empty((DYNAMIC, n))
+    for k in range(count):
+        for i in range(DYNAMIC):
+            for j in range(n):
+                work[i, j] = 0.0
+            for a in range(DYNAMIC):
+                factor = J[k, i, a]
+                if factor != 0.0:
+                    for j in range(n):
+                        work[i, j] += factor * P[k, a, j]
+        for i in range(DYNAMIC):
+            for j in range(DYNAMIC, n):
+                P[k, i, j] = P[k, j, i] = work[i, j]
+            for j in range(i, DYNAMIC):
+                total = 0.0
+                for a in range(DYNAMIC):
+                    total += work[i, a] * J[k, j, a]
+                P[k, i, j] = P[k, j, i] = total

@@ -27,7 +27,7 @@ _PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
 GRAVITY_GRADIENT = 2.0 * earth.GRAVITY_EQUATOR / earth.SEMI_MAJOR  # 1/s^2: of the free vertical channel
 
 
-@compiled
+@compiled(forceinline=True)
 def measure(m: Memory, model: Model, sources: Sources, source: int, measured: Any, now: Any, w: Any, R: Any) -> None:
     """Fill in `H`, `z` and what the row adds to `R` (3,)."""
     for i in range(3):
@@ -42,7 +42,7 @@ def measure(m: Memory, model: Model, sources: Sources, source: int, measured: An
                     w.H[i, slow + j] = w.H[i, whole + j]
 
 
-@compiled
+@compiled(forceinline=True)
 def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
     """How many rows are present, and ``nu' S^-1 nu`` of them together, by Cholesky's factor of ``S``."""
     count = 0
@@ -139,7 +139,7 @@ def rotation_vector_of(q: Any) -> Any:
     return scale * q[1], scale * q[2], scale * q[3]
 
 
-@compiled
+@compiled(forceinline=True)
 def feed_back(s: Any, aux: Any, x: Any, turns: Any) -> None:
     """Take the estimated errors off the state and the sensors; the estimate is zero again.
 
@@ -161,7 +161,7 @@ def feed_back(s: Any, aux: Any, x: Any, turns: Any) -> None:
         x[j] = 0.0
 
 
-@compiled
+@compiled(forceinline=True)
 def set_place(size: Any, m: Memory, now: Any, variance: Any, w: Any) -> None:
     """Put the vehicle where a row of position says (`z`, along east, north, up), its error independent of all others."""
     s, c = now[NOW_NORTH], now[NOW_NORTH + 1]

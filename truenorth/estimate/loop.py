@@ -45,7 +45,7 @@ SAME_TIME = 1e-6  # s: an event this near the end of a sample is at its end
 _PHI, _DV = 0, 3
 
 
-@compiled
+@compiled(forceinline=True)
 def correct(
     size: Any,
     m: Memory,
@@ -123,7 +123,7 @@ def correct(
     return SOUND
 
 
-@compiled
+@compiled(forceinline=True)
 def keep(m: Memory, w: Any, time: float, j: int, kept: Kept) -> None:
     """Put out the state at an epoch."""
     kept.time[j] = time
@@ -158,7 +158,7 @@ def disturb(of: Events, e: int, P: Any) -> None:
         P[_DV + a, _DV + a] += of.measured[e, a]
 
 
-@compiled
+@compiled(forceinline=True)
 def time_of(samples: Samples, i: int, done: float) -> float:
     """Where the loop stands, a part `done` of sample i taken."""
     if i < len(samples.step):
@@ -168,7 +168,7 @@ def time_of(samples: Samples, i: int, done: float) -> float:
     return samples.end[i - 1]
 
 
-@compiled
+@compiled(forceinline=True)
 def next_event(events: Events, late: Events, sources: Sources, aux: Any, k: int, r: int, took: bool) -> Any:
     """The next re-timed event's time, whether it shares its stamp with one just taken, whether it is the next, and when."""
     target = np.inf

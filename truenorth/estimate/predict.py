@@ -86,7 +86,7 @@ def take_sample(
     sums.T[0] += part * T
 
 
-@compiled
+@compiled(forceinline=True)
 def describe(m: Memory, model: Model, now: Any) -> None:
     """Fill in what rows and columns are given of this epoch, but for what is needed of it sample by sample."""
     s, C = m.s, m.sums.C_now
@@ -112,7 +112,7 @@ def describe(m: Memory, model: Model, now: Any) -> None:
     now[NOW_NORTH], now[NOW_NORTH + 1] = azimuth(s)
 
 
-@compiled
+@compiled(forceinline=True)
 def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: Any, now: Any) -> None:
     """Rate, its derivative and specific force at a part `done` of sample i: a line through the samples next to it."""
     middle = i
@@ -151,7 +151,7 @@ def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: A
         now[NOW_FORCE + j] = force + growth * since
 
 
-@compiled
+@compiled(forceinline=True)
 def predict_to_event(
     size: Any, m: Memory, model: Model, F: Any, rate: Any, now: Any, w: Any, Q: Any, link: Any
 ) -> None:

@@ -17,7 +17,7 @@ from truenorth.errors.deflection import at_rest
 from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart
 from truenorth.estimate import loop as kernel
-from truenorth.estimate.axes import convergence, turned
+from truenorth.estimate.axes import convergence, turn
 from truenorth.estimate.events import LoopState, Rows, Setting, planned, received
 from truenorth.estimate.memory import (
     ABSENT,
@@ -82,12 +82,13 @@ def begin(
     if prior is None and start.plumb > 0.0 and deflected >= 0:
         P0 = at_rest(P0, deflected, start.C_nb, start.lat, start.plumb)
     place = np.array([[start.lat, start.lon, start.alt]])
-    J = convergence(np.eye(3)[None], s[None, wander.VELOCITY], place)[0]
+    P0 = np.array(P0)[None]
+    turn(np.linalg.inv(convergence(np.eye(3)[None], s[None, wander.VELOCITY], place)), P0)
     width = max([3, *(source.measured.shape[1] for source in setting.sources)])
     nothing = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, width)), np.zeros((0, 3)))
     empty = Samples(np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
     state = LoopState(
-        memory(s, aux, turned(np.linalg.inv(J), P0), time, len(setting.sources)),
+        memory(s, aux, P0[0], time, len(setting.sources)),
         empty,
         0,
         0,
@@ -276,7 +277,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, model.dynamics.turns)
     C_nb, v_n, position, C_nw = wander.north(states)
     if setting.covariance:
-        P = turned(convergence(C_nw, v_n, position), P)
+        turn(convergence(C_nw, v_n, position), P)
     return after, Track(kept.time[:outputs], C_nb, v_n, position, sensors, P, model.layout, residuals)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 PHI = slice(0, 3)
 DV = slice(3, 6)
@@ -21,12 +22,12 @@ class Layout:
     names: tuple[str, ...] = ()  # of the groups
     priors: tuple[tuple[float, ...], ...] = ()  # one-sigma of each of their states at the start
 
-    @property
+    @cached_property
     def states(self) -> int:
         """How many."""
         return STATES + sum(map(len, self.priors))
 
-    @property
+    @cached_property
     def groups(self) -> dict[str, slice]:
         """Where the states of each group stand."""
         found, start = {}, STATES
