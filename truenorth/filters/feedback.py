@@ -10,75 +10,69 @@ Source: P. S. Maybeck, *Stochastic Models, Estimation and Control*, vol. 1, 1979
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Unpack
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
-from truenorth.core.linalg import Size, dot, transposed_times
-from truenorth.filters.drive import Running, drive
-from truenorth.filters.recursion import (
-    Histories,
-    begin,
-    conclude,
-    innovate,
-    keep,
-    load_measurement,
-    load_process,
-    predict,
-    update,
-    workspace,
-)
-from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+from truenorth.core.linalg import Array, Size, dot, transposed_times
+from truenorth.filters.drive import Running
+from truenorth.filters.linear import run_linear, variant
+from truenorth.filters.recursion import SOUND, Workspace, update
+from truenorth.filters.system import Estimates, FilterState, LinearSystem
 
 
-@compiled
-def feedback_runs(size: Size, system: Runs, epochs: int, fed: NDArray[np.bool_], out: Histories) -> None:
-    """Closed loop of each run; the memory holds the nominal state."""
-    N, n, rows = len(size), out.x.shape[2], system.z.shape[2]
-    w = workspace(size, rows)
-    nominal, moved, u = np.zeros(N), np.zeros(N), np.zeros(N)
-    for run in range(out.x.shape[0]):
-        begin(size, system, run, w)
-        for i in range(n):
-            nominal[i] = w.x[i] if np.isnan(out.memory[run, i]) else out.memory[run, i]
-            w.x[i] -= nominal[i]
-        for epoch in range(epochs):
-            for i in range(n):
-                w.u[i] = u[i]  # taken away below; a constant one is loaded at epoch 0 only
-            load_process(size, system, run, epoch, w)
-            transposed_times(size, w.Phi_t, nominal, moved)
-            for i in range(n):
-                u[i] = w.u[i]
-                nominal[i] = moved[i] + u[i]
-                w.u[i] = 0.0
-            predict(size, w)
-            present, correlated = load_measurement(size, system, run, epoch, w)
-            for row in range(rows):
-                w.z[row] -= dot(size, w.H[row], nominal)
-            if out.innovation.shape[1] > 0:
-                innovate(size, w, out.innovation[run, epoch], out.innovation_covariance[run, epoch])
-            if present > 0:
-                failure, nis, log_likelihood = update(size, w, correlated, True)
-                if not conclude(out, run, epoch, failure, nis, log_likelihood):
-                    break
-            for i in range(n):
-                correction = w.x[i] if fed[i] and present > 0 else 0.0
-                nominal[i] += correction
-                w.x[i] -= correction
-                if out.adaptation.shape[1] > 0:
-                    out.adaptation[run, epoch, i] = correction
-            # Histories hold the whole state: the nominal one and what is left in the filter.
-            for i in range(n):
-                moved[i] = w.x[i]
-                w.x[i] += nominal[i]
-            keep(out, run, epoch, epochs - 1, w)
-            for i in range(n):
-                w.x[i] = moved[i]
-        for i in range(n):
-            out.memory[run, i] = nominal[i]
+class Feedback(NamedTuple):
+    """Options of :func:`feedback`."""
+
+    fed: NDArray[np.bool_]
+
+
+class Room(NamedTuple):
+    """Nominal state of this epoch, and what was fed back to it, (N,)."""
+
+    nominal: Array
+    correction: Array
+
+
+def room(size: Size, rows: int, options: Feedback) -> Room:
+    """The memory holds the nominal state between epochs, NaN before the first."""
+    return Room(np.zeros(len(size)), np.zeros(len(size)))
+
+
+def adapt(size: Size, w: Workspace, options: Feedback, own: Room, memory: Array) -> None:
+    """Carry the nominal state on; what the filter sees, and estimates, is relative to it."""
+    n, first = len(memory), np.isnan(memory[0])
+    for i in range(n):
+        own.correction[i] = 0.0 if first else memory[i]
+    transposed_times(size, w.Phi_t, own.correction, own.nominal)
+    for i in range(n):
+        own.nominal[i] = w.x[i] if first else own.nominal[i] + w.u[i]
+        w.x[i] -= own.nominal[i]
+    for row in range(w.z.shape[0]):
+        w.z[row] -= dot(size, w.H[row], own.nominal)
+
+
+def condition(
+    size: Size, w: Workspace, options: Feedback, own: Room, memory: Array, present: int, correlated: bool
+) -> tuple[int, float, float]:
+    """Update, and feed back; histories hold the whole state: the nominal one and what is left in the filter."""
+    found = update(size, w, correlated, True) if present > 0 else (SOUND, 0.0, 0.0)
+    for i in range(len(memory)):
+        own.correction[i] = w.x[i] if options.fed[i] and present > 0 else 0.0
+        memory[i] = own.nominal[i] + own.correction[i]
+        w.x[i] += own.nominal[i]
+    return found
+
+
+def report(size: Size, w: Workspace, options: Feedback, own: Room, memory: Array, figures: Array) -> None:
+    """What was fed back."""
+    for i in range(len(figures)):
+        figures[i] = own.correction[i]
+
+
+variant(Feedback, room=room, adapt=adapt, condition=condition, report=report)
 
 
 def feedback(
@@ -118,14 +112,5 @@ def feedback(
     except IndexError:
         raise UsageError(f"states is {states!r}, expected indices below {system.states}") from None
 
-    def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        feedback_runs(size, runs, epochs, fed, out)
-
-    return drive(
-        kernel,
-        system,
-        state,
-        memory=np.full(system.states, np.nan),
-        adaptation=system.states,
-        **running,
-    )
+    memory = np.full(system.states, np.nan)
+    return run_linear(Feedback(fed), system, state, memory=memory, adaptation=system.states, **running)
