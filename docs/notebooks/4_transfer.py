@@ -29,7 +29,7 @@ for name, e, s in zip(("heading", "pitch", "roll"), 60 * error, 60 * np.degrees(
 answer
 
 # %% [markdown]
-# Delay and lever arm, and what this motion cannot tell apart: in a steady turn the delay and the forward arm are one number.
+# Delay and lever arm, and what this motion cannot separate: in a steady turn the delay and the forward arm are one number.
 
 # %%
 t = answer.transfer

@@ -1,4 +1,4 @@
-"""Execute the notebooks (``make notebooks``): each script beside this file becomes an .ipynb with its results inside."""
+"""Execute the notebooks (``make notebooks``): each script next to this file becomes an .ipynb with its results inside."""
 
 from __future__ import annotations
 

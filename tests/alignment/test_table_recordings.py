@@ -9,7 +9,7 @@ from truenorth.alignment.positions import align_positions
 from truenorth.coarse import means, two_position
 from truenorth.records.specs import imu_spec
 
-# A MEMS whose axes are set as well as the better ones of its class: offsets are told apart from tilt as well as that.
+# A MEMS whose axes are set as well as the better ones of its class: offsets are separated from tilt as well as that.
 MEMS = {
     "gyro": {
         "bias": "0.4 deg/s",

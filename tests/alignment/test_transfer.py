@@ -68,7 +68,7 @@ def test_without_noise_it_finds_the_truth(flight, ideal):
 def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
     """Along the true motion, the same rows: sigmas within 2 % before the turn, .5 % from then on.
 
-    Before it heading and mounting cannot be told apart: a filter that linearises about its own corrections has there a tenth of
+    Before it heading and mounting cannot be separated: a filter that linearises about its own corrections has there a tenth of
     the sigma that it should have.
     """
     spec, C_mb = replace(MASTER, lever_arm=(0.0, 0.0, 0.0)), dcm_from_euler(*MOUNT_TRUE)

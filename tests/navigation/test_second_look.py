@@ -143,15 +143,15 @@ def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
         lon=white.lon + drift[:, 0] / 4.27e6,
         alt=white.alt + drift[:, 2],
     )
-    assert not any("hang together" in words for words in warnings(navigate(record, start, aid=Gnss(white), imu=SPEC)))
+    assert not any("are correlated" in words for words in warnings(navigate(record, start, aid=Gnss(white), imu=SPEC)))
     told = [
-        words for words in warnings(navigate(record, start, aid=Gnss(wandering), imu=SPEC)) if "hang together" in words
+        words for words in warnings(navigate(record, start, aid=Gnss(wandering), imu=SPEC)) if "are correlated" in words
     ]
     assert len(told) == 1
     assert "give the size and the time of that wander" in told[0]
     antenna = Mounting(bias_sigma=1.5, bias_time=60.0)
     assert not any(
-        "hang together" in w for w in warnings(navigate(record, start, aid=Gnss(wandering, antenna), imu=SPEC))
+        "are correlated" in w for w in warnings(navigate(record, start, aid=Gnss(wandering, antenna), imu=SPEC))
     )
 
 

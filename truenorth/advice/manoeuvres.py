@@ -124,7 +124,7 @@ def advise_manoeuvre(
     longest: float = 120.0,
     manoeuvres: Sequence[str] = (),
 ) -> ManoeuvreAdvice:
-    """Say which of the standard manoeuvres tells heading soonest.
+    """Say which of the standard manoeuvres shows heading soonest.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an odometer or a Doppler log tells an INS: velocity in the vehicle's axes, scale and mounting angles unknown.
+"""What an odometer or a Doppler log gives an INS: velocity in the vehicle's axes, scale and mounting angles unknown.
 
 The sensor's axes m are the vehicle's (x right, y forward, z up), turned against the IMU's body by ``C_mb`` and displaced
 by a lever arm l. What it shows, with the scale factor k, the mounting angles mu left in ``C_mb`` (``C_mb true = (I - [mu

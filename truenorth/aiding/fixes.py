@@ -1,6 +1,6 @@
 """Position fixes and azimuth resets from outside: a few, far apart, of a ship that navigates by itself in between.
 
-One fix sets anew what it shows, and by the covariance what hangs together with it. What two of them differ by is what the gyros
+One fix sets anew what it shows, and by the covariance what is correlated with it. What two of them differ by is what the gyros
 have drifted in between. With ``theta`` the place's error as a small rotation, ``theta = (-dL, dlon cos L, dlon sin L)``, the
 drift angle ``psi = phi - theta`` obeys
 

@@ -1,4 +1,4 @@
-"""What a barometer or a depth gauge tells an INS: height, with a slowly changing error.
+"""What a barometer or a depth gauge gives an INS: height, with a slowly changing error.
 
 y = h + (C l)_U + b,   z = y_hat - y = dp_U + ((C l) x phi)_U - db
 """

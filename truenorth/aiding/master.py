@@ -1,4 +1,4 @@
-"""What a master INS on the same vehicle tells a slave: velocity and attitude, late, from another place and another seat.
+"""What a master INS on the same vehicle gives a slave: velocity and attitude, late, from another place and another seat.
 
 The master is late by tau, stands at -r in the slave (r: from master to slave, slave axes) and is turned by ``C_mb`` (slave to
 master axes, ``C_mb true = (I + [mu x]) C_mb assumed``); the slave's seat bends by theta:

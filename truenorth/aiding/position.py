@@ -1,4 +1,4 @@
-"""What GNSS tells an INS: position and velocity of an antenna, written once, as compiled functions of one epoch.
+"""What GNSS gives an INS: position and velocity of an antenna, written once, as compiled functions of one epoch.
 
 A row is *predicted less measured*, so that ``z = H x + noise`` with the states of :mod:`truenorth.errors.ins` (errors
 computed minus true; what is left of a parameter, true minus assumed). With the lever arm l (body axes) and the clock lag

@@ -1,4 +1,4 @@
-"""What it tells an INS that its base does not turn: the gyros show the earth's rate and their own errors, nothing else.
+"""What an INS learns from a base that does not turn: the gyros show the earth's rate and their own errors, nothing else.
 
     z = w_hat - C' w_ie = eps + C' (w_ie x phi)
 

@@ -2,7 +2,7 @@
 
 On a base that stays, a scale factor error of the accelerometers is a bias (it always multiplies gravity), and so is a
 misalignment; an error of latitude looks like a gyro bias, one of height like an accelerometer bias. The filter estimates
-their sum; what it tells of the bias proper is less.
+their sum; what it shows of the bias proper is less.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def check_means(m: Means, lat: float, g: float) -> LogCheck:
 def check_filter(
     task: Task, integrals: InertialIntegrals, C_n0_i: Array, usual: StaticModel, known: StaticModel | None = None
 ) -> tuple[LogCheck, StaticModel]:
-    """What the inertial frame tells of the biases and random walks: a filter that believes in no specified bias.
+    """What the inertial frame shows of the biases and random walks: a filter that believes in no specified bias.
 
     The random walks are fitted about the usual ones, unless they are known.
     """
@@ -118,7 +118,7 @@ def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogChe
     """The filter's check, with those rates taken from the means that tell them better.
 
     A filter that knows only that the base goes nowhere sees the vertical gyro bias badly; on a base that does not turn
-    either, the mean rate tells it at once. (On a swaying base coning gives the mean rate an offset, and it is not asked.)
+    either, the mean rate shows it at once. (On a swaying base coning gives the mean rate an offset, and it is not asked.)
     """
     if motion.overall not in ("still", "disturbed"):
         return filtered

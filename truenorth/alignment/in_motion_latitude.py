@@ -17,7 +17,7 @@ from truenorth.core.position import METRES_PER_RADIAN, Position
 GRID = np.radians(np.arange(-80.0, 81.0, 10.0))
 CLOSE = math.radians(5e-4)  # two metres in five kilometres: far below what gyros tell
 PRIOR = math.radians(1.0)  # about what was found, wide compared with what the filter then says: the log is used once
-NARROWED = 0.5  # of that prior: a filter that does not narrow it has not told one hemisphere from the other
+NARROWED = 0.5  # of that prior: a filter that does not narrow it has not separated one hemisphere from the other
 
 
 def find_latitude(cost: Callable[[float], float]) -> Position:

@@ -4,7 +4,7 @@ Biases: three components can be checked (:mod:`truenorth.alignment.check`). The 
 the level components of force, which tilt, cannot: their size is inferred from those that can, as drawn from the same
 population, and from what is usual of sensors with the random walk that the log shows.
 
-Random walks: by maximum likelihood of the filter (:mod:`truenorth.alignment.noise`), which tells them from the base's
+Random walks: by maximum likelihood of the filter (:mod:`truenorth.alignment.noise`), which separates them from the base's
 motion.
 """
 

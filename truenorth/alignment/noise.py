@@ -1,6 +1,6 @@
-"""Random walks of the sensors and motion of the base, told apart by maximum likelihood.
+"""Random walks of the sensors and motion of the base, separated by maximum likelihood.
 
-On a base that moves, the Allan deviation sees the motion. The filter tells both apart by their spectra: white gyro noise
+On a base that moves, the Allan deviation sees the motion. The filter separates both by their spectra: white gyro noise
 makes the velocity of a base that stays wander as ``g t^(3/2)``, white accelerometer noise as ``t^(1/2)``, and bounded motion
 not at all. Where the log has nothing to say (heavy sway hides it all), a prior about the usual values decides.
 """

@@ -66,7 +66,7 @@ def align_positions(
 ) -> Alignment:
     """Find pitch, roll and true heading, and the sensors' errors, from a log with several positions of a turntable.
 
-    Any sequence of positions: turns are found in the gyros. The more the positions differ, the more of the biases is told
+    Any sequence of positions: turns are found in the gyros. The more the positions differ, the more of the biases is known
     apart from tilt and heading; two that differ by 180 deg about the vertical are enough for the level sensors.
 
     Parameters
@@ -172,7 +172,7 @@ def _leaves(motion: MotionSummary, stretches: list[tuple[float, float]]) -> floa
 
 
 def _inferred(check: LogCheck, part: ImuRecord) -> ImuSpec:
-    """What a still position tells, and what it hides as in the class of IMU with such biases: scale factors, slow wander."""
+    """What a still position shows, and what it hides as in the class of IMU with such biases: scale factors, slow wander."""
     gyro, accel = noise_coefficients(part)
     noise = StaticModel(float(np.max(gyro.random_walk)), float(np.max(accel.random_walk)))
     spec = infer_spec(check, noise)

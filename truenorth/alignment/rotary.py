@@ -43,7 +43,7 @@ from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, inte
 
 Array = NDArray[np.float64]
 
-SHORTEST = 60.0  # s: below that sway cannot be told from tilt
+SHORTEST = 60.0  # s: below that sway cannot be separated from tilt
 KNOWN_ARM = 0.1  # m, one sigma along each axis of an arm that was measured
 INDEXER_METHODS = ("auto", "swaying", *FADING)
 COVER = 0.05  # s by which an encoder's log may begin late or end early

@@ -1,7 +1,7 @@
 """Fine alignment of a base that sways: its lever arm and its own motion are states of the filter.
 
 A windowed least-squares fit, which needs to know nothing of the sway, is re-linearised until it stands still. What it leaves of the
-velocity tells how the base moves along each axis (:mod:`truenorth.alignment.motion_fit`); with that a Kalman filter estimates
+velocity shows how the base moves along each axis (:mod:`truenorth.alignment.motion_fit`); with that a Kalman filter estimates
 attitude, biases, lever arm and motion together, twice: the second time about the first answer, the motion fitted anew.
 """
 

@@ -94,7 +94,7 @@ def last_part(task: Task) -> Task:
 
 
 def level_of(f_b: Array) -> Array:
-    """``C_nb`` with the pitch and roll that a specific force tells, and heading zero."""
+    """``C_nb`` with the pitch and roll that a specific force shows, and heading zero."""
     up = f_b / np.linalg.norm(f_b)
     return dcm_from_euler(0.0, math.asin(float(np.clip(up[1], -1.0, 1.0))), math.atan2(-up[0], up[2]))
 

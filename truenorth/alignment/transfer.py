@@ -81,7 +81,7 @@ def align_transfer(
     imu : ImuSpec, str, path or mapping, optional
         Specification of the slave; the preset "industrial" when left out.
     matching : {"auto", "velocity", "attitude", "both", "position", "acceleration", "position+attitude", "acceleration+attitude"}
-        What of the master is matched; velocity and attitude, as far as it tells them, when left out. Position is slower than
+        What of the master is matched; velocity and attitude, as far as it gives them, when left out. Position is slower than
         velocity and bears a constant error of the master's velocity (the sigma of velocity is against the master then);
         acceleration needs its specific force and attitude.
     lever_arm : three floats, m
@@ -102,16 +102,16 @@ def align_transfer(
     velocity_noise, attitude_noise, position_noise, acceleration_noise : float, optional, m/s, rad, m and m/s^2
         White noise of the master's rows; fitted to the innovations when left out.
     position : Position, optional
-        Where the master tells none.
+        Where the master gives none.
     heading : float, rad, optional
-        Of the slave at the start, where the master tells no attitude; its course when left out.
+        Of the slave at the start, where the master gives no attitude; its course when left out.
     calibration, heading_limit, progress
         As of :func:`truenorth.align`; the calibration is the slave's.
 
     Returns
     -------
     Alignment
-        With `transfer`: delay, lever arm, mounting, each with sigma, and what the motion could not tell apart.
+        With `transfer`: delay, lever arm, mounting, each with sigma, and what the motion could not separate.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def _linear(
     track: TransferTrack,
     begin: tuple[float, float] | None = None,
 ) -> Linear:
-    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master tells its own."""
+    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own."""
     C_nb = np.full((len(master), 3, 3), np.nan)
     C_nb[track.row] = final_attitudes(slave, track)
     C_nm = C_nb @ track.C_mb[-1].T

@@ -1,4 +1,4 @@
-"""From the closed loop of transfer alignment to an `Alignment`: history, verdict, and what the motion could not tell apart."""
+"""From the closed loop of transfer alignment to an `Alignment`: history, verdict, and what the motion could not separate."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 
-MOST_EPOCHS = 400  # of the linear system that says what is told apart
+MOST_EPOCHS = 400  # of the linear system that says what is separated
 MOST_ROWS = 5000  # of the history
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
@@ -214,7 +214,7 @@ def _open(
     noise: tuple[float, float],
     what: Matched,
 ) -> tuple[str, ...]:
-    """What the motion as it was could not tell apart, from the model along the track."""
+    """What the motion as it was could not separate, from the model along the track."""
     every = max(1, len(track.time) // MOST_EPOCHS)
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:

@@ -1,7 +1,7 @@
 """How late is a master, before any filter: its rates and forces held against the slave's at all shifts of time.
 
-Rates compare axis by axis where the master tells attitude: a constant bias and a mounting of some degrees do not matter.
-Where it tells velocity alone, the length of the specific force compares; that needs acceleration of the vehicle.
+Rates compare axis by axis where the master gives attitude: a constant bias and a mounting of some degrees do not matter.
+Where it gives velocity alone, the length of the specific force compares; that needs acceleration of the vehicle.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CHANCE = 5.0  # sigmas by which a correlation must exceed that of unrelated sign
 
 
 class Found(NamedTuple):
-    """A delay that the motion itself tells."""
+    """A delay that the motion itself shows."""
 
     delay: float  # s; of the master's stamps behind the slave's clock
     correlation: float  # of the signals at that shift

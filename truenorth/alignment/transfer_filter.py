@@ -77,7 +77,7 @@ class Matching:
 
 @dataclass(frozen=True)
 class Linear:
-    """Attitudes of master and slave at the master's rows, (M, 3, 3), better known than the rows tell, and how late these are."""
+    """Attitudes of master and slave at the master's rows, (M, 3, 3), better known than from the rows, and how late these are."""
 
     C_nm: Array
     C_nb: Array
@@ -136,7 +136,7 @@ def transfer_filter(
         At the beginning of the slave's record.
     linear : Linear, optional
         Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
-        rows (as much as 1 rad^-2 of information a row), would otherwise tell a little of the mounting and of the delay falsely.
+        rows (as much as 1 rad^-2 of information a row), would otherwise give a little false information on mounting and delay.
 
     Raises
     ------
@@ -312,7 +312,7 @@ def _slopes(slave: ImuRecord, times: Array) -> Array:
     noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
     moved = np.any(apart > APART * noise, axis=1)[
         :, None
-    ]  # all six alike: delay and arm are told apart by their columns
+    ]  # all six alike: delay and arm are separated by their columns
     return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 

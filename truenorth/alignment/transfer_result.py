@@ -45,7 +45,7 @@ class Transfer:
     jumps : tuple of str
         Where the master jumped, in words.
     open : tuple of str
-        Combinations that the motion could not tell apart, in words.
+        Combinations that the motion could not separate, in words.
     notes : tuple of str
         What was found and mended on the way: delay of another clock, drop-outs.
     residuals : tuple of Residuals

@@ -41,11 +41,11 @@ class Assumed:
     delay_sigma: float  # s
     C_mb: Array  # (3, 3): slave to master axes
     mounting_sigma: float  # rad
-    heading: float | None = None  # rad; of the slave at the start, where no master tells attitude; else its course
+    heading: float | None = None  # rad; of the slave at the start, where no master gives attitude; else its course
 
 
 def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:
-    """The delay assumed, or that which the motion tells where the two contradict each other, with notes in words.
+    """The delay assumed, or that which the motion shows where the two contradict each other, with notes in words.
 
     Raises
     ------
@@ -129,9 +129,9 @@ def hand_over(
     spec: ImuSpec,
     assumed: Assumed,
     noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
-    position: Position | None,  # where the master tells none
+    position: Position | None,  # where the master gives none
 ) -> tuple[ImuRecord, SlaveStart]:
-    """The slave's record from the master's first row on, and its first state as the master tells it.
+    """The slave's record from the master's first row on, and its first state as the master gives it.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:
         heading = math.atan2(east, north) + float(euler_from_dcm(assumed.C_mb)[0])
     else:
         raise UsageError(
-            f"{master.source}: it tells velocity alone, and {math.hypot(east, north):.1f} m/s at the start, too slow for a course: "
+            f"{master.source}: it gives velocity alone, and {math.hypot(east, north):.1f} m/s at the start, too slow for a course: "
             "give a master with attitude, a part of the logs that begins on the move (`record.between`), or the slave's `heading`"
         )
     t = master.time[:rows] - master.time[:rows].mean()

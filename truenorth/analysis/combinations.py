@@ -2,7 +2,7 @@
 
 A null space says in numbers which changes of the state no measurement sees. Read are its complement's rows, the
 combinations that *are* seen, brought to reduced echelon form: each is led by a state of its own and else holds only
-the states that cannot be told apart from others, so that it is as short as it can be. States come in the caller's order:
+the states that cannot be separated from others, so that it is as short as it can be. States come in the caller's order:
 the first are given in terms of the last.
 """
 
@@ -42,7 +42,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class Entangled:
-    """States that the measurements do not tell apart.
+    """States that the measurements do not separate.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Faults of what is said beside the IMU's log: place, specification, arms, aiding sensors, a start."""
+"""Faults of what is given besides the IMU's log: place, specification, arms, aiding sensors, a start."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The command line: one command for each thing to do (`align`, `inspect`, `navigate`, `simulate`, ...).
 
-Each command lives in a module of its own and imports its work when it runs, so that ``--help`` is quick.
+Each command stands in a module of its own and imports its work when it runs, so that ``--help`` is quick.
 """
 
 from __future__ import annotations

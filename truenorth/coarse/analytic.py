@@ -17,7 +17,7 @@ from truenorth.records import ImuRecord
 from truenorth.strapdown.level import increments
 
 Array = NDArray[np.float64]
-BLOCKS = 10  # the scatter of this many block means tells how well the mean is known
+BLOCKS = 10  # the scatter of this many block means shows how well the mean is known
 UP = np.array([0.0, 0.0, 1.0])
 
 

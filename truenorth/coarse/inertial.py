@@ -99,8 +99,8 @@ def oba(integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velo
 def estimate_latitude(integrals: InertialIntegrals, alt: float = 0.0) -> float:
     """Latitude (rad) that makes the turn of gravity fit best; its uncertainty: :func:`latitude_gain`.
 
-    Gravity's direction draws a cone about the pole with half angle 90 deg - L. How fast it moves tells ``|L|``; which
-    way its track bends, by ``(w_ie t)^2 sin(2L)/4``, tells the hemisphere: .1 mrad after 300 s, so that gyros that
+    Gravity's direction draws a cone about the pole with half angle 90 deg - L. How fast it moves shows ``|L|``; which
+    way its track bends, by ``(w_ie t)^2 sin(2L)/4``, shows the hemisphere: .1 mrad after 300 s, so that gyros that
     wander by more than that can return the latitude of the other one.
     """
     from scipy.optimize import minimize_scalar

@@ -4,8 +4,8 @@ The velocity of a vehicle, seen from the frame ``n0`` that is frozen at the star
 
     d/dt (C_n0_n v_n) = C_n0_n (C_nb f - w_ie x v_n + g)
 
-and ``C_n0_n C_nb = C_n0_i C_ib`` with one constant rotation, which is sought. A wheel tells velocity in body axes,
-``v_n = C_nb v_b``; GNSS tells it in navigation axes. Collected on the side on which they are known,
+and ``C_n0_n C_nb = C_n0_i C_ib`` with one constant rotation, which is sought. A wheel gives velocity in body axes,
+``v_n = C_nb v_b``; GNSS gives it in navigation axes. Collected on the side on which they are known,
 
     odometer   C_n0_i [int C_ib f dt - C_ib v_b - int w_ie_i x C_ib v_b dt]  =  -int C_n0_n g dt - C_n0_n0 v_n(0)
     GNSS       C_n0_i [int C_ib f dt]  =  C_n0_n v_n - int C_n0_n (g - w_ie x v_n) dt - v_n(0)

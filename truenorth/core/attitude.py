@@ -126,7 +126,7 @@ def dcm_from_euler(heading: ArrayLike, pitch: ArrayLike, roll: ArrayLike) -> Arr
 def euler_from_dcm(C_nb: ArrayLike) -> tuple[Array, Array, Array]:
     """Heading (0..2 pi, clockwise from north), pitch and roll, rad, of (..., 3, 3).
 
-    Within 1e-9 rad of pitch +-90 deg heading and roll turn about the same axis and cannot be told apart: roll is then
+    Within 1e-9 rad of pitch +-90 deg heading and roll turn about the same axis and cannot be separated: roll is then
     given as zero, and heading holds what can be seen, ``heading - roll`` (nose up) or ``heading + roll`` (nose down).
     """
     C = np.asarray(C_nb, dtype=np.float64)

@@ -1,7 +1,7 @@
 """How fast a speed log's drift changes, where nobody has said so: what the data make most likely.
 
 Of white innovations ``nu`` with covariance ``S`` the likelihood is ``-1/2 sum(nu' S^-1 nu + ln |S|)``. The augmented filter is run
-for each correlation time in question. Under a drift that is taken for too slow the innovations hang together and are too large;
+for each correlation time in question. Under a drift that is taken for too slow the innovations are correlated and too large;
 under one too fast S is larger than they are.
 
 The walk of the drift, ``sigma^2/tau``, shows within hours, its size ``sigma`` only over several ``tau``: the time is searched

@@ -401,7 +401,7 @@ def _even(track: Track) -> Track:
 
 
 def _corrected(track: Track, damped: Course, found: _Found, start: int) -> Track:
-    """The track with the errors taken off and the bands that are left; correlations are not told."""
+    """The track with the errors taken off and the bands that are left; correlations are not given."""
     P, sensors, estimate = track.P.copy(), track.sensors.copy(), found.estimate
     variance = np.einsum("kii->ki", P)[start:].copy()
     if found.bands is not None:

@@ -53,7 +53,7 @@ class Damping:
     rejected : int
         Measurements that the filter's gate kept out.
     length : float, s
-        From the switch to the end: what tells lines apart.
+        From the switch to the end: what separates lines.
     time : (K,) array, s
         Of the epochs from the switch on.
     switching : Switching or None
@@ -92,7 +92,7 @@ class Damping:
         """One line: method, switch, the lines it had, and what the log's error was found to be."""
         parts = [f"{self.damper.method} from {self.switch:.0f} s on"]
         if not np.isnan(self.lines[0]):
-            apart = 0.5 * self.lines[1] ** 2 / self.length  # half of what the log's length can tell apart
+            apart = 0.5 * self.lines[1] ** 2 / self.length  # half of what the log's length can separate
             lines = " and ".join(f"{x / 60.0:.1f}" for x in self.lines)
             parts.append(f"undamped Schuler lines at {lines} min (to {apart / 60.0:.1f} min)")
         if self.reference is not None:

@@ -1,6 +1,6 @@
 """When internal damping is switched off: a network without a reference takes the ship's manoeuvres for errors.
 
-What a manoeuvre lets into the loop is ``(1 - H) v_m`` with ``v_m`` the velocity that it has changed. It is told from the INS's own
+What a manoeuvre lets into the loop is ``(1 - H) v_m`` with ``v_m`` the velocity that it has changed. It is seen in the INS's own
 oscillation by what that cannot do: turn the ship's head, or change velocity by more than ``3 sigma_v w_s``. The loop is left
 undamped from the moment when ``|(1 - H) v_m|`` exceeds a share of what an undamped INS is off by, ``sigma_v``, until it has
 fallen to half of that (hysteresis). The network goes on listening, so that it is warm when it is switched on again.

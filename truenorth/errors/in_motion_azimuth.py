@@ -227,7 +227,7 @@ def correction(x: Array) -> Array:
 def after_correction(x: Array, P: Array, *, velocity: bool = True) -> Array:
     """(B, 16, 16) covariance once x is fed back: what is left of tilts and velocity is turned with the computed frame.
 
-    Tilts belong to that frame. The velocity error is ``(I - M) v`` where the azimuth is off: how it hangs together with an
+    Tilts belong to that frame. The velocity error is ``(I - M) v`` where the azimuth is off: how it is correlated with an
     azimuth error *about the new estimate* is turned by that estimate. `velocity` false leaves it, as the ordinary
     error-state filter does: then the reduced Gauss-Hermite filter of order 7 diverges in a third of the runs that start 30 deg
     off, else in none.

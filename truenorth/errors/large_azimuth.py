@@ -7,7 +7,7 @@ was given and gravity turns with the earth. Let ``B = C_n0_b_hat C_n0_b'`` be wh
 
 three ways written: as a tilt after an azimuth of any size, ``B = (I - [(phi_E, phi_N, 0) x]) Rz(-phi_U)``, in which the model
 is nonlinear in ``phi_U`` alone; as a rotation vector, ``B = exp(-[phi x])``; and as a quaternion. Each is exact to the first
-order in the biases and, the first, in the tilts. Gravity's turn is what tells the azimuth.
+order in the biases and, the first, in the tilts. Gravity's turn is what shows the azimuth.
 
 Sources: system 4, and its related work: X. Kong, E. M. Nebot, H. Durrant-Whyte, Development of a nonlinear psi-angle model for
 large misalignment errors, ICRA 1999; J. L. Crassidis, F. L. Markley, Unscented filtering for spacecraft attitude estimation,

@@ -110,7 +110,7 @@ class StaticModel(Walks):
         H[:, :, BG] = -(T**2) / 6 * (f @ C_mean)
         H[:, :, BA] = -T * C_late
         # Noise inside the interval acts on its mean with the weight (T-s)/T (accelerometers) and (T-s)^2/(2T)
-        # (gyros); less what H x_k already tells, -s/T and s^2/(2T) are left: their covariance, and that with Q's.
+        # (gyros); less what H x_k already holds, -s/T and s^2/(2T) are left: their covariance, and that with Q's.
         R_inside = q_a * T / 3 * eye + q_g * T**3 / 20 * ff
         S = np.zeros((count, STATES, 3))
         S[:, PHI] = q_g * T**2 / 6 * np.swapaxes(f, 1, 2)
@@ -177,7 +177,7 @@ def force_system(
     On a base that does not move beyond the noise of its accelerometers it says what the velocity says, and asks nothing of where
     the velocity began; on one that does, the base's motion comes in differentiated, and the velocity form is the better.
 
-    Source: system 4, "Kalman filters for static alignment": its eight states beside its ten.
+    Source: system 4, "Kalman filters for static alignment": its eight states next to its ten.
 
     Parameters
     ----------

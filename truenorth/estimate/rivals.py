@@ -191,7 +191,7 @@ def likelihood_ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> 
     """Twice the logarithm of the likelihood ratio, of each source as far as its measurements are independent.
 
     Measurements that both take count: outliers choose no model. A source whose innovations are ``f`` times as large as they
-    should be, or hang together so that a mean errs by ``f`` times as much, carries a share ``1 / f^2`` of its information.
+    should be, or are correlated so that a mean errs by ``f`` times as much, carries a share ``1 / f^2`` of its information.
     """
     total = 0.0
     others = {r.name: r for r in rival}

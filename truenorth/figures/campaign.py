@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SHOWN = {"phi_u": "heading", "level": "level"}  # quantities worth a figure, and how people call them
 FANS = ((5, 95), (25, 75))  # percentiles
 MOST_CASES = 12  # on one figure
-SMALL = 1e-4  # arcmin: below it a logarithmic axis tells nothing
+SMALL = 1e-4  # arcmin: below it a logarithmic axis shows nothing
 
 
 def plot_campaign(campaign: Campaign) -> dict[str, Figure]:

@@ -1,4 +1,4 @@
-"""One look for all figures: fonts, colours that colour-blind readers tell apart, sigma bands, long traces.
+"""One look for all figures: fonts, colours that colour-blind readers can distinguish, sigma bands, long traces.
 
 Draw inside ``with style():`` on a figure from `new_figure`. Figures are made without pyplot, so no window system
 is needed, nothing is global, and a long campaign leaks no figure.

@@ -59,7 +59,7 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
     before = np.concatenate([P0[..., None, :, :], estimates.P[..., :-1, :, :]], axis=-3)
     P_predicted = Phi @ before @ np.swapaxes(Phi, -1, -2) + system.Q
     cross = P_predicted @ np.swapaxes(H, -1, -2) + (0.0 if system.S is None else system.S)
-    # An absent row becomes one of its own that tells nothing.
+    # An absent row becomes one of its own without information.
     absent = np.isnan(estimates.innovation)
     W = np.where(absent[..., :, None] | absent[..., None, :], np.eye(m), estimates.innovation_covariance)
     cross = np.where(absent[..., None, :], 0.0, cross)

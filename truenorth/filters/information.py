@@ -5,7 +5,7 @@ It carries the information matrix ``Y = P^-1`` and the vector ``y = Y x``. A mea
 part; with ``Q = B B'`` and ``M = Phi^-T Y Phi^-1`` it is ``L M L' + J J'``, ``J = M B (I + B' M B)^-1``, ``L = I - J B'``, which
 stays positive semidefinite and takes a singular Q.
 
-Run backwards, without a prior, the same recursion tells what the *later* measurements know of each epoch and needs no
+Run backwards, without a prior, the same recursion gives what the *later* measurements know of each epoch and needs no
 inverse of Phi; joined with the Kalman filter before, it is the backward-forward smoother.
 
 Sources: D. C. Fraser, J. E. Potter, The optimum linear smoother as a combination of two optimum linear filters, IEEE

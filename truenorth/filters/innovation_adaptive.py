@@ -5,7 +5,7 @@ Of the last N measurements of a row, with the predicted covariance P- and the fi
     innovation:  r = mean(nu^2 - h P- h'),   nu = z - h x-
     residual:    r = mean(e^2 + h P+ h'),    e  = z - h x+
 
-The first tells the truth also where the given R is far off, but as a difference it may be negative and is held within
+The first is right also where the given R is far off, but as a difference it may be negative and is held within
 limits. The second is never negative; since P+ and e follow from the R in use, it comes nearer with each window only.
 Where the window reaches back before the first measurement, the given R stands in.
 

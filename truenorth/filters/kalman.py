@@ -48,7 +48,7 @@ def kalman(
         From an earlier call, to go on from; replaces ``x0, P0``. Chunks give the bits of one batch.
     joseph : bool
         Update the covariance in Joseph's form, which survives precise measurements of what was unknown; the plain
-        form takes two thirds of the time of an update. Where P cannot hold what a row tells in either form (rows that mix
+        form takes two thirds of the time of an update. Where P cannot hold the information of a row in either form (rows that mix
         states with a prior some 1e16 times R), the filter stops and says so; :func:`truenorth.filters.square_root` goes on.
     **running
         ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.

@@ -199,7 +199,7 @@ def _at_rest(mean: float, sigma: float, walk: float) -> float:
 
 
 def _of_one_class(walk: float, force_walk: float) -> float:
-    """Likelihood of a gyro's random walk (rad/sqrt(s)) beside an accelerometer of this one (m/s/sqrt(s)) in one IMU.
+    """Likelihood of a gyro's random walk (rad/sqrt(s)) with an accelerometer of this one (m/s/sqrt(s)) in one IMU.
 
     Data sheets from ring lasers with pendulous accelerometers to MEMS: ``walk = TYPICAL (force walk / 80 ug/sqrt(Hz))^1.3``,
     to half a decade. A base that shakes raises the accelerometers' more: beyond a MEMS's it says nothing more.

@@ -26,7 +26,7 @@ REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
 INTERVALS = ("ts", "Ts", "dt", "interval")
 RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|$)", re.IGNORECASE)
 STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
-MOST_COLUMNS = 200  # that are looked at where no name tells
+MOST_COLUMNS = 200  # that are looked at where no name decides
 
 
 @dataclass

@@ -75,7 +75,7 @@ def format_of(
     Raises
     ------
     UsageError
-        A format that does not exist, or a suffix that names none and a content that tells none.
+        A format that does not exist, or a suffix that names none and a content that shows none.
     DataError
         An empty file, or one that is not what its suffix says.
     """

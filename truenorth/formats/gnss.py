@@ -122,7 +122,7 @@ def read_gnss(
 
 
 def _heading(found: Found) -> dict[str, Any]:
-    """Heading of two antennas, told or from their baseline.
+    """Heading of two antennas, given or from their baseline.
 
     A column called heading without a sigma is, in many a receiver's log, the course over ground: it is left out.
     """

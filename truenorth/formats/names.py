@@ -1,7 +1,7 @@
 """What the headings of an IMU's log mean: ``wx``, ``gyroX``, ``Acc_X [g]``, ``w_RS_S_x [rad s^-1]``, ``linear_acceleration.z``.
 
 A heading is a stem and an axis, with a unit in brackets or at its end. What stands before the stem (``imu0_``, ``field.``,
-``raw_``) tells several sensors of a log apart, and nothing else.
+``raw_``) distinguishes several sensors of a log, and nothing else.
 """
 
 from __future__ import annotations

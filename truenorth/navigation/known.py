@@ -1,7 +1,7 @@
 """A start of which the heading is known: from a survey, a compass, two antennas, a painted line.
 
 An alignment that knows its heading's error together with its biases, even where its heading was refused, takes a given heading as
-a measurement: heading and east gyro bias of a base at rest hide each other, and to know the one tells the other. An alignment that
+a measurement: heading and east gyro bias of a base at rest hide each other; who knows the one knows the other. An alignment that
 has levelled only is turned to the heading; of a mean rate that it took for the gyros' bias the level part of the earth's rate,
 which it could not tell from gyro bias, is then known too.
 """

@@ -49,7 +49,7 @@ Array = NDArray[np.float64]
 
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
 FINE, COARSE = 0.2, 1.0
-# Of the log, what tells axes of velocities: at most this long, and until an INS without aiding has tilted or drifted so far.
+# Of the log, what shows axes of velocities: at most this long, and until an INS without aiding has tilted or drifted so far.
 AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
 SHORTEST_AXES = 20.0  # s
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge

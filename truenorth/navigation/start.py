@@ -113,7 +113,7 @@ def _by_static_limits(
     position: Position,
     spec: ImuSpec,
 ) -> Handover:
-    """Of an alignment that tells no joint covariance: one that took no biases, or turned.
+    """Of an alignment that has no joint covariance: one that took no biases, or turned.
 
     Tilt and accelerometer bias of an alignment at rest cancel each other, and so do heading and east gyro bias: without
     their correlation navigation would seem far worse than it is. The biases' part of the misalignment's covariance (its
@@ -145,7 +145,7 @@ def moving_start(
     position: Position,
     spec: ImuSpec,
 ) -> Start:
-    """Of an alignment on the move, which knows velocity and how all errors hang together."""
+    """Of an alignment on the move, which knows velocity and how all errors are correlated."""
     whole = WholeBiases(spec.constant_variance)
     lat, lon, alt = position.lat, position.lon, position.alt
     return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)

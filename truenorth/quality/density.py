@@ -1,4 +1,4 @@
-"""How noisy are the sensors, stretch by stretch? White noise told from the base's own motion, while it sways or turns.
+"""How noisy are the sensors, stretch by stretch? White noise separated from the base's own motion, while it sways or turns.
 
 Sixth differences of means over ``m`` rows leave of a smooth motion of period ``T`` only ``(2 pi m dt / T)^6``, of white noise of
 density ``N`` a variance of ``924 N^2 / (m dt)``. A vibration is larger at one ``m`` than at another, white noise alike at
@@ -91,7 +91,7 @@ def burst_evidence(record: ImuRecord) -> list[Evidence]:
 def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSpec, lat: float) -> list[Evidence]:
     """Whether sensors at rest are noisier than their specification by more than any sensor is: it is not theirs then.
 
-    At rest alone: while the base moves, only what is faster than its motion can be told from it, and there a sound sensor has
+    At rest alone: while the base moves, only what is faster than its motion can be separated from it, and there a sound sensor has
     noise that is none of its random walk (the dither of a ring laser, quantisation).
 
     Parameters

@@ -142,7 +142,7 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
     sigma : Effect
         Of the answer.
     memory : float, s
-        For which residuals hang together: so many of them are independent; a constant or Schuler's period at least.
+        For which residuals are correlated: so many of them are independent; a constant or Schuler's period at least.
     """
     found = []
     for source in sources:

@@ -1,4 +1,4 @@
-"""Everything that a record tells about itself, in one object."""
+"""Everything that a record shows about itself, in one object."""
 
 from __future__ import annotations
 

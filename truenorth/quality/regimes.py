@@ -1,9 +1,9 @@
 """How the base moved: still, disturbed, swaying, rotating or moving, second by second, from the IMU alone.
 
 The raw variance of a sample says nothing: a cheap gyro at rest is noisier than a good one on a ship. What
-tells motion from noise is where the power lies. White rate noise gives an angle that wanders as
+separates motion from noise is where the power lies. White rate noise gives an angle that wanders as
 ``N sqrt(t)``; motion moves the angle by more than that over seconds, though single samples may not show it.
-Acceleration is told from tilt by carrying the specific force with the gyros into axes that do not turn.
+Acceleration is separated from tilt by carrying the specific force with the gyros into axes that do not turn.
 
 NumPy only: `auto` alignment calls it on every record.
 """

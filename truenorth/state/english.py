@@ -217,7 +217,7 @@ SENTENCES = {
     ),
     "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
     "innovations.wander": (
-        "errors of the {name}s hang together from fix to fix (correlation {correlation:.2f}), they wander by {wander:.2g} m or "
+        "errors of the {name}s are correlated from fix to fix (correlation {correlation:.2f}) and wander by {wander:.2g} m or "
         "more: the sigma of position is too small"
     ),
     "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
@@ -336,10 +336,10 @@ REMEDIES = {
         "attitude matching knows the slave only as well as its mounting on the master is known; match velocity too"
     ),
     "manoeuvre": "velocity shows heading by horizontal acceleration alone; make a turn, an S-turn, a change of speed",
-    "log": "check its units, axes, mounting, and whether it lives",
+    "log": "check its units, axes, mounting, and whether it works",
     "log_error": "check the error that was stated for it",
     "manoeuvre_gnss": "the vehicle must accelerate and turn while GNSS sees it",
-    "north": "velocity along the vehicle tells nothing of north; use gyros that see the earth turn, or GNSS",
+    "north": "velocity along the vehicle does not show north; use gyros that see the earth turn, or GNSS",
 }
 
 TERMS = {

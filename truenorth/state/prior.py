@@ -24,7 +24,7 @@ class WholeBiases:
 def prior_covariance(
     phi: ArrayLike = 0.0, dv: ArrayLike = 0.0, dp: ArrayLike = 0.0, bias_variance: ArrayLike = 0.0, *others: float
 ) -> Array:
-    """(15 + m, 15 + m) covariance at the start of errors that do not hang together.
+    """(15 + m, 15 + m) covariance at the start of uncorrelated errors.
 
     Parameters
     ----------

@@ -42,5 +42,5 @@ def told_by(case: Case) -> Seen:
     names, units = [model.names[i] for i in seen], [model.units[i] for i in seen]
     found = observability(system_of_motion(motion, model, P0, R, END, STEP), names, units)
     hardly = "; ".join(map(str, found.hardly))
-    words = f"what keeps more than .9 of its prior sigma: {hardly}" if hardly else "all states are told apart"
+    words = f"what keeps more than .9 of its prior sigma: {hardly}" if hardly else "all states are separated"
     return Seen(found.rank, words)

@@ -35,7 +35,7 @@ RULES = (
         ),
     ),
     Rule(
-        "In a turn, delay and lever arm can hardly be told apart.",
+        "In a turn, delay and lever arm can hardly be separated.",
         (
             interval(
                 "flat_turn_random states16 lever_arm_y_and_speed_times_tau@200 < 0.5 * flat_turn_random states16 lever_arm_y@200"
