@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth
 from tests.recordings import rlg_vehicle_xian
-from tests.runs import few_and_all
+from tests.runs import few_and_all, some
 from truenorth.aiding.aids import VelocityLog
 from truenorth.alignment import align
 from truenorth.cli import app
@@ -140,7 +140,7 @@ def test_the_logs_constant_error_is_found(ship):
     assert f"min (to {apart:.1f} min)" in result.damping.in_words()
 
 
-@pytest.mark.parametrize(("lat", "heading"), [(-45.78, 231.0), (79.0, 120.0), (-80.0, -30.0), (0.5, 270.0)])
+@pytest.mark.parametrize(("lat", "heading"), some([(-45.78, 231.0), (79.0, 120.0)], [(-80.0, -30.0), (0.5, 270.0)]))
 def test_both_hemispheres_east_and_west(lat, heading):
     ship = Ship(lat, heading, seed=3)
     free = ship.errors(ship.navigate(Damper("none")))
@@ -182,7 +182,7 @@ def test_a_sick_log(ship, method):
     assert np.degrees(np.abs(two[after, PHI.stop - 1]).max()) < np.degrees(np.abs(one[after, PHI.stop - 1]).max()) + 0.1
 
 
-@pytest.mark.parametrize("method", ["external", "kalman"])
+@pytest.mark.parametrize("method", some(["kalman"], ["external"]))
 @pytest.mark.parametrize("factor", [0.0, 1.0 / 0.514444])
 def test_a_log_that_cannot_be_this_ships(ship, method, factor):
     """Dead, or knots taken for m/s: nothing in the log itself is amiss, and it is not believed in silence."""

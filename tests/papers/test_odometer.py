@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.runs import some
 from truenorth.papers import reproduce
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, run_method
@@ -39,7 +40,7 @@ def test_the_invariant_filter_does_not_mind_where_it_begins(drives):
     assert rms(ordinary) > 20.0 * rms(sixty)
 
 
-@pytest.mark.parametrize(("method", "degrees"), [("gh3", 10.0), ("gh7", 10.0), ("gh7", 30.0), ("sgkf7", 30.0)])
+@pytest.mark.parametrize(("method", "degrees"), some([("gh3", 10.0), ("sgkf7", 30.0)], [("gh7", 10.0), ("gh7", 30.0)]))
 def test_the_papers_model_converges(drives, method, degrees):
     errors = from_angle(run_method, drives, degrees, method)
     assert not diverged(errors).any()

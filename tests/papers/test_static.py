@@ -187,7 +187,7 @@ def test_runs_do_not_depend_on_their_number():
 
 
 def test_the_command(tmp_path):
-    result = CliRunner().invoke(app, ["reproduce", "static", "--runs", "4", "-o", str(tmp_path)])
+    result = CliRunner().invoke(app, ["reproduce", "static", "--runs", "2", "-o", str(tmp_path)])
     assert result.exit_code == 0, result.output
     names = {path.name for path in tmp_path.iterdir()}
     drawings = {"figures_1_to_6.png", "convergence.png", "observability.png", "large_180.png", "open_choices.png"}
