@@ -8,7 +8,7 @@ import truenorth
 from truenorth.core.attitude import dcm_from_euler, quaternion_from_dcm
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.formats import write_record
+from truenorth.formats import UnsureError, read_gnss, read_master, read_odometer, read_velocity, write_record
 from truenorth.records import GnssRecord, HeightRecord, MasterRecord, OdometerRecord, Trajectory, VelocityRecord
 
 RNG = np.random.default_rng(3)
@@ -311,3 +311,59 @@ def test_paths(tmp_path):
     (tmp_path / "a.parquet").rename(path)
     with pytest.raises(DataError, match="holds parquet data"):
         truenorth.read_height(path)
+
+
+T60 = np.arange(60.0)
+
+
+def rows_of(tmp_path, header, *columns, name="log.csv"):
+    path = tmp_path / name
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.12g")
+    return path
+
+
+@pytest.mark.parametrize(("apart", "unit"), [(1e3, "ms"), (1e6, "us"), (200.0, "ms")])
+def test_a_clock_without_a_unit_is_asked_for(apart, unit, tmp_path):
+    """Rows a thousand seconds apart, or milliseconds: of fixes the way between them may tell, of a speed nothing does."""
+    path = rows_of(tmp_path, "timestamp,speed", apart * T60, 5.0 + 0 * T60)
+    with pytest.raises(UnsureError, match=rf"seconds, or {unit}\? .*units: {{time: {unit}}} or units: {{time: s}}"):
+        read_odometer(path)
+    assert read_odometer(path, units=f"time={unit}").duration == pytest.approx(
+        60 * apart * {"ms": 1e-3, "us": 1e-6}[unit]
+    )
+    assert len(read_odometer(path, units="time=s")) == 60
+    assert len(read_odometer(rows_of(tmp_path, "time_ms,speed", apart * T60, 5.0 + 0 * T60))) == 60
+    ship = rows_of(tmp_path, "time,lat,lon,alt", 600.0 * T60, 20.0 + 0.02 * T60, 115 + 0.01 * T60, 0 * T60)
+    assert read_gnss(ship).interval == 600.0  # 4 m/s, and not 4 km/s
+
+
+def test_places_near_zero_may_be_radians(tmp_path):
+    car = 48.1 + 1e-5 * T60, 11.5 + 2e-5 * T60, 500.0 + 0 * T60
+    path = rows_of(tmp_path, "time,lat,lon,alt", T60, *np.radians(car[:2]), car[2])
+    with pytest.raises(
+        UnsureError, match=r"degrees south of Ghana, or radians of lat 48\.100, lon 11\.500 deg.*position: rad"
+    ):
+        read_gnss(path)
+    assert np.degrees(read_gnss(path, units="position=rad").lat[0]) == pytest.approx(48.1)
+    assert np.degrees(read_gnss(path, units="position=deg").lat[0]) == pytest.approx(np.radians(48.1))
+    ship = rows_of(tmp_path, "time,lat,lon,alt", 60.0 * T60, 1.0 + 0.01 * T60, 2.0 + 0.01 * T60, 0 * T60)
+    assert np.degrees(read_gnss(ship).lat[0]) == pytest.approx(1.0)  # 26 m/s, and not 1.5 km/s
+
+
+def test_a_vehicle_that_goes_along_x_is_asked_for_its_axes(tmp_path):
+    path = rows_of(tmp_path, "time,vx,vy,vz", T60, 5.0 + 0 * T60, 0.1 + 0 * T60, 0 * T60)
+    with pytest.raises(UnsureError, match=r"along x .*axes: FRD or axes: FLU or axes: RFU"):
+        read_velocity(path)
+    np.testing.assert_allclose(read_velocity(path, axes="FLU").velocity, np.tile([-0.1, 5.0, 0.0], (60, 1)))
+    np.testing.assert_allclose(read_velocity(path, axes="RFU").velocity[:, 0], 5.0)
+    forward = rows_of(tmp_path, "time,vx,vy,vz", T60, 0.1 + 0 * T60, 5.0 + 0 * T60, 0 * T60)
+    np.testing.assert_allclose(read_velocity(forward).velocity[:, 1], 5.0)
+
+
+def test_a_yaw_is_asked_which_way_it_counts(tmp_path):
+    path = rows_of(tmp_path, "time,yaw,pitch,roll", T60, 30.0 + 0 * T60, 2.0 + 0 * T60, 3.0 + 0 * T60)
+    with pytest.raises(UnsureError, match=r"columns: \{heading: yaw\} or columns: \{heading: -yaw\}"):
+        read_master(path)
+    for name, heading in (("yaw", 30.0), ("-yaw", -30.0)):
+        C = read_master(path, columns=f"heading={name}").C_nb[0]
+        assert np.degrees(np.arctan2(C[0, 1], C[1, 1])) == pytest.approx(heading)

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -154,6 +155,7 @@ def test_an_answer_holds_no_nan(sound, data):
     json.dumps(answer.summary(), allow_nan=False)
     assert np.isfinite(answer.C_nb).all()
     assert np.isfinite(answer.phi_covariance).all()
+    assert not re.search(r"\b(nan|inf|None)\b", " ".join(answer.reasons)), answer.reasons
 
 
 def run(*arguments, cwd=None):

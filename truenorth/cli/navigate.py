@@ -99,6 +99,10 @@ class KnownStart:
     ] = None
     pitch: Annotated[float | None, option("Deg; without it the level is that of the log's beginning.")] = None
     roll: Annotated[float | None, option("Deg; with --pitch.")] = None
+    speed: Annotated[
+        str | None,
+        option("Forward speed at the start and its one-sigma, m/s: '8,0.5'; with --pitch. At rest without it."),
+    ] = None
 
     def given(self) -> tuple[float, float]:
         """Heading and sigma, rad."""
@@ -154,10 +158,23 @@ class KnownStart:
             return start_from_master(record, read_master(self.master), imu, *sigmas, place=at)
         if (self.pitch is None) != (self.roll is None):
             raise UsageError("--pitch or --roll alone; expected both, or none: the level then comes from the log")
-        level = (
-            {} if self.pitch is None else {"pitch": math.radians(self.pitch), "roll": math.radians(self.roll or 0.0)}
-        )
+        if self.speed is not None and self.pitch is None:
+            raise UsageError("--speed without --pitch and --roll; expected them: a level is found at rest alone")
+        level: dict[str, Any] = {}
+        if self.pitch is not None:
+            level = {"pitch": math.radians(self.pitch), "roll": math.radians(self.roll or 0.0)} | self._moving()
         return known_start(record, Position.from_degrees(*(place or ())), imu, *self.given(), **level)
+
+    def _moving(self) -> dict[str, Any]:
+        """Velocity at the start along the heading, and its sigma: across, that of the heading turns it."""
+        if self.speed is None:
+            return {}
+        speed, sigma = numbers_of(self.speed, "--speed", 2, "forward speed and its one-sigma in m/s")
+        heading, uncertain = self.given()
+        climb = math.radians(self.pitch or 0.0)
+        level = speed * math.cos(climb)
+        velocity = level * math.sin(heading), level * math.cos(heading), speed * math.sin(climb)
+        return {"velocity": velocity, "velocity_sigma": math.hypot(sigma, speed * uncertain)}
 
     def imu_of(self, folder: Path | None) -> Any:
         """The specification in the folder, where a heading turns its start."""

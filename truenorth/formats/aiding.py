@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import devices
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
+from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import options_for
 from truenorth.formats.opening import columns_of
 from truenorth.formats.order import ordered
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 FilePath = str | PathLike[str]
 Pairs = str | Mapping[str, str]
 
+SLOW, MOSTLY = 0.2, 3.0  # m/s, and how many times the speed aside the one along a vehicle is
 COUNTS = ("pulses", "distance", "pulses_total", "distance_total", "speed")
 ODOMETER = (
     TIME,
@@ -61,7 +63,8 @@ PLACE = (
     Quantity("alt", "length", "m", ("altitude", "height", "h", "hgt", "ellipsoidal_height"), ("depth",), "height"),
 )
 ANGLES = (
-    Quantity("heading", "angle", "deg", ("heading_cw",), ("yaw_ccw",), "attitude"),
+    Quantity("heading", "angle", "deg", ("heading_cw", "azimuth", "true_heading", "hdg"), ("yaw_ccw",), "attitude"),
+    Quantity("yaw", "angle", "deg", (), (), "attitude"),  # which way it counts it does not say
     Quantity("pitch", "angle", "deg", (), (), "attitude"),
     Quantity("roll", "angle", "deg", (), (), "attitude"),
 )
@@ -194,6 +197,8 @@ def read_velocity(
     frames = [key for key, of in names.items() if any(found.has(name) for name in of)]
     if any(found.has(q.name) for q in AXES):
         velocity = turned(found.stack(*(q.name for q in AXES)), others.get("axes"))
+        if others.get("axes") is None:
+            _ask_forward(found.source, velocity)
         frames = frames or ["body"]
     chosen: Any = others.get("frame") or (frames[0] if len(frames) == 1 else None)
     if not frames:
@@ -371,6 +376,13 @@ def whole(found: Found, *names: str) -> Array | None:
 def _poses(found: Found) -> dict[str, Any]:
     from truenorth.core.attitude import dcm_from_euler, dcm_from_quaternion
 
+    if found.has("yaw") and not found.has("heading"):
+        label = found.labels["yaw"]
+        raise UnsureError(
+            f"{found.source}: column {label} may count clockwise from north, as a heading does, or the other way; say which, in a "
+            "YAML file next to the log, or to the reader",
+            [{"columns": {"heading": label}}, {"columns": {"heading": f"-{label}"}}],
+        )
     angles, q = whole(found, "heading", "pitch", "roll"), whole(found, "q_w", "q_x", "q_y", "q_z")
     C_nb = None
     if q is not None:
@@ -399,6 +411,19 @@ def turned(values: Array | None, axes: str | None) -> Array | None:
     C = body_axes(axes)
     source = np.abs(C).argmax(axis=1)
     return values[:, source] * C[np.arange(3), source]
+
+
+def _ask_forward(source: str, velocity: Array | None) -> None:
+    """Ask for the axes of a vehicle that goes along x, which is not to the right of any."""
+    if velocity is None:
+        return
+    along, aside = (float(np.sqrt(np.nanmean(axis**2))) if np.isfinite(axis).any() else 0.0 for axis in velocity.T[:2])
+    if along > SLOW and along > MOSTLY * aside:
+        raise UnsureError(
+            f"{source}: the velocity is along x ({along:.3g} m/s RMS, along y {aside:.2g}), which seems to point forward, not "
+            "to the right; say which axes they are, in a YAML file next to the log, or to the reader",
+            [{"axes": "FRD"}, {"axes": "FLU"}, {"axes": "RFU"}],
+        )
 
 
 def _pulse_size(found: Found, given: float | str | None) -> float | None:

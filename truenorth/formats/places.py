@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.earth import SEMI_MAJOR
 from truenorth.core.errors import DataError
-from truenorth.formats.quantities import Found
+from truenorth.formats.guesses import UnsureError
+from truenorth.formats.quantities import FASTEST, Found
 
 Array = NDArray[np.float64]
 
@@ -34,6 +36,33 @@ def check_degrees(found: Found) -> None:
                 f"expected {-least:.6g} to {least:.6g} {unit}: {_advice(found, name)}"
             )
 
+    _ask_near_zero(found)
+
+
+def _ask_near_zero(found: Found) -> None:
+    """Ask where neither the log nor the caller says a unit and both do: south of Ghana in degrees, anywhere in radians."""
+    if {"lat", "lon"} & found.stated:
+        return
+    lat, lon = (np.degrees(found.values[name]) for name in LIMIT)
+    here = np.isfinite(lat) & np.isfinite(lon)
+    lat, lon, time = lat[here], lon[here], found.values["time"][here]
+    if not len(lat) or np.abs(lat).max() > 0.5 * np.pi or np.abs(lon).max() > np.pi:
+        return
+    steps = SEMI_MAJOR * np.hypot(np.diff(lat), np.diff(lon) * np.cos(lat[1:]))
+    if max(np.abs(lat).max(), np.abs(lon).max()) == 0.0 or np.any(steps > FASTEST * np.diff(time)):
+        return
+    labels = f"{found.labels['lat']}, {found.labels['lon']}"
+    seen = f"lat {np.degrees(lat[0]):.3f}, lon {np.degrees(lon[0]):.3f} deg"
+    raise UnsureError(
+        f"{found.source}: columns {labels}: {lat[0]:.6g}, {lon[0]:.6g} are degrees south of Ghana, or radians of {seen}; say "
+        f"which, in a file {_beside(found)} next to the log, or to the reader",
+        [{"units": {"position": "rad"}}, {"units": {"position": "deg"}}],
+    )
+
+
+def _beside(found: Found) -> str:
+    return found.source.rpartition(".")[0] + ".yaml"
+
 
 def _in_radians(found: Found, name: str) -> bool:
     return found.factors[name] == 1.0
@@ -48,10 +77,9 @@ def _advice(found: Found, name: str) -> str:
     lat, lon = (np.abs(_written(found, key)) for key in LIMIT)
     farthest, other = float(np.nanmax(lat, initial=0.0)), float(np.nanmax(lon, initial=0.0))
     labels = {key: found.labels[key] for key in LIMIT}
-    beside = found.source.rpartition(".")[0] + ".yaml"
 
     def options(text: str) -> str:
-        return f"put {text} into a file {beside} next to the log, or give it to the reader"
+        return f"put {text} into a file {_beside(found)} next to the log, or give it to the reader"
 
     if _in_radians(found, name):
         if farthest <= LIMIT["lat"] and other <= LIMIT["lon"]:

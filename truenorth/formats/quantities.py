@@ -15,16 +15,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.earth import SEMI_MAJOR
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import unknown_key
 from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.checks import check_finite
 from truenorth.formats.columns import Columns
+from truenorth.formats.guesses import UnsureError
 from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
 
 Array = NDArray[np.float64]
+
+LONG_STEP = 100.0  # s: sensors that aid seldom wait so long
+FASTEST = 1000.0  # m/s, of what carries a receiver
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,7 @@ class Found:
     factors: Mapping[str, float]  # our names to what the log's numbers were multiplied with
     place: Callable[[int], str]  # where a row stands in the file, in words
     asked: frozenset[str]  # our names of those that the caller named
+    stated: frozenset[str] = frozenset()  # our names of those whose unit the file or the caller says
     late: Late = IN_ORDER  # rows that were put in order
 
     def has(self, *names: str) -> bool:
@@ -143,12 +149,14 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
     """
     source = columns.path.name
     claims: dict[str, list[tuple[str, float]]] = {}
+    stated: set[str] = set()
     named = {ours: text if text in columns.names else text.removeprefix("-") for ours, text in options.columns.items()}
     for name in columns.names:
         if name in named.values():
             continue
         for quantity, sign, unit in _meanings(name, quantities):
             if quantity.name not in options.columns:
+                stated |= {quantity.name} if _unit(quantity, unit, options) else set()
                 claims.setdefault(quantity.name, []).append(
                     (name, sign * _factor(quantity, unit, name, options, source))
                 )
@@ -160,6 +168,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
                 hint = f"; is it {near[0]!r}?" if near else ""
                 raise DataError(f"{source}: column {name!r} is missing; found {', '.join(columns.names)}{hint}")
             unit = split(name)[1]
+            stated |= {quantity.name} if _unit(quantity, unit, options) else set()
             sign = 1.0 if name == options.columns[quantity.name] else -1.0
             claims[quantity.name] = [(name, sign * _factor(quantity, unit, name, options, source))]
     for ours, claim in claims.items():
@@ -184,9 +193,33 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
         )
     values = {ours: table[:, numbers.index(label)] * factors[ours] for ours, label in labels.items() if ours != "time"}
     values = {"time": time * factors["time"], **values}
-    found = Found(source, labels, values, factors, columns.place, frozenset(options.columns))
+    found = Found(source, labels, values, factors, columns.place, frozenset(options.columns), frozenset(stated))
     found.require("time")
+    if said is None and "time" not in stated and factors["time"] == 1.0:
+        _ask_clock(found)
     return found
+
+
+def _ask_clock(found: Found) -> None:
+    """Ask where whole numbers so far apart stand under a name without a unit that they seem to count parts of a second.
+
+    Where places would then move faster than anything does, they are seconds.
+    """
+    time = found.values["time"]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if step < LONG_STEP or np.any(time != np.round(time)):
+        return
+    size = 1e-3 if step < 1e3 * LONG_STEP else 1e-6
+    if found.has("lat", "lon"):
+        moved = np.hypot(np.diff(found.values["lat"]), np.diff(found.values["lon"]) * np.cos(found.values["lat"][1:]))
+        if np.nanmax(moved / np.diff(time), initial=0.0) * SEMI_MAJOR > FASTEST * size:
+            return
+    unit = {1e-3: "ms", 1e-6: "us"}[size]
+    raise UnsureError(
+        f"{found.source}: column {found.labels['time']}: rows are {step:g} apart and say no unit; seconds, or {unit}? Say "
+        "which, in a YAML file next to the log, or to the reader",
+        [{"units": {"time": unit}}, {"units": {"time": "s"}}],
+    )
 
 
 def _of_epoch(time: Array, factor: float) -> float:
@@ -218,9 +251,14 @@ def _key(name: str) -> str:
     return re.sub(r"[\s\-]+", "_", name.strip()).casefold()
 
 
+def _unit(quantity: Quantity, stated: str | None, options: Options) -> str | None:
+    """The unit that the caller says, or else the heading; None: neither does."""
+    return options.units.get(quantity.name, options.units.get(quantity.group)) or stated
+
+
 def _factor(quantity: Quantity, stated: str | None, label: str, options: Options, source: str) -> float:
     """What a column is multiplied with."""
-    text = options.units.get(quantity.name, options.units.get(quantity.group)) or stated or quantity.unit
+    text = _unit(quantity, stated, options) or quantity.unit
     try:
         factor, found = parse_quantity(text) if text[:1] in "0123456789." and text != "1" else parse_unit(text)
     except UsageError as error:
