@@ -89,7 +89,18 @@ def test_align_and_navigate(files, gnss, more, best):
     ratio, sigma = off(call("align", folder / "imu.parquet", "--gnss", folder / gnss, *IMU, *more, "--json"), true)
     assert ratio < 4.0
     assert sigma < best
-    start = ("--heading", f"{math.degrees(0.7):.3f},5", "--position", "50,10,100", "--pitch", 0, "--roll", 0, "--speed", "8,0.3")
+    start = (
+        "--heading",
+        f"{math.degrees(0.7):.3f},5",
+        "--position",
+        "50,10,100",
+        "--pitch",
+        0,
+        "--roll",
+        0,
+        "--speed",
+        "8,0.3",
+    )
     navigated = call("navigate", folder / "imu.parquet", *start, "--gnss", folder / gnss, *IMU, *more, "--json")
     ratio, sigma = off(navigated, true)
     assert ratio < 4.0

@@ -348,6 +348,8 @@ def test_places_near_zero_may_be_radians(tmp_path):
     assert np.degrees(read_gnss(path, units="position=deg").lat[0]) == pytest.approx(np.radians(48.1))
     ship = rows_of(tmp_path, "time,lat,lon,alt", 60.0 * T60, 1.0 + 0.01 * T60, 2.0 + 0.01 * T60, 0 * T60)
     assert np.degrees(read_gnss(ship).lat[0]) == pytest.approx(1.0)  # 26 m/s, and not 1.5 km/s
+    moored = rows_of(tmp_path, "time,lat,lon,alt", T60, 1.23456 + 0 * T60, 2.0 + 0 * T60, 0 * T60)
+    assert np.degrees(read_gnss(moored).lat[0]) == pytest.approx(1.23456)  # as radians in steps of 64 m
 
 
 def test_a_vehicle_that_goes_along_x_is_asked_for_its_axes(tmp_path):

@@ -13,6 +13,7 @@ from truenorth.formats.quantities import FASTEST, Found
 Array = NDArray[np.float64]
 
 LIMIT = {"lat": 90.0, "lon": 360.0}  # deg; longitudes are counted from -180 or from 0
+COARSE = 1e-5  # rad, 64 m: nobody writes places in steps of it
 SCALED = (1e7, 1e6, 1e9)  # counts a degree, as receivers write whole numbers
 
 
@@ -49,7 +50,8 @@ def _ask_near_zero(found: Found) -> None:
     if not len(lat) or np.abs(lat).max() > 0.5 * np.pi or np.abs(lon).max() > np.pi:
         return
     steps = SEMI_MAJOR * np.hypot(np.diff(lat), np.diff(lon) * np.cos(lat[1:]))
-    if max(np.abs(lat).max(), np.abs(lon).max()) == 0.0 or np.any(steps > FASTEST * np.diff(time)):
+    whole = np.concatenate([lat, lon]) / COARSE
+    if np.all(np.abs(whole - np.round(whole)) < 1e-6) or np.any(steps > FASTEST * np.diff(time)):
         return
     labels = f"{found.labels['lat']}, {found.labels['lon']}"
     seen = f"lat {np.degrees(lat[0]):.3f}, lon {np.degrees(lon[0]):.3f} deg"
