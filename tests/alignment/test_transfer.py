@@ -17,8 +17,10 @@ from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel, master_errors
+from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel, master_errors, own_errors
 from truenorth.filters import kalman
+from truenorth.formats import read_master
+from truenorth.formats.writing import write_record
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
@@ -391,3 +393,31 @@ def test_a_delay_that_cannot_be_seen_is_not_printed_as_seen():
     answer = align_transfer(slave, master, "tactical").transfer
     assert not answer.delay_estimated
     assert abs(answer.delay - 0.06) < 2.0 * answer.delay_sigma
+
+
+def test_a_masters_own_sigmas_make_sigma_absolute(tmp_path):
+    """Columns of its log, medians of which count: half of the variance constant, half of it drift; "none" leaves them out."""
+    way = course(Position.from_degrees(62.0, 20.0, 3000.0), straight(200.0), heading=0.6, speed=150.0)
+    slave = simulate(way, rate=100.0, duration=60.0, imu=imu_spec("tactical"), seed=4).record
+    master = simulate_sensor(way, MasterSpec(velocity_noise=0.05), duration=60.0, seed=4).record
+    rows, arcmin = len(master), math.radians(1.0 / 60.0)
+    attitude_sigma = np.tile(np.array([60.0, 4.0, 4.0]) * arcmin, (rows, 1))
+    attitude_sigma[3] = np.nan
+    master = replace(master, attitude_sigma=attitude_sigma, velocity_sigma=np.full((rows, 3), 0.1))
+    own = own_errors(master.attitude_sigma, master.velocity_sigma)
+    whole = np.hypot(
+        [own.level, own.heading, own.velocity], [own.attitude_drift, own.attitude_drift, own.velocity_drift]
+    )
+    assert whole == pytest.approx([4.0 * arcmin, 60.0 * arcmin, 0.1])
+    write_record(master, tmp_path / "master.csv")
+    read = read_master(tmp_path / "master.csv")
+    np.testing.assert_allclose(read.attitude_sigma, master.attitude_sigma, rtol=1e-9)
+    np.testing.assert_allclose(read.velocity_sigma, master.velocity_sigma)
+    absolute = align_transfer(slave, read, "tactical")
+    relative = align_transfer(slave, read, "tactical", master_errors="none")
+    assert absolute.transfer.considered
+    assert not relative.transfer.considered
+    # The master's heading comes on top, and its velocities tell less of the slave.
+    assert absolute.euler_sigma[0] > 0.97 * np.hypot(relative.euler_sigma[0], 60.0 * arcmin)
+    with pytest.raises(DataError, match="sigma"):
+        replace(master, velocity_sigma=np.zeros((rows, 3)))

@@ -157,7 +157,8 @@ class Master(_Mounted):
     flexure : FlexureSpec, optional
         The IMU's seat bends.
     errors : MasterErrors or {"navigation", "tactical"}, optional
-        The master's own slow errors; left out, it is taken for the truth, and sigma is relative to it.
+        The master's own slow errors; left out, what its record says of them. With neither, or "none", it is taken for the truth,
+        and sigma is relative to it.
     velocity_noise, attitude_noise, position_noise, acceleration_noise : float, optional, m/s, rad, m and m/s^2
         White noise of the master's rows; fitted when left out.
     heading : float, rad, optional

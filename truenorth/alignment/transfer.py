@@ -22,7 +22,7 @@ from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over,
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import DELAY, MasterErrors, TransferModel
+from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.rivals import wandering_evidence
 from truenorth.quality.gnss import master_evidence
@@ -97,8 +97,8 @@ def align_transfer(
     flexure : FlexureSpec, optional
         The slave's seat bends: second-order Gauss-Markov states, with attitude matching.
     master_errors : MasterErrors or {"navigation", "tactical"}, optional
-        The master's own slow errors: sigma then is absolute, and `relative_sigma` that against the master. Left out, the master is
-        taken for the truth.
+        The master's own slow errors: sigma then is absolute, and `relative_sigma` that against the master. Left out, they are
+        what its record says of them; where it says nothing, or with "none", the master is taken for the truth.
     velocity_noise, attitude_noise, position_noise, acceleration_noise : float, optional, m/s, rad, m and m/s^2
         White noise of the master's rows; fitted to the innovations when left out.
     position : Position, optional
@@ -140,7 +140,8 @@ def align_transfer(
     assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     assumed, notes = common_clock(slave, master, assumed)
     notes = (*notes, *master.notes)
-    model = _model(spec, assumed, what, flexure, errors_of(master_errors))
+    own = own_errors(master.attitude_sigma, master.velocity_sigma) if master_errors is None else None
+    model = _model(spec, assumed, what, flexure, own or errors_of(master_errors))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
     noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, what.kind, position, tell)

@@ -166,7 +166,8 @@ class ByMaster:
         str | None,
         option(
             "Slow errors of the master's own solution: navigation, tactical, or 'level=0.3 arcmin,heading=2 arcmin,"
-            "velocity=0.05 m/s'; without it the master is taken for the truth, and sigma is against it."
+            "velocity=0.05 m/s'; without it what its log says (sigma_heading .. sigma_VU). With neither, or none, the master is "
+            "taken for the truth, and sigma is against it."
         ),
     ] = None
     flexure: Annotated[

@@ -106,14 +106,14 @@ DIMENSIONS = {
 def master_errors(given: MasterErrors | str | None) -> MasterErrors:
     """Of a grade's name, of words such as ``level=.3 arcmin, heading=2 arcmin, velocity=.05 m/s``, or as given.
 
-    None: the master is taken for the truth. Of words, drifts that are left out are as large as the constants.
+    None, or ``none``: the master is taken for the truth. Of words, drifts that are left out are as large as the constants.
 
     Raises
     ------
     UsageError
         An unknown grade, a name that is none, a value that cannot be read.
     """
-    if given is None:
+    if given is None or given == "none":
         return MasterErrors()
     if isinstance(given, MasterErrors):
         return given
@@ -130,6 +130,37 @@ def master_errors(given: MasterErrors | str | None) -> MasterErrors:
     found.setdefault("attitude_drift", found.get("level", 0.0))
     found.setdefault("velocity_drift", found.get("velocity", 0.0))
     return MasterErrors(**found)
+
+
+def own_errors(attitude_sigma: Array | None, velocity_sigma: Array | None) -> MasterErrors | None:
+    """What a master's own filter says of its errors; None where it says nothing.
+
+    A filter's sigma is of the whole error, and says nothing of how fast it changes: medians over the log, half of their squares
+    taken for constants and half for drift.
+
+    Parameters
+    ----------
+    attitude_sigma : (N, 3) array or None, rad
+        Of heading, pitch and roll.
+    velocity_sigma : (N, 3) array or None, m/s
+    """
+    if attitude_sigma is None and velocity_sigma is None:
+        return None
+    half = math.sqrt(0.5)
+    heading = level = velocity = 0.0
+    if attitude_sigma is not None:
+        heading, level = _median(attitude_sigma[:, 0]), _median(attitude_sigma[:, 1:])
+    if velocity_sigma is not None:
+        velocity = _median(velocity_sigma)
+    drift = min(level, heading)
+    return MasterErrors(
+        level * half, math.sqrt(max(heading**2 - 0.5 * drift**2, 0.0)), velocity * half, drift * half, velocity * half
+    )
+
+
+def _median(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else 0.0
 
 
 @dataclass(frozen=True)

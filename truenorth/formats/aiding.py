@@ -87,6 +87,10 @@ def sigmas(names: Sequence[str], dimension: str, unit: str, group: str) -> tuple
 
 
 POSES = (TIME, *PLACE, *NAVIGATION, *ANGLES, *QUATERNION)
+OWN_SIGMAS = (
+    *sigmas(["heading", "pitch", "roll"], "angle", "deg", "sigma_attitude"),
+    *sigmas(["VE", "VN", "VU"], "speed", "m/s", "sigma_velocity"),
+)
 
 
 def read_odometer(
@@ -269,7 +273,8 @@ def read_master(
 
     Columns ``time`` and attitude (``heading, pitch, roll`` in degrees, heading clockwise from north, or ``yaw_ccw``; or
     ``q_w, q_x, q_y, q_z``, which turns right-forward-up into east-north-up), velocity (``VE, VN, VU`` or ``VD``), position
-    (``lat, lon`` in degrees, ``alt``), and the master's own ``gyro_x .. accel_z``; each group whole or not at all.
+    (``lat, lon`` in degrees, ``alt``), and the master's own ``gyro_x .. accel_z``; each group whole or not at all. With
+    ``sigma_`` before the names of angles and velocities the standard deviations of its own filter.
 
     Parameters
     ----------
@@ -284,9 +289,11 @@ def read_master(
         As for :func:`read_odometer`.
     """
     found, others = open_log(
-        path, format, (*POSES, *SENSORS), {"columns": columns, "units": units, "axes": axes}, "poses"
+        path, format, (*POSES, *SENSORS, *OWN_SIGMAS), {"columns": columns, "units": units, "axes": axes}, "poses"
     )
     values = _poses(found)
+    values["attitude_sigma"] = known(found.stack(*(f"sigma_{angle}" for angle in ("heading", "pitch", "roll"))))
+    values["velocity_sigma"] = known(found.stack("sigma_VE", "sigma_VN", "sigma_VU"))
     for ours, sensor in (("w_ib_b", "gyro"), ("f_b", "accel")):
         values[ours] = turned(whole(found, *(f"{sensor}_{axis}" for axis in "xyz")), others.get("axes"))
     if values["C_nb"] is None and values["v_n"] is None:

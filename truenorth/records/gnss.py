@@ -161,5 +161,5 @@ def check_place(record: Record) -> None:
 
 def in_degrees(columns: dict[str, Array]) -> dict[str, Array]:
     """The same columns, latitude, longitude and heading in degrees."""
-    angles = ("lat", "lon", "heading", "sigma_heading")
+    angles = ("lat", "lon", "heading", "sigma_heading", "sigma_pitch", "sigma_roll")
     return {name: np.degrees(values) if name in angles else values for name, values in columns.items()}

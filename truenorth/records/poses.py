@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.records.base import GAP_FACTOR, Record, check_together
+from truenorth.records.base import GAP_FACTOR, Record, check_positive, check_together
 from truenorth.records.gnss import PLACE, check_place, in_degrees
 from truenorth.records.interpolation import interpolated
 
@@ -153,20 +153,29 @@ class MasterRecord(Poses):
         Rates of the master's own gyros, in its axes.
     f_b : (N, 3) array or None, m/s^2
         Specific force of the master's own accelerometers, in its axes.
+    attitude_sigma : (N, 3) array or None, rad
+        One-sigma errors of heading, pitch and roll by the master's own filter, NaN where not known.
+    velocity_sigma : (N, 3) array or None, m/s
+        The same of velocity, east, north, up.
     source : str
 
     Raises
     ------
     DataError
-        As for :class:`Trajectory`; neither attitude nor velocity, or a part of a position.
+        As for :class:`Trajectory`; neither attitude nor velocity, a part of a position, or a sigma that is not positive.
     """
 
     GROUPS: ClassVar[Mapping[str, Sequence[str]]] = {
         **Poses.GROUPS,
         "w_ib_b": ("gyro_x", "gyro_y", "gyro_z"),
         "f_b": ("accel_x", "accel_y", "accel_z"),
+        "attitude_sigma": ("sigma_heading", "sigma_pitch", "sigma_roll"),
+        "velocity_sigma": ("sigma_VE", "sigma_VN", "sigma_VU"),
     }
-    OPTIONAL: ClassVar[frozenset[str]] = frozenset({"C_nb", "v_n", "lat", "lon", "alt", "w_ib_b", "f_b"})
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset(
+        {"C_nb", "v_n", "lat", "lon", "alt", "w_ib_b", "f_b", "attitude_sigma", "velocity_sigma"}
+    )
+    PARTIAL: ClassVar[frozenset[str]] = frozenset({"attitude_sigma", "velocity_sigma"})
 
     time: Array
     C_nb: Array | None = None
@@ -176,12 +185,15 @@ class MasterRecord(Poses):
     alt: Array | None = None
     w_ib_b: Array | None = None
     f_b: Array | None = None
+    attitude_sigma: Array | None = None
+    velocity_sigma: Array | None = None
     source: str = field(default="master record", compare=False)
 
     def __post_init__(self) -> None:
         if self.C_nb is None and self.v_n is None:
             raise DataError(f"{self.source}: neither attitude nor velocity; expected at least one to align against")
         super().__post_init__()
+        check_positive(self, "attitude_sigma", "velocity_sigma")
 
 
 def _check_rotations(C: Array, source: str) -> None:
