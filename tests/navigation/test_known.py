@@ -1,13 +1,13 @@
 """A start whose heading is known: the level of the log, and what a heading says of the biases."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import truenorth as tn
+from truenorth.cli import app
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.formats import write_imu
 from truenorth.records.specs import imu_spec
@@ -130,26 +130,31 @@ def test_what_is_refused(poor):
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "truenorth", *map(str, arguments)], capture_output=True, text=True)
+    """Exit code and message of the program."""
+    done = CliRunner().invoke(app, [str(word) for word in arguments])
+    wrong = done.exception if isinstance(done.exception, tn.TruenorthError) else None
+    return (done.exit_code, done.output) if wrong is None else (wrong.exit_code, str(wrong))
 
 
 def test_on_the_command_line(poor, tmp_path):
     write_imu(poor.record, tmp_path / "log.parquet")
     log = tmp_path / "log.parquet"
     known = ("--heading", "123,0.5", "--position", "48,11,500", "--imu", "consumer")
-    done = run("navigate", log, *known, "--pitch", "1.15", "--roll", "-1.72", "--zupt", "1-59", "--json")
-    assert done.returncode == 0, done.stderr
+    code, said = run("navigate", log, *known, "--pitch", "1.15", "--roll", "-1.72", "--zupt", "1-59", "--json")
+    assert code == 0, said
     tn.align(poor.record.between(None, 40.0), PLACE, "consumer").save(tmp_path / "level")
-    refused = run("navigate", log, "--start", tmp_path / "level")
-    assert refused.returncode == 4
-    done = run("navigate", log, "--start", tmp_path / "level", "--heading", "123,0.5", "--zupt", "41-59", "--json")
-    assert done.returncode == 0, done.stderr
+    assert run("navigate", log, "--start", tmp_path / "level")[0] == 4
+    code, said = run(
+        "navigate", log, "--start", tmp_path / "level", "--heading", "123,0.5", "--zupt", "41-59", "--json"
+    )
+    assert code == 0, said
     for arguments, words in (
         ((), "expected --start FOLDER, or --heading"),
         (("--heading", "123", "--position", "48,11"), "--heading"),
         (("--heading", "123,1", "--position", "48,11"), "--imu"),
         ((*known, "--pitch", "1"), "--pitch or --roll alone"),
+        ((*known, "--speed", "8,1"), "--speed without --pitch"),
     ):
-        done = run("navigate", log, *arguments)
-        assert done.returncode == 2
-        assert words in done.stderr
+        code, said = run("navigate", log, *arguments)
+        assert code == 2
+        assert words in said
