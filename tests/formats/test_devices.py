@@ -9,7 +9,7 @@ import pytest
 
 from tests.formats.corpus.truth import truth
 from truenorth.core.errors import DataError, TruenorthError
-from truenorth.formats import read_gnss, read_imu, read_trajectory
+from truenorth.formats import read_gnss, read_imu, read_trajectory, write_layout
 from truenorth.formats.magnetometer import read_magnetometer
 
 SWAY = truth("swaying", "tactical", 100.0, 10.0)
@@ -200,6 +200,14 @@ def test_flight_controllers(tmp_path, module, name, content):
     assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
     assert_is_at_home(read_gnss(path), 10)
     assert_is_field(read_magnetometer(path))
+    write_layout(read_imu(path), path)  # which all its readers then obey, or pass over where it is the IMU's
+    assert_is_sway(read_imu(path), 1e-6, 1e-5, 0.0)
+    assert_is_at_home(read_gnss(path), 10)
+    assert_is_field(read_magnetometer(path))
+    layout = path.with_suffix(".yaml")
+    layout.write_text(layout.read_text() + "wrong: 1\n")
+    with pytest.raises(DataError, match="'wrong' is not known"):
+        read_gnss(path)
 
 
 def write_tlog(path, mavutil, log=SWAY):

@@ -20,7 +20,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import devices
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.guesses import UnsureError
-from truenorth.formats.layout import options_for
+from truenorth.formats.layout import options_for, without_imu
 from truenorth.formats.opening import columns_of
 from truenorth.formats.order import ordered
 from truenorth.formats.places import check_degrees
@@ -337,10 +337,15 @@ def open_log(
     known_keys = [key for key in given if key not in ("columns", "units")]
     try:
         chosen = format_of(path, format, AIDING_SUFFIXES, "a log of named columns")
-        values = options_for(path, given, lambda content: checked_options(content, quantities, known_keys))
+        device = chosen in devices.DEVICES
+
+        def checked(content: Mapping[Any, Any]) -> dict[str, Any]:
+            return checked_options(without_imu(content, known_keys) if device else content, quantities, known_keys)
+
+        values = options_for(path, given, checked)
         others = {key: value for key, value in values.items() if key in known_keys}
         options = Options(values.get("columns", {}), values.get("units", {}), others)
-        if chosen in devices.DEVICES:
+        if device:
             columns = devices.columns(path, chosen, part or "gnss", values.get("topic"))
         else:
             columns = (columns_of_positions(path) if part == "gnss" and chosen == "csv" else None) or columns_of(

@@ -75,6 +75,24 @@ def options_for(
     return values | checked({key: value for key, value in given.items() if value is not None})
 
 
+def without_imu(content: Mapping[Any, Any], known: Sequence[str]) -> dict[Any, Any]:
+    """What a layout says of a log's other sensors than its IMU: a device's log holds both, and has one layout.
+
+    Parameters
+    ----------
+    known : sequence of str
+        Options of the other sensor, which stay.
+    """
+    mine = {"columns": KNOWN_COLUMNS, "units": ("gyro", "accel")}
+    left = {
+        key: value for key, value in content.items() if key in (*mine, *known) or key not in Layout.__dataclass_fields__
+    }
+    for key, names in mine.items():
+        if isinstance(left.get(key), Mapping):
+            left[key] = {name: text for name, text in left[key].items() if name not in names or name == "time"}
+    return left
+
+
 def _checked(content: Mapping[Any, Any]) -> dict[str, Any]:
     known = [item.name for item in fields(Layout)]
     values = dict(content)
