@@ -17,6 +17,7 @@ LONGEST = [
     "campaign/test_faults",
     "alignment/test_positions",
     "campaign/test_run",
+    "campaign/test_kills",
     "filters/test_particle",
     "papers/test_damping",
     "filters/test_nonlinear",
@@ -30,7 +31,7 @@ LONGEST = [
     "figures/test_simulation",
     "damping/test_dynamics",
     "papers/test_odometer",
-    "test_quality",
+    "quality/test_regimes",
 ]
 
 # Time on the wall counts what else the machine does; the first example of a property may compile its kernels.

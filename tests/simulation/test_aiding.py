@@ -1,66 +1,26 @@
 """Simulated aiding sensors: without errors the truth itself; each error is what was asked for, and can be taken off again."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
-from truenorth.core import schema
+from tests.simulation.made import ARM, DRIVE, FERRY, LOADED, PLACE, SENSORS
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.earth import ecef_axes, ecef_from_geodetic
-from truenorth.core.errors import DataError, UsageError
+from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.simulation import (
-    EncoderSpec,
-    Flexed,
-    FlexureSpec,
     GnssSpec,
     HeightSpec,
     MasterSpec,
     OdometerSpec,
-    Sway,
-    Tone,
     VelocityLogSpec,
-    simulate,
     simulate_sensor,
 )
 from truenorth.simulation.aiding import STREAMS, velocity_b
-from truenorth.simulation.course import Leg, course, with_lever_arm
+from truenorth.simulation.course import with_lever_arm
 from truenorth.simulation.streams import STREAMS as IMU_STREAMS
-from truenorth.strapdown.level import NavigationState, mechanise
-
-PLACE = Position.from_degrees(48.0, 11.0, 500.0)
-ARM = (0.4, -1.3, -0.6)
-DRIVE = course(
-    PLACE,
-    [
-        Leg(10.0),
-        Leg(8.0, speed=12.0, slope=np.radians(2.0)),
-        Leg(12.0, turn=np.radians(100.0)),
-        Leg(15.0, slope=np.radians(-3.0)),
-        Leg(10.0, turn=np.radians(-60.0), bank=0.05),
-        Leg(8.0, speed=0.0),
-    ],
-    heading=0.7,
-)
-FERRY = Sway(  # to and fro
-    PLACE,
-    heading=0.3,
-    heading_tones=(Tone(0.1, 11.0, 0.2),),
-    pitch_tones=(Tone(0.05, 7.0, 0.0),),
-    roll_tones=(Tone(0.1, 6.0, 1.0),),
-    east_tones=(Tone(6.0, 40.0, 0.1),),
-    north_tones=(Tone(20.0, 40.0, 0.1),),
-    up_tones=(Tone(0.8, 8.0, 2.0),),
-)
-SENSORS = {
-    "odometer": OdometerSpec,
-    "velocity": VelocityLogSpec,
-    "gnss": GnssSpec,
-    "height": HeightSpec,
-    "master": MasterSpec,
-}
 
 
 @pytest.mark.parametrize("motion", [DRIVE, FERRY], ids=["drive", "ferry"])
@@ -299,128 +259,6 @@ def test_height_errors():
     assert run.record.sigma[0] == pytest.approx(np.hypot(2.0, 0.5))
 
 
-NOISY_MASTER = MasterSpec(
-    level=1e-4,
-    heading=1e-3,
-    attitude_drift=2e-4,
-    attitude_noise=1e-4,
-    velocity=0.1,
-    velocity_drift=0.05,
-    velocity_noise=0.02,
-    position=5.0,
-    schuler=0.01,
-    jumps=((30.0, 0.5, -0.2),),
-    jump_rate=0.05,
-)
-
-
-def test_master_errors_are_computed_minus_true():
-    run = simulate_sensor(DRIVE, NOISY_MASTER, duration=60.0, seed=2)
-    at, e = DRIVE.states(run.sampled), run.errors
-    phi = -rotation_vector_from_dcm(run.record.C_nb @ np.swapaxes(at.C_nb, 1, 2))
-    np.testing.assert_allclose(phi, e["attitude"], atol=1e-14)
-    np.testing.assert_allclose(run.record.v_n - at.v_n, e["velocity"], atol=1e-14)
-    place = ecef_from_geodetic(run.record.lat, run.record.lon, run.record.alt) - ecef_from_geodetic(
-        at.lat, at.lon, at.alt
-    )
-    error = np.einsum("kji,kj->ki", ecef_axes(at.lat, at.lon), place)
-    np.testing.assert_allclose(error, e["position"], atol=1e-4)  # some 10 m in a tangent plane
-    calm = simulate_sensor(DRIVE, replace(NOISY_MASTER, jumps=(), jump_rate=0.0), duration=60.0, seed=2)
-    steps = np.array([[t, 0, 0] for t in run.sampled]) * 0
-    for moment, east, north in e["jumps"]:
-        steps[run.sampled >= moment] += (east, north, 0)
-    np.testing.assert_allclose(e["velocity"] - calm.errors["velocity"], steps, atol=1e-14)
-    assert len(e["jumps"]) > 1
-
-
-def test_the_oscillation_of_a_master_obeys_the_error_equations():
-    from truenorth.core.earth import normal_gravity, radii
-
-    spec = MasterSpec(rate=0.5, schuler=0.5)
-    ferry = Sway(PLACE)
-    run = simulate_sensor(ferry, spec, duration=3 * 84.4 * 60, seed=1)
-    phi, dv, dp = (run.errors[name] for name in ("attitude", "velocity", "position"))
-    g, R = normal_gravity(PLACE.lat, PLACE.alt), np.mean(radii(PLACE.lat)) + PLACE.alt
-    slope = lambda x: (x[2:] - x[:-2]) / 4.0  # noqa: E731  # of rows 2 s apart
-    near = {"rtol": 1e-4, "atol": 1e-9}
-    np.testing.assert_allclose(slope(dv)[:, 0], -g * phi[1:-1, 1], **near)
-    np.testing.assert_allclose(slope(dv)[:, 1], g * phi[1:-1, 0], **near)
-    np.testing.assert_allclose(slope(phi)[:, 0], -dv[1:-1, 1] / R, **near)
-    np.testing.assert_allclose(slope(phi)[:, 1], dv[1:-1, 0] / R, **near)
-    np.testing.assert_allclose(slope(phi)[:, 2], dv[1:-1, 0] * np.tan(PLACE.lat) / R, **near)
-    np.testing.assert_allclose(slope(dp), dv[1:-1], rtol=1e-4, atol=1e-5)
-    crossings = run.sampled[1:][np.diff(np.sign(dv[:, 0])) > 0]
-    assert np.diff(crossings) == pytest.approx(84.4 * 60, abs=6.0)
-
-
-def test_a_master_in_other_axes_and_on_its_own_clock():
-    spec = MasterSpec(
-        mounting=(0.02, -0.01, 0.03), clock_offset=100.0, clock_drift=1e-3, latency=0.2, with_sensors=True
-    )
-    run = simulate_sensor(DRIVE, spec, duration=60.0, start=5.0)
-    np.testing.assert_allclose(run.record.time, run.sampled + 100.2 + 1e-3 * (run.sampled - 5.0), rtol=1e-15)
-    at = DRIVE.states(run.sampled)
-    C_ms = dcm_from_euler(0.02, -0.01, 0.03)
-    np.testing.assert_allclose(run.record.C_nb @ C_ms, at.C_nb, atol=1e-14)
-    f_n = np.einsum("kij,kj->ki", run.record.C_nb, run.record.f_b)
-    np.testing.assert_allclose(f_n, np.einsum("kij,kj->ki", at.C_nb, at.f_b), atol=1e-13)
-    few = simulate_sensor(DRIVE, MasterSpec(with_attitude=False, with_position=False), duration=60.0).record
-    assert few.C_nb is None
-    assert few.lat is None
-
-
-FLEXIBLE = FlexureSpec(sigma=(2e-3, 3e-3, 1e-2), correlation_time=3.0)
-
-
-def test_a_flexed_slave_is_a_motion_like_any_other():
-    """An ideal IMU on it comes back through the strapdown; rates are the derivatives of attitude and of each other."""
-    flexed = Flexed(DRIVE, FLEXIBLE, duration=70.0, seed=3)
-    record = simulate(flexed, rate=100.0, duration=60.0).record
-    start = flexed.states(0.0)
-    state = NavigationState.at(start.C_nb, float(start.lat), float(start.lon), float(start.alt), tuple(start.v_n), 0.01)
-    computed = mechanise(record, state, every=100)
-    true = flexed.states(computed.time)
-    error = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))
-    assert np.degrees(np.abs(error).max()) * 3600 < 0.05
-    assert np.abs(computed.v_n - true.v_n).max() < 1e-4
-
-    t, h = np.array([7.123, 33.3]), 1e-4
-    ahead, at, behind = (flexed.states(t + s) for s in (h, 0.0, -h))
-    np.testing.assert_allclose((ahead.w_ib_b - behind.w_ib_b) / (2 * h), at.dw_ib_b, atol=1e-6)
-    body = DRIVE.states(t)
-    np.testing.assert_allclose(at.C_nb, body.C_nb @ dcm_from_euler(*flexed.angles(t).T), atol=1e-15)
-    np.testing.assert_array_equal(at.v_n, body.v_n)
-    with pytest.raises(UsageError, match="longer duration"):
-        flexed.states(80.0)
-
-
-def test_flexure_has_its_covariance_between_its_knots_as_at_them():
-    """500 runs, three angles: 4.5 sigma (1 in 1e5) for each of six figures."""
-    times = np.array([1.037, 2.5, 4.037])  # the first and the last are a correlation time apart
-    x = np.array([Flexed(DRIVE, FLEXIBLE, duration=5.0, run=run).angles(times) for run in range(500)]) / FLEXIBLE.sigma
-    for product, wanted in ((x[:, 1] ** 2, 1.0), (x[:, 0] * x[:, 2], np.exp(-1.0))):
-        assert np.all(np.abs(product.mean(axis=0) - wanted) < 4.5 * product.std(axis=0) / np.sqrt(500))
-
-
-LOADED = {
-    "odometer": OdometerSpec(
-        scale_sigma=0.01, mounting_sigma=0.01, noise=0.1, slip_rate=0.1, output="pulses", lost=0.01
-    ),
-    "velocity": VelocityLogSpec(
-        bias_sigma=0.1,
-        drift=0.1,
-        noise=0.1,
-        scale_sigma=0.1,
-        misalignment_sigma=0.1,
-        outlier_rate=0.1,
-        outage_rate=0.02,
-    ),
-    "gnss": GnssSpec(
-        position_noise=1, position_drift=1, velocity_noise=1, velocity_drift=1, outlier_rate=0.1, outage_rate=0.02
-    ),
-    "height": HeightSpec(bias_sigma=1.0, drift=1.0, noise=1.0, outlier_rate=0.1, outage_rate=0.02),
-    "master": replace(NOISY_MASTER, outage_rate=0.02),
-}
 NO_ERROR = ("output", "outlier_size", "slip_size")
 TERMS = [(sensor, item) for sensor, spec in LOADED.items() for item in spec.to_mapping() if item not in NO_ERROR]
 
@@ -463,89 +301,6 @@ def test_streams_are_those_of_nobody_else():
     assert len(set(numbers)) == len(numbers)
     assert min(numbers) >= 100 > max(IMU_STREAMS.values())
     assert max(numbers) < 200  # where those of motions begin
-
-
-@pytest.mark.parametrize("sensor", SENSORS)
-def test_specifications_go_into_files_and_come_back(sensor):
-    kind = SENSORS[sensor]
-    assert kind.from_mapping(LOADED[sensor].to_mapping()) == LOADED[sensor]
-    assert kind().to_mapping() == {}
-
-
-QUANTITIES = [
-    "Angle",
-    "AngularRate",
-    "Length",
-    "Speed",
-    "Acceleration",
-    "AccelerationDensity",
-    "Time",
-    "Frequency",
-    "Ratio",
-]
-KINDS = [*SENSORS.values(), FlexureSpec, EncoderSpec]
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-@pytest.mark.parametrize("number", [1 / 3, 1e-7 / 7, 0.07])
-def test_any_value_comes_back_from_a_file_to_the_bit(kind, number):
-    """Also where the unit of the file would round it; each term alone, as `simulate` writes the resolved scenario."""
-    for item in fields(kind):
-        if "dimensions" not in item.metadata:
-            continue
-        row = (number,) * len(item.metadata["dimensions"])
-        given = row if len(row) > 1 else number
-        if item.name in ("outages", "slips"):
-            given = ((number, 1.0 + number, *row[2:]),)
-        elif item.metadata["many"]:
-            given = (row,)
-        other = {"output": "pulses"} if item.name == "lost" else {}
-        spec = kind(**{item.name: given}, **other)
-        assert kind.from_mapping(spec.to_mapping()) == spec, item.name
-
-
-@pytest.mark.parametrize("name", QUANTITIES)
-@pytest.mark.parametrize("number", [1 / 3, 1e-7 / 7, 0.07])
-def test_any_quantity_of_a_scenario_comes_back_to_the_bit(name, number):
-    adapter = TypeAdapter(getattr(schema, name))
-    assert adapter.validate_python(adapter.dump_python(number)) == number
-
-
-def test_a_specification_with_its_units():
-    text = {"rate": "4 Hz", "output": "pulses", "pulse_size": "2 cm", "scale_sigma": "0.3 %", "signed": False}
-    text |= {"mounting": ["2 deg", "0.5 deg"], "slips": [["10 s", "11.5 s", "30 %"]]}
-    spec = OdometerSpec.from_mapping(text)
-    assert (spec.pulse_size, spec.scale_sigma, spec.slips) == (0.02, 0.003, ((10.0, 11.5, 0.3),))
-    assert spec.mounting == pytest.approx(np.radians([2.0, 0.5]))
-    assert OdometerSpec.from_mapping(spec.to_mapping()) == spec
-
-
-@pytest.mark.parametrize(
-    ("kind", "content", "words"),
-    [
-        (OdometerSpec, {"scal": "1 %"}, ["odo: key 'scal'", "'scale'"]),
-        (OdometerSpec, {"scale": "1 m"}, ["odo: scale", "ratio"]),
-        (OdometerSpec, {"rate": "-1 Hz"}, ["odo: rate: '-1 Hz'; expected a positive value"]),
-        (OdometerSpec, {"noise": "-1 m/s"}, ["odo: noise: '-1 m/s'; expected zero or more"]),
-        (OdometerSpec, {"mounting": "1 deg"}, ["odo: mounting", "2 quantities"]),
-        (OdometerSpec, {"slips": [["1 s", "2 s"]]}, ["odo: slips[1]", "3 quantities"]),
-        (OdometerSpec, {"slips": [["2 s", "1 s", "1 %"]]}, ["slips, number 1", "an end after its start"]),
-        (OdometerSpec, {"lost": "1 %"}, ["lost pulses", "distance"]),
-        (OdometerSpec, {"output": "miles"}, ["output 'miles'"]),
-        (OdometerSpec, {"signed": "no"}, ["odo: signed: 'no'", "true or false"]),
-        (VelocityLogSpec, {"frame": "navigation", "axes": "forward"}, ["body axes"]),
-        (GnssSpec, {"outlier_rate": "120 %"}, ["outlier_rate is 1.2"]),
-        (MasterSpec, {"with_attitude": False, "with_velocity": False}, ["without attitude and velocity"]),
-        (FlexureSpec, {"correlation_time": "0 s"}, ["odo: correlation_time: '0 s'; expected a positive value"]),
-        (FlexureSpec, {"sigma": ["1 deg", "-1 deg", "0 deg"]}, ["odo: sigma: '-1 deg'; expected zero or more"]),
-        (HeightSpec, ["lag"], ["odo: expected keys"]),
-    ],
-)
-def test_a_wrong_specification_is_named(kind, content, words):
-    with pytest.raises(DataError) as caught:
-        kind.from_mapping(content, "odo")
-    for word in words:
-        assert word in str(caught.value), caught.value
 
 
 def test_too_short_a_log():

@@ -41,7 +41,7 @@ from truenorth.errors import stationary
 from truenorth.errors.stationary import StationaryModel
 from truenorth.errors.staying import PHI, StaticModel, gained_velocity, sampled_system, sampled_velocity
 from truenorth.estimate.base_motion import QUIETEST_BASE, white_variance
-from truenorth.estimate.batch import CONVERGED, ROUGHLY, Filtered, in_sigmas, settle
+from truenorth.estimate.batch import ROUGHLY, Filtered, in_sigmas, settle
 from truenorth.estimate.staying import HEADING_PRIOR, LEVEL_PRIOR, VELOCITY_PRIOR, StayingLog, prior_of
 from truenorth.filters import Estimates, LinearSystem, fading, filter_gains, kalman
 from truenorth.filters.fading import Fading
@@ -76,6 +76,10 @@ class SampledLog(StayingLog):
         return sampled_system(super().linearise(), velocity, self.R)
 
 
+def _plain(system: LinearSystem) -> Filtered:
+    return Filtered(system, kalman(system, history="full"))
+
+
 def faded_align(
     record: ImuRecord,
     C_n0_i: Array,
@@ -92,15 +96,12 @@ def faded_align(
     log = SampledLog(record, C_n0_i, position, model, prior, interval, rows_at)
     log.arm_velocity = arm_velocity
 
-    def plain(system: LinearSystem) -> Filtered:
-        return Filtered(system, kalman(system, history="full"))
-
     def faded(system: LinearSystem) -> Filtered:
-        return plain(system) if kind is None else Filtered(system, fading(system, kind=kind, history="full"))
+        return _plain(system) if kind is None else Filtered(system, fading(system, kind=kind, history="full"))
 
     last = settle(log, faded, in_sigmas(PHI), most=PASSES)
     # The floor is that of the filter without factors.
-    unfaded = replace(last, found=plain(last.found.system))
+    unfaded = replace(last, found=_plain(last.found.system))
     fine = FineAlignment.of(log, unfaded, prior.sensors, np.full(3, math.sqrt(log.R)))
     return replace(fine, estimates=_allowing(last.found.estimates, fine.estimates))
 
@@ -148,6 +149,48 @@ class Stationary(NamedTuple):
     settled: bool
 
 
+class StationaryLog:
+    """An INS at rest in the local level: ten states observed by its velocity, or eight by the level accelerometers."""
+
+    def __init__(self, task: Task, C_n0_i: Array, model: StaticModel, P_bias: Array, states: int) -> None:
+        self.task, self.C_n0_i, self.model, self.states = task, C_n0_i, model, states
+        self.biases = slice(states - 5, states)
+        self.every = max(1, round(task.interval / task.record.interval))
+        whole = np.diag([LEVEL_PRIOR**2] * 2 + [HEADING_PRIOR**2] + [VELOCITY_PRIOR**2] * 2 + [0.0] * 5)
+        whole[BIASES, BIASES] = P_bias[:5, :5]
+        kept = stationary.KEPT[states]
+        self.P0 = whole[np.ix_(kept, kept)]
+
+    def linearise(self) -> LinearSystem:
+        """The model about the attitude that the gyros carry on from the start."""
+        record, place, n = self.task.record, self.task.position, self.states
+        walks, T = StationaryModel(place.lat, place.alt, self.model), self.every * record.interval
+        start = NavigationState.at(self.C_n0_i, place.lat, place.lon, place.alt)
+        out = mechanise(record, start, altitude="fixed", every=self.every)
+        count = len(out.time)
+        C_nb = out.C_nb if n == 10 else _by_gyros(self.task, self.C_n0_i, T, count)
+        self.last, self.C_end = count * self.every - 1, C_nb[-1]
+        self.C_n0_n = earth_rotation(float(out.time[-1] - record.time[0] + record.steps[0]), place.lat)
+        Phi, Q = walks.discrete(T, self.C_end, n)
+        if n == 10:
+            z, H, noise = out.v_n[:, :2], np.eye(10)[stationary.DV], 0.0
+        else:
+            z = gained_velocity(integrate(record, T), self.C_n0_i, place.lat, place.alt)[:count, :2] / T
+            H, noise = walks.accelerometer_rows(self.C_end), self.model.accel_random_walk**2 / T
+        R = np.diag(np.maximum(white_variance(z), QUIETEST_BASE**2) + noise)
+        return LinearSystem(Phi=Phi[None], Q=Q[None], H=H[None], R=R[None], z=z, x0=np.zeros(n), P0=self.P0)
+
+    def correct(self, x: Array) -> None:
+        """Begin with the attitude that the errors at the end say."""
+        self.C_n0_i, _ = self.begun(x)
+
+    def begun(self, x: Array) -> tuple[Array, Array]:
+        """Attitude at the first sample by the errors (n,) at the end, and that of the task's epoch against it, (3, 3) each."""
+        rows = np.array([self.task.epoch.row, self.last])
+        C_ib = integrate(self.task.record, self.task.interval, x[self.biases][:3], np.zeros(3), rows).C_ib_at
+        return self.C_n0_n @ dcm_from_rotation_vector(x[PHI]) @ self.C_end @ C_ib[1].T, C_ib[0]
+
+
 def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Array, method: str) -> Stationary:
     """Align by states10 or states8.
 
@@ -165,56 +208,26 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
     AlignmentError
         A base that moves, or an IMU that is not level: outside what the model holds for.
     """
-    n, lat, alt = STATIONARY[method], task.position.lat, task.position.alt
     tilt = math.acos(min(1.0, float(C_n0_i[2, 2])))
     if task.motion.overall != "still" or tilt > LEVEL_IMU:
         raise AlignmentError(
             f"{task.record.source}: the base is {task.motion.overall}, the IMU tilted by {math.degrees(tilt):.1f} deg; the method "
             f"{method} holds for a still base and an IMU level to {math.degrees(LEVEL_IMU):g} deg: choose another method"
         )
-    walks = StationaryModel(lat, alt, model)
-    whole = np.diag([LEVEL_PRIOR**2] * 2 + [HEADING_PRIOR**2] + [VELOCITY_PRIOR**2] * 2 + [0.0] * 5)
-    whole[BIASES, BIASES] = P_bias[:5, :5]
-    kept = stationary.KEPT[n]
-    P0, biases = whole[np.ix_(kept, kept)], slice(n - 5, n)
-    every = max(1, round(task.interval / task.record.interval))
-    T = every * task.record.interval
-    bias = np.zeros(6)
-    for _ in range(PASSES):
-        start = NavigationState.at(C_n0_i, lat, task.position.lon, alt)
-        out = mechanise(task.record, start, altitude="fixed", every=every)
-        C_nb = out.C_nb if n == 10 else _by_gyros(task, C_n0_i, T, len(out.time))
-        Phi, Q = walks.discrete(T, C_nb[-1], n)
-        if n == 10:
-            z, H, noise = out.v_n[:, :2], np.eye(10)[stationary.DV], 0.0
-        else:
-            integrals = integrate(task.record, T)
-            z = gained_velocity(integrals, C_n0_i, lat, alt)[: len(out.time), :2] / T
-            H, noise = walks.accelerometer_rows(C_nb[-1]), model.accel_random_walk**2 / T
-        R = np.diag(np.maximum(white_variance(z), QUIETEST_BASE**2) + noise)
-        system = LinearSystem(Phi=Phi[None], Q=Q[None], H=H[None], R=R[None], z=z, x0=np.zeros(n), P0=P0)
-        estimates = kalman(system, history="full")
-        x, P = estimates.x[-1], estimates.P[-1]
-        bias = np.append(x[biases], math.nan)
-        end = float(out.time[-1] - task.record.time[0] + task.record.steps[0])
-        rows = np.array([task.epoch.row, len(out.time) * every - 1])
-        inside = integrate(task.record, task.interval, bias[:3], np.zeros(3), rows)
-        C_n0_n = earth_rotation(end, lat)
-        moved = float(np.max(np.abs(x[:3]) / np.sqrt(np.diag(P)[:3])))
-        C_n0_i = C_n0_n @ dcm_from_rotation_vector(x[:3]) @ C_nb[-1] @ inside.C_ib_at[1].T
-        if moved < CONVERGED:
-            break
-    P_floor = P0.copy()
-    P_floor[: biases.start, : biases.start] = 0.0
-    floor = initial_part(filter_gains(system, estimates).step, P_floor)[-1]
-    sigma = np.append(np.sqrt(np.diag(P)[biases]), math.nan)
+    log = StationaryLog(task, C_n0_i, model, P_bias, STATIONARY[method])
+    last = settle(log, _plain, in_sigmas(PHI), most=PASSES)
+    found, C_n0_n = last.found, log.C_n0_n
+    C_n0_i, C_ib = log.begun(found.end)
+    P_floor = log.P0.copy()
+    P_floor[: log.biases.start, : log.biases.start] = 0.0
+    floor = initial_part(filter_gains(found.system, found.estimates).step, P_floor)[-1]
     return Stationary(
-        C_n0_i @ task.epoch.attitude(inside.C_ib_at[0]),
-        C_n0_n @ P[:3, :3] @ C_n0_n.T,
-        C_n0_n @ floor[:3, :3] @ C_n0_n.T,
-        bias,
-        sigma,
-        moved < ROUGHLY,
+        C_n0_i @ task.epoch.attitude(C_ib),
+        C_n0_n @ found.P[PHI, PHI] @ C_n0_n.T,
+        C_n0_n @ floor[PHI, PHI] @ C_n0_n.T,
+        np.append(found.end[log.biases], math.nan),
+        np.append(np.sqrt(np.diag(found.P)[log.biases]), math.nan),
+        last.moved < ROUGHLY,
     )
 
 
