@@ -49,6 +49,7 @@ class Case:
     align: Callable[[Log], Alignment]  # ``align(log)``: the procedure
     good: Sequence[str] = ("aligned",)  # statuses that are no refusal
     of_imu: bool = False  # the truth is the attitude of the IMU, not of the body that it turns in
+    left_out: bool = False  # no log can show it: kept to show what it costs
 
 
 def place(rng: np.random.Generator) -> dict[str, str]:
@@ -107,7 +108,7 @@ def outcome(case: Case, seed: int, run: int) -> Outcome:
 
 def framed(procedure: str, cases: Sequence[Case]) -> tuple[frame.Case, ...]:
     """These cases as rows of the matrix."""
-    return tuple(frame.Case(procedure, case.name, partial(outcome, case)) for case in cases)
+    return tuple(frame.Case(procedure, case.name, partial(outcome, case), case.left_out) for case in cases)
 
 
 def main(cases: Sequence[Case]) -> None:

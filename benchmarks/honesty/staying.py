@@ -67,6 +67,13 @@ def rotary_spin(imu: Any) -> Any:
     }
 
 
+def rotary_off(rng: np.random.Generator) -> Mapping[str, Any]:
+    """Eight positions, the zeros of the encoder off by 20 arcsec, its disc out of centre by 5."""
+    made = dict(rotary_scheme(rng))
+    encoder = {"resolution": "1 arcsec", "offset": "20 arcsec", "eccentricity": "5 arcsec"}
+    return made | {"indexer": {**made["indexer"], "encoder": encoder}}
+
+
 def ship(rng: np.random.Generator) -> Mapping[str, Any]:
     """A ship at 20 deg S, the IMU 14 m from its centre, without an indexer."""
     return {
@@ -128,9 +135,9 @@ def offset(rng: np.random.Generator) -> Mapping[str, Any]:
     return low_cost(rng) | {"imu": "consumer", "errors": {"gyro": gyro}}
 
 
-def _by_rotary(axes: tuple[str, ...], imu: Any = "navigation") -> Any:
+def _by_rotary(axes: tuple[str, ...], imu: Any = "navigation", angle_sigma: float = 0.0) -> Any:
     def call(log: Log) -> Alignment:
-        return align_rotary(log.record, log.encoder, log.position, imu, axes=axes)
+        return align_rotary(log.record, log.encoder, log.position, imu, axes=axes, angle_sigma=angle_sigma)
 
     return call
 
@@ -144,6 +151,7 @@ def _with(imu: Any) -> Any:
 
 CASES = (
     Case("rotary, eight positions, navigation grade", rotary_scheme, _by_rotary(("z", "x"))),
+    Case("rotary, encoder off by 20 arcsec", rotary_off, _by_rotary(("z", "x"), angle_sigma=np.radians(20.0 / 3600.0))),
     Case("rotary, spin x 15 z 6 deg/s, navigation grade", rotary_spin("navigation"), _by_rotary(("x", "z"))),
     Case("rotary, the same, no scale factors", rotary_spin(UNSCALED), _by_rotary(("x", "z"), UNSCALED)),
     Case("ship at 20 deg S, arm 14 m, auto", ship, _with("navigation")),

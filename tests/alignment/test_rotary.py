@@ -85,6 +85,20 @@ def test_a_known_arm_gives_the_same(ship, answer):
     assert np.all(np.abs(apart) < np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
 
 
+def test_errors_of_the_indexer_itself_are_the_bodys(ship, answer):
+    """Zeros off by 2 arcmin: the body is found as far off, many sigmas, unless it is said how good the angles are."""
+    off = replace(ship.encoder, angles=ship.encoder.angles + 2.0 * ARCMIN)
+    aid = IndexerAid(off, lever_arm=-ship.arm, angle_sigma=2.0 * ARCMIN)
+    found = align(ship.record, ship.place, ship.imu, aid=aid)
+    phi = error(found, body_attitude(ship, found.time))
+    known = np.diag(found.phi_covariance) - (2.0 * ARCMIN) ** 2
+    assert 1.0 < np.linalg.norm(phi) < 4.0
+    assert np.all(np.abs(phi) < 2.0 * np.sqrt(np.diag(found.phi_covariance)) / ARCMIN)
+    assert np.sqrt(known) == pytest.approx(np.sqrt(np.diag(answer.phi_covariance)), rel=0.2)
+    with pytest.raises(UsageError, match="angle_sigma"):
+        align_rotary(ship.record, ship.encoder, ship.place, ship.imu, angle_sigma=-1.0)
+
+
 def test_an_earlier_epoch(ship):
     """Between two samples, too: the body's own attitude there."""
     middle = align_rotary(ship.record, ship.encoder, ship.place, ship.imu, at=123.4567)
@@ -190,7 +204,16 @@ def test_the_command(ship, tmp_path):
     for name, record in (("imu.parquet", ship.record), ("encoder.parquet", ship.encoder)):
         write_record(record, tmp_path / name)
     arguments = ["align", str(tmp_path / "imu.parquet"), "--lat", repr(math.degrees(ship.place.lat)), "--json"]
-    more = ["--indexer", str(tmp_path / "encoder.parquet"), "--lever-arm", "10,30,10", "--to", "120"]
+    more = [
+        "--indexer",
+        str(tmp_path / "encoder.parquet"),
+        "--lever-arm",
+        "10,30,10",
+        "--to",
+        "120",
+        "--indexer-sigma",
+        "1 arcsec",
+    ]
     result = CliRunner().invoke(app, arguments + more)
     assert result.exit_code == 0, result.output
     summary = json.loads(result.stdout)

@@ -189,11 +189,14 @@ class Indexer:
         The outermost first.
     lever_arm : (3,) array, m, optional
         From the IMU to the body's centre of rotation, body axes; estimated when it is left out.
+    angle_sigma : float, rad
+        One-sigma error of the indexer's own angles and axes, which the body's attitude has in full.
     """
 
     record: EncoderRecord | None
     axes: tuple[str, ...] = ("z", "x")
     lever_arm: ArrayLike | None = None
+    angle_sigma: float = 0.0
     key: ClassVar[str] = "indexer"
 
 

@@ -202,6 +202,7 @@ def on_indexer(r: Request) -> Alignment:
         r.imu or "navigation",
         axes=indexer.axes,
         lever_arm=None if indexer.lever_arm is None else -np.asarray(indexer.lever_arm, dtype=np.float64),
+        angle_sigma=indexer.angle_sigma,
         at=r.at,
         method=r.method,
         **r.common,

@@ -28,7 +28,7 @@ from truenorth.alignment.published import FADING, faded_align, turned_arm_veloci
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
 from truenorth.alignment.task import Task, bridged, make_task
-from truenorth.alignment.verdict import base_speed, judged, model_evidence
+from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.indexing import C_bs_from_angles
@@ -38,7 +38,7 @@ from truenorth.quality.encoder import encoder_evidence, zero_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.state.evidence import notes
+from truenorth.state.evidence import Effect, notes
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
@@ -58,6 +58,7 @@ def align_rotary(
     *,
     axes: Sequence[str] = ("z", "x"),
     lever_arm: ArrayLike | None = None,
+    angle_sigma: float = 0.0,
     at: float | None = None,
     method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
@@ -80,6 +81,9 @@ def align_rotary(
     method : str
         ``auto`` or ``swaying``; or a published filter of this base, which takes the arm as known (none where it is left out):
         ``kf``, ``sakf``, ``makf``, ``imakf``.
+    angle_sigma : float, rad
+        One-sigma error of the indexer itself: zero of each axis' angle, and what its axes are off by from those of the body. The
+        IMU's attitude is found without them; that of the body has them in full, about each axis, however long the log is.
     at, heading_limit, progress
         As in :func:`truenorth.align`.
 
@@ -91,7 +95,7 @@ def align_rotary(
     Raises
     ------
     UsageError
-        An unknown method, axes that do not fit the angles, or a lever arm that is not three finite numbers.
+        An unknown method, axes that do not fit the angles, a lever arm that is not three finite numbers, a negative sigma.
     DataError
         The encoder's log does not cover the record, or a body without encoder that is not still.
     AlignmentError
@@ -100,6 +104,8 @@ def align_rotary(
     tell = progress or (lambda stage: None)
     if method not in INDEXER_METHODS:
         raise UsageError(f"method {method!r} on an indexer; choose one of {', '.join(INDEXER_METHODS)}")
+    if not 0.0 <= angle_sigma < math.inf:
+        raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
     spec = imu_spec(imu).seen_in(record)
     record = bridged(record)
     if record.duration < SHORTEST:
@@ -143,6 +149,7 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), "
         + (f"{own} was asked for" if own in FADING else "the base may sway: its own motion is fitted to the log"),
     )
+    answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
     evidence += base_speed(answer) + bias_step_evidence(fine) + bad_stretches(fine, record)
     if encoder is None:

@@ -116,6 +116,12 @@ class OnIndexer:
         option("Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns."),
     ] = None
     indexer_axes: Annotated[str, option("Axes of the indexer, the outermost first.")] = "z,x"
+    indexer_sigma: Annotated[
+        str,
+        option(
+            "One-sigma error of the indexer's own angles and axes: '10 arcsec'; the body's attitude has it in full."
+        ),
+    ] = "0 arcsec"
     lever_arm: Annotated[
         str | None,
         option(
@@ -131,13 +137,14 @@ class OnIndexer:
     def aids(self) -> list[Any]:
         """The indexer, where one is named."""
         from truenorth.aiding.aids import Indexer
+        from truenorth.core.units import parse
         from truenorth.formats import read_encoder
 
         if self.indexer is None:
             return []
         encoder = None if self.indexer == GYROS else read_encoder(self.indexer)
         axes = tuple(self.indexer_axes.replace(" ", "").lower().replace(",", ""))
-        return [Indexer(encoder, axes, self.arm)]
+        return [Indexer(encoder, axes, self.arm, parse(self.indexer_sigma, "angle"))]
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ MOVING = ("--odometer", "--gnss", "--velocity")
 BELONGS = {
     "--arm-sigma": ("--positions",),
     "--indexer-axes": ("--indexer",),
+    "--indexer-sigma": ("--indexer",),
     "--lever-arm": ("--indexer", "--master"),
     "--lever-arm-sigma": ("--master",),
     "--master-columns": ("--master",),
