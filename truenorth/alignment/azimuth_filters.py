@@ -56,7 +56,8 @@ class Method:
     tracking: bool = False
 
 
-def _reduced(order: int, tracking: StrongTracking | None = None) -> Method:
+def reduced(order: int, tracking: StrongTracking | None = None) -> Method:
+    """Gauss-Hermite nodes in the azimuth alone, with strong tracking or without."""
     return Method(
         lambda system, state, gate: gauss_hermite(
             system, state, order=order, nonlinear=[AZIMUTH], tracking=tracking, gate=gate, innovations=True
@@ -73,12 +74,12 @@ METHODS = {
         )
     ),
     "ckf": Method(lambda system, state, gate: cubature(system, state, gate=gate, innovations=True)),
-    "gh3": _reduced(3),
-    "gh5": _reduced(5),
-    "gh7": _reduced(7),
-    "sgkf3": _reduced(3, StrongTracking()),
-    "sgkf7": _reduced(7, StrongTracking()),
-    "sgkf3_capped": _reduced(3, StrongTracking(cap=CAP)),
+    "gh3": reduced(3),
+    "gh5": reduced(5),
+    "gh7": reduced(7),
+    "sgkf3": reduced(3, StrongTracking()),
+    "sgkf7": reduced(7, StrongTracking()),
+    "sgkf3_capped": reduced(3, StrongTracking(cap=CAP)),
 }
 
 
@@ -149,7 +150,7 @@ def run_loop(
     logs: Logs,
     which: NDArray[np.int64],
     begin: Begin,
-    method: str,
+    method: str | Method,
     *,
     gated: bool = False,
     turned: bool = True,
@@ -162,8 +163,8 @@ def run_loop(
     ----------
     which : (B,) array of int
         The log of each.
-    method : str
-        A key of `METHODS`.
+    method : str or Method
+        A key of `METHODS`, or one of one's own.
     gated : bool
         Judge each epoch by its normalised innovation squared.
     turned : bool
@@ -180,7 +181,8 @@ def run_loop(
     start = P.copy()
     p, z, errors = np.zeros((B, model.PARAMETERS)), np.zeros((B, 3)), np.zeros((B, 7))
     out = _room(B, count, keep_P)
-    gate, state, tracking = GATE if gated else None, None, METHODS[method].tracking
+    kind = METHODS[method] if isinstance(method, str) else method
+    gate, state, tracking = GATE if gated else None, None, kind.tracking
     system: NonlinearSystem | None = None
     for k in range(count):
         ends = logs.rows[begin.epoch + k : begin.epoch + k + 2]
@@ -200,7 +202,7 @@ def run_loop(
             )
         else:
             system = replace(system, z=z[:, None, :], p=p[:, None, :])
-        found = METHODS[method].run(system, state, gate)
+        found = kind.run(system, state, gate)
         if tracking:
             out.acted[:] += found.adaptation[:, -1, 0] > 1.0
         if gated:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.azimuth_filters import NOMINAL, Begin, Belief, run_loop
+from truenorth.alignment.azimuth_filters import NOMINAL, Begin, Belief, Method, run_loop
 from truenorth.core.attitude import misalignment, skew
 from truenorth.errors import in_motion_azimuth as model
 from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DV, PHI, STATES
@@ -57,7 +57,7 @@ def run_method(
     which: NDArray[np.int64],
     phi0: Array,
     azimuth_sigma: Array,
-    method: str,
+    method: str | Method,
     gated: bool = False,
     turned: bool = True,
     belief: Belief = NOMINAL,

@@ -174,6 +174,19 @@ def stepping(drives: Drives) -> Drives:
     return replace(drives, dvel=dvel)
 
 
+def coarser(drives: Drives, every: int) -> Drives:
+    """The same drives with filter intervals that take so many of theirs together."""
+    at = slice(None, None, every)
+    return replace(
+        drives,
+        rows=drives.rows[at],
+        time=drives.time[every - 1 :: every],
+        C_nb=drives.C_nb[at],
+        v_n=drives.v_n[at],
+        places=drives.places[at],
+    )
+
+
 def _by_sample(odometers: list[OdometerRecord], edges: Array) -> Array:
     """(R, N) distance in each sample, m: an odometer's row shared evenly."""
     ways = [np.interp(edges, np.append(0.0, o.time), np.append(0.0, np.cumsum(o.distance))) for o in odometers]

@@ -51,6 +51,8 @@ SWEEPS = (
     Sweep("A", "R", "base velocity in R, m/s", BASE_VELOCITY, (0.01, 0.02, 0.05, 0.1, 0.3, 1.0)),
     Sweep("A", "P0", "angle in P0, deg", 1.0, (0.2, 0.5, 1.0, 2.0, 5.0)),
     Sweep("A", "rho", "rho of eq. 50", RHO, (0.2, 0.5, 0.95, 5.0, 50.0)),
+    Sweep("A", "step", "step of the filter, s", 1.0, (1.0, 2.0, 5.0)),
+    Sweep("A", "signs", "draw of the biases' signs (0: as in A)", 0.0, (0.0, 1.0, 2.0, 3.0), logarithmic=False),
 )
 
 
@@ -103,8 +105,11 @@ def work(case: str, seed: int, noise: Noise, parts: Sequence[str], times: Sequen
         if "sweeps" in parts:
             for sweep in SWEEPS:
                 for value in sweep.values:
-                    options: dict[str, Any] = {sweep.name: np.radians(value) if sweep.name == "P0" else value}
-                    _filters(stage, sweep.case_of(value), results, MEAN_START, **options)
+                    at, options = stage, {sweep.name: np.radians(value) if sweep.name == "P0" else value}
+                    if sweep.name == "signs":
+                        signs, options = round(options.pop("signs")), {}
+                        at = _Stage(simulate_run(case, run, seed, noise, signs)) if signs else stage
+                    _filters(at, sweep.case_of(value), results, MEAN_START, **options)
         if "pipeline" in parts:
             _filters(stage, case, results, results.coarse["triad", "gyros"], ("kf_two_pass",), passes=2)
     if "whole" in parts:
@@ -122,8 +127,11 @@ class _Stage:
         self.integrals = self.sampled.integrals
         self.truth = data.C_ns(self.integrals.start + self.integrals.time)
 
-    def log(self, start: Array, angle: float, **options: Any) -> RotaryLog:
-        """The log with an attitude off by `start` (3,) rad at the beginning, and angles believed to be known to `angle` (rad)."""
+    def log(self, start: Array, angle: float, step: float, **options: Any) -> RotaryLog:
+        """The log with an attitude off by `start` (3,) rad at the beginning, and angles believed to be known to `angle` (rad).
+
+        `step` is that of the filter, whole seconds.
+        """
         P = np.diag([angle**2] * 3 + [START_SIGMA["velocity"] ** 2] * 3 + [*self.data.imu.bias_variance])
         return RotaryLog(
             self.record.between(None, self.integrals.start + self.integrals.time[-1] + 0.5 * self.record.interval),
@@ -131,8 +139,8 @@ class _Stage:
             self.data.place,
             StaticModel.of(self.data.imu),
             Prior(np.zeros(STATES), P, {}),
-            1.0,
-            arm_velocity=self.sampled.arm["gyros"],
+            step,
+            arm_velocity=self.sampled.arm["gyros"][:: round(step)],
             **options,
         )
 
@@ -148,9 +156,10 @@ def _filters(
     R: float = BASE_VELOCITY,
     P0: float = START_SIGMA["angle"],
     rho: float = RHO,
+    step: float = 1.0,
 ) -> None:
     """12 states from the end of coarse alignment on, with its error at the start given."""
-    truth = stage.truth
+    truth = stage.truth[:: round(step)]
     for method in filters:
         kind = FILTERS.get(method)
 
@@ -159,7 +168,7 @@ def _filters(
                 return Filtered(system, kalman(system, history="full", innovations=False))
             return Filtered(system, fading(system, kind=kind, rho=rho, history="full", innovations=True))
 
-        log = stage.log(start, P0, base_velocity=R, keep_first=keep_first)
+        log = stage.log(start, P0, step, base_velocity=R, keep_first=keep_first)
         estimates = settle(log, estimate, in_sigmas(PHI), most=passes, least=passes).found.estimates
         if kind is not None:
             results.acted[case, method] = float(np.mean(np.any(estimates.adaptation > 1.0, axis=-1)))
@@ -170,7 +179,8 @@ def _filters(
         results.curves[case, method] = phi
         P = C_n_i @ estimates.P[:, PHI, PHI] @ np.swapaxes(C_n_i, 1, 2)
         for at in FILTER_TIMES:
-            results.found[case, method, at] = _found(phi[round(at) - 1], P[round(at) - 1])
+            k = round(at / step) - 1
+            results.found[case, method, at] = _found(phi[k], P[k])
 
 
 def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> None:

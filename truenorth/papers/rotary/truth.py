@@ -69,8 +69,8 @@ class Run:
         return C
 
 
-def scenario_of(case: str, run: int, seed: int, noise: Noise = "per_sample") -> Scenario:
-    """The scenario of a run of a case."""
+def scenario_of(case: str, run: int, seed: int, noise: Noise = "per_sample", signs: int = 0) -> Scenario:
+    """The scenario of a run of a case; `signs` above 0: other signs of the biases, the same in all runs."""
     with resources.as_file(resources.files("truenorth.simulation") / "scenarios" / "rotary_ship.yaml") as file:
         mapping: dict[str, Any] = copy.deepcopy(read_mapping(file))
     mapping["duration"] = f"{DURATION + 1} s"  # a sample beyond the last whole second
@@ -95,20 +95,21 @@ def scenario_of(case: str, run: int, seed: int, noise: Noise = "per_sample") -> 
             ]
     if case == "jonswap":
         mapping["motion"], mapping["disturbances"] = copy.deepcopy(SEA), [copy.deepcopy(ENGINE)]
-    if case in ("B", "jonswap", "unrotated"):
-        signs = rng.choice((-1.0, 1.0), (2, 3))
+    if signs or case in ("B", "jonswap", "unrotated"):
+        draws = stream(seed, NUMBERS[case], signs, DRAWS + 1) if signs else rng
+        gyro, accel = draws.choice((-1.0, 1.0), (2, 3))
         mapping["errors"] = {
-            "gyro": {"bias": [f"{float(0.01 * s)!r} deg/h" for s in signs[0]]},
-            "accel": {"bias": [f"{float(100.0 * s)!r} ug" for s in signs[1]]},
+            "gyro": {"bias": [f"{float(0.01 * s)!r} deg/h" for s in gyro]},
+            "accel": {"bias": [f"{float(100.0 * s)!r} ug" for s in accel]},
         }
     if case in ("unrotated", "rotation_off"):
         del mapping["indexer"]
     return read_scenario(mapping)
 
 
-def simulate_run(case: str, run: int, seed: int, noise: Noise = "per_sample") -> Run:
-    """Simulate a run; the same three numbers give the same bits."""
-    scenario = scenario_of(case, run, seed, noise)
+def simulate_run(case: str, run: int, seed: int, noise: Noise = "per_sample", signs: int = 0) -> Run:
+    """Simulate a run; the same numbers give the same bits."""
+    scenario = scenario_of(case, run, seed, noise, signs)
     simulation = scenario.simulate(seed=seed, run=run, number=NUMBERS[case])
     aiding = scenario.simulate_aiding(seed=seed, run=run, number=NUMBERS[case])
     record = simulation.record

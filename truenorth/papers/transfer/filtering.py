@@ -73,6 +73,8 @@ class Method:
         Of the master's rows as believed, over the true one.
     tau_sigma, arm_sigma : float, s and m
         In P0.
+    every : int
+        Of the master's rows, ten a second, one in so many is taken.
     """
 
     delay: bool = False
@@ -85,6 +87,7 @@ class Method:
     noise: float = 1.0
     tau_sigma: float = TAU_SIGMA
     arm_sigma: float = ARM_SIGMA
+    every: int = 1
 
 
 VELOCITY = {
@@ -224,7 +227,7 @@ def _track(flights: Flights, run: Run, method: Method) -> TransferTrack:
     master = run.master if kind == "velocity" else run.felt
     if method.late == "extrapolated":
         master = extrapolated(master, flights.case.extra_delay)
-    linear = None
+    linear, master = None, master[:: method.every]
     if kind == "acceleration" and method.delay:
         found = delay_found(model, transfer_filter(run.slave, master, model, start, Matching(VELOCITY_NOISE)))
         assert found is not None

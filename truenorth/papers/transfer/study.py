@@ -54,6 +54,7 @@ SWEEPS = {
     "noise": Sweep("flat_turn", "R", "velocity noise as believed, times the true", 1.0, (0.25, 0.5, 1.0, 2.0, 4.0)),
     "tau_sigma": Sweep("flat_turn", "P0_delay", "delay in P0, s", TAU_SIGMA, (0.01, 0.02, 0.05, 0.1, 0.3)),
     "arm_sigma": Sweep("flat_turn", "P0_arm", "lever arm in P0, m", ARM_SIGMA, (0.1, 0.3, 1.0, 3.0, 10.0)),
+    "every": Sweep("flat_turn", "step", "of ten rows a second, one in", 1, (1, 2, 5, 10)),
 }
 SWEPT_RUNS = 30  # at most
 PANELS = {
