@@ -237,6 +237,19 @@ def test_published_filters_find_the_body_on_an_indexer(ship, method):
     assert without.phi_covariance[2, 2] > 4.0 * answer.phi_covariance[2, 2]
 
 
+def test_a_published_filter_on_an_indexer_by_the_command_line(ship, tmp_path):
+    write_record(ship.record.between(None, 200.0), tmp_path / "imu.csv")
+    write_record(ship.encoder, tmp_path / "encoder.csv")
+    arm = ",".join(f"{x:g}" for x in ship.arm)
+    where = ["--lat", "40", "--lon", "118", "--imu", "navigation", "--indexer", str(tmp_path / "encoder.csv")]
+    asked = ["align", str(tmp_path / "imu.csv"), *where, "--lever-arm", arm, "--json", "--method"]
+    result = CliRunner().invoke(app, [*asked, "imakf"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["method"] == "imakf"
+    result = CliRunner().invoke(app, [*asked, "states8"])
+    assert "choose one of auto, swaying" in str(result.exception)
+
+
 def test_a_method_of_a_base_is_refused_on_an_indexer(ship):
     with pytest.raises(UsageError, match="method 'states10' on an indexer; choose one of auto, swaying, kf"):
         align(ship.record, ship.place, ship.imu, aid=IndexerAid(ship.encoder), method="states10")

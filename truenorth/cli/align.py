@@ -57,7 +57,11 @@ def align(
         ),
     ] = None,
     method: Annotated[
-        str, option("auto, analytic, inertial, oba, kalman or swaying; on the move gyrocompass or motion.")
+        str,
+        option(
+            "auto, analytic, inertial, oba, kalman or swaying; on the move gyrocompass or motion; published filters: kf, sakf, "
+            "makf, imakf, states10, states8, and by an odometer ekf, ukf, ckf, gh3, sgkf ..."
+        ),
     ] = "auto",
     at: Annotated[float | None, option("Epoch of the attitude, s; the last sample without it.")] = None,
     heading_limit: Annotated[float, option("Largest usable one-sigma heading error, deg.")] = 5.0,

@@ -44,7 +44,7 @@ BELONGS = {
     "--mounting-sigma": (*MOVING, "--master"),
 }
 CLASHES = {
-    "--method": ("--positions", "--indexer", "--master"),
+    "--method": ("--positions", "--master"),
     "--at": ("--positions", "--master", *MOVING),
     "--advise": ("--master", *MOVING),
 }
