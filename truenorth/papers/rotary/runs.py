@@ -105,7 +105,8 @@ def work(case: str, seed: int, noise: Noise, parts: Sequence[str], times: Sequen
         if "sweeps" in parts:
             for sweep in SWEEPS:
                 for value in sweep.values:
-                    at, options = stage, {sweep.name: np.radians(value) if sweep.name == "P0" else value}
+                    at: _Stage = stage
+                    options: dict[str, Any] = {sweep.name: np.radians(value) if sweep.name == "P0" else value}
                     if sweep.name == "signs":
                         signs, options = round(options.pop("signs")), {}
                         at = _Stage(simulate_run(case, run, seed, noise, signs)) if signs else stage
