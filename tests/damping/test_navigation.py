@@ -19,7 +19,7 @@ from truenorth.damping.options import Damper
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI
 from truenorth.navigation import Mounting, Start, navigate
-from truenorth.records import VelocityRecord
+from truenorth.records import ImuRecord, VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import simulate
 from truenorth.state.mounting import mounting_angles
@@ -244,6 +244,15 @@ def test_a_log_in_body_axes_mounted_askew(ship):
         navigate(ship.record, ship.start, aid=VelocityLog(body, Mounting(lever_arm=np.array([0, 1.0, 0]))), **options)
     with pytest.raises(UsageError, match="expected 10 s at most"):
         navigate(ship.record, ship.start, aid=VelocityLog(body), **options | {"output": 40.0})
+
+
+def test_rows_of_a_long_log_are_close_enough():
+    """Of 60 h a track has a row every 10.8 s by default, and damping takes 10 s at most: not refused."""
+    from truenorth.navigation.procedure import _intervals
+
+    long = ImuRecord(np.linspace(10.0, 216e3, 100), np.zeros((100, 3)), np.tile([0.0, 0.0, 9.8], (100, 1)))
+    assert _intervals(long, None, None) == (1.0, 11)
+    assert _intervals(long, None, None, True) == (1.0, 8)
 
 
 def test_a_ramp_throws_the_switch_slowly(ship):

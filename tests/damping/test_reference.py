@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.honesty.voyage import passage, voyage
 from tests.damping.marine_case import ideal_and_truth, paper_errors
+from truenorth.aiding.aids import VelocityLog
+from truenorth.core.attitude import misalignment
 from truenorth.core.errors import DataError
+from truenorth.damping.options import Damper
 from truenorth.damping.reference import cleaned, reference_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.marine import MarineModel
@@ -80,6 +84,43 @@ def test_a_log_in_body_axes_is_turned(course):
     np.testing.assert_allclose(
         np.nanmean(found.velocity, axis=0), 12.0 * np.array([np.sin(heading), np.cos(heading)]), rtol=1e-3
     )
+
+
+@pytest.mark.parametrize("frame", ["navigation", "body"])
+def test_rows_between_epochs_are_compared_at_their_own_times(frame):
+    """A true log every 4 s, epochs every 8 s, turns of 1 deg/s: exact by the finer epochs, to a decimetre by cubics alone.
+
+    Rows taken for the nearest epoch's would be .7 m/s off in a turn at 10 m/s, and any filter would believe them.
+    """
+    _, truth = passage(np.random.default_rng(4), 2.0)
+    v = truth.v_n if frame == "navigation" else np.einsum("kij,ki->kj", truth.C_nb, truth.v_n)
+    log, coarse = VelocityRecord(truth.time, v, frame), truth.every(2)
+    exact, near = (reference_of(coarse, log, LogErrors(), fine) for fine in (truth, None))
+    np.testing.assert_allclose(exact.velocity, coarse.v_n[:, :2], atol=1e-9)
+    assert np.nanmax(np.abs(near.velocity - coarse.v_n[:, :2])) < 0.1  # at the ends of turns outliers are left out
+
+
+def test_a_fix_in_a_turn_holds_at_its_own_time():
+    """Of the true course, with epochs every 8 s and a turn of 1 deg/s: place and heading between epochs, to .5 m and .1 deg."""
+    _, truth = passage(np.random.default_rng(4), 2.0)
+    turning = 1 + 2 * np.flatnonzero(np.abs(np.diff(truth.v_n[:, 0])[1::2]) > 0.05)[5]  # a row between two epochs
+    coarse = truth.every(2)
+    C_nb, _ = coarse.at(truth.time[[turning]])
+    assert np.degrees(np.abs(misalignment(C_nb, truth.C_nb[[turning]]))).max() < 0.1
+    lat, lon, _ = coarse.place(truth.time[turning])
+    off = np.array([lat, lon]) - truth.position[turning, :2]
+    assert np.abs(off * 6.37e6).max() < 0.5
+
+
+def test_hard_turns_and_a_coarse_track():
+    """Filter 1 and the double filter on a track of 8 s, a log of 4 s: within their bands, through `navigate`."""
+    ship = voyage(3, 1, hours=8.0)
+    aid = VelocityLog(ship.log(LogErrors(drift=0.3)), errors=LogErrors(drift=0.3))
+    for method in ("kalman", "double"):
+        result = ship.navigated(aid, damping=Damper(method), output=8.0)
+        ratios = ship.outcome(result, (2.0, 4.0, 6.0, 8.0)).ratios
+        assert result.status == "navigated"
+        assert max(np.abs(r).max() for r in ratios.values()) < 4.0
 
 
 def test_what_is_refused(course):

@@ -13,6 +13,7 @@ from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.errors import DataError
 from truenorth.errors.intervals import Intervals
 from truenorth.errors.marine import DP, DV, PHI, MarineModel, position_in_angles
+from truenorth.records.interpolation import Between
 
 Array = NDArray[np.float64]
 UNEVEN = 0.01  # share of the interval by which the time steps may differ
@@ -66,6 +67,28 @@ class Course:
         """The intervals `start` to `stop`, with the epoch before them."""
         part = slice(start, stop + 1)
         return Course(self.time[part], self.C_nb[part], self.v_n[part], self.position[part])
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """``C_nb`` (M, 3, 3) and ``v_n`` (M, 3) between epochs: by constant turns, and by cubics through three epochs' slopes.
+
+        Raises
+        ------
+        DataError
+            A time outside the course.
+        """
+        between = Between(self.time, times, "damping")
+        slopes = np.gradient(self.v_n, self.time, axis=0)
+        v = [between.cubic(value, slope) for value, slope in zip(self.v_n.T, slopes.T, strict=True)]
+        return between.slerp(self.C_nb), np.stack(v, axis=1)
+
+    def place(self, time: float) -> tuple[float, float, float]:
+        """Latitude, longitude (rad) and height (m) between epochs, on from the nearest by the mean velocity since."""
+        k = int(np.argmin(np.abs(self.time - time)))
+        lat, lon, alt = (float(x) for x in self.position[k])
+        _, v = self.at(np.array([time]))
+        east, north = 0.5 * (self.v_n[k, :2] + v[0, :2]) * (time - self.time[k])
+        R_M, R_N = earth.radii(lat)
+        return lat + north / (R_M + alt), lon + east / ((R_N + alt) * np.cos(lat)), alt
 
     def every(self, count: int) -> Course:
         """Each so many-th epoch, from the first on."""

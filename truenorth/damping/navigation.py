@@ -59,6 +59,7 @@ def damp_navigation(
     damper: Damper,
     others: Sequence[Group],
     fixes: Fixes,
+    fine: Track | None = None,
 ) -> Navigation:
     """Damp a free inertial navigation afterwards.
 
@@ -75,6 +76,8 @@ def damp_navigation(
         Further error states of the navigation; of these the deflection of the vertical is known here.
     fixes : Fixes
         From outside; method ``augmented`` takes them.
+    fine : Track, optional
+        The same navigation with more epochs, by which the log's rows are compared.
 
     Returns
     -------
@@ -100,7 +103,7 @@ def damp_navigation(
     if strange := [group.name for group in others if group.name != DEFLECTION]:
         raise UsageError(f"damping with error states {', '.join(strange)}; expected {DEFLECTION!r} alone")
     track = _even(result.track)
-    course = Course(track.time, track.C_nb, track.v_n, track.position)
+    course = _course(track)
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
             f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most"
@@ -111,9 +114,10 @@ def damp_navigation(
             f"damping begins {damper.start:g} s after {course.time[0]:.1f} s, the log ends at {course.time[-1]:.1f} s; expected an "
             "earlier start"
         )
-    log = _Log(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity)
+    finest = course if fine is None else _course(_even(fine))
+    log = _Log(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity, finest)
     errors, evidence = _with_drift(course, track, log, spec, others, start)
-    whole = replace(_whole(track, log, errors, spec, others, start), fixes=_fixes_on(course, fixes, start))
+    whole = replace(_whole(track, log, errors, spec, others, start), fixes=_fixes_on(course, finest, fixes, start))
     found = _damped(course, log.reference, spec, damper, start, whole, errors, track)
     damped = course.corrected(found.x)
     seen = slice(start, None)
@@ -171,14 +175,14 @@ class _Found(NamedTuple):
     switching: Switching | None
 
 
-def _log_on(course: Course, velocity: VelocityLog) -> _Log:
+def _log_on(course: Course, velocity: VelocityLog, seen: Course) -> _Log:
     record = _mounted(velocity.record, velocity.mounting)
     errors = log_errors(velocity.errors, record.frame)
-    return _Log(reference_of(course, record, errors), errors, record.frame == "body")
+    return _Log(reference_of(course, record, errors, seen), errors, record.frame == "body")
 
 
-def _fixes_on(course: Course, fixes: Fixes, start: int) -> FixRows | None:
-    """Fixes as errors of the course, at the nearest epochs after the switch."""
+def _fixes_on(course: Course, seen: Course, fixes: Fixes, start: int) -> FixRows | None:
+    """Fixes as errors of the course at their own times, given to the nearest epochs after the switch."""
     z, sigma = np.full((course.epochs + 1, 3), np.nan), np.ones((course.epochs + 1, 3))
 
     def epoch(time: float) -> int:
@@ -190,14 +194,13 @@ def _fixes_on(course: Course, fixes: Fixes, start: int) -> FixRows | None:
         return k
 
     for fix in fixes.positions:
-        k = epoch(fix.time)
-        lat, lon, alt = course.position[k]
+        k, (lat, lon, alt) = epoch(fix.time), seen.place(fix.time)
         R_M, R_N = earth.radii(lat)
         apart = math.remainder(lon - fix.lon, 2.0 * math.pi)
         z[k, :2], sigma[k, :2] = (apart * (R_N + alt) * math.cos(lat), (lat - fix.lat) * (R_M + alt)), fix.sigma
     for turn in fixes.azimuths:
-        k = epoch(turn.time)
-        heading = math.atan2(course.C_nb[k, 0, 1], course.C_nb[k, 1, 1])
+        k, C_nb = epoch(turn.time), seen.at(np.array([turn.time]))[0][0]
+        heading = math.atan2(C_nb[0, 1], C_nb[1, 1])
         z[k, 2], sigma[k, 2] = math.remainder(heading - turn.heading, 2.0 * math.pi), turn.sigma
     return FixRows(z[start:], sigma[start:]) if np.isfinite(z).any() else None
 
@@ -384,6 +387,10 @@ def _residuals(course: Course, log: _Log, damped: Course, found: _Found, start: 
     return [Residuals(LEVELLED, time, e, s, nis, used[there], 0, time, np.zeros(len(there), dtype=bool))]
 
 
+def _course(track: Track) -> Course:
+    return Course(track.time, track.C_nb, track.v_n, track.position)
+
+
 def _even(track: Track) -> Track:
     """The track without a last epoch that comes too early."""
     steps = np.diff(track.time)
@@ -395,7 +402,7 @@ def _even(track: Track) -> Track:
             v_n=track.v_n[:-1],
             position=track.position[:-1],
             sensors=track.sensors[:-1],
-            P=track.P[:-1],
+            P=track.P[:-1] if len(track.P) else track.P,
         )
     return track
 

@@ -70,10 +70,12 @@ class Reference:
         return found + [note("log.silent", time=time, length=length) for time, length in self.gaps]
 
 
-def reference_of(course: Course, record: VelocityRecord, errors: LogErrors) -> Reference:
+def reference_of(course: Course, record: VelocityRecord, errors: LogErrors, fine: Course | None = None) -> Reference:
     """Bring a velocity log onto a course.
 
-    A log in body axes is turned by the course's attitude; one of forward speed alone is taken to make no leeway.
+    A log in body axes is turned by the course's attitude; one of forward speed alone is taken to make no leeway. What INS and
+    log differ by, each row at its own time, is averaged about an epoch: that is smooth, also in turns and in waves, which the
+    velocities are not.
 
     Parameters
     ----------
@@ -81,6 +83,8 @@ def reference_of(course: Course, record: VelocityRecord, errors: LogErrors) -> R
     record : VelocityRecord
     errors : LogErrors
         Its slow errors.
+    fine : Course, optional
+        The same INS at finer epochs, by which rows between the epochs of `course` are compared.
 
     Raises
     ------
@@ -95,21 +99,23 @@ def reference_of(course: Course, record: VelocityRecord, errors: LogErrors) -> R
     T = course.interval
     nearest = np.floor((record.time - course.time[0]) / T + 0.5).astype(int)
     value = record.velocity[:, [1]] if record.frame == "body" else record.velocity[:, :2]
-    inside = (nearest >= 0) & (nearest <= course.epochs) & np.isfinite(value).all(axis=1)
+    inside = (record.time >= course.time[0]) & (record.time <= course.time[-1]) & np.isfinite(value).all(axis=1)
     if not inside.any():
         raise DataError(
             f"{record.source}: runs from {record.time[0]:.3f} s to {record.time[-1]:.3f} s, navigation from "
             f"{course.time[0]:.3f} s to {course.time[-1]:.3f} s: no overlap; expected one clock"
         )
     nearest, velocity = nearest[inside], np.nan_to_num(record.velocity[inside])
+    seen = course if fine is None else fine
+    C_nb, v_n = seen.at(record.time[inside])
     if record.frame == "body":
-        velocity = np.einsum("kij,kj->ki", course.C_nb[nearest], velocity)
+        velocity = np.einsum("kij,kj->ki", C_nb, velocity)
     count = np.bincount(nearest, minlength=course.epochs + 1)
     mean = np.full((course.epochs + 1, 2), np.nan)
     full = count > 0
     for axis in range(2):
-        total = np.bincount(nearest, velocity[:, axis], minlength=course.epochs + 1)
-        mean[full, axis] = total[full] / count[full]
+        total = np.bincount(nearest, v_n[:, axis] - velocity[:, axis], minlength=course.epochs + 1)
+        mean[full, axis] = course.v_n[full, axis] - total[full] / count[full]
     given = None
     if record.sigma is not None:
         known = record.sigma[inside][np.isfinite(record.sigma[inside])]

@@ -52,6 +52,7 @@ FINE, COARSE = 0.2, 1.0
 # Of the log, what shows axes of velocities: at most this long, and until an INS without aiding has tilted or drifted so far.
 AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
 SHORTEST_AXES = 20.0  # s
+DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
 LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
 AIDS = (Gnss, Odometer, VelocityLog, Barometer)
 USUAL = {"baro": WEATHER}
@@ -143,7 +144,7 @@ def navigate(
     height, why = kept_altitude(altitude, given)
     fixed, groups = height == "fixed", groups_of((*errors, *deflection.groups), noise)
     model = InsModel.from_spec(noise, scale_factors=scale_factors, groups=groups, fixed_altitude=fixed)
-    plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output))
+    plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
     _check_places(given, begin, height)
@@ -175,7 +176,8 @@ def navigate(
     from truenorth.damping.navigation import damp_navigation
 
     tell(f"damping: {damping.method}")
-    return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, groups, fixes)
+    fine = plan.finest() if reference is not None and plan.every > 1 else None
+    return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, groups, fixes, fine)
 
 
 @dataclass(frozen=True)
@@ -199,6 +201,10 @@ class _Plan:
         used = [*sensors, *self.always]
         model = with_states(self.model, used)
         return navigate_track(self.record, self.start, model, used, interval=self.interval, every=self.every, **options)
+
+    def finest(self) -> Track:
+        """Free, at every interval, without covariance."""
+        return navigate_track(self.record, self.start, self.model, interval=self.interval, every=1, covariance=False)
 
 
 def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
@@ -268,10 +274,13 @@ def _looked_at(given: Mapping[str, Any]) -> dict[str, Mounting]:
     return found | {key: a.mounting for key, a in given.items() if getattr(a, "mounting", None) is not None}
 
 
-def _intervals(record: ImuRecord, interval: float | None, output: float | None) -> tuple[float, int]:
+def _intervals(
+    record: ImuRecord, interval: float | None, output: float | None, damped: bool = False
+) -> tuple[float, int]:
     """Interval of the filter (s), and how many of them to a row of the track."""
     interval = (FINE if record.duration <= LONG else COARSE) if interval is None else interval
-    output = max(1.0, record.duration / 20_000.0) if output is None else output
+    usual = max(1.0, record.duration / 20_000.0)
+    output = (min(usual, DAMPED) if damped else usual) if output is None else output
     if not (interval > 0.0 and output > 0.0):
         raise UsageError(f"interval {interval:g} s, output {output:g} s; expected both above zero")
     return interval, max(1, round(output / interval))
