@@ -46,3 +46,14 @@ def test_the_logs_hold_what_their_names_say(tmp_path):
 def test_another_name(tmp_path):
     with pytest.raises(UsageError, match="choose one of rlg, fog, transfer"):
         write_sample("mems", tmp_path)
+
+
+def test_samples_are_listed():
+    from typer.testing import CliRunner
+
+    from truenorth.cli import app
+    from truenorth.formats.samples import SAMPLES
+
+    listed = CliRunner().invoke(app, ["example"])
+    assert listed.exit_code == 0
+    assert [line.partition(":")[0] for line in listed.output.splitlines()] == list(SAMPLES)

@@ -24,12 +24,16 @@ Examples:
 
 @command(EXAMPLES)
 def example(
-    name: Annotated[str, argument("rlg, fog or transfer.")],
+    name: Annotated[str | None, argument("rlg, fog or transfer; without one they are listed.")] = None,
     output: Annotated[Path, option("Folder for the logs.", "-o", "--output")] = Path(),
 ) -> None:
     """Write a sample recording as logs that the other commands read."""
     from truenorth.formats.samples import SAMPLES, write_sample
 
     console = make_console()
+    if name is None:
+        for known, sample in SAMPLES.items():
+            console.print(f"{known}: {sample.what}", soft_wrap=True)
+        return
     print_written(write_sample(name, output))
     console.print(f"{SAMPLES[name].what}; try: {SAMPLES[name].command}", soft_wrap=True)
