@@ -28,6 +28,7 @@ from pydantic import Field, PrivateAttr, field_validator
 from truenorth.alignment.azimuth import AZIMUTH_METHODS
 from truenorth.alignment.procedure import Method
 from truenorth.core.errors import DataError, TruenorthError
+from truenorth.core.paths import as_path
 from truenorth.core.plugins import plugins
 from truenorth.core.schema import Angle, Strict, Time, validated
 from truenorth.core.yaml_file import read_mapping
@@ -259,7 +260,7 @@ def read_plan(source: str | PathLike[str] | Mapping[str, Any] | Plan) -> Plan:
     if isinstance(source, Mapping):
         plan = validated(Plan, dict(source), "plan")
     else:
-        path = Path(source)
+        path = as_path(source, "plan")
         plan = validated(Plan, read_mapping(path), str(path))
         plan._folder, plan._source = path.parent, str(path)
     names = [method.name for method in plan.methods]

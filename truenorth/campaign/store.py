@@ -20,6 +20,7 @@ import numpy as np
 
 from truenorth.core.atomic import atomic_path, writable_folder
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.json_file import read_object
 from truenorth.core.version import __version__
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def _claim(store: Store, plan: Plan) -> None:
 
     folder, manifest = store.folder, store.folder / "manifest.json"
     if manifest.is_file():
-        held = json.loads(manifest.read_text(encoding="utf-8"))
+        held = read_object(manifest)
         if held.get("plan_sha256") != plan.fingerprint:
             raise UsageError(
                 f"{folder}: holds the runs of another plan (see its plan.yaml); name another folder, or begin anew "

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ from truenorth.core.errors import DataError
 
 SMALLEST_PACKED = 6  # columns of a symmetric matrix, below which packing saves little
 TREE = "tree"
+LARGEST = 4 << 30  # bytes of arrays that are unpacked into memory
 
 
 def write_archive(value: Any, path: str | PathLike[str] | IO[bytes]) -> None:
@@ -53,9 +56,12 @@ def read_archive(path: str | PathLike[str], more: Collection[str] = ()) -> Any:
         No such file, one that is damaged, or one of another version, whose types are not these.
     """
     try:
+        check_size(path)
         with np.load(path, allow_pickle=False) as file:
             tree = json.loads(file[TREE].tobytes())
             return _unpacked(tree, file, more)
+    except DataError:
+        raise
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (ValueError, KeyError, TypeError, AttributeError, ImportError, EOFError) as error:
@@ -66,9 +72,30 @@ def read_archive(path: str | PathLike[str], more: Collection[str] = ()) -> Any:
         raise DataError(f"{path}: damaged ({error})") from None
 
 
+def check_size(path: str | PathLike[str]) -> None:
+    """Refuse an npz file whose headers promise more than memory takes, before anything is unpacked.
+
+    Raises
+    ------
+    DataError
+        More than `LARGEST` bytes. What a damaged file raises passes through.
+    """
+    total = 0
+    with ZipFile(path) as archive:
+        for name in archive.namelist():
+            with archive.open(name) as file:
+                version = np.lib.format.read_magic(file)
+                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                shape, _, dtype = read(file)
+            total += math.prod(shape) * dtype.itemsize
+    if total > LARGEST:
+        raise DataError(f"{path}: its arrays hold {total / 2**30:.3g} GiB; expected at most {LARGEST >> 30}")
+
+
 def type_in(path: str | PathLike[str]) -> str:
     """The name of the type that an archive holds, such as ``Alignment``; empty where it cannot be read."""
     try:
+        check_size(path)
         with np.load(path, allow_pickle=False) as file:
             return str(json.loads(file[TREE].tobytes())["type"]).rpartition(":")[2]
     except Exception:  # whatever a damaged or foreign file raises: it holds no result of ours

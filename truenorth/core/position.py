@@ -54,8 +54,17 @@ class Position:
 
     @classmethod
     def from_degrees(cls, lat: float, lon: float = 0.0, alt: float = 0.0, **sigmas: float) -> Position:
-        """Latitude and longitude in degrees, height in metres."""
-        return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
+        """Latitude and longitude in degrees, height in metres.
+
+        Raises
+        ------
+        UsageError
+            No number, or a latitude that is none.
+        """
+        try:
+            return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
+        except TypeError:
+            raise UsageError(f"place {lat!r}, {lon!r}, {alt!r}; expected degrees and metres as numbers") from None
 
     @classmethod
     def of(cls, place: Position | Sequence[float]) -> Position:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.paths import as_path
 
 if TYPE_CHECKING:
     import xarray
@@ -172,7 +173,7 @@ def load(folder: str | PathLike[str]) -> Any:
     from truenorth.core.archive import read_archive
 
     _own_table()
-    path = Path(folder)
+    path = as_path(folder, "folder")
     for views in _VIEWS.values():
         if views.load is not None and (path / views.marker).is_file():
             return _function(views.load)(path)

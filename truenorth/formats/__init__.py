@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from truenorth.core.errors import UsageError
+from truenorth.core.paths import as_path
 from truenorth.core.plugins import plugin, plugins
 from truenorth.formats import devices
 from truenorth.formats.aiding import (
@@ -109,7 +110,7 @@ def read_imu(
     UnsureError
         Two readings explain the log: it names both, and the option that says which.
     """
-    path = Path(path)
+    path = as_path(path, "log")
     given = {"units": units, "axes": axes, "rate": rate, "columns": columns, "kind": kind, "topic": topic}
     try:
         if (own := _plugged(path, format)) is not None:

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.paths import as_path
 from truenorth.formats import devices
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.guesses import UnsureError
@@ -333,7 +333,7 @@ def open_log(
     UsageError, DataError
         As for :func:`read_odometer`.
     """
-    path = Path(path)
+    path = as_path(path, "log")
     known_keys = [key for key in given if key not in ("columns", "units")]
     try:
         chosen = format_of(path, format, AIDING_SUFFIXES, "a log of named columns")

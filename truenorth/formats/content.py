@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from truenorth.core.errors import DataError, UsageError
@@ -67,8 +68,8 @@ def _bytes(path: Path, most: int) -> bytes:
     with path.open("rb") as file:
         how = packing(file.read(4))
         file.seek(0)
-        if how is None:
-            return file.read(most)
+        if how is None:  # a buffer of the most that is taken would be asked of the system at once
+            return file.read(min(most, os.fstat(file.fileno()).st_size + 1))
     import pyarrow as pa
 
     parts, left = [], most

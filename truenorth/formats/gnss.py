@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
+from truenorth.core.paths import as_path
 from truenorth.core.position import Position
 from truenorth.formats.aiding import NAVIGATION, PLACE, FilePath, Pairs, known, made, open_log, sigmas
 from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
@@ -96,7 +96,7 @@ def read_gnss(
     DataError
         Bad data: with file, line (or row) and column.
     """
-    path = Path(path)
+    path = as_path(path, "log")
     try:
         by_content = format is None and path.is_file() and (path.suffix.lower() in NMEA_SUFFIXES or is_nmea(path))
         if format == "nmea" or by_content:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import zlib
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
+from zipfile import BadZipFile
 
 import numpy as np
 
+from truenorth.core.archive import check_size
 from truenorth.core.errors import DataError
-from truenorth.formats.content import LARGEST
 from truenorth.formats.layout import BLOCKS
 from truenorth.records import ImuRecord, Record
 
@@ -25,29 +24,13 @@ def variables_of(path: Path) -> dict[str, Any]:
         A damaged file.
     """
     try:
-        _check_size(path)
+        check_size(path)
         with np.load(path, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except MemoryError:
         raise DataError(f"{path.name}: its arrays do not fit into memory; expected a smaller log") from None
     except (ValueError, OSError, EOFError, KeyError, NotImplementedError, BadZipFile, zlib.error) as error:
         raise DataError(f"{path.name}: the NumPy archive is damaged or cut short ({error}); write it anew") from None
-
-
-def _check_size(path: Path) -> None:
-    """Refuse an archive whose headers promise more than memory takes, before anything is unpacked."""
-    total = 0
-    with ZipFile(path) as archive:
-        for name in archive.namelist():
-            with archive.open(name) as file:
-                version = np.lib.format.read_magic(file)
-                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-                shape, _, dtype = read(file)
-            total += math.prod(shape) * dtype.itemsize
-    if total > LARGEST:
-        raise DataError(
-            f"{path.name}: its arrays hold {total / 2**30:.3g} GiB; expected at most {LARGEST >> 30}: cut the log into parts"
-        )
 
 
 def write(record: Record, path: Path) -> None:

@@ -298,6 +298,10 @@ def start_of(start: Any, imu: ImuSpec | str | None) -> tuple[Start, ImuSpec, str
     if isinstance(start, (str, PathLike)):
         begin, own, _ = read_start(start)
         where = own.name
+    elif not hasattr(start, "imu_source"):
+        raise UsageError(
+            f"start is a {type(start).__name__}; expected an Alignment, a Start or the folder of an alignment"
+        )
     else:
         own, where = start.imu, start.imu_source
         begin = start_from_alignment(start)

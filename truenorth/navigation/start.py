@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError
+from truenorth.core.json_file import read_object
 from truenorth.core.position import Position
 from truenorth.navigation.handover import Handover
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -191,13 +191,9 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
     path = Path(folder)
     path = path / SUMMARY if path.is_dir() else path
     try:
-        s: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise DataError(
-            f"{folder}: {path.name} cannot be read ({error.strerror}); expected the folder of a saved alignment"
-        ) from None
-    except ValueError as error:
-        raise DataError(f"{path}: not JSON ({error}); expected the summary of a saved alignment") from None
+        s = read_object(path)
+    except DataError as error:
+        raise DataError(f"{error}; expected the folder of a saved alignment") from None
     if s.get("heading_deg") is None:
         raise AlignmentError(
             f"{path}: the alignment is {s.get('status')!r}, it holds no heading that may be used; navigation needs one: align "

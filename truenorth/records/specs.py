@@ -18,13 +18,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.paths import as_path
 from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 from truenorth.records.presets import PRESETS
@@ -309,7 +309,7 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
         return _from_mapping(source, "IMU specification", "custom")
     if isinstance(source, str) and source in PRESETS:
         return _from_mapping(PRESETS[source], source, source)
-    path = Path(source)
+    path = as_path(source, "IMU specification")
     if not path.is_file():
         near = get_close_matches(str(source), PRESETS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""

@@ -96,8 +96,12 @@ def simulate(
     Raises
     ------
     UsageError
-        A rate, a duration or a given error that makes no sense.
+        A motion that is none; a rate, a duration or a given error that makes no sense.
     """
+    if not hasattr(motion, "states") and not isinstance(motion, IdealLog):
+        raise UsageError(
+            f"motion is a {type(motion).__name__}; expected a motion, such as `rest(...)`, or an ideal log"
+        )
     ideal = motion if isinstance(motion, IdealLog) else ideal_log(motion, rate=rate, duration=duration, start=start)
     spec = ImuSpec() if imu is None else imu_spec(imu)
     interval = ideal.interval

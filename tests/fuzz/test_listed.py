@@ -1,0 +1,251 @@
+"""What once crashed, hung or passed for something else: each is one message of ours, in little time and memory."""
+
+import io
+import json
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truenorth
+from tests.campaign.test_plan import PLAN
+from tests.fuzz.test_answers import in_time
+from tests.helpers import run_command
+from truenorth.core.errors import DataError, TruenorthError, UsageError
+from truenorth.core.position import Position
+from truenorth.formats import read_gnss, read_imu
+from truenorth.papers import reproduce
+from truenorth.records import EncoderRecord, GnssRecord, MasterRecord, OdometerRecord
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import rest, simulate
+
+PLACE = Position.from_degrees(45.0, 10.0)
+WHERE = ["--lat", "45", "--lon", "10"]
+RECORD = simulate(rest(PLACE, 0.3), rate=10.0, duration=60.0, imu=imu_spec("navigation"), seed=1).record
+TEXTS = {
+    "braces": "{{ }}: 1",
+    "a date": "name: 2024-13-45",
+    "a tag": "name: !!python/object:os.system x",
+    "brackets": "a: " + "[" * 2000,
+    "anchors": "a: &a [x, x, x]\n" + "".join(f"{chr(c + 1)}: &{chr(c + 1)} [*{chr(c)}, *{chr(c)}]\n" for c in range(97, 117)),
+    "itself": "a: &a [*a]",
+    "nothing": "",
+    "bytes": "\x00\x01",
+    "long": "a: " + "9" * 5000,
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def memory():
+    """Two GiB more than there are: what asks for more fails here, and not for want of memory of the whole machine."""
+    resource = pytest.importorskip("resource", reason="this system has no limit of memory")
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text().split()[0]) if Path("/proc/self/statm").exists() else None
+    if pages is not None:
+        resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (2 << 30), hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def refused(capsys, monkeypatch, *words, codes=(2, 3, 4)):
+    """One line of ours, no traceback: whatever else is raised goes through the program's last resort and fails the test."""
+    with in_time():
+        code, said = run_command(capsys, monkeypatch, *words)
+    assert code in codes, said.err
+    assert said.err.startswith("truenorth: ")
+    assert len(said.err.strip().splitlines()) <= 12
+    return said.err
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "log.csv"
+    truenorth.write_imu(RECORD, path)
+    return path
+
+
+def bomb(path, rows=10**11):
+    """An archive of a kilobyte whose header says that its arrays have so many rows."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, shape in (
+            ("time", f"({rows},)"),
+            ("gyro", f"({rows}, 3)"),
+            ("accel", f"({rows}, 3)"),
+            ("tree", f"({rows},)"),
+        ):
+            header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode()
+            header += b" " * (63 - (len(header) + 10) % 64) + b"\n"
+            archive.writestr(f"{name}.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(100))
+    return path
+
+
+def test_an_archive_that_promises_more_than_memory(tmp_path):
+    with in_time(), pytest.raises(DataError, match="GiB"):
+        read_imu(bomb(tmp_path / "log.npz"))
+    with in_time(), pytest.raises(DataError, match=r"result\.npz"):
+        truenorth.load(bomb(tmp_path / "result.npz").parent)
+
+
+@pytest.mark.parametrize(
+    "text", ["duration: 1e6 s\nrate: 100 kHz", "duration: 60 s\nrate: 2e9 Hz", "duration: 1e9 s\nrate: 100 Hz"]
+)
+def test_a_scenario_of_1e11_samples(text, tmp_path, capsys, monkeypatch):
+    path = tmp_path / "scenario.yaml"
+    path.write_text(f"name: x\n{text}\nposition: {{lat: 45 deg}}\nimu: navigation\nmotion: {{kind: rest}}\n")
+    said = refused(capsys, monkeypatch, "simulate", path, "-o", tmp_path / "out")
+    assert "samples" in said or "116 days" in said
+
+
+@pytest.mark.parametrize("text", TEXTS)
+@pytest.mark.parametrize("where", ["specification", "layout", "scenario", "plan", "search"])
+def test_yaml_from_anybody(where, text, log, tmp_path, capsys, monkeypatch):
+    path = tmp_path / "log.yaml"
+    path.write_text(TEXTS[text])
+    out = ["-o", tmp_path / "out"]
+    if where == "layout":
+        (tmp_path / "log.csv").write_bytes(log.read_bytes())
+    words = {
+        "specification": ["align", log, *WHERE, "--imu", path],
+        "layout": ["align", tmp_path / "log.csv", *WHERE, "--imu", "navigation"],
+        "scenario": ["simulate", path, *out],
+        "plan": ["campaign", path, *out],
+        "search": ["tune", path, *out],
+    }
+    allowed = (0, 2, 3, 4) if (where, text) == ("layout", "nothing") else (2, 3, 4)
+    if 0 in allowed:
+        run_command(capsys, monkeypatch, *words[where])
+    else:
+        refused(capsys, monkeypatch, *words[where])
+
+
+FOREIGN = {
+    "a list": "[1, 2]",
+    "a number": "7",
+    "a word": '"aligned"',
+    "nothing": "{}",
+    "null": "null",
+    "no JSON": "{",
+    "not UTF-8": b"\xff\xfe{}",
+    "NaN": '{"heading_deg": NaN, "navigation": NaN}',
+    "other types": '{"heading_deg": 1, "navigation": [], "status": {}}',
+    "a heading alone": '{"heading_deg": 1.0, "navigation": {"C_nb": "x"}}',
+    "deep": "[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("text", FOREIGN)
+def test_a_start_or_a_manifest_that_is_not_ours(text, log, tmp_path, capsys, monkeypatch):
+    content = FOREIGN[text] if isinstance(FOREIGN[text], bytes) else FOREIGN[text].encode()
+    start, campaign = tmp_path / "start", tmp_path / "campaign"
+    for folder, name in ((start, "summary.json"), (campaign, "manifest.json")):
+        folder.mkdir()
+        (folder / name).write_bytes(content)
+    (tmp_path / "plan.yaml").write_text(json.dumps(PLAN))
+    refused(capsys, monkeypatch, "navigate", log, "--start", start)
+    refused(capsys, monkeypatch, "campaign", tmp_path / "plan.yaml", "-o", campaign, "--workers", "1")
+
+
+@pytest.mark.parametrize(
+    "option", ["log", "--gnss", "--odometer", "--indexer", "--master", "--imu", "scenario", "plan", "--start"]
+)
+def test_a_device_without_an_end(option, log, tmp_path, capsys, monkeypatch):
+    zero = "/dev/zero"
+    words = {
+        "log": ["align", zero, *WHERE],
+        "--start": ["navigate", log, "--start", zero],
+        "scenario": ["simulate", zero, "-o", tmp_path / "out"],
+        "plan": ["campaign", zero, "-o", tmp_path / "out"],
+        "--imu": ["align", log, *WHERE, "--imu", zero],
+    }
+    refused(capsys, monkeypatch, *words.get(option, ["align", log, *WHERE, "--imu", "navigation", option, zero]))
+
+
+def test_quoted_cells_are_the_numbers_in_them(log, tmp_path):
+    lines = log.read_text().splitlines()
+    quoted = [lines[0], *(",".join(f'"{cell}"' for cell in line.split(",")) for line in lines[1:])]
+    (tmp_path / "log.csv").write_text("\n".join(quoted) + "\n")
+    assert np.array_equal(read_imu(tmp_path / "log.csv").gyro, read_imu(log).gyro)
+
+
+@pytest.mark.parametrize("digits", ["٠١٢٣٤٥٦٧٨٩", "०१२३४५६७८९", "０１２３４５６７８９"])
+def test_digits_of_other_scripts_are_named(digits, log, tmp_path):
+    head, *rows = log.read_text().splitlines()
+    text = "\n".join([head, *(row.translate(str.maketrans("0123456789", digits)) for row in rows)])
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=r"log\.csv"):
+        read_imu(tmp_path / "log.csv")
+
+
+def test_nmea_with_semicolons(tmp_path):
+    row = "$GPGGA;{:06d}.00;4806.0;N;01130.0;E;1;08;1.0;500.0;M;45.0;M;;\r\n"
+    (tmp_path / "log.nmea").write_text("".join(row.format(100000 + k) for k in range(20)))
+    with pytest.raises(TruenorthError, match=r"log\.nmea"):
+        read_gnss(tmp_path / "log.nmea")
+
+
+def others(time, values):
+    """A record of each kind that is not an IMU's, with these values in a column of numbers."""
+    C_nb = np.broadcast_to(np.eye(3), (len(time), 3, 3))
+    return {
+        "encoder": lambda: EncoderRecord(time, np.stack([values, values], axis=1)),
+        "odometer": lambda: OdometerRecord(time, values),
+        "gnss": lambda: GnssRecord(time, 0.7 + 1e-9 * values, 0.1 + 0 * values, 100.0 + values),
+        "master": lambda: MasterRecord(time, C_nb, np.stack([values] * 3, axis=1)),
+    }
+
+
+@pytest.mark.parametrize("kind", ["encoder", "odometer", "gnss", "master"])
+def test_arrays_of_callers(kind):
+    """A masked value is absent, dates are seconds, what the caller writes later is not the record's, text is named."""
+    time, values = 0.5 * np.arange(1.0, 9.0), np.linspace(1.0, 2.0, 8)
+    dates = np.datetime64("2024-03-05T10:00:00", "ns") + (1e9 * time).astype("timedelta64[ns]")
+    assert others(dates, values)[kind]().time[0] == 1709632800.5
+    mine = time.copy()
+    record = others(mine, values)[kind]()
+    mine[0] = -7.0
+    assert record.time[0] == 0.5
+    masked = np.ma.masked_array(values, mask=[0, 0, 1, 0, 0, 0, 0, 0])
+    if kind in ("encoder", "odometer"):
+        with pytest.raises(DataError, match="row 3"):
+            EncoderRecord(time, np.ma.stack([masked, masked], axis=1)) if kind == "encoder" else OdometerRecord(
+                time, masked
+            )
+    with pytest.raises(TruenorthError):
+        others(np.array(["a"] * 8), values)[kind]()
+
+
+CALLS = {
+    "align without a record": lambda: truenorth.align(None, PLACE, "navigation"),
+    "align at a text": lambda: truenorth.align(RECORD, "45 N", "navigation"),
+    "align with a number for an IMU": lambda: truenorth.align(RECORD, PLACE, 5),
+    "align with a list for an IMU": lambda: truenorth.align(RECORD, PLACE, ["navigation"]),
+    "align by no method": lambda: truenorth.align(RECORD, PLACE, "navigation", method="by eye"),
+    "align with a record for an aid": lambda: truenorth.align(RECORD, PLACE, "navigation", aid=RECORD),
+    "align with a text for an aid": lambda: truenorth.align(RECORD, PLACE, "navigation", aid=["gnss"]),
+    "align at no time": lambda: truenorth.align(RECORD, PLACE, "navigation", at=float("nan")),
+    "navigate from nothing": lambda: truenorth.navigate(RECORD, None),
+    "navigate from a text": lambda: truenorth.navigate(RECORD, "start"),
+    "navigate without a record": lambda: truenorth.navigate([1, 2], None),
+    "inspect a text": lambda: truenorth.inspect("log.csv"),
+    "inspect nothing": lambda: truenorth.inspect(None),
+    "read nothing": lambda: truenorth.read_imu(None),
+    "read a number": lambda: truenorth.read_imu(3.0),
+    "read bytes that are no path": lambda: truenorth.read_imu("\0"),
+    "save a number": lambda: truenorth.save(3, "out"),
+    "plot a text": lambda: truenorth.plot("x"),
+    "load a number": lambda: truenorth.load(3),
+    "a place of text": lambda: Position.from_degrees("45", "10"),
+    "a place of NaN": lambda: Position.from_degrees(float("nan"), 10.0),
+    "advise on nothing": lambda: truenorth.advise(None, PLACE, 0.01),
+    "a campaign of nothing": lambda: truenorth.run_campaign(None, io.StringIO()),
+    "a study of nothing": lambda: reproduce(None),
+    "simulate nothing": lambda: truenorth.simulate(None, rate=10.0, duration=1.0, imu="navigation"),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_wrong_types_are_errors_of_ours(call):
+    with in_time(), pytest.raises((TruenorthError, UsageError)):
+        CALLS[call]()
