@@ -15,8 +15,8 @@ import pytest
 
 import truenorth as tn
 from truenorth.formats import write_imu
-from truenorth.live.feeds import FEEDS
 from truenorth.live.journal import Journal
+from truenorth.live.known_feeds import FEEDS
 from truenorth.live.session import START, Session
 from truenorth.simulation.scenario import read_scenario
 

@@ -54,24 +54,34 @@ class Aids:
     odometer: Annotated[str | None, option("Source of an odometer's rows: CSV.")] = None
     velocity: Annotated[str | None, option("Source of a velocity log's rows: CSV; in navigation.")] = None
     baro: Annotated[str | None, option("Source of heights: CSV; in navigation.")] = None
+    master: Annotated[str | None, option("Source of another INS's solution on the same vehicle: CSV.")] = None
     lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up.")] = None
+    latency: Annotated[
+        float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
+    ] = None
 
     def sources(self) -> dict[str, str]:
         """By the key of the feed."""
-        found = {"gnss": self.gnss, "odometer": self.odometer, "velocity": self.velocity, "baro": self.baro}
-        return {key: text for key, text in found.items() if text is not None}
+        keys = ("gnss", "odometer", "velocity", "baro", "master")
+        return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
 
     def feeds(self) -> list[Feed]:
         """What keeps their rows."""
+        from dataclasses import replace
+
+        from truenorth.alignment.in_motion import usual_antenna
         from truenorth.cli.aiding_options import arm_of
-        from truenorth.live.feeds import FEEDS
-        from truenorth.state.mounting import Mounting
+        from truenorth.live.known_feeds import FEEDS
 
         found = [FEEDS[key]() for key in self.sources()]
+        antenna = usual_antenna(None)
         if self.lever_arm is not None:
-            for feed in found:
-                if feed.key == "gnss":
-                    feed.mounting = Mounting(lever_arm=arm_of(self.lever_arm, "--lever-arm"))
+            antenna = replace(antenna, lever_arm=arm_of(self.lever_arm, "--lever-arm"))
+        if self.latency is not None:
+            antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
+        for feed in found:
+            if feed.key == "gnss" and (self.lever_arm is not None or self.latency is not None):
+                feed.mounting = antenna
         return found
 
 

@@ -4,6 +4,7 @@ from truenorth.live.aligner import Aligner
 from truenorth.live.answer import Answer, Motion
 from truenorth.live.feeds import Feed, GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
 from truenorth.live.intake import Counts
+from truenorth.live.master_feed import MasterFeed
 from truenorth.live.navigator import Navigator
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "Feed",
     "GnssFeed",
     "HeightFeed",
+    "MasterFeed",
     "Motion",
     "Navigator",
     "OdometerFeed",

@@ -7,7 +7,7 @@ about the last solution, and sigma comes down with every ten seconds; on the mov
 the bit as long as the rows fit into memory one by one (see :mod:`.log`).
 
 With aiding sensors the regime is watched: as long as they say that the vehicle stays where it is, it is aligned as a base that
-stays; once they say that it moves, as a vehicle on the move, from all rows.
+stays; once they say that it moves, as a vehicle on the move, from all rows. A master INS aligns it from the first row on.
 """
 
 from __future__ import annotations
@@ -26,16 +26,18 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.alignment import Alignment, align
 from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.recipes import RECIPES
-from truenorth.core.attitude import euler_sigma
+from truenorth.core.attitude import angle_text, euler_sigma
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.live.answer import Answer, Motion
+from truenorth.live.answer import Answer, Motion, under_way
 from truenorth.live.carry import Carry
-from truenorth.live.feeds import FEEDS, Feed
+from truenorth.live.feeds import Feed, GnssFeed
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
+from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.navigator import Navigator
+from truenorth.live.reasons import reasons_of
 from truenorth.live.solving import Solving
 from truenorth.navigation.procedure import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
@@ -50,8 +52,8 @@ SHARE = 0.1  # of one core, for solutions
 SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "place", "imu", "method", "share", "feeds", "log", "intake", "left", "_gap_before", "failure", "solutions", "_solution",
-    "_carry", "_earlier", "_newest", "_due",
+    "place", "imu", "method", "share", "feeds", "log", "intake", "left", "_gap_before", "until_then", "failure", "solutions",
+    "_solution", "_carry", "_earlier", "_newest", "_due",
 )  # fmt: skip
 UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
@@ -103,6 +105,7 @@ class Aligner:
         self.intake = Intake()
         self.left: float | None = None
         self._gap_before = -np.inf  # s: the last gap before the base left
+        self.until_then = ""  # how well heading was known when it did
         self.failure = ""
         self.solutions = 0
         self._solution: Alignment | None = None
@@ -147,6 +150,10 @@ class Aligner:
         """Take an odometer's rows in, see :meth:`OdometerFeed.push`: speeds, m/s, unless `aid` holds another one."""
         self._feed("odometer").push(time, values)
 
+    def push_master(self, time: ArrayLike, C_nb: Any = None, v_n: Any = None, **more: Any) -> None:
+        """Take rows of a master INS in, see :meth:`MasterFeed.push`."""
+        self._feed("master").push(time, C_nb, v_n, **more)
+
     def push_velocity(self, time: ArrayLike, velocity: ArrayLike, sigma: ArrayLike | None = None) -> None:
         """Take a velocity log's rows in, see :meth:`VelocityFeed.push`: body axes, unless `aid` holds another one."""
         self._feed("velocity").push(time, velocity, sigma)
@@ -183,7 +190,7 @@ class Aligner:
             if now is not None:
                 return replace(
                     now, status=at.status if now.status == "navigated" else now.status, floor=np.asarray(at.euler_sigma_floor),
-                    reasons=(*self._reasons(at), *now.reasons), counts=self.intake.counts, left=self.left,
+                    reasons=(*reasons_of(self, at), *now.reasons), counts=self.intake.counts, left=self.left,
                 )  # fmt: skip
             time, C_nb, phi = at.time, at.C_nb, at.phi_covariance
             if carry is not None:
@@ -194,11 +201,11 @@ class Aligner:
                 sigma=euler_sigma(C_nb, phi),
                 floor=np.asarray(at.euler_sigma_floor),
                 status=at.status,
-                reasons=self._reasons(at),
+                reasons=reasons_of(self, at),
                 solution=at,
                 counts=self.intake.counts,
                 left=self.left,
-                motion=None if at.moving is None else Motion.of(at),
+                motion=Motion.of(at) if under_way(at) else None,
             )
 
     def finish(self) -> Alignment:
@@ -257,7 +264,7 @@ class Aligner:
         state = kept(path, "Aligner")
         found = cls(state["place"], state["imu"], background=background, share=state["share"], method=state["method"])
         vars(found).update(state)
-        if found._solution is not None and found._solution.moving is not None:
+        if found._solution is not None and under_way(found._solution):
             found._take_over(found._solution)
         return found
 
@@ -292,12 +299,18 @@ class Aligner:
                 continue
             carry.add(block)
             if self.left is None and carry.left is not None:
-                self.left, self._carry, self._earlier = carry.left, carry, None
-                self._solution, self._gap_before = carry.solution, self.log.last_gap
+                self._carry, self._earlier, self._solution = carry, None, carry.solution
+                self._leave(carry.left, carry.solution)
+
+    def _leave(self, time: float, solution: Alignment) -> None:
+        """The base has left its place."""
+        self.left, self._gap_before = time, self.log.last_gap
+        known = angle_text(float(solution.euler_sigma[0])) if solution.heading_known else "not at all"
+        self.until_then = f"heading was known to {known} (one sigma)"
 
     def _lost(self, found: Alignment | None) -> bool:
         """Whether a solution of a base that stays lies before a gap in the rows: what the base did in it, nobody knows."""
-        return found is not None and found.moving is None and found.time <= self.log.last_gap
+        return found is not None and not under_way(found) and found.time <= self.log.last_gap
 
     def _start_when_due(self) -> None:
         if not self._solving.free or self.duration < FIRST or self.log.end < self._due:
@@ -312,6 +325,9 @@ class Aligner:
 
     def _aids(self) -> list[Any]:
         """What aids an alignment on the move; nothing as long as the vehicle stays where it is, or no sensor says that it moves."""
+        master = self.feeds["master"].until(self.log.end) if "master" in self.feeds else None
+        if master is not None:
+            return [master]
         if all(feed.moves_from() is None for feed in self.feeds.values()):
             return []
         found = [feed.until(self.log.end) for feed in self.feeds.values()]
@@ -327,18 +343,9 @@ class Aligner:
         return self.log.record(since, until)
 
     def _solve(self, record: ImuRecord, aids: Sequence[Any]) -> Alignment:
-        place = self.place or (None if aids else self._place())
-        return align(record, place, self.imu, aid=list(aids), method=self.method)
-
-    def _place(self) -> Position | None:
-        """Of a vehicle that stays: the median of its fixes."""
         gnss = self.feeds.get("gnss")
-        fixes = np.empty((0, 3)) if gnss is None else gnss.rows[:, 1:4]
-        fixes = fixes[np.isfinite(fixes[:, :2]).all(axis=1)]
-        if not len(fixes):
-            return None
-        lat, lon, alt = np.median(np.nan_to_num(fixes), axis=0)
-        return Position(float(lat), float(lon), float(alt), 10.0, 20.0)
+        place = self.place or (gnss.place if isinstance(gnss, GnssFeed) and not aids else None)
+        return align(record, place, self.imu, aid=list(aids), method=self.method)
 
     def _collect(self) -> None:
         """Take over a solution that is ready."""
@@ -351,42 +358,25 @@ class Aligner:
         if found is None:
             return
         self.solutions += 1
-        if found.moving is not None or (self.left is None and not self._lost(found)):
+        if under_way(found) or (self.left is None and not self._lost(found)):
             self._take_over(found)
 
     def _take_over(self, found: Alignment) -> None:
         """Carry a new solution on: by the closed loop on the move, by the gyros alone on a base that stays."""
-        self._solution = found
-        if found.moving is not None:
+        before, self._solution = self._solution, found
+        if found.moving is not None and before is not None and not under_way(before) and self.left is None:
+            drives = [time for feed in self.feeds.values() if (time := feed.moves_from()) is not None]
+            self._leave(min(drives), before)
+        if under_way(found):
             self._carry = self._earlier = self._mover = None
             if found.heading_known:
                 self._mover = self._navigator(found)
         elif self._earlier is None or self._carry is None or self._carry.elapsed > SETTLED:
             self._earlier = self._carry
-        if found.moving is None:
+        if not under_way(found):
             self._carry = Carry(found, self.log.source_kind)
         for block in self._newest:
             if self._mover is not None:
                 self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
             if self._carry is not None:
                 self._carry.add(block)
-
-    def _reasons(self, at: Alignment) -> tuple[str, ...]:
-        more = []
-        if self.left is not None:
-            went_on = "alignment goes on in motion" if at.moving is not None else "carried on by the gyros"
-            more.append(
-                f"the base left its place at {self.left:.1f} s: the heading is that of the rows until then, {went_on}"
-            )
-        found = self.intake.counts.words()
-        if found:
-            more.append(found)
-        for key, feed in self.feeds.items():
-            if feed.left_out:
-                more.append(f"{key}: {feed.left_out} row{'s' * (feed.left_out > 1)} left out")
-        if self.log.merged > 1:
-            since = f", the last {self.duration / 3600.0:.1f} h count" if self.log.dropped else ""
-            more.append(f"the log is long: rows are kept as increments over {self.log.merged} of them{since}")
-        if self.failure:
-            more.append(self.failure)
-        return (*at.reasons, *more)

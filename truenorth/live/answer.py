@@ -39,9 +39,10 @@ class Motion:
     @classmethod
     def of(cls, found: Alignment) -> Motion:
         """At the epoch of an alignment on the move."""
-        assert found.moving is not None
-        at, sigma = found.position, np.sqrt(np.diag(found.moving.P))
-        return cls(found.moving.v_n, np.array([at.lat, at.lon, at.alt]), sigma[DV], sigma[DP])
+        state = found.moving or found.transfer
+        assert state is not None
+        at, sigma = found.position, np.sqrt(np.diag(state.P))
+        return cls(state.v_n, np.array([at.lat, at.lon, at.alt]), sigma[DV], sigma[DP])
 
     def summary(self) -> dict[str, Any]:
         """The part of :meth:`Answer.summary`."""
@@ -127,3 +128,8 @@ class Answer:
             "rows_left_out": self.counts.left_out,
             **({} if self.motion is None else self.motion.summary()),
         }
+
+
+def under_way(found: Alignment) -> bool:
+    """Whether an alignment holds for a vehicle that moves: it has a velocity."""
+    return found.moving is not None or found.transfer is not None

@@ -48,6 +48,7 @@ class Carry:
         self._window_start, self._velocity = alignment.time, np.zeros(3)
         self._quiet_at = alignment.time
         self._gone_since: float | None = None
+        self.left: float | None = None  # s: when the base began to leave its place; None as long as it stays
         self.going = None if alignment.ongoing is None else Going(alignment, kind)
 
     def add(self, rows: Array) -> None:
@@ -82,7 +83,7 @@ class Carry:
         self.time = float(rows[-1, 0])
         self._watch()
         if self.going is not None:
-            self.going.advance(self._quiet_at - MARGIN)
+            self.going.advance(self._quiet_at - MARGIN if self.left is None else self.left)
             if self.left is not None:
                 self.going.advance(self.time - MARGIN, measured=False)
 
@@ -115,13 +116,6 @@ class Carry:
         G = np.hstack([turn, -turn @ at.C_nb @ self._C_sum])
         return G @ P @ G.T + at.imu.gyro_random_walk**2 * self.elapsed * np.eye(3)
 
-    @property
-    def left(self) -> float | None:
-        """Time at which the base began to leave its place, s; None as long as it stays."""
-        if self._gone_since is None or self.time - self._gone_since < LASTING:
-            return None
-        return self._quiet_at - MARGIN
-
     def _turned(self, time: float) -> Array:
         """``C_n_n0``: the level frame now, seen from that of the epoch."""
         return earth_rotation(time - self.solution.time, self.solution.position.lat).T
@@ -142,5 +136,7 @@ class Carry:
             self._gone_since = None
         elif self._gone_since is None:
             self._gone_since = self.time
+        if self.left is None and self._gone_since is not None and self.time - self._gone_since >= LASTING:
+            self.left = self._quiet_at - MARGIN
         if span > WINDOW and self._gone_since is None:
             self._window_start, self._velocity = self.time, np.zeros(3)

@@ -7,7 +7,6 @@ at a time, as measurements for the closed loop.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.source import Aiding
+from truenorth.core.position import Position
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
 from truenorth.state.mounting import Mounting
 
@@ -41,6 +41,7 @@ class Feed(ABC):
     key: ClassVar[str]
     columns: ClassVar[tuple[str, ...]]
     says: ClassVar[tuple[str, ...]] = ()  # attributes that say what the columns mean
+    navigates: ClassVar[bool] = True  # whether it aids navigation, too
 
     def __init__(self, mounting: Mounting | None = None) -> None:
         self.mounting = mounting
@@ -158,7 +159,7 @@ def _rows_of(source: Aiding, rows: NDArray[np.intp]) -> dict[str, Any]:
     return {"time": source.time[rows], "measured": source.measured[rows], "sigma": source.sigma[rows]}
 
 
-def _table(time: ArrayLike, *values: tuple[ArrayLike | None, int]) -> Array:
+def table(time: ArrayLike, *values: tuple[ArrayLike | None, int]) -> Array:
     """Rows ``time, values``: each with its number of columns; None is absent."""
     times = np.atleast_1d(np.asarray(time, dtype=np.float64))
     parts = [
@@ -170,7 +171,8 @@ def _table(time: ArrayLike, *values: tuple[ArrayLike | None, int]) -> Array:
     return np.column_stack([times, *parts])
 
 
-def _or_none(values: Array) -> Array | None:
+def or_none(values: Array) -> Array | None:
+    """None where no number is there."""
     return values if np.isfinite(values).any() else None
 
 
@@ -199,7 +201,7 @@ class GnssFeed(Feed):
         """Take fixes in, see :class:`truenorth.GnssRecord`: radians, metres, east, north, up."""
         place = [(value, 1) for value in (lat, lon, alt)]
         rest = [(v_n, 3), (position_sigma, 3), (velocity_sigma, 3), (dop, 2), (quality, 1)]
-        self.add(_table(time, *place, *rest))
+        self.add(table(time, *place, *rest))
 
     def rows_of(self, record: GnssRecord) -> Array:
         """See :class:`Feed`."""
@@ -211,18 +213,16 @@ class GnssFeed(Feed):
             (record.dop, 2),
             (record.quality, 1),
         ]
-        return _table(record.time, *place, *rest)
+        return table(record.time, *place, *rest)
 
     def aid_of(self, rows: Array) -> Gnss:
         """See :class:`Feed`."""
         t = rows.T
         sigma, velocity_sigma, dop = (
-            _or_none(np.ascontiguousarray(rows[:, at : at + n])) for at, n in ((7, 3), (10, 3), (13, 2))
+            or_none(np.ascontiguousarray(rows[:, at : at + n])) for at, n in ((7, 3), (10, 3), (13, 2))
         )
-        v_n = _or_none(np.ascontiguousarray(rows[:, 4:7]))
-        record = GnssRecord(
-            t[0], t[1], t[2], t[3], v_n, sigma, velocity_sigma, dop, _or_none(t[15]), source="live GNSS"
-        )
+        v_n = or_none(np.ascontiguousarray(rows[:, 4:7]))
+        record = GnssRecord(t[0], t[1], t[2], t[3], v_n, sigma, velocity_sigma, dop, or_none(t[15]), source="live GNSS")
         return Gnss(record, self.mounting)
 
     def speed_of(self, rows: Array) -> Array:
@@ -235,6 +235,15 @@ class GnssFeed(Feed):
         sigma = np.fmax(np.hypot(rows[:, 7], rows[:, 8]), 1.0)
         away = np.hypot(*(place - np.median(fixes[:FIXED], axis=0)).T) > FAR + FAR_SIGMAS * sigma
         return np.where(np.isfinite(speed), speed, np.where(away, np.inf, 0.0))
+
+    @property
+    def place(self) -> Position | None:
+        """Of a vehicle that stays: the median of its fixes."""
+        fixes = self.rows[np.isfinite(self.rows[:, 1:3]).all(axis=1), 1:4]
+        if not len(fixes):
+            return None
+        lat, lon, alt = np.median(np.nan_to_num(fixes), axis=0)
+        return Position(float(lat), float(lon), float(alt), 10.0, 20.0)
 
     @staticmethod
     def _metres(rows: Array) -> Array:
@@ -276,12 +285,12 @@ class OdometerFeed(Feed):
 
     def push(self, time: ArrayLike, values: ArrayLike) -> None:
         """Take rows in: of the interval that ends at each time, or speeds."""
-        self.add(_table(time, (values, 1)))
+        self.add(table(time, (values, 1)))
 
     def rows_of(self, record: OdometerRecord) -> Array:
         """See :class:`Feed`."""
         self.kind, self.pulse_size, self.signed = record.kind, record.pulse_size, record.signed
-        return _table(record.time, (record.values, 1))
+        return table(record.time, (record.values, 1))
 
     def aid_of(self, rows: Array) -> Odometer:
         """See :class:`Feed`."""
@@ -321,18 +330,18 @@ class VelocityFeed(Feed):
 
     def push(self, time: ArrayLike, velocity: ArrayLike, sigma: ArrayLike | None = None) -> None:
         """Take rows in: right, forward, up, or east, north, up; NaN where an axis is not measured."""
-        self.add(_table(time, (velocity, 3), (sigma, 3)))
+        self.add(table(time, (velocity, 3), (sigma, 3)))
 
     def rows_of(self, record: VelocityRecord) -> Array:
         """See :class:`Feed`."""
         self.frame = record.frame
-        return _table(record.time, (record.velocity, 3), (record.sigma, 3))
+        return table(record.time, (record.velocity, 3), (record.sigma, 3))
 
     def aid_of(self, rows: Array) -> VelocityLog:
         """See :class:`Feed`."""
         velocity, sigma = (np.ascontiguousarray(rows[:, at : at + 3]) for at in (1, 4))
         return VelocityLog(
-            VelocityRecord(rows[:, 0], velocity, self.frame, _or_none(sigma), "live velocity"), self.mounting
+            VelocityRecord(rows[:, 0], velocity, self.frame, or_none(sigma), "live velocity"), self.mounting
         )
 
     def speed_of(self, rows: Array) -> Array:
@@ -348,19 +357,16 @@ class HeightFeed(Feed):
 
     def push(self, time: ArrayLike, alt: ArrayLike, sigma: ArrayLike | None = None) -> None:
         """Take heights in, m."""
-        self.add(_table(time, (alt, 1), (sigma, 1)))
+        self.add(table(time, (alt, 1), (sigma, 1)))
 
     def rows_of(self, record: HeightRecord) -> Array:
         """See :class:`Feed`."""
-        return _table(record.time, (record.alt, 1), (record.sigma, 1))
+        return table(record.time, (record.alt, 1), (record.sigma, 1))
 
     def aid_of(self, rows: Array) -> Barometer:
         """See :class:`Feed`."""
-        return Barometer(HeightRecord(rows[:, 0], rows[:, 1], _or_none(rows[:, 2]), "live barometer"), self.mounting)
+        return Barometer(HeightRecord(rows[:, 0], rows[:, 1], or_none(rows[:, 2]), "live barometer"), self.mounting)
 
     def speed_of(self, rows: Array) -> Array:
         """Says nothing of motion."""
         return np.full(len(rows), np.nan)
-
-
-FEEDS: dict[str, Callable[..., Feed]] = {feed.key: feed for feed in (GnssFeed, OdometerFeed, VelocityFeed, HeightFeed)}

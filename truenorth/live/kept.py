@@ -12,9 +12,9 @@ from truenorth.core.archive import read_archive, write_archive
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError
 from truenorth.live.carry import Carry
-from truenorth.live.feeds import FEEDS
 from truenorth.live.going import Going
 from truenorth.live.intake import Intake
+from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import Log
 from truenorth.live.past import Past
 

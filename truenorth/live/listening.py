@@ -19,13 +19,19 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
-from truenorth.formats import read_gnss, read_height, read_odometer, read_velocity
+from truenorth.formats import read_gnss, read_height, read_master, read_odometer, read_velocity
 from truenorth.live.feeds import Feed
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 
 Array = NDArray[np.float64]
 
-READERS: dict[str, Any] = {"gnss": read_gnss, "odometer": read_odometer, "velocity": read_velocity, "baro": read_height}
+READERS: dict[str, Any] = {
+    "gnss": read_gnss,
+    "odometer": read_odometer,
+    "velocity": read_velocity,
+    "baro": read_height,
+    "master": read_master,
+}
 DAY = 86400.0
 BEFORE = 2  # lines: a total of counts needs one before, a record two rows
 PLACE, MOTION = ("GGA",), ("RMC", "VTG")

@@ -94,8 +94,8 @@ class Navigator:
         self.start, self.spec, self._imu_source = start_of(start, imu)
         self._given, self._imu = start, imu
         self.solution = start if isinstance(start, Alignment) else None
-        self.feeds, self._mountings = {feed.key: feed for feed in feeds}, mountings or {}
-        dummies: dict[str, Aid] = {feed.key: feed.aid_of(feed.dummy()) for feed in feeds}
+        self.feeds, self._mountings = {feed.key: feed for feed in feeds if feed.navigates}, mountings or {}
+        dummies: dict[str, Aid] = {key: feed.aid_of(feed.dummy()) for key, feed in self.feeds.items()}
         self.altitude, self._why = kept_altitude(altitude, dummies)
         self.intake, self.log = Intake(), Log(kind, most_rows)
         self.output = output
@@ -107,7 +107,7 @@ class Navigator:
         self._state: LoopState | None = None
         self._interval = 0.0
         self._loop_end = self.start.time
-        self._sent: dict[str, dict[str, float]] = {feed.key: {} for feed in feeds}
+        self._sent: dict[str, dict[str, float]] = {key: {} for key in self.feeds}
         self._gaps: list[tuple[float, float]] = []
         self._lock = threading.Lock()
 

@@ -1,0 +1,12 @@
+"""The feeds that there are, by their keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from truenorth.live.feeds import Feed, GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
+from truenorth.live.master_feed import MasterFeed
+
+FEEDS: dict[str, Callable[..., Feed]] = {
+    feed.key: feed for feed in (GnssFeed, OdometerFeed, VelocityFeed, HeightFeed, MasterFeed)
+}

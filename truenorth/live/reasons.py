@@ -1,0 +1,31 @@
+"""What there is to say of an alignment that runs: of the last solution, and of the rows since."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from truenorth.alignment import Alignment
+from truenorth.live.answer import under_way
+
+if TYPE_CHECKING:
+    from truenorth.live.aligner import Aligner
+
+
+def reasons_of(run: Aligner, at: Alignment) -> tuple[str, ...]:
+    """The verdict of the last solution `at` in words, then what became of base, rows and log."""
+    more = []
+    if run.left is not None:
+        went_on = "alignment goes on in motion" if under_way(at) else "the gyros carry it on"
+        more.append(f"the base left its place at {run.left:.1f} s: {run.until_then} until then, {went_on}")
+    found = run.intake.counts.words()
+    if found:
+        more.append(found)
+    for key, feed in run.feeds.items():
+        if feed.left_out:
+            more.append(f"{key}: {feed.left_out} row{'s' * (feed.left_out > 1)} left out")
+    if run.log.merged > 1:
+        since = f", the last {run.duration / 3600.0:.1f} h count" if run.log.dropped else ""
+        more.append(f"the log is long: rows are kept as increments over {run.log.merged} of them{since}")
+    if run.failure:
+        more.append(run.failure)
+    return (*at.reasons, *more)
