@@ -69,7 +69,7 @@ class Aids:
         """What keeps their rows."""
         from dataclasses import replace
 
-        from truenorth.alignment.in_motion import usual_antenna
+        from truenorth.alignment.in_motion_task import usual_antenna
         from truenorth.cli.aiding_options import arm_of
         from truenorth.live.known_feeds import FEEDS
 
