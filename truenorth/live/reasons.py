@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from truenorth.alignment import Alignment
 from truenorth.live.answer import under_way
+from truenorth.live.feeds import Feed
+from truenorth.live.intake import Intake
+from truenorth.live.log import Log
 
-if TYPE_CHECKING:
-    from truenorth.live.aligner import Aligner
+
+class _Run(Protocol):
+    """What an aligner knows of its rows."""
+
+    left: float | None
+    until_then: str
+    intake: Intake
+    feeds: dict[str, Feed]
+    log: Log
+    failure: str
+
+    @property
+    def duration(self) -> float: ...
 
 
-def reasons_of(run: Aligner, at: Alignment) -> tuple[str, ...]:
+def reasons_of(run: _Run, at: Alignment) -> tuple[str, ...]:
     """The verdict of the last solution `at` in words, then what became of base, rows and log."""
     more = []
     if run.left is not None:
