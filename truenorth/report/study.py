@@ -31,10 +31,6 @@ def study_page(
     table : DataFrame
         Every figure.
     """
-    settled = Counter(claim.verdict for claim in study.claims)
-    summary = _("Of {count} claims: {verdicts}.").format(
-        count=len(study.claims), verdicts=", ".join(f"{number} {_(verdict)}" for verdict, number in settled.items())
-    )
 
     def drawn(names: Sequence[str]) -> list[tuple[str, str, str]]:
         return [(n.replace("_", " "), study.captions.get(n, ""), _inline(study.drawings[n])) for n in names]
@@ -46,7 +42,7 @@ def study_page(
         "study.html",
         interactive=False,
         study=study,
-        summary=summary,
+        summary=_summary(study.claims),
         beside="" if beside.empty else _html(beside),
         of_paper=drawn(of_paper),
         more=drawn(more),
@@ -58,7 +54,18 @@ def study_page(
 def index_page(studies: Mapping[str, Any]) -> str:
     """HTML text of one page with every claim of every study, each linked to ``NAME/report.html``."""
     contents = [_("Verdict"), *(study.title for study in studies.values())]
-    return render("studies.html", interactive=False, studies=studies, contents=contents)
+    summaries = {name: _summary(study.claims) for name, study in studies.items()}
+    every = _summary([claim for study in studies.values() for claim in study.claims])
+    return render(
+        "studies.html", interactive=False, studies=studies, contents=contents, summary=every, summaries=summaries
+    )
+
+
+def _summary(claims: Sequence[Any]) -> str:
+    """How many of the claims have which verdict."""
+    settled = Counter(claim.verdict for claim in claims)
+    verdicts = ", ".join(f"{number} {_(verdict)}" for verdict, number in settled.items())
+    return _("Of {count} claims: {verdicts}.").format(count=len(claims), verdicts=verdicts)
 
 
 def _spelt(name: str) -> str:
