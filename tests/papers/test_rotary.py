@@ -19,7 +19,7 @@ BARS = {120.0: 0.35, 250.0: 0.1, 600.0: 0.03}
 
 @pytest.fixture(scope="module")
 def run_a():
-    return work("A", 11, "per_sample", ("coarse", "filters", "sweeps", "pipeline", "whole"), (250.0, 600.0), 0)
+    return work("A", 11, "per_sample", ("coarse", "filters", "R", "pipeline", "whole"), (250.0, 600.0), 0)
 
 
 def phi(results, *key):

@@ -89,12 +89,13 @@ class Results:
 
 
 def work(case: str, seed: int, noise: Noise, parts: Sequence[str], times: Sequence[float], run: int) -> Results:
-    """One run; `parts` of coarse, filters (with the first arm velocity kept too), sweeps, kf alone, pipeline, whole."""
+    """One run; `parts` of coarse, filters (also with the first arm velocity kept), sweeps or one by name, kf, pipeline, whole."""
     data = simulate_run(case, run, seed, noise)
     results = Results()
     if "coarse" in parts:
         results.coarse = coarse_errors(data, sample(data, data.record.between(None, LAST + 1.5), SOURCES))
-    if {"filters", "kf", "pipeline", "sweeps"} & set(parts):
+    sweeps = [sweep for sweep in SWEEPS if "sweeps" in parts or sweep.name in parts]
+    if sweeps or {"filters", "kf", "pipeline"} & set(parts):
         stage = _Stage(data)
         if "filters" in parts:
             _filters(stage, case, results, MEAN_START)
@@ -102,15 +103,14 @@ def work(case: str, seed: int, noise: Noise, parts: Sequence[str], times: Sequen
             _filters(stage, "lever_arm_at_t1_kept", results, MEAN_START, keep_first=True)
         if "kf" in parts:
             _filters(stage, case, results, MEAN_START, ("kf",))
-        if "sweeps" in parts:
-            for sweep in SWEEPS:
-                for value in sweep.values:
-                    at: _Stage = stage
-                    options: dict[str, Any] = {sweep.name: np.radians(value) if sweep.name == "P0" else value}
-                    if sweep.name == "signs":
-                        signs, options = round(options.pop("signs")), {}
-                        at = _Stage(simulate_run(case, run, seed, noise, signs)) if signs else stage
-                    _filters(at, sweep.case_of(value), results, MEAN_START, **options)
+        for sweep in sweeps:
+            for value in sweep.values:
+                at: _Stage = stage
+                options: dict[str, Any] = {sweep.name: np.radians(value) if sweep.name == "P0" else value}
+                if sweep.name == "signs":
+                    signs, options = round(options.pop("signs")), {}
+                    at = _Stage(simulate_run(case, run, seed, noise, signs)) if signs else stage
+                _filters(at, sweep.case_of(value), results, MEAN_START, **options)
         if "pipeline" in parts:
             _filters(stage, case, results, results.coarse["triad", "gyros"], ("kf_two_pass",), passes=2)
     if "whole" in parts:
