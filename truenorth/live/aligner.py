@@ -56,6 +56,8 @@ KEPT = (
     "_solution", "_carry", "_earlier", "_newest", "_due",
 )  # fmt: skip
 UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
+BLOCK = 256  # rows, up to which blocks of the newest rows are put together
+BACK = 10.0  # s before a solution's end, from which its filter may need rows
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
 
 
@@ -288,7 +290,10 @@ class Aligner:
         if self._lost(self._solution) and self.log.end - self.log.start > LATE:
             self._solution = self._carry = self._earlier = None
             self._due = -np.inf
-        self._newest.append(block)
+        if self._newest and len(self._newest[-1]) + len(block) <= BLOCK:
+            self._newest[-1] = np.vstack([self._newest[-1], block])
+        else:
+            self._newest.append(block)
         oldest = min(self.log.end - RECENT, self._newest_in)
         while self._newest[0][-1, 0] < oldest:
             self._newest.popleft()
@@ -376,6 +381,8 @@ class Aligner:
         if not under_way(found):
             self._carry = Carry(found, self.log.source_kind)
         for block in self._newest:
+            if block[-1, 0] < found.time - BACK:
+                continue
             if self._mover is not None:
                 self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
             if self._carry is not None:
