@@ -60,6 +60,7 @@ WORDS = {
         f"master_phi_{axis}": f"master's attitude error about {side}"
         for axis, side in zip("ENU", ("east", "north", "up"))
     },
+    **{f"skew_{axis}": f"gyros turned about {axis}" for axis in "xyz"},
     "tau": "delay",
     "r_right": "lever arm right",
     "r_forward": "lever arm forward",

@@ -6,6 +6,7 @@
 | `ARM` | lever arm from the master to the slave, slave axes: true minus assumed | m |
 | `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
+| `SKEW` | misalignment of the slave's gyros as a whole, slave axes | rad |
 | `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: constants that wander | m/s, rad |
 
 (The mounting stands in the *master's* axes, in which it does not turn with what is estimated: in the slave's axes the filter would
@@ -19,22 +20,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.attitude import cross, times
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
-from truenorth.errors.group import Group
+from truenorth.errors.group import Group, columns
 from truenorth.errors.ins import TURN_TIME
 from truenorth.errors.model import InsModel
 from truenorth.errors.walks import Walks
 from truenorth.state.layout import BA, BG, DP, DV, PHI, Layout
+from truenorth.state.now import NOW_C, NOW_MEAN_RATE, matrix_of, vector_of
 
 Array = NDArray[np.float64]
 
 DELAY, ARM, MOUNTING, FLEXURE = "master delay", "master lever arm", "mounting", "flexure"
 VELOCITY_ERROR, ATTITUDE_ERROR = "master velocity error", "master attitude error"
+SKEW = "gyro skew"
 SIDES = ("right", "forward", "up")
 PLACE_SIGMA = 10.0  # m: the slave's place is set to the master's, its error moves attitude by parts in a million
 _OF_GROUPS = {
@@ -44,6 +49,7 @@ _OF_GROUPS = {
     FLEXURE: (tuple(f"theta_{axis}" for axis in "xyz") + tuple(f"theta'_{axis}" for axis in "xyz"), "rad"),
     VELOCITY_ERROR: (tuple(f"master_dv_{axis}" for axis in "ENU"), "m/s"),
     ATTITUDE_ERROR: (tuple(f"master_phi_{axis}" for axis in "ENU"), "rad"),
+    SKEW: (tuple(f"skew_{axis}" for axis in "xyz"), "rad"),
 }
 _OF_INS = (
     ("phi", "ENU", "rad"),
@@ -52,6 +58,17 @@ _OF_INS = (
     ("eps", "xyz", "rad/s"),
     ("nabla", "xyz", "m/s^2"),
 )
+
+
+@columns
+def _skewed(now: Any, figures: Any, first: int, assumed: Any, F: Any) -> None:
+    """``phi' = -C (s x w)``: gyros whose axes are turned by s against the case measure ``w + s x w``."""
+    w = vector_of(now, NOW_MEAN_RATE)
+    for j in range(3):
+        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
+        turn = times(matrix_of(now, NOW_C), cross(e, w))
+        for i in range(3):
+            F[i, first + j] = -turn[i]
 
 
 @dataclass(frozen=True)
@@ -178,6 +195,7 @@ class TransferModel(Walks):
     flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
     flexure_beta: float = 1.0  # rad/s; natural frequency of its critically damped processes
     master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
+    misalignment: float = 0.0  # rad; of the gyros' axes: what turns them all alike is a group, the rest noise in turns
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -198,6 +216,8 @@ class TransferModel(Walks):
             found.append(Group(MOUNTING, np.zeros(3), rotation=True, unit="rad"))
         if any(self.flexure_sigma):
             found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
+        if self.misalignment > 0.0:
+            found.append(Group(SKEW, np.full(3, self.misalignment), acts=_skewed, unit="rad"))
         rate = math.sqrt(2.0 / of.correlation_time)
         if of.velocity > 0.0 or of.velocity_drift > 0.0:
             sigma, walk = np.full(3, math.hypot(of.velocity, of.velocity_drift)), rate * of.velocity_drift
