@@ -112,7 +112,7 @@ def model_from_spec(
         flexure_sigma=sigma,
         flexure_beta=beta,
         master=master or MasterErrors(),
-        misalignment=spec.gyro_misalignment if attitude else 0.0,
+        misalignment=spec.gyro_misalignment if attitude and assumed.mounting_sigma > 0.0 else 0.0,
     )
 
 
