@@ -49,4 +49,5 @@ def test_every_case_has_a_name_of_its_own():
 def test_sigma_is_honest(case):
     """No run beyond four sigmas with a good status, no sigma that is too small, few refusals; eight worlds each."""
     line = run_case(case, 7, RUNS)
+    print(as_markdown([line]).splitlines()[-1])  # shown with -rP
     assert line.mark in ("ok", "large"), line.cells()

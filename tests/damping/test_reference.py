@@ -100,6 +100,16 @@ def test_rows_between_epochs_are_compared_at_their_own_times(frame):
     assert np.nanmax(np.abs(near.velocity - coarse.v_n[:, :2])) < 0.1  # at the ends of turns outliers are left out
 
 
+def test_a_swing_is_not_late():
+    """INS and log differ by a swing of 6 m/s; rows every 4 s, epochs every 8 s: two rows' mean is 2 s old, .015 m/s."""
+    _, truth = passage(np.random.default_rng(4), 2.0, turns=False)
+    swing = 6.0 * np.sin(truth.time / 806.0)[:, None] * [1.0, -1.0]
+    v = truth.v_n.copy()
+    v[:, :2] -= swing
+    found = reference_of(truth.every(2), VelocityRecord(truth.time, v, "navigation"), LogErrors(), truth)
+    assert np.abs(found.velocity - v[::2, :2])[2:-2].max() < 1.5e-3
+
+
 def test_a_fix_in_a_turn_holds_at_its_own_time():
     """Of the true course, with epochs every 8 s and a turn of 1 deg/s: place and heading between epochs, to .5 m and .1 deg."""
     _, truth = passage(np.random.default_rng(4), 2.0)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -233,7 +233,13 @@ class _Stream:
 
 
 def run_filters(
-    course: Course, reference: Array, *, start: int, kinds: Mapping[str, Filter], workers: int = 1
+    course: Course,
+    reference: Array,
+    *,
+    start: int,
+    kinds: Mapping[str, Filter],
+    workers: int = 1,
+    about: Array | None = None,
 ) -> dict[str, Estimate]:
     """Run filters over a course, all switched on at one epoch.
 
@@ -249,6 +255,9 @@ def run_filters(
         smooths, as in the paper.
     workers : int
         Threads; filter 2 follows filter 1, the others are free.
+    about : (K+1-start, 7) array, optional
+        Errors as they are known already: the dynamics are taken midway between the computed course and the one without them, and
+        what the log shows, which is linear in the true velocity, on the one without them. No filter then re-linearises.
 
     Raises
     ------
@@ -259,6 +268,8 @@ def run_filters(
         raise UsageError("filter2 is on the velocity that filter1 smooths; expected both, or another name for it alone")
     if not 0 <= start < course.epochs:
         raise UsageError(f"start at epoch {start}; expected 0 to {course.epochs - 1}")
+    if about is not None:
+        kinds = {name: replace(kind, relinearise=False) for name, kind in kinds.items()}
     streams = {name: _Stream(kind, course, start) for name, kind in kinds.items()}
     z = course.v_n[:, :2] - reference
     interval = course.interval
@@ -283,6 +294,10 @@ def run_filters(
             end = min(begin + BLOCK, course.epochs)
             part = course.between(begin, end)
             linear = None if stream.kind.relinearise else part.linearise(stream.kind.model)
+            if about is not None:
+                known = about[begin - start : end - start + 1]
+                linear = part.corrected(0.5 * known).linearise(stream.kind.model)
+                part = part.corrected(known)
             if stream.lag:
                 stream.feed(part, change(z, stream, begin, end, start), linear)
             else:

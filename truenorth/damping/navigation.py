@@ -293,7 +293,9 @@ def _damped(
     assert reference is not None  # checked before
     if damper.method == "augmented":
         kinds = {"augmented": replace(whole, gate=GATE)}
-        estimate = run_filters(course, reference.velocity, start=start, kinds=kinds)["augmented"]
+        first = run_filters(course, reference.velocity, start=start, kinds=kinds)["augmented"]
+        again = run_filters(course, reference.velocity, start=start, kinds=kinds, about=first.x[:, MOTION])
+        estimate = again["augmented"]
         x[start:] = estimate.x[:, MOTION]
         return _Found(x, None, estimate, None)
     model = MarineModel.from_spec(spec)

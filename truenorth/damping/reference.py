@@ -113,9 +113,11 @@ def reference_of(course: Course, record: VelocityRecord, errors: LogErrors, fine
     count = np.bincount(nearest, minlength=course.epochs + 1)
     mean = np.full((course.epochs + 1, 2), np.nan)
     full = count > 0
+    times = np.bincount(nearest, record.time[inside], minlength=course.epochs + 1)[full] / count[full]
     for axis in range(2):
         total = np.bincount(nearest, v_n[:, axis] - velocity[:, axis], minlength=course.epochs + 1)
-        mean[full, axis] = course.v_n[full, axis] - total[full] / count[full]
+        off = _on_epochs(total[full] / count[full], times, course.time[full], T)
+        mean[full, axis] = course.v_n[full, axis] - off
     given = None
     if record.sigma is not None:
         known = record.sigma[inside][np.isfinite(record.sigma[inside])]
@@ -133,6 +135,15 @@ def change_of(course: Course, errors: LogErrors) -> Array:
     rows = log_rows(groups, course.C_nb, course.v_n)
     own = np.concatenate([np.zeros(0), *(group.prior for group in groups)])
     return np.asarray(np.sqrt(((rows[after] - rows[before]) ** 2 @ own**2).max(axis=1)))
+
+
+def _on_epochs(off: Array, times: Array, epochs: Array, interval: float) -> Array:
+    """Means of rows, carried from their mean times to the epochs by the median slope of two minutes, free of jumps and outliers."""
+    if len(off) < FEWEST or np.abs(times - epochs).max() < 1e-6:
+        return off
+    n = max(FEWEST, round(2.0 * MINUTE / interval)) | 1
+    slope = _running_median(np.diff(off) / np.diff(times), n)
+    return np.asarray(off + np.append(slope, slope[-1]) * (epochs - times))
 
 
 def cleaned(
