@@ -49,8 +49,10 @@ def whole_log(end, record):
     return replace(system, R=system.R + np.diag(end.R - QUIETEST_BASE**2))
 
 
-@pytest.mark.parametrize("method", ["kalman", "swaying"])
-def test_it_is_the_filter_of_the_whole_log_about_the_same_nominal_solution(record, method):
+@pytest.mark.parametrize(("method", "kind"), [("kalman", "increments"), ("kalman", "rates"), ("swaying", "increments")])
+def test_it_is_the_filter_of_the_whole_log_about_the_same_nominal_solution(record, method, kind):
+    scale = 1.0 if kind == "increments" else 1.0 / record.interval
+    record = replace(record, gyro=scale * record.gyro, accel=scale * record.accel, kind=kind)
     end = align(record.between(None, FIRST), PLACE, "navigation", method=method).ongoing
     went_on = after(end, record)
     assert went_on.disturbed == 0
