@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,29 +13,37 @@ from numpy.typing import NDArray
 from truenorth.aiding.fixes import Fixes
 from truenorth.core import earth
 from truenorth.core.errors import DataError, UsageError
-from truenorth.damping.bands import Bands, filter_bands, network_bands
+from truenorth.damping.answer import (
+    Found,
+    LogOn,
+    corrected,
+    even,
+    history_of,
+    lines_of,
+    residuals_of,
+    spectrum_of,
+    switched,
+)
+from truenorth.damping.bands import filter_bands, network_bands
 from truenorth.damping.course import Course
 from truenorth.damping.drift import likely_drift
-from truenorth.damping.filters import Estimate, Filter, FixRows, Fusion, run_filters
+from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, first_order, second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import LEAST_NOISE, Reference, reference_of
-from truenorth.damping.result import Damping, LogHistory
-from truenorth.damping.spectrum import Spectrum, schuler_lines, spectrum
-from truenorth.damping.switching import Switching, switching
+from truenorth.damping.result import Damping
+from truenorth.damping.switching import switching
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors, log_errors, log_rows
-from truenorth.errors.marine import BA, BG, MOTION, OF_INS, STATES, MarineModel
+from truenorth.errors.marine import MOTION, OF_INS, STATES, MarineModel
 from truenorth.navigation.result import Navigation, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence, residual_evidence
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state import layout as ins
 from truenorth.state.evidence import Evidence, contradiction, note
 from truenorth.state.limits import limit
-from truenorth.state.track import Residuals
 
 if TYPE_CHECKING:
     from truenorth.aiding.aids import VelocityLog
@@ -46,10 +54,7 @@ Array = NDArray[np.float64]
 
 GATE = 1.0 - 1e-6  # with which a good row passes: one in six days at 1 Hz is lost
 WINDOW = 5.0  # s, of filter 2
-LEVELLED = "levelled velocity log"  # its residuals, east and north
 LEAST_WALK = 1e-5  # m/s/sqrt(s), of an IMU without noise
-SHORTEST = 16  # epochs of a spectrum
-LEVEL = OF_INS[MOTION]
 
 
 def damp_navigation(
@@ -102,7 +107,7 @@ def damp_navigation(
         raise UsageError(f"fixes with damping {damper.method}; expected damping augmented, whose filter can weigh them")
     if strange := [group.name for group in others if group.name != DEFLECTION]:
         raise UsageError(f"damping with error states {', '.join(strange)}; expected {DEFLECTION!r} alone")
-    track = _even(result.track)
+    track = even(result.track)
     course = _course(track)
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
@@ -114,15 +119,15 @@ def damp_navigation(
             f"damping begins {damper.start:g} s after {course.time[0]:.1f} s, the log ends at {course.time[-1]:.1f} s; expected an "
             "earlier start"
         )
-    finest = course if fine is None else _course(_even(fine))
-    log = _Log(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity, finest)
+    finest = course if fine is None else _course(even(fine))
+    log = LogOn(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity, finest)
     errors, evidence = _with_drift(course, track, log, spec, others, start)
     whole = replace(_whole(track, log, errors, spec, others, start), fixes=_fixes_on(course, finest, fixes, start))
     found = _damped(course, log.reference, spec, damper, start, whole, errors, track)
     damped = course.corrected(found.x)
     seen = slice(start, None)
     base = 0.0 if log.reference is None else log.reference.velocity[seen]
-    spectra = [_spectrum(c.v_n[seen, :2] - base, course.interval) for c in (course, damped)]
+    spectra = [spectrum_of(c.v_n[seen, :2] - base, course.interval) for c in (course, damped)]
     network = damper.method in ("none", "internal", "external")
     report = Damping(
         damper=damper,
@@ -130,16 +135,16 @@ def damp_navigation(
         reference=log.reference,
         before=spectra[0],
         after=spectra[1],
-        lines=_lines(course.v_n[seen, :2] - base, course.interval),
+        lines=lines_of(course.v_n[seen, :2] - base, course.interval),
         modes=tuple(eigenvalues(course, _loop(damper), course.epochs // 2)) if network else (),
         rejected=0 if found.estimate is None else found.estimate.rejected,
         length=float(course.time[-1] - course.time[start]),
         time=course.time[start:],
         switching=found.switching,
-        log=_history(course, found.estimate, whole.model.groups) if damper.method == "augmented" else None,
+        log=history_of(course, found.estimate, whole.model.groups) if damper.method == "augmented" else None,
         weight=None if found.estimate is None else found.estimate.weight,
     )
-    residuals = _residuals(course, log, damped, found, start)
+    residuals = residuals_of(course, log, damped, found, start)
     evidence = [*result.evidence, *evidence]
     if log.reference is not None:
         evidence += log.reference.evidence()
@@ -147,9 +152,9 @@ def damp_navigation(
             evidence += _contradiction(course, log.reference, track.sigma[:, 3:5], log.errors, start)
     evidence += [] if not report.rejected else [note("log.rejected", count=report.rejected)]
     if found.switching is not None and found.switching.switches:
-        evidence.append(_switched(found.switching, course.time))
+        evidence.append(switched(found.switching, course.time))
     if damper.method != "none":
-        track = _corrected(track, damped, found, start)
+        track = corrected(track, damped, found, start)
         track = replace(track, residuals=tuple(residuals))
     if damper.method == "augmented":
         evidence += innovation_evidence(residuals, last_sigma(track))
@@ -158,27 +163,10 @@ def damp_navigation(
     return judged_navigation(replace(result, track=track, damping=report), evidence)
 
 
-class _Log(NamedTuple):
-    """A speed log on a course: what it says, what it may be wrong by, and whether the INS has turned it."""
-
-    reference: Reference | None
-    errors: LogErrors
-    turned: bool
-
-
-class _Found(NamedTuple):
-    """Errors (K+1, 7), their bands from the switch on, the filter's estimate where it is one, switches where there are some."""
-
-    x: Array
-    bands: Bands | None
-    estimate: Estimate | None
-    switching: Switching | None
-
-
-def _log_on(course: Course, velocity: VelocityLog, seen: Course) -> _Log:
+def _log_on(course: Course, velocity: VelocityLog, seen: Course) -> LogOn:
     record = _mounted(velocity.record, velocity.mounting)
     errors = log_errors(velocity.errors, record.frame)
-    return _Log(reference_of(course, record, errors, seen), errors, record.frame == "body")
+    return LogOn(reference_of(course, record, errors, seen), errors, record.frame == "body")
 
 
 def _fixes_on(course: Course, seen: Course, fixes: Fixes, start: int) -> FixRows | None:
@@ -206,7 +194,7 @@ def _fixes_on(course: Course, seen: Course, fixes: Fixes, start: int) -> FixRows
 
 
 def _with_drift(
-    course: Course, track: Track, log: _Log, spec: ImuSpec, others: Sequence[Group], start: int
+    course: Course, track: Track, log: LogOn, spec: ImuSpec, others: Sequence[Group], start: int
 ) -> tuple[LogErrors, list[Evidence]]:
     """Errors of the log; a drift of which nobody knows how long it lasts is found."""
     errors = log.errors
@@ -219,7 +207,7 @@ def _with_drift(
     return found, [note("log.drifts", drift=found.drift, hours=found.time / 3600.0)]
 
 
-def _whole(track: Track, log: _Log, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
+def _whole(track: Track, log: LogOn, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
     """All errors of INS and log at the switch."""
     model = MarineModel.from_spec(spec, (*errors.groups(), *others))
     places, rows = list(range(STATES)), OF_INS.tolist()
@@ -283,11 +271,11 @@ def _damped(
     whole: Filter,
     errors: LogErrors,
     track: Track,
-) -> _Found:
+) -> Found:
     x = np.zeros((course.epochs + 1, MOTION.stop))
     rest = course.between(start, course.epochs)
     if damper.method == "none":
-        return _Found(x, None, None, None)
+        return Found(x, None, None, None)
     if damper.method in ("internal", "external"):
         return _by_network(course, rest, reference, damper, start, whole, track)
     assert reference is not None  # checked before
@@ -297,7 +285,7 @@ def _damped(
         again = run_filters(course, reference.velocity, start=start, kinds=kinds, about=first.x[:, MOTION])
         estimate = again["augmented"]
         x[start:] = estimate.x[:, MOTION]
-        return _Found(x, None, estimate, None)
+        return Found(x, None, estimate, None)
     model = MarineModel.from_spec(spec)
     one = Filter(model, whole.P0[:STATES, :STATES], reference.noise, relinearise=True)
     two = None if damper.method == "kalman" else change_filter(one, errors, course.interval)
@@ -312,7 +300,7 @@ def _damped(
         estimate = fused
     x[start:] = estimate.x[:, MOTION]
     absent = np.asarray(np.isnan(reference.velocity[start:]).any(axis=1))
-    return _Found(x, filter_bands(rest, whole, one, two, known, absent), estimate, None)
+    return Found(x, filter_bands(rest, whole, one, two, known, absent), estimate, None)
 
 
 def change_filter(one: Filter, errors: LogErrors, interval: float) -> Filter:
@@ -333,7 +321,7 @@ def _by_network(
     start: int,
     whole: Filter,
     track: Track,
-) -> _Found:
+) -> Found:
     """A network's correction, its bands, and what manoeuvres add to those of internal damping."""
     loop, at = _loop(damper), float(course.time[start])
     internal = damper.method == "internal"
@@ -347,91 +335,8 @@ def _by_network(
         still = course.v_n[:, :2] - found.manoeuvre
         added = network_correction(course, loop, still, start=at, ramp=damper.ramp, mu=mu)
         bands = bands._replace(errors=np.hypot(bands.errors, added[start:]))
-    return _Found(x, bands, None, found if damper.switching else None)
-
-
-def _switched(found: Switching, time: Array) -> Evidence:
-    """How often, for how long, and the worst reason for it."""
-    first = next(s for s in found.switches if not s.damped)
-    count = sum(not s.damped for s in found.switches)
-    share = float(np.mean(found.mu == 0.0) * (time[-1] - time[0]))
-    return note(
-        "damping.switched", count=count, undamped=share / 60.0, time=first.time, leak=first.leak, allowed=first.allowed
-    )
-
-
-def _history(course: Course, estimate: Estimate | None, groups: Sequence[Group]) -> LogHistory | None:
-    if estimate is None:
-        return None
-    names = tuple(group.name for group in groups for _ in group.prior)
-    units = tuple(group.unit for group in groups for _ in group.prior)
-    time = course.time[estimate.start :]
-    return LogHistory(time, names, units, estimate.x[:, STATES:], estimate.sigma[:, STATES:])
-
-
-def _residuals(course: Course, log: _Log, damped: Course, found: _Found, start: int) -> list[Residuals]:
-    """What INS and log differ by: innovations of the augmented filter, else what is left after the correction."""
-    if log.reference is None:
-        return []
-    estimate = found.estimate
-    if found.bands is not None:
-        off, sigma = (damped.v_n[start:, :2] - log.reference.velocity[start:]), found.bands.residual
-        used = np.ones(len(off), dtype=bool)
-    elif estimate is not None and estimate.innovation is not None and estimate.innovation_sigma is not None:
-        off, sigma = estimate.innovation, estimate.innovation_sigma
-        used = ~(estimate.used == 0.0).any(axis=1)
-    else:
-        return []
-    there = np.flatnonzero(np.isfinite(off).all(axis=1))
-    time = course.time[start:][there]
-    e, s = (np.column_stack([a[there], np.full(len(there), np.nan)]) for a in (off, sigma))
-    nis = np.nansum((e / s) ** 2, axis=1)
-    return [Residuals(LEVELLED, time, e, s, nis, used[there], 0, time, np.zeros(len(there), dtype=bool))]
+    return Found(x, bands, None, found if damper.switching else None)
 
 
 def _course(track: Track) -> Course:
     return Course(track.time, track.C_nb, track.v_n, track.position)
-
-
-def _even(track: Track) -> Track:
-    """The track without a last epoch that comes too early."""
-    steps = np.diff(track.time)
-    if len(steps) > 1 and abs(steps[-1] - steps[0]) > 0.01 * steps[0]:
-        return replace(
-            track,
-            time=track.time[:-1],
-            C_nb=track.C_nb[:-1],
-            v_n=track.v_n[:-1],
-            position=track.position[:-1],
-            sensors=track.sensors[:-1],
-            P=track.P[:-1] if len(track.P) else track.P,
-        )
-    return track
-
-
-def _corrected(track: Track, damped: Course, found: _Found, start: int) -> Track:
-    """The track with the errors taken off and the bands that are left; correlations are not given."""
-    P, sensors, estimate = track.P.copy(), track.sensors.copy(), found.estimate
-    variance = np.einsum("kii->ki", P)[start:].copy()
-    if found.bands is not None:
-        sigma = found.bands.errors
-    else:
-        assert estimate is not None  # one of the two
-        sigma = estimate.sigma[:, MOTION]
-        for own, there in ((BG, ins.BG), (BA, ins.BA)):
-            sensors[start:, there] += estimate.x[:, own]
-            variance[:, there] = estimate.sigma[:, own] ** 2
-    variance[:, LEVEL] = sigma**2
-    P[start:] = 0.0
-    states = np.arange(P.shape[1])
-    P[start:, states, states] = variance
-    return replace(track, C_nb=damped.C_nb, v_n=damped.v_n, position=damped.position, P=P, sensors=sensors)
-
-
-def _spectrum(v: Array, interval: float) -> Spectrum | None:
-    there = np.isfinite(v).all(axis=1)
-    return spectrum(v[:, 0] + 1j * v[:, 1], interval) if there.sum() >= SHORTEST else None
-
-
-def _lines(v: Array, interval: float) -> tuple[float, float]:
-    return schuler_lines(v, interval) if np.isfinite(v).any() else (np.nan, np.nan)

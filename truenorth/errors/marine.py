@@ -43,6 +43,7 @@ from truenorth.errors.intervals import Intervals
 from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state import layout as ins
+from truenorth.state.prior import joined
 
 Array = NDArray[np.float64]
 
@@ -113,11 +114,7 @@ class MarineModel(Walks):
 
     def prior(self, P0: Array) -> Array:
         """(n, n) covariance: the given one of the thirteen, the groups' own behind it."""
-        P = np.zeros((self.states, self.states))
-        P[:STATES, :STATES] = P0
-        sigma = [group.prior for group in self.groups]
-        P[STATES:, STATES:] = np.diag(np.concatenate([np.zeros(0), *sigma]) ** 2)
-        return P
+        return joined(P0, *(group.prior for group in self.groups))
 
     @property
     def noise(self) -> Array:

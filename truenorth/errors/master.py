@@ -32,8 +32,9 @@ from truenorth.errors.group import Group, columns
 from truenorth.errors.ins import TURN_TIME
 from truenorth.errors.model import InsModel
 from truenorth.errors.walks import Walks
-from truenorth.state.layout import BA, BG, DP, DV, PHI, Layout
+from truenorth.state.layout import DV, PHI, Layout
 from truenorth.state.now import NOW_C, NOW_MEAN_RATE, matrix_of, vector_of
+from truenorth.state.prior import joined, prior_covariance
 
 Array = NDArray[np.float64]
 
@@ -297,12 +298,10 @@ class TransferModel(Walks):
         C_mb : (3, 3) array, optional
             The assumed mounting; the unit matrix when left out.
         """
-        P = np.diag(np.concatenate([np.zeros(15), *(group.prior for group in self.groups.values())]) ** 2)
-        for part, value in ((DV, dv), (PHI, phi), (DP, dp), (BA, accel_bias), (BG, gyro_bias)):
-            P[part, part] = np.eye(3) * np.square(value)
-        for name, sigma in ((DELAY, tau), (ARM, arm), (MOUNTING, mounting)):
-            if (at := self.slice_of(name)) is not None:
-                P[at, at] = np.eye(at.stop - at.start) * np.square(sigma)
+        given = {DELAY: tau, ARM: arm, MOUNTING: mounting}
+        biases = np.concatenate([np.broadcast_to(np.square(bias), 3) for bias in (gyro_bias, accel_bias)])
+        sigmas = (np.broadcast_to(given.get(g.name, g.prior), len(g.prior)) for g in self.groups.values())
+        P = joined(prior_covariance(phi, dv, dp, biases), *sigmas)
         ties: list[tuple[slice, str, Array]] = [(DV, VELOCITY_ERROR, np.eye(3))]
         if C_nb is not None:
             seat = np.asarray(C_nb, dtype=np.float64)

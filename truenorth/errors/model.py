@@ -19,6 +19,7 @@ from truenorth.errors.intervals import Intervals
 from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
+from truenorth.state.prior import joined
 
 Array = NDArray[np.float64]
 
@@ -100,13 +101,10 @@ class InsModel(Walks):
 
     def prior(self, P15: ArrayLike) -> Array:
         """(n, n) covariance at the start: the given one of the fifteen, the groups' own sigmas behind it."""
-        P = np.zeros((self.states, self.states))
-        P[:STATES, :STATES] = P15
+        P = joined(P15, *(group.prior for group in self.groups))
         if self.fixed_altitude:
             P[DV.stop - 1, :] = 0.0
             P[:, DV.stop - 1] = 0.0
-        if self.groups:
-            P[STATES:, STATES:] = np.diag(np.concatenate([group.prior for group in self.groups]) ** 2)
         return P
 
     def linearise(self, along: Intervals) -> tuple[Array, Array]:

@@ -18,11 +18,12 @@ from truenorth.core.position import Position
 from truenorth.errors.arm import arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
 from truenorth.errors.matrices import MATRICES, matrices_of, with_matrices, without_errors
-from truenorth.errors.staying import BG, DV, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
+from truenorth.errors.staying import BG, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
 from truenorth.errors.sway import without_sway
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.state.prior import joined
 from truenorth.strapdown.inertial import InertialIntegrals, integrate
 
 Array = NDArray[np.float64]
@@ -73,7 +74,9 @@ def prior_of(
     level_rate : float, rad/s
         One sigma, along east and along north, of the earth's level rate where heading is a convention; zero where it is not.
     """
-    means, blocks, groups = [np.zeros(6), np.asarray(bias, dtype=np.float64)], [P_bias], {}
+    heading = 0.0 if level_rate else HEADING_PRIOR
+    start = np.array([LEVEL_PRIOR, LEVEL_PRIOR, heading, *[VELOCITY_PRIOR] * 3])
+    means, blocks, groups = [np.zeros(6), np.asarray(bias, dtype=np.float64)], [start, P_bias], {}
     size = STATES
     if spec is not None:
         one = np.eye(3, dtype=bool)
@@ -81,26 +84,19 @@ def prior_of(
         accel = np.where(one, spec.accel_scale_factor, spec.accel_misalignment).ravel()
         groups["matrices"] = slice(size, size + MATRICES)
         means.append(np.zeros(MATRICES))
-        blocks.append(np.diag(np.concatenate([gyro, accel]) ** 2))
+        blocks.append(np.concatenate([gyro, accel]))
         size += MATRICES
     if arm is not None:
         groups["arm"] = slice(size, size + 3)
         means.append(np.asarray(arm, dtype=np.float64))
-        blocks.append(arm_sigma**2 * np.eye(3))
+        blocks.append(np.full(3, arm_sigma))
         size += 3
     if level_rate:
         groups["rate"] = slice(size, size + LEVEL_RATE)
         means.append(np.zeros(LEVEL_RATE))
-        blocks.append(level_rate**2 * np.eye(LEVEL_RATE))
+        blocks.append(np.full(LEVEL_RATE, level_rate))
         size += LEVEL_RATE
-    P = np.zeros((size, size))
-    P[PHI, PHI] = np.diag([LEVEL_PRIOR, LEVEL_PRIOR, 0.0 if level_rate else HEADING_PRIOR]) ** 2
-    P[DV, DV] = VELOCITY_PRIOR**2 * np.eye(3)
-    at = BIASES.start
-    for block in blocks:
-        P[at : at + len(block), at : at + len(block)] = block
-        at += len(block)
-    return Prior(np.concatenate(means), P, groups)
+    return Prior(np.concatenate(means), joined(*blocks), groups)
 
 
 class StayingLog:

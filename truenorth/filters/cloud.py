@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.compiled import compiled
 from truenorth.core.linalg import Array, Size, load
 from truenorth.filters.linearisation import Points, decompose
-from truenorth.filters.nonlinear import copy
+from truenorth.filters.nonlinear_steps import copy
 from truenorth.filters.nonlinear_system import NonlinearRuns
 from truenorth.filters.recursion import Workspace
 

@@ -31,7 +31,7 @@ from truenorth.filters.linearisation import (
     points,
     predict_tangent,
 )
-from truenorth.filters.nonlinear import add_noise, are_correlated, copy, keep_point, load_epoch, load_rows
+from truenorth.filters.nonlinear_steps import add_noise, are_correlated, copy, keep_point, load_epoch, load_rows
 from truenorth.filters.nonlinear_system import (
     Functions,
     NonlinearRuns,

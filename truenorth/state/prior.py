@@ -39,3 +39,18 @@ def prior_covariance(
         variance[part] = np.square(sigma)
     variance[BG.start : BA.stop] = bias_variance
     return np.diag(variance)
+
+
+def joined(*blocks: ArrayLike) -> Array:
+    """(n, n) covariance of uncorrelated groups of states, in order.
+
+    Parameters
+    ----------
+    *blocks : (m, m) covariances, or (m,) sigmas
+    """
+    square = [np.diag(b**2) if b.ndim == 1 else b for b in (np.asarray(block, dtype=np.float64) for block in blocks)]
+    edges = np.cumsum([0, *map(len, square)])
+    P = np.zeros((edges[-1], edges[-1]))
+    for first, last, block in zip(edges, edges[1:], square):
+        P[first:last, first:last] = block
+    return P
