@@ -19,7 +19,6 @@ from truenorth.simulation import (
     simulate_sensor,
 )
 from truenorth.simulation.aiding import STREAMS, velocity_b
-from truenorth.simulation.course import with_lever_arm
 from truenorth.simulation.streams import STREAMS as IMU_STREAMS
 
 
@@ -63,10 +62,10 @@ def test_distance_is_exact():
         np.testing.assert_allclose(np.cumsum(record.distance), DRIVE.distance(record.time), atol=1e-9)
 
 
-@pytest.mark.parametrize("motion", [DRIVE, with_lever_arm(DRIVE, (0.0, 1.0, 0.5))], ids=["centre", "arm"])
+@pytest.mark.parametrize("motion", [DRIVE, replace(DRIVE, lever_arm=(0.0, 1.0, 0.5))], ids=["centre", "arm"])
 def test_points_of_the_body(motion):
     """A sensor at an arm sees what the motion of an IMU at that arm is."""
-    there = with_lever_arm(motion, tuple(np.add(motion.lever_arm, ARM)))
+    there = replace(motion, lever_arm=tuple(np.add(motion.lever_arm, ARM)))
     gnss = simulate_sensor(motion, GnssSpec(lever_arm=ARM), duration=60.0).record
     at = there.states(gnss.time)
     place = ecef_from_geodetic(gnss.lat, gnss.lon, gnss.alt) - ecef_from_geodetic(at.lat, at.lon, at.alt)

@@ -190,11 +190,6 @@ def to_rotation(C: ArrayLike) -> Rotation:
     return Rotation.from_matrix(np.asarray(C, dtype=np.float64))
 
 
-def from_rotation(rotation: Rotation) -> Array:
-    """Direction cosine matrix (..., 3, 3) of a SciPy rotation (or a stack of them)."""
-    return np.asarray(rotation.as_matrix(), dtype=np.float64)
-
-
 def body_axes(axes: str) -> Array:
     """``C_rfu_given``: turns vectors given in other body axes into right, forward, up.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -261,11 +261,6 @@ def ring(
     straight = 0.5 * speed * duration  # the distance of the acceleration
     track = lead_in(heading, straight, 2.0 * speed, (1.0 if clockwise else -1.0) / radius)
     return Course(position, V, track, profile(0.0, []), profile(0.0, []), "distance", lever_arm=lever_arm)
-
-
-def with_lever_arm(course: Course, arm: tuple[float, float, float]) -> Course:
-    """The same course seen by an IMU elsewhere in the vehicle."""
-    return replace(course, lever_arm=arm)
 
 
 def check_leg(leg: Leg, speed: float) -> None:
