@@ -133,7 +133,9 @@ def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogChe
 def implied(check: LogCheck, bias: Array, P: Array, P0: Array) -> LogCheck:
     """The check, with those rates that a filter with a prior implies better: what it saw before the prior drew it to zero.
 
-    Of a bias b, known before to P0 and after to P, the data alone say ``b P0 / (P0 - P)``, to ``P P0 / (P0 - P)``.
+    Of a bias b, known before to P0 and after to P, the data alone say ``b P0 / (P0 - P)``, to ``P P0 / (P0 - P)``. Where the
+    data say less than the prior that is a small difference of large numbers, in which what the model leaves out weighs as
+    much more: on a ship with an arm of 12 m the vertical rate missed by 2.7 of its sigmas (RMS). It is not asked there.
 
     Parameters
     ----------
@@ -146,7 +148,7 @@ def implied(check: LogCheck, bias: Array, P: Array, P0: Array) -> LogCheck:
     after, before = np.diag(P)[1:], np.diag(P0)[1:]
     seen = np.maximum(before - after, 1e-9 * before)
     noise = np.sqrt(after * before / seen)
-    better = noise < check.rate_noise
+    better = noise < np.minimum(check.rate_noise, np.sqrt(before))
     return replace(
         check,
         rate_residual=np.where(better, bias[1:] * before / seen, check.rate_residual),
