@@ -25,6 +25,7 @@ STRETCH = 8.0  # s
 ROWS = (1, 2, 4)  # over which means are taken
 ORDER, GAIN = 6, 924.0  # of the differences, and their squares' sum
 FEWEST = 30  # differences in a stretch
+TAUS = (0.02, 0.1, 0.5, 1.0, 2.0, 5.0)  # s: of the Allan deviation of a sensor at rest
 ALIKE = 1.5  # largest over smallest of the densities that pass for one
 BURST = 3.0  # times the usual density: a stretch of its own
 LOUD = 4.0  # times the specification, beyond which it is another sensor's
@@ -55,6 +56,21 @@ def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
     return edges, np.where(
         (low > 0.0) & (high < ALIKE * low), np.exp(np.log(np.maximum(density, 1e-300)).mean(axis=0)), np.nan
     )
+
+
+def walk_density(record: ImuRecord) -> Array:
+    """(6,) random walk, rad/sqrt(s) and m/s/sqrt(s), of channels whose Allan deviation is one over all `TAUS`; NaN of others."""
+    scale = record.interval if record.kind == "rates" else 1.0
+    total = np.cumsum(np.hstack([record.gyro, record.accel]), axis=0) * scale
+    found = []
+    for tau in TAUS:
+        m = max(1, round(tau / record.interval))
+        if len(total) // m < FEWEST:
+            return np.full(6, np.nan)
+        turns = np.diff(total[::m], n=2, axis=0)
+        found.append(np.sqrt(0.5 * np.mean(turns**2, axis=0) / (m * record.interval)))
+    low, high = np.min(found, axis=0), np.max(found, axis=0)
+    return np.where(high < ALIKE * low, np.exp(np.log(np.maximum(found, 1e-300)).mean(axis=0)), np.nan)
 
 
 def bursts(record: ImuRecord) -> tuple[Array, Array]:
@@ -91,8 +107,9 @@ def burst_evidence(record: ImuRecord) -> list[Evidence]:
 def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSpec, lat: float) -> list[Evidence]:
     """Whether sensors at rest are noisier than their specification by more than any sensor is: it is not theirs then.
 
-    At rest alone: while the base moves, only what is faster than its motion can be separated from it, and there a sound sensor has
-    noise that is none of its random walk (the dither of a ring laser, quantisation).
+    Noise counts where its Allan deviation is that of a random walk from .02 to 5 s: the residual dither of a ring laser,
+    quantisation and a base that trembles are louder than the walk, and bounded. At rest alone: while the base moves, only what is
+    faster than its motion can be separated from it, and there a sound sensor has noise that is none of its random walk.
 
     Parameters
     ----------
@@ -105,6 +122,9 @@ def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSp
     if motion.overall != "still":
         return []
     noise = white_noise(record)
+    said_noise = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3)
+    if np.any(noise > LOUD * said_noise):
+        noise = np.nan_to_num(walk_density(record))
     bias = np.sqrt(spec.bias_variance)
     found = []
     for name, channels, said in (

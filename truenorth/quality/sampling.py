@@ -21,6 +21,7 @@ FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called fr
 FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
 SATURATED_RUN = 3  # rows at the extreme, one after the other
+RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off
 
 
 @dataclass(frozen=True)
@@ -193,6 +194,8 @@ def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArr
             at_top = signed == top
             count = int(np.count_nonzero(at_top))
             if count < 2 * SATURATED_RUN or count == values.size:
+                continue
+            if -float(signed.min()) > RANGE_SLACK * abs(top):  # a range has two sides alike: this one is not its end
                 continue
             below = signed[~at_top]
             second = float(below.max())
