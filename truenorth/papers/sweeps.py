@@ -103,7 +103,7 @@ def draw_sweeps(
         axes = np.atleast_1d(figure.subplots(1, len(sweeps), sharey=True))
         for ax, sweep in zip(axes, sweeps, strict=True):
             first = sweep.case_of(sweep.values[0])
-            methods = list(dict.fromkeys(f.method for f in table.figures if f.case == first))
+            methods = sorted({f.method for f in table.figures if f.case == first})  # one order, one legend for all
             for number, (method, colour) in enumerate(zip(methods, COLOURS, strict=False)):
                 values = [table.number_of(f"{sweep.case_of(v)} {method} {quantity}") for v in sweep.values]
                 ax.plot(
