@@ -21,6 +21,10 @@ def requirements(lines: list[str]) -> dict[str, str]:
     return {m[1].lower(): m[2].replace(" ", "") for m in found if m}
 
 
+def conda(lines: list[str]) -> dict[str, str]:
+    return {CONDA_NAMES.get(name, name): version for name, version in requirements(lines).items()}
+
+
 def project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -33,11 +37,13 @@ def test_the_version_is_one():
 
 def test_the_conda_recipe_asks_for_what_the_wheel_asks_for():
     text = (ROOT / "packaging/conda/meta.yaml").read_text(encoding="utf-8")
-    run = text.split("  run:\n")[1].split("\n\n")[0]
-    recipe = requirements([line.strip(" -") for line in run.splitlines()])
+    needed, figures = text.split("  run:\n")[1].split("\n\n")[0].split("  run_constrained:")
+    recipe = requirements([line.strip(" -") for line in needed.splitlines()])
     assert recipe.pop("python") == project()["requires-python"]
-    wheel = {CONDA_NAMES.get(name, name): version for name, version in requirements(project()["dependencies"]).items()}
-    assert recipe == wheel
+    assert recipe == conda(project()["dependencies"])
+    constrained = requirements([line.strip(" -") for line in figures.splitlines()[1:]])
+    assert constrained == conda(project()["optional-dependencies"]["plot"])
+    assert f"- truenorth = {project()['scripts']['truenorth']}\n" in text
 
 
 def test_the_image_runs_as_a_user_without_rights_and_copies_what_it_builds_from():
