@@ -117,7 +117,7 @@ def test_a_scenario_that_cannot_be_is_rows_and_does_not_spoil_the_report(tmp_pat
 
 
 def test_what_goes_wrong_while_an_answer_is_judged_is_a_row(tmp_path, monkeypatch):
-    def broken(answer, simulated):
+    def broken(*given):
         raise np.linalg.LinAlgError("Singular matrix")
 
     monkeypatch.setattr("truenorth.campaign.aligning._errors", broken)

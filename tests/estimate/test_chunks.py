@@ -114,7 +114,7 @@ def test_chunks_of_transfer_alignment_give_the_bits_of_one_batch():
     at = flight.states(slave.time[:1] - slave.steps[0])
     P = model.prior(0.1, 1e-3, 1e-2, 1e-5, tau=0.05, arm=1.0, mounting=0.05, C_nb=at.C_nb[0])
     start = SlaveStart(at.C_nb[0], at.v_n[0], float(at.lat[0]), float(at.lon[0]), float(at.alt[0]), P)
-    sources = tuple(master_aiding(master, model, start, Matching(0.05, 1e-3, gate=1e-6)))
+    sources = tuple(master_aiding(master, model, start, Matching(0.05, 1e-3, gate=1e-6), None, slave))
     batch = transfer_filter(slave, master, model, start, Matching(0.05, 1e-3, gate=1e-6))
     place, zero = (start.lat, start.lon, start.alt), np.zeros(3)
     begun = Start(float(slave.time[0] - slave.steps[0]), start.C_nb, start.v_n, *place, zero, zero, P[:15, :15])

@@ -17,7 +17,7 @@ def test_every_scenario_has_its_page(name, tmp_path):
     figure.savefig(tmp_path / "page.png")
     labels = {ax.get_title(loc="left") or ax.get_title(): ax.get_ylabel() for ax in figure.axes}
     assert next(iter(labels)).startswith("Track of the IMU, from ")
-    far = name == "transfer_flat_turn"  # 12 km in a minute
+    far = name in ("transfer_flat_turn", "transfer_release")  # 12 km in a minute
     assert list(labels.values()) == ["north, km" if far else "north, m", "m/s", "m", "deg", "deg", "deg/s", "g"]
     drawn = {text.get_text() for ax in figure.axes if ax.get_legend() for text in ax.get_legend().get_texts()}
     assert drawn >= {key.replace("_", " ") for key in read_scenario(name).aiding_specs}

@@ -19,16 +19,17 @@ def read_object(path: Path) -> dict[str, Any]:
     DataError
         The file cannot be read, is no file or too large, holds no JSON, or JSON that is no object.
     """
+    if not path.is_file():
+        raise DataError(f"{path}: cannot be read (no such file, or not a regular one)")
     try:
-        if not path.is_file():
-            raise DataError(f"{path}: no such file, or not a regular one")
         with path.open("rb") as file:
             raw = file.read(LARGEST + 1)
-        if len(raw) > LARGEST:
-            raise DataError(f"{path}: larger than {LARGEST >> 20} MiB")
-        content = json.loads(raw.decode("utf-8"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from None
+    if len(raw) > LARGEST:
+        raise DataError(f"{path}: larger than {LARGEST >> 20} MiB")
+    try:
+        content = json.loads(raw.decode("utf-8"))
     except (ValueError, RecursionError) as error:  # decoding raises the first, brackets without end the second
         raise DataError(f"{path}: not JSON ({error})") from None
     if not isinstance(content, dict):
