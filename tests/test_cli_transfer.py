@@ -38,7 +38,7 @@ def test_what_a_person_reads(logs):
     assert result.exit_code == 0, result.output
     assert "mounting, deg: heading 0.3" in result.stdout
     assert "right 0 (as given)" in result.stdout
-    assert "does not separate them well" in result.stdout
+    assert "does not separate all" in result.stdout
 
 
 def test_sigma_is_absolute_where_the_master_s_own_errors_are_given(logs):

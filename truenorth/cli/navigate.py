@@ -296,6 +296,8 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from truenorth.report.estimated import estimated_rows
+
     console = make_console()
     s = result.summary()
     status = Text(result.status, style=f"bold {'green' if result.status == 'navigated' else 'red'}")
@@ -323,10 +325,10 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
         counts = _("{name}: {count} measurements, {rejected} rejected, {nis}")
         said = counts.format(name=_(name), count=told["measurements"], rejected=told["rejected"], nis=nis)
         console.print(said, soft_wrap=True)
-    for name, told in s["estimated"].items():
-        if not name.startswith("slow"):
-            shown = ", ".join(f"{v:.4g} ± {e:.2g}" for v, e in zip(told["value"], told["sigma"]))
-            console.print(f"{_(name)}: {shown}", soft_wrap=True)
+    for name, value, sigma in estimated_rows(result):
+        console.print(
+            _("{name}: {value} (one sigma {sigma})").format(name=name, value=value, sigma=sigma), soft_wrap=True
+        )
     if result.damping is not None:
         console.print(_("damping: {how}").format(how=result.damping.in_words()), soft_wrap=True)
     height = _("height: {how}; IMU: {source}").format(how=_(result.altitude), source=_(result.imu_source))

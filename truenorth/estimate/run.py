@@ -80,7 +80,7 @@ def begin(
         P0, aux = taken_apart(model, start.P, np.append(start.gyro_bias, start.accel_bias), start.whole)
     deflected = model.layout.first_of(DEFLECTION)
     if prior is None and start.plumb > 0.0 and deflected >= 0:
-        P0 = at_rest(P0, deflected, start.C_nb, start.lat, start.plumb)
+        P0 = at_rest(P0, deflected, start.C_nb, start.lat, start.alt, start.plumb)
     place = np.array([[start.lat, start.lon, start.alt]])
     P0 = np.array(P0)[None]
     turn(np.linalg.inv(convergence(np.eye(3)[None], s[None, wander.VELOCITY], place)), P0)

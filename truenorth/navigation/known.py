@@ -22,13 +22,13 @@ from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, eu
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.navigation.start import moving_start, positive, start_from_alignment
+from truenorth.navigation.start import moving_start, start_from_alignment
 from truenorth.quality.regimes import SEEN_LATE, motion_summary
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import note
 from truenorth.state.layout import PHI
-from truenorth.state.prior import prior_covariance
+from truenorth.state.prior import positive, prior_covariance
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]

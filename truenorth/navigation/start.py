@@ -21,7 +21,7 @@ from truenorth.navigation.handover import Handover
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.layout import BA, BG, PHI, STATES
 from truenorth.state.mounting import Mounting
-from truenorth.state.prior import WholeBiases, prior_covariance
+from truenorth.state.prior import WholeBiases, positive, prior_covariance
 from truenorth.state.state import Start
 
 if TYPE_CHECKING:
@@ -166,16 +166,6 @@ def _found_wheel(summary: Mapping[str, Any]) -> Mounting | None:
         angle_sigma=math.radians(max(summary["mounting_sigma_deg"])),
         scale_sigma=math.hypot(summary["odometer_scale"], summary["odometer_scale_sigma"]),
     )
-
-
-def positive(P: Array) -> Array:
-    """The nearest correlation structure without negative eigenvalues; variances stay as they are or grow by rounding."""
-    sigma = np.sqrt(np.maximum(np.diag(P), 1e-300))
-    values, vectors = np.linalg.eigh(P / np.outer(sigma, sigma))
-    if values[0] >= 1e-9:
-        return P
-    raised = (vectors * np.maximum(values, 1e-9)) @ vectors.T
-    return np.asarray(raised * np.outer(sigma, sigma), dtype=np.float64)
 
 
 def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:

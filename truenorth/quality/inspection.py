@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SHORTEST_REST = 15.0  # s at rest, from which noise densities are given
 REST_MARGIN = 2.0  # s between a motion and a stretch at rest
+SLOW_TERMS = ("bias_instability", "rate_random_walk")
 SEVERITIES = ("error", "warning", "note")
 
 
@@ -163,10 +164,14 @@ class Inspection(Shown):
             "motion": self.noise_from.kind,
         }
         for key, _words, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
-            factor = parse_unit(unit)[0]
-            table[key] = [_figure(value / factor) for value in getattr(noise, name)]
-            table[f"{key}_sigma"] = [_figure(value / factor) for value in getattr(noise, f"{name}_sigma")]
+            factor, of_motion = parse_unit(unit)[0], self._of_motion(name)
+            for column, values in ((key, getattr(noise, name)), (f"{key}_sigma", getattr(noise, f"{name}_sigma"))):
+                table[column] = [None if of_motion else _figure(value / factor) for value in values]
         return table
+
+    def _of_motion(self, term: str) -> bool:
+        """Whether what looks like this term of the noise is the motion of the base, and says nothing of the sensors."""
+        return self.noise_from is not None and self.noise_from.kind != "still" and term in SLOW_TERMS
 
     def table(self) -> Table:
         """Figures as a rich table: sampling, motion, noise."""
@@ -192,11 +197,12 @@ class Inspection(Shown):
             rest = self.noise_from
             where = _("{kind}, {start} to {stop} s")
             where = where.format(kind=_(rest.kind), start=round(rest.start), stop=round(rest.stop))
-            table.add_row(_("noise x, y, z from"), where)
+            still = rest.kind == "still"
+            table.add_row(_("noise x, y, z from") if still else _("noise x, y, z at most, from"), where)
             for _key, words, noise, name, unit in _noise_rows(self.gyro_noise, self.accel_noise):
                 factor = parse_unit(unit)[0]
                 values = getattr(noise, name) / factor
-                if np.any(values > 0.0):
+                if np.any(values > 0.0) and not self._of_motion(name):
                     shown = ", ".join(f"{value:.3g}" if value > 0.0 else "-" for value in values)
                     table.add_row(f"  {_(words)}", f"{shown} {unit}")
         return table

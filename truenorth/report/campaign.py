@@ -195,7 +195,8 @@ def _compared(row: dict[Any, Any]) -> list[str]:
 
 def _converged(row: dict[Any, Any]) -> list[str]:
     share = f"{100 * row['converged']:.0f} %"
-    return [str(row["name"]), str(row["method"]), str(row["runs"]), share, f"{row['median_s']:g}", f"{row['p95_s']:g}"]
+    reached = [f"{row[key]:g}" if math.isfinite(row[key]) else _("not reached") for key in ("median_s", "p95_s")]
+    return [str(row["name"]), str(row["method"]), str(row["runs"]), share, *reached]
 
 
 def _text(value: Any) -> str:

@@ -23,6 +23,7 @@ FAN = (5, 95)  # percentiles
 MOST_CASES = 12  # with charts of their own
 SMALL = 1e-4  # arcmin: below it a logarithmic axis says nothing
 MUCH_TOO_SMALL = 2.0  # RMS over sigma, above which a claimed sigma misleads
+CHANCE = 0.05  # of a sign test
 
 
 def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
@@ -66,6 +67,8 @@ def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
             wanted=short(wanted), count=len(met), all=len(best)
         )
     )
+    if len(plan.methods) > 1:
+        lines.append(_sure(campaign, best))
     mood, honesty = _honesty(last)
     lines.append(honesty)
     failed = int(last["failed"].sum())
@@ -73,6 +76,21 @@ def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
         lines.append(_("{count} run(s) gave no answer; the last table says why.").format(count=failed))
         mood = "fair" if mood == "good" else mood
     return mood, finding, lines
+
+
+def _sure(campaign: Campaign, best: pd.DataFrame) -> str:
+    """In how many cases the best method wins against every other by more than chance."""
+    pairs = campaign.comparison
+    pairs = pairs[
+        (pairs["quantity"] == "phi_u") & (pairs["time_s"] == pairs.groupby("case")["time_s"].transform("max"))
+    ]
+    sure = 0
+    for case, method in zip(best["case"], best["method"].astype(str), strict=True):
+        own = pairs[(pairs["case"] == case) & ((pairs["method"] == method) | (pairs["against"] == method))]
+        sure += bool(len(own) and (own["p_value"] < CHANCE).all())
+    return _("The best method leads every other by more than chance in {count} of {all} (sign test, 5 %).").format(
+        count=sure, all=len(best)
+    )
 
 
 def _honesty(last: pd.DataFrame) -> tuple[str, str]:

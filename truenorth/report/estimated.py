@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truenorth.core.language import translated as _
+from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.report.document import Table
 from truenorth.report.numbers import short
 
@@ -16,19 +17,34 @@ if TYPE_CHECKING:
     from truenorth.navigation.result import Navigation
 
 # The last words of a group's name tell what it is: unit, and how many of them an SI unit has.
-UNITS = {"lever arm": ("m", 1.0), "scale": ("%", 100.0), "mounting": ("deg", 180.0 / np.pi), "lag": ("ms", 1e3)}
+DEG = ("deg", 180.0 / np.pi)
+UNITS = {
+    "lever arm": ("m", 1.0),
+    "scale": ("%", 100.0),
+    "mounting": DEG,
+    "heading bias": DEG,
+    "attitude bias": DEG,
+    "lag": ("ms", 1e3),
+    "deflection of the vertical": ("arcsec", 3600.0 * 180.0 / np.pi),
+    "iron": ("% of the field", 100.0),
+    "anomaly": ("% of the field", 100.0),
+}
+NOT_ESTIMATED = 0.9  # of its prior: a sigma above it
 AXES = ("x", "y", "z")
 
 
 def estimated_rows(result: Navigation) -> list[tuple[str, str, str]]:
     """Name, value and one-sigma at the end of each group of states of an aiding sensor."""
     rows = []
+    priors = dict(zip(result.track.layout.names, result.track.layout.priors, strict=True))
     for name, found in result.estimated().items():
-        if name.startswith("slow"):
-            continue  # the slow parts of the IMU's biases, which the track holds
+        open_ = np.all(np.array(found["sigma"]) > NOT_ESTIMATED * np.array(priors[name]))
+        if name.startswith("slow") or (open_ and name == DEFLECTION):
+            continue  # the slow parts of the IMU's biases, which the track holds; a deflection of which the log shows nothing
         unit, factor = _unit(name)
         value, sigma = (", ".join(short(factor * x) for x in found[key]) for key in ("value", "sigma"))
-        rows.append((_(name).capitalize().replace("Gnss", "GNSS"), f"{value} {unit}", f"{sigma} {unit}"))
+        shown = _("not estimated") if open_ else f"{value} {_(unit)}"
+        rows.append((_(name).capitalize().replace("Gnss", "GNSS"), shown, f"{sigma} {_(unit)}"))
     return rows
 
 

@@ -191,6 +191,7 @@ def _health(result: Alignment) -> dict[str, Any] | None:
         "legend": {r.kind: _(r.kind) for r in found.regimes},
         "facts": facts,
         "noise": [] if noise is None else _densities(noise),
+        "at_rest": noise is not None and noise["motion"] == "still",
         "noise_from": ""
         if noise is None
         else _("{motion}, {start:.0f} to {stop:.0f} s").format(

@@ -87,14 +87,14 @@ SENTENCES = {
     ),
     "rate.misses": (
         "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification "
-        "({imu:term}) allows {allowed:deg/h|} deg/h"
+        "({imu:imu}) allows {allowed:deg/h|} deg/h"
     ),
     "rate.doubtful": (
         "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification "
-        "({imu:term}) allows {allowed:deg/h|} deg/h: a miss of that size towards east is in sigma"
+        "({imu:imu}) allows {allowed:deg/h|} deg/h: a miss of that size towards east is in sigma"
     ),
     "force.misses": (
-        "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu:term}) allows "
+        "the mean specific force misses gravity by {residual:ug|.0f} ug, where the specification ({imu:imu}) allows "
         "{allowed:ug|} ug"
     ),
     "table.touched": (
@@ -126,10 +126,10 @@ SENTENCES = {
         "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers"
     ),
     "bias.gyro": (
-        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:term}) allows {allowed:deg/h|} deg/h"
+        "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:imu}) allows {allowed:deg/h|} deg/h"
     ),
     "bias.accel": (
-        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:term}) allows {allowed:ug|} ug"
+        "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:imu}) allows {allowed:ug|} ug"
     ),
     "bias.gyro_steps": (
         "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
@@ -157,15 +157,15 @@ SENTENCES = {
     ),
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
-        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:term}) says "
+        "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "
         "{said:deg/sqrt(h)|}: it is another sensor's, and so may be what it says of biases"
     ),
     "specification.accel_noise": (
-        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:term}) says "
+        "the accelerometers' white noise is {noise:ug/sqrt(Hz)|} ug/sqrt(Hz), where the specification ({imu:imu}) says "
         "{said:ug/sqrt(Hz)|}: it is another sensor's, and so may be what it says of biases"
     ),
     "specification.suspect": (
-        "the specification ({imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
+        "the specification ({imu:imu}) is the suspect: with an IMU {factor:.0f} times as poor the measurements fit"
     ),
     "bias.vertical_steps": (
         "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
@@ -242,7 +242,7 @@ SENTENCES = {
     ),
     "transfer.lopsided": (
         "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
-        "specification ({imu:term}) allows, or the master drifts"
+        "specification ({imu:imu}) allows, or the master drifts"
     ),
     "transfer.jumps": "the master's solution jumps {count} times: it does not fit this slave",
     "transfer.absolute": (
@@ -250,7 +250,7 @@ SENTENCES = {
         "to {level:angle}"
     ),
     "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
-    "transfer.open": "this motion does not separate them well: {states}",
+    "transfer.open": "this motion does not separate all that is estimated; {states}",
     # ---- clocks, arms, scales and mountings left open
     "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
     "second_look.early": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s early",

@@ -54,3 +54,13 @@ def joined(*blocks: ArrayLike) -> Array:
     for first, last, block in zip(edges, edges[1:], square):
         P[first:last, first:last] = block
     return P
+
+
+def positive(P: Array) -> Array:
+    """The nearest correlation structure without negative eigenvalues; variances stay as they are or grow by rounding."""
+    sigma = np.sqrt(np.maximum(np.diag(P), 1e-300))
+    values, vectors = np.linalg.eigh(P / np.outer(sigma, sigma))
+    if values[0] >= 1e-9:
+        return P
+    raised = (vectors * np.maximum(values, 1e-9)) @ vectors.T
+    return np.asarray(raised * np.outer(sigma, sigma), dtype=np.float64)

@@ -1,7 +1,8 @@
 """Evidence in words: English templates, or their translations, filled with figures in the units people read.
 
 A field of a template is ``{name}``, ``{name:spec}`` with Python's own specification, ``{name:unit|spec}`` (an SI figure
-shown in a unit), ``{name:angle}`` (deg or arcmin, whichever is shorter) or ``{name:term}`` (a word of the language).
+shown in a unit), ``{name:angle}`` (deg or arcmin, whichever is shorter), ``{name:term}`` (a word of the language) or
+``{name:imu}`` (where a specification is from).
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ class _Figures(string.Formatter):
         """One figure, in its unit."""
         if format_spec == "term":
             return translated(TERMS.get(str(value), str(value)))
+        if format_spec == "imu":  # after the word "specification"
+            return translated(TERMS.get(str(value), str(value).removeprefix("specification ")))
         if format_spec == "angle":
             return angle(float(value))
         unit, bar, spec = format_spec.partition("|")
