@@ -11,6 +11,7 @@ from truenorth.advice import advise
 from truenorth.advice.positions import SCHEMES
 from truenorth.alignment import align
 from truenorth.alignment.positions import align_positions
+from truenorth.alignment.suspect import poorer
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
@@ -68,6 +69,22 @@ def test_out_of_reach_says_what_is_in_the_way():
     assert found.best is None
     assert "out of reach" in found.words[0]
     assert "gyro bias" in found.words[0]
+
+
+def test_what_would_reach_it_does():
+    """The IMU that is named reaches the wish in the scheme that is named, and one a tenth poorer does not."""
+    two, wanted = {"two positions, 180 deg apart": (180.0,)}, math.radians(0.2)
+    found = advise("tactical", PLACE, wanted, schemes=two, longest=600.0)
+    assert "times as good (gyro" in found.words[1]
+    assert advise(found.would.imu, PLACE, wanted, schemes=two, longest=600.0).best is not None
+    short = poorer(found.would.imu, 1.1)
+    assert advise(short, PLACE, wanted, schemes=two, longest=600.0).best is None
+
+
+def test_no_imu_sees_through_a_deflected_plumb_line():
+    found = advise("navigation", PLACE, math.radians(4.0 / 3600), schemes={"one position": ()}, longest=600.0)
+    assert found.would == "deflection of the vertical"
+    assert "no better IMU alone would" in found.words[1]
 
 
 def test_a_restless_base_takes_longer(navigation):

@@ -39,6 +39,7 @@ def test_in_words_and_drawn(velocity):
     far = advise_manoeuvre("consumer", HERE, 20.0, 0.01 * ARCMIN, manoeuvres=("flat turn",))
     assert far.best is None
     assert "none of the manoeuvres" in str(far)
+    assert "what would reach it" in far.words[1]
 
 
 def test_bad_requests():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.suspect import poorer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, model_from_spec
 from truenorth.alignment.transfer_system import system_of_motion
 from truenorth.core.errors import UsageError
@@ -31,6 +32,8 @@ BEFORE = 20.0  # s straight on, before each manoeuvre
 STEP = 0.5  # s of the covariance analysis
 RATE, ANGLE, SIDE = math.radians(3.0), math.radians(90.0), math.radians(20.0)  # of turns; of each side of an S
 GAIN, ACCELERATION = 0.25, 2.0  # change of speed, as a part of it, and m/s^2
+LONGER, BETTER = 3.0, (3.0, 10.0, 30.0, 100.0)  # what would reach a wish: times as long, times as good an IMU
+MATCHED = math.radians(3.0 / 60.0)  # of a master's attitude
 ROCK, PERIOD, ROCKING = math.radians(20.0), 4.0, 30.0  # amplitude, s, s
 
 
@@ -47,6 +50,8 @@ class ManoeuvreAdvice(Shown):
         Infinite: not in the time considered.
     begun : float, s
         When each manoeuvre begins.
+    would : str
+        What would bring the nearest manoeuvre there, of what was tried; empty where one is there, or nothing was tried.
     """
 
     time: Array
@@ -54,6 +59,7 @@ class ManoeuvreAdvice(Shown):
     wanted: float
     reached: dict[str, float]
     begun: float = BEFORE
+    would: str = ""
 
     @property
     def best(self) -> str | None:
@@ -63,12 +69,12 @@ class ManoeuvreAdvice(Shown):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The answer."""
-        return (str(self),)
+        """The answer, and where none is there, what would be."""
+        return (str(self), f"what would reach it: {self.would}") if self.would else (str(self),)
 
     def in_brief(self) -> dict[str, str]:
         """The answer."""
-        return {"answer": str(self)}
+        return {"answer": "; ".join(self.words)}
 
     def to_frame(self) -> pd.DataFrame:
         """One-sigma of heading (deg) of each manoeuvre, index ``time``."""
@@ -82,6 +88,7 @@ class ManoeuvreAdvice(Shown):
         return {
             "wanted_heading_sigma_deg": math.degrees(self.wanted),
             "best": self.best,
+            "what_would": self.would or None,
             "manoeuvres": {
                 name: {
                     "reached_s": t if math.isfinite(t) else None,
@@ -156,6 +163,64 @@ def advise_manoeuvre(
     unknown = [name for name in manoeuvres if name not in flights]
     if unknown:
         raise UsageError(f"manoeuvre {unknown[0]!r} is not known; choose of {', '.join(flights)}")
+    known = {
+        "velocity_noise": velocity_noise,
+        "rate": rate,
+        "heading_sigma": heading_sigma,
+        "level_sigma": level_sigma,
+        "delay_sigma": delay_sigma,
+        "lever_arm_sigma": lever_arm_sigma,
+    }
+    sigmas, reached = {}, {}
+    time: Array = np.zeros(0)
+    for name, flight in flights.items():
+        if manoeuvres and name not in manoeuvres:
+            continue
+        time, sigma = _along(spec, flight, attitude_noise, longest, **known)
+        below = np.flatnonzero(sigma <= wanted)
+        sigmas[name], reached[name] = sigma, float(time[below[0]]) if below.size else math.inf
+    advice = ManoeuvreAdvice(time, sigmas, wanted, reached)
+    if advice.best is not None:
+        return advice
+    nearest = min(sigmas, key=lambda name: float(sigmas[name][-1]))
+
+    def reaches(other: ImuSpec, noise: float, longest: float) -> bool:
+        return bool(np.any(_along(other, flights[nearest], noise, longest, **known)[1] <= wanted))
+
+    return replace(advice, would=_what_would(spec, nearest, attitude_noise, longest, reaches))
+
+
+def _what_would(
+    spec: ImuSpec, name: str, attitude_noise: float, longest: float, reaches: Callable[[ImuSpec, float, float], bool]
+) -> str:
+    """The first change of one thing, of some in their order, that is enough."""
+    noise = min(attitude_noise, MATCHED)
+    matched = f"the master's attitude matched to {60 * math.degrees(noise):.3g} arcmin"
+    if reaches(spec, attitude_noise, LONGER * longest):
+        return f"{name}, {LONGER * longest:.0f} s"
+    if attitude_noise > noise and reaches(spec, noise, longest):
+        return f"{name}, with {matched} too"
+    for used, said in ((attitude_noise, ""), (noise, f" and {matched}")):
+        for factor in BETTER:
+            if reaches(poorer(spec, 1.0 / factor), used, longest):
+                return f"{name}, with an IMU {factor:g} times as good{said}"
+    return f"not even an IMU {BETTER[-1]:g} times as good: the master's measurements are in the way"
+
+
+def _along(
+    spec: ImuSpec,
+    flight: Moving,
+    attitude_noise: float,
+    longest: float,
+    *,
+    velocity_noise: float,
+    rate: float,
+    heading_sigma: float,
+    level_sigma: float,
+    delay_sigma: float,
+    lever_arm_sigma: float,
+) -> tuple[Array, Array]:
+    """Times and heading's one-sigma along one flight."""
     mounting = math.isfinite(attitude_noise)
     assumed = Assumed(np.zeros(3), lever_arm_sigma, 0.0, delay_sigma, np.eye(3), heading_sigma)
     model = model_from_spec(spec, assumed, mounting, None, 0.0)
@@ -172,16 +237,9 @@ def advise_manoeuvre(
         C_nb=np.eye(3) if mounting else None,
     )
     R = np.repeat([velocity_noise**2, attitude_noise**2], 3) / (rate * STEP)
-    sigmas, reached = {}, {}
     time: Array = STEP * np.arange(1.0, round(longest / STEP) + 0.5)
-    for name, flight in flights.items():
-        if manoeuvres and name not in manoeuvres:
-            continue
-        system = system_of_motion(flight, model, P0, R, longest, STEP)
-        sigma = np.squeeze(kalman(system, history="sigma", innovations=False).sigma)[:, PHI.stop - 1]
-        below = np.flatnonzero(sigma <= wanted)
-        sigmas[name], reached[name] = sigma, float(time[below[0]]) if below.size else math.inf
-    return ManoeuvreAdvice(time, sigmas, wanted, reached)
+    system = system_of_motion(flight, model, P0, R, longest, STEP)
+    return time, np.squeeze(kalman(system, history="sigma", innovations=False).sigma)[:, PHI.stop - 1]
 
 
 def standard_manoeuvres(position: Position, speed: float) -> dict[str, Moving]:

@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.advice.better import Better, better
 from truenorth.alignment.positions import ARM_SIGMA, SHORTEST_POSITION, prior_covariance
 from truenorth.analysis.error_budget import Source, error_budget
 from truenorth.core.earth import DEFLECTION
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.shown import Shown
+from truenorth.core.units import significant
 from truenorth.errors.staying import BA, BG, DV, PHI, QUIETEST_BASE, StaticModel
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
@@ -79,6 +81,8 @@ class Advice(Shown):
     position : Position
     disturbance : float, m/s
     schemes : tuple of SchemeAdvice
+    would : Better or str
+        The specification with which the nearest scheme reaches it, or what is in the way of every IMU; empty where one reaches it.
     """
 
     wanted: float
@@ -86,6 +90,12 @@ class Advice(Shown):
     position: Position
     disturbance: float
     schemes: tuple[SchemeAdvice, ...]
+    would: Better | str = ""
+
+    @property
+    def nearest(self) -> SchemeAdvice:
+        """The scheme with the smallest sigma of all."""
+        return min(self.schemes, key=lambda scheme: scheme.least[1])
 
     @property
     def best(self) -> SchemeAdvice | None:
@@ -101,12 +111,13 @@ class Advice(Shown):
         if best is not None:
             lines.append(f"{_angle(self.wanted)} of heading (one sigma): {best.name}, {best.reached:.0f} s in all")
         else:
-            least = min(self.schemes, key=lambda scheme: scheme.least[1])
+            least = self.nearest
             lines.append(
                 f"{_angle(self.wanted)} of heading (one sigma) is out of reach of IMU {self.imu.name!r} within "
                 f"{least.time[-1]:.0f} s: {least.name} come nearest, {_angle(least.least[1])} after {least.least[0]:.0f} s; in "
                 f"the way: {next(iter(least.share))}"
             )
+            lines.append(self._what_would(least))
         for scheme in self.schemes:
             what, part = next(iter(scheme.share.items()))
             where = f"{scheme.reached:.0f} s" if scheme.reached is not None else "not reached"
@@ -116,6 +127,14 @@ class Advice(Shown):
                 f"{'then' if scheme.reached is not None else 'there'} is {what}"
             )
         return tuple(lines)
+
+    def _what_would(self, scheme: SchemeAdvice) -> str:
+        if isinstance(self.would, str):
+            return f"what would reach it: no better IMU alone would, {self.would} is in the way"
+        return (
+            f"what would reach it: an IMU {significant(self.would.factor)} times as good ({self.would.words}), in {scheme.name}, "
+            f"{scheme.least[0]:.0f} s"
+        )
 
     def in_brief(self) -> dict[str, str]:
         """The answer, then scheme by scheme."""
@@ -138,6 +157,15 @@ class Advice(Shown):
             "disturbance_m_s": self.disturbance,
             "best": None if self.best is None else self.best.name,
             "time_s": None if self.best is None else self.best.reached,
+            "what_would": self.would or None
+            if isinstance(self.would, str)
+            else {
+                "scheme": self.nearest.name,
+                "time_s": self.nearest.least[0],
+                "factor": self.would.factor,
+                "sources": list(self.would.sources),
+                "imu": self.would.imu.to_mapping(),
+            },
             "schemes": [
                 {
                     "name": scheme.name,
@@ -208,7 +236,16 @@ def advise(
         if reached is not None:
             at = _Scheme(spec, position, turns, reached, disturbance, arm_sigma)
         found.append(SchemeAdvice(name, time, sigma, reached, at.shares()))
-    return Advice(heading_sigma, spec, position, disturbance, tuple(found))
+    advice = Advice(heading_sigma, spec, position, disturbance, tuple(found))
+    if advice.best is not None:
+        return advice
+    name, T = advice.nearest.name, advice.nearest.least[0]
+
+    def evaluate(other: ImuSpec) -> tuple[float, Mapping[str, float]]:
+        scheme = _Scheme(other, position, schemes[name], T, disturbance, arm_sigma)
+        return scheme.heading_variance(), scheme.shares()
+
+    return replace(advice, would=better(spec, heading_sigma, evaluate))
 
 
 class _Scheme:
