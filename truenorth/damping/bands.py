@@ -22,11 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.course import Course
-from truenorth.damping.filters import BLOCK, SETTLING, Filter, silences
+from truenorth.damping.filters import SETTLING, Filter, silences
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
 from truenorth.errors.marine import DV, MOTION
+from truenorth.filters.gains import Gains, filter_gains
+from truenorth.filters.kalman import kalman
+from truenorth.filters.system import LinearSystem
 
 Array = NDArray[np.float64]
+
+PART = 600  # epochs at a time: some 40 MB
 
 
 class Bands(NamedTuple):
@@ -71,14 +76,12 @@ def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: 
     Phi, Gamma = transition_and_input(A, inputs, coarse.interval)
     P = np.zeros((count, count))
     P[np.ix_(placed, placed)] = P0
-    Q = np.zeros((coarse.epochs, count, count))
-    Q[:, placed[:, None], placed] = model.noise_of(coarse.interval, 0.5 * (coarse.v_n[1:] + coarse.v_n[:-1]))
     white = whole.sigma**2 * course.interval / coarse.interval * log
-    errors, residual = np.empty((coarse.epochs + 1, first)), np.empty((coarse.epochs + 1, 2))
-    errors[0], residual[0] = np.diagonal(P)[MOTION], np.diagonal(H[0] @ P @ H[0].T)
-    for k in range(coarse.epochs):
-        P = Phi[k] @ P @ Phi[k].T + Q[k] + white * Gamma[k] @ Gamma[k].T
-        errors[k + 1], residual[k + 1] = np.diagonal(P)[MOTION], np.diagonal(H[k] @ P @ H[k].T)
+    Q = white * (Gamma @ np.swapaxes(Gamma, -1, -2))
+    Q[:, placed[:, None], placed] += model.noise_of(coarse.interval, 0.5 * (coarse.v_n[1:] + coarse.v_n[:-1]))
+    joint = _covariances(Phi, Q, P)
+    errors = np.diagonal(joint, axis1=1, axis2=2)[:, MOTION]
+    residual = _variances(H[np.maximum(np.arange(len(joint)) - 1, 0)], joint)
     return _spread(course, coarse, errors, residual + whole.sigma**2)
 
 
@@ -119,54 +122,74 @@ def filter_bands(
     absent = np.zeros(course.epochs + 1, dtype=bool) if absent is None else absent
     silent = silences(absent, max(1, round(SETTLING / course.interval)))[::stride]
     absent = absent[::stride]
+    # Until filter 1 has settled nothing goes into filter 2.
+    silent = silent | (np.arange(-1, coarse.epochs) * coarse.interval < SETTLING - 1e-6)
     share, apart = (None, None) if fused is None else (fused[0][::stride], fused[1][::stride])
     errors, residual = np.empty((coarse.epochs + 1, MOTION.stop)), np.empty((coarse.epochs + 1, 2))
     errors[0], residual[0] = np.diagonal(whole.P0)[MOTION], whole.sigma**2
-    for begin in range(0, coarse.epochs, BLOCK):
-        part = coarse.between(begin, min(begin + BLOCK, coarse.epochs))
+    off, differs = np.zeros((2, MOTION.stop, count))  # of the last filter, and between the two
+    last = x1 if two is None else x2
+    off[:, MOTION] = -np.eye(MOTION.stop)
+    off[:, last.start : last.start + MOTION.stop] = np.eye(MOTION.stop)
+    differs[:, x1.start : x1.start + MOTION.stop] = np.eye(MOTION.stop)
+    for begin in range(0, coarse.epochs, PART):
+        part = coarse.between(begin, min(begin + PART, coarse.epochs))
+        rows = slice(begin + 1, begin + 1 + part.epochs)
         mean = 0.5 * (part.v_n[1:] + part.v_n[:-1])
         _, Phi = part.linearise(whole.model)
         Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), whole.rows(part)
         F1, Phi1 = part.linearise(one.model)
-        Q1, H1 = one.model.noise_of(part.interval, mean)[0], one.rows(part)
-        for k in range(part.epochs):
-            A, G = np.zeros((count, count)), np.zeros((count, 2))
-            K1, P1 = _gain(P1, Phi1[k], Q1, H1[k] * (not absent[begin + k + 1]), R1)
-            A[e, e] = Phi[k]
-            A[x1, e], A[x1, x1] = K1 @ H[k] @ Phi[k], Phi1[k] - K1 @ H1[k] @ Phi1[k]
-            B = np.zeros((count, n))  # of the noise that drives the errors
-            B[e], B[x1], G[x1] = np.eye(n), K1 @ H[k], K1
-            if two is not None and P2 is not None:
-                H2 = F1[k, DV, : two.model.states]
-                settled = (begin + k) * part.interval >= SETTLING - 1e-6
-                H2 = H2 * (
-                    settled and not silent[begin + k + 1]
-                )  # until filter 1 has settled nothing goes into filter 2
-                K2, P2 = _gain(P2, Phi1[k], Q1, H2, two.sigma**2 / (stride if two.overlap else 1) * np.eye(2))
-                A[x2, x2] = Phi1[k] - K2 @ H2 @ Phi1[k]
-                A[x2] += K2 @ A[v1] / part.interval
-                A[x2, v1] -= K2 / part.interval
-                B[x2], G[x2] = K2 @ B[v1] / part.interval, K2 @ G[v1] / part.interval
-            joint = A @ joint @ A.T + B @ Q[k] @ B.T + G @ R1 @ G.T
-            row = begin + k + 1
-            off, differs = np.zeros((2, MOTION.stop, count))  # of the last filter, and between the two
-            off[:, MOTION] = -np.eye(MOTION.stop)
-            last = x1 if two is None else x2
-            off[:, last.start : last.start + MOTION.stop] = np.eye(MOTION.stop)
-            seen = off[DV].copy()
-            seen[:, e] = -H[k]  # x - (dv - d): the residual's slow part
-            errors[row] = np.sum((off @ joint) * off, axis=1)
-            residual[row] = np.sum((seen @ joint) * seen, axis=1)
-            if share is not None and apart is not None:
-                differs[:, x1.start : x1.start + MOTION.stop] = np.eye(MOTION.stop)
-                differs[:, x2.start : x2.start + MOTION.stop] = -np.eye(MOTION.stop)
-                spread = np.sum((differs @ joint) * differs, axis=1)
-                known = share[row], apart[row], spread
-                errors[row] = _given(errors[row], np.sum((off @ joint) * differs, axis=1), *known)
-                with_log = np.sum((seen @ joint) * differs[DV], axis=1)
-                residual[row] = _given(residual[row], with_log, *(part[DV] for part in known))
-            residual[row] += whole.sigma**2
+        Q1, H1 = one.model.noise_of(part.interval, mean)[:1], one.rows(part)
+        first, P1 = _gains(Phi1, Q1, H1, R1, absent[rows], P1)
+        A, G = np.zeros((part.epochs, count, count)), np.zeros((part.epochs, count, 2))
+        B = np.zeros((part.epochs, count, n))  # of the noise that drives the errors
+        A[:, e, e], B[:, e] = Phi, np.eye(n)
+        A[:, x1, e], A[:, x1, x1] = first.gain @ H @ Phi, first.step
+        B[:, x1], G[:, x1] = first.gain @ H, first.gain
+        if two is not None and P2 is not None:
+            R2 = two.sigma**2 / (stride if two.overlap else 1) * np.eye(2)
+            second, P2 = _gains(Phi1, Q1, F1[:, DV, : two.model.states], R2, silent[rows], P2)
+            K2 = second.gain / part.interval
+            A[:, x2], B[:, x2], G[:, x2] = K2 @ A[:, v1], K2 @ B[:, v1], K2 @ G[:, v1]
+            A[:, x2, x2] += second.step
+            A[:, x2, v1] -= K2
+        driven = B @ Q @ np.swapaxes(B, -1, -2) + G @ R1 @ np.swapaxes(G, -1, -2)
+        joints = _covariances(A, driven, joint)[1:]
+        joint = joints[-1]
+        seen = np.repeat(off[None, DV], part.epochs, axis=0)
+        seen[:, :, e] = -H  # x - (dv - d): the residual's slow part
+        errors[rows], residual[rows] = _variances(off, joints), _variances(seen, joints)
+        if share is not None and apart is not None:
+            differs[:, x2.start : x2.start + MOTION.stop] = -np.eye(MOTION.stop)
+            known = share[rows], apart[rows], _variances(differs, joints)
+            errors[rows] = _given(errors[rows], _variances(off, joints, differs), *known)
+            with_log = _variances(seen, joints, differs[DV])
+            residual[rows] = _given(residual[rows], with_log, *(column[:, DV] for column in known))
+    residual[1:] += whole.sigma**2
     return _spread(course, coarse, errors, residual)
+
+
+def _covariances(A: Array, Q: Array, P: Array) -> Array:
+    """(K+1, n, n) of ``x+ = A x + w``, from `P` on."""
+    out = np.empty((len(A) + 1, *P.shape))
+    out[0] = P
+    for k in range(len(A)):
+        P = A[k] @ P @ A[k].T + Q[k]
+        out[k + 1] = P
+    return out
+
+
+def _variances(H: Array, P: Array, other: Array | None = None) -> Array:
+    """Diagonals of ``H P H'``, or of the covariance with `other` in place of the second H."""
+    return np.sum((H @ P) * (H if other is None else other), axis=-1)
+
+
+def _gains(Phi: Array, Q: Array, H: Array, R: Array, absent: Array, P: Array) -> tuple[Gains, Array]:
+    """Of a filter's updates at these epochs, and its covariance after them."""
+    z = np.where(absent[:, None], np.nan, np.zeros(2))
+    system = LinearSystem(Phi, Q, H, R[None], z, np.zeros(len(P)), P)
+    found = kalman(system, history="full")
+    return filter_gains(system, found), np.asarray(found.P[-1])
 
 
 def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spread: Array) -> Array:
@@ -176,14 +199,6 @@ def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spre
     """
     k = np.divide(covariance, spread, out=np.zeros_like(spread), where=spread > 0.0)
     return np.maximum(variance - k**2 * spread, 0.0) + ((weight + k) * apart) ** 2
-
-
-def _gain(P: Array, Phi: Array, Q: Array, H: Array, R: Array) -> tuple[Array, Array]:
-    """Of a filter's next update, and its covariance after it."""
-    P = Phi @ P @ Phi.T + Q
-    K = np.asarray(np.linalg.solve(H @ P @ H.T + R, H @ P).T, dtype=np.float64)
-    left = np.eye(len(P)) - K @ H
-    return K, left @ P @ left.T + K @ R @ K.T
 
 
 def _spread(course: Course, coarse: Course, errors: Array, residual: Array) -> Bands:
