@@ -1,5 +1,8 @@
 """What tests draw in every call, and what where the slow ones run: runs of a statistic, cases of one law."""
 
+import subprocess
+import sys
+
 import pytest
 
 FEW = 8
@@ -14,3 +17,16 @@ def some(few, more):
 def few_and_all(runs, few=FEW):
     """Parametrize `runs`: the bands of such a test follow from it."""
     return pytest.mark.parametrize("runs", [few, pytest.param(runs, marks=pytest.mark.slow)])
+
+
+def said_by_a_second_process(program, first_will_do):
+    """The words that a program prints in a process of its own.
+
+    It runs again where the kernels that it needs were not on the disk before: `first_will_do` says so of its words.
+    """
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+        words = done.stdout.split()
+        if first_will_do(words):
+            break
+    return words

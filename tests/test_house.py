@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -30,13 +31,18 @@ LONGEST = 120
 TYPES_COMMANDS = {"truenorth.formats.samples"}  # it shows commands to type
 
 FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
-TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
+
+
+@cache
+def tree(name: str) -> ast.Module:
+    """Parsed where a test asks for it, not while tests are collected."""
+    return ast.parse(FILES[name].read_text(encoding="utf-8"))
 
 
 def imports(name: str) -> set[str]:
     """Files that a file imports: a name that is a file itself, or the file in which the name stands."""
     found = set()
-    for node in ast.walk(TREES[name]):
+    for node in ast.walk(tree(name)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -88,28 +94,31 @@ def test_no_procedure_imports_the_simulator():
 def test_no_long_functions():
     wrong = [
         f"{name}:{node.name}"
-        for name, tree in TREES.items()
-        for node in ast.walk(tree)
+        for name in FILES
+        for node in ast.walk(tree(name))
         if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno + 1 > LONGEST
     ]
     assert wrong == []
 
 
-def documented(tree):
+@cache
+def documented(name):
     """The docstrings of a module: their nodes."""
     kinds = ast.Module | ast.ClassDef | ast.FunctionDef
-    return {id(node.body[0].value) for node in ast.walk(tree) if isinstance(node, kinds) and ast.get_docstring(node)}
+    return {
+        id(node.body[0].value) for node in ast.walk(tree(name)) if isinstance(node, kinds) and ast.get_docstring(node)
+    }
 
 
 def test_the_library_names_no_options():
     """Messages name Python's parameters, between backticks; the command line makes its options of them."""
     wrong = [
         f"{name}: {node.value!r}"
-        for name, tree in TREES.items()
+        for name in FILES
         if folder(name) != "cli" and name not in TYPES_COMMANDS
-        for node in ast.walk(tree)
+        for node in ast.walk(tree(name))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        if re.search(r"(?<![\w-])--[a-z]|(?<!\S)-o\b", node.value) and id(node) not in documented(tree)
+        if re.search(r"(?<![\w-])--[a-z]|(?<!\S)-o\b", node.value) and id(node) not in documented(name)
     ]
     assert wrong == []
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests import recordings
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.core.units import STANDARD_GRAVITY as G
@@ -42,7 +43,7 @@ def test_level_of_a_spinning_imu_is_honest(given):
     assert np.max(squares) < 16.0
 
 
-@pytest.mark.parametrize("start", [0.0, 60.0, 100.0, 135.0])
+@pytest.mark.parametrize("start", some([0.0], [60.0, 100.0, 135.0]))
 @pytest.mark.parametrize("imu", ["consumer", None])
 def test_a_turntable_that_turns_while_the_log_runs(start, imu):
     """Up in body axes: the mean of the force as it swings about the axis, and the axis as the gyros show it."""

@@ -24,7 +24,7 @@ def carried(course, x):
 
 
 @pytest.mark.parametrize(
-    ("lat", "heading"), some([(-45.78, 231.0), (79.0, 120.0)], [(45.78, 51.34), (-80.0, -30.0), (0.5, 270.0)])
+    ("lat", "heading"), some([(-45.78, 231.0)], [(79.0, 120.0), (45.78, 51.34), (-80.0, -30.0), (0.5, 270.0)])
 )
 def test_every_column_is_that_of_the_strapdown(lat, heading):
     """One error at a time, 48 h at 12.8 m/s in both hemispheres, east and west: within .3 % of its greatest effect.

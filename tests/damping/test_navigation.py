@@ -140,7 +140,7 @@ def test_the_logs_constant_error_is_found(ship):
     assert f"min (to {apart:.1f} min)" in result.damping.in_words()
 
 
-@pytest.mark.parametrize(("lat", "heading"), some([(-45.78, 231.0), (79.0, 120.0)], [(-80.0, -30.0), (0.5, 270.0)]))
+@pytest.mark.parametrize(("lat", "heading"), some([(-45.78, 231.0)], [(79.0, 120.0), (-80.0, -30.0), (0.5, 270.0)]))
 def test_both_hemispheres_east_and_west(lat, heading):
     ship = Ship(lat, heading, seed=3)
     free = ship.errors(ship.navigate(Damper("none")))
@@ -154,7 +154,7 @@ def test_both_hemispheres_east_and_west(lat, heading):
         assert (np.abs(left[late]) / sigma[late]).max() < 5.0
 
 
-@pytest.mark.parametrize("method", ["external", "kalman", "double", "augmented"])
+@pytest.mark.parametrize("method", some(["double"], ["external", "kalman", "augmented"]))
 def test_a_sick_log(ship, method):
     """Outliers, a jump of 1.1 m/s and two hours of silence: told, and what is left is near to a healthy log's."""
     healthy = ship.log()
@@ -183,7 +183,7 @@ def test_a_sick_log(ship, method):
 
 
 @pytest.mark.parametrize("method", some(["kalman"], ["external"]))
-@pytest.mark.parametrize("factor", [0.0, 1.0 / 0.514444])
+@pytest.mark.parametrize("factor", some([0.0], [1.0 / 0.514444]))
 def test_a_log_that_cannot_be_this_ships(ship, method, factor):
     """Dead, or knots taken for m/s: nothing in the log itself is amiss, and it is not believed in silence."""
     log = ship.log()

@@ -4,8 +4,6 @@ Each comparison is of the mean over many independent runs of the filter on the s
 units of that mean's own standard deviation: Student's t. Its bounds are two-sided with a false-alarm rate of 1e-3.
 """
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +13,7 @@ from scipy.stats import t as student
 
 from tests.filters.dense import random_system
 from tests.filters.nonlinear_models import TURNING, conditionally_linear, growth, in_disguise, squared, tracking
-from tests.runs import few_and_all
+from tests.runs import few_and_all, said_by_a_second_process
 from truenorth.analysis.consistency import chi_square_band, nees
 from truenorth.core.errors import DataError, UsageError
 from truenorth.filters import NonlinearSystem, gauss_hermite, kalman, particle
@@ -68,6 +66,7 @@ def test_on_a_linear_system_it_is_the_kalman_filter_on_average(nonlinear, runs):
     assert np.abs(((ours.innovation - exact.innovation) / sigma)[:, have]).max() < 0.5
 
 
+@pytest.mark.slow
 def test_linear_states_need_fewer_particles():
     # The scatter of the mean over runs, with as many particles: the fewer states are drawn, the smaller.
     runs = 100
@@ -199,9 +198,8 @@ for states in (None, [TURNING]):
 stats = sys.modules["truenorth.filters.particle"].particle_run.stats
 print(sum(stats.cache_misses.values()), sum(stats.cache_hits.values()))
 """
-    for _ in range(2):
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["0", "1"]
+    expected = ["0", "1"]
+    assert said_by_a_second_process(program, expected.__eq__) == expected
 
 
 def test_options_are_checked():

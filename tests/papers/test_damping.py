@@ -96,6 +96,7 @@ def test_switching_overshoots_and_need_not(voyage, cases):
     assert most["corrected"] < 0.5  # the log's own error is .42
 
 
+@pytest.mark.slow
 def test_random_signs_and_consistency(voyage):
     """Four voyages: fused against filter 1 at 18-24 h; NEES of 60 numbers in its 99.9 % band."""
     signs = random_signs(voyage, -0.3, 4, 11, 1, lambda stage: None)

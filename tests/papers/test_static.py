@@ -186,6 +186,7 @@ def test_runs_do_not_depend_on_their_number():
     np.testing.assert_array_equal(few.velocity, many.velocity[:2])
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path):
     result = CliRunner().invoke(app, ["reproduce", "static", "--runs", "2", "-o", str(tmp_path)])
     assert result.exit_code == 0, result.output

@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.quality.made import LAT, G, as_increments, base, car, changed, codes
+from tests.runs import few_and_all
 from truenorth.quality import inspect, motion_summary
 from truenorth.records import ImuRecord
 
@@ -196,12 +197,13 @@ def test_the_summary_is_cheap():
     assert min(times) < 0.12
 
 
-def test_waves_do_not_carry_a_moored_ship_away():
+@few_and_all(3, few=1)
+def test_waves_do_not_carry_a_moored_ship_away(runs):
     """A swell that shakes the mast by .1 m/s^2 and turns the hull by a fifth of a degree; a start of a van, beside it."""
     from truenorth.quality.regimes import motion_summary
     from truenorth.simulation.scenario import read_scenario
 
-    for run in range(3):
+    for run in range(runs):
         ship = motion_summary(read_scenario("quay").simulate(run=run).record)
         assert ship.fraction("moving") == 0.0
         assert ship.overall == "disturbed"
