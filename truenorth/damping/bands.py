@@ -184,7 +184,7 @@ def _variances(H: Array, P: Array, other: Array | None = None) -> Array:
     return np.sum((H @ P) * (H if other is None else other), axis=-1)
 
 
-def _gains(Phi: Array, Q: Array, H: Array, R: Array, absent: Array, P: Array) -> tuple[Gains, Array]:
+def _gains(Phi: Array, Q: Array, H: Array, R: Array, absent: NDArray[np.bool_], P: Array) -> tuple[Gains, Array]:
     """Of a filter's updates at these epochs, and its covariance after them."""
     z = np.where(absent[:, None], np.nan, np.zeros(2))
     system = LinearSystem(Phi, Q, H, R[None], z, np.zeros(len(P)), P)
