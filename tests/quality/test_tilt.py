@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from truenorth.campaign.fault_benches import BENCHES
 from truenorth.quality.tilt import _changes, check_tilt
 from truenorth.simulation.scenario import read_scenario
 
@@ -45,3 +46,9 @@ def test_a_long_arm_is_no_scale_factor(seed):
     off = check_tilt(ship(seed, 0.02))
     assert off.scale[0] == pytest.approx(0.02, rel=0.15)  # the arm takes a part of it, or gives
     assert [item.key for item in off.evidence()] == ["tilt.scale"]
+
+
+def test_a_base_that_moves_along_with_its_sway_is_no_scale_factor():
+    """A sound log drawn so: the line through its scales stands ten sigmas from zero, and gyros without such errors turn worse."""
+    record = BENCHES["swaying"].draw(8202, 51)[0]["record"]
+    assert check_tilt(record).evidence() == []

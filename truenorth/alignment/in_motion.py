@@ -44,7 +44,7 @@ from truenorth.core.units import significant
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
-from truenorth.estimate.rivals import jump_evidence, misfit, wandering_evidence
+from truenorth.estimate.rivals import jump_evidence, misfit, noise_evidence, wandering_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
@@ -208,13 +208,12 @@ def _seen(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
     found += jump_evidence(lambda record: replace(task, record=record).run(guess, gated=gated), track, task.record)
-    return found + wandering_evidence(
-        lambda model: replace(task, model=model).run(guess, gated=gated),
-        track,
-        task.model,
-        task.spec,
-        task.record.duration,
-    )
+
+    def again(model: InsModel) -> Track:
+        return replace(task, model=model).run(guess, gated=gated)
+
+    found += noise_evidence(again, track, task.model, task.record)
+    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration)
 
 
 def _published(task: MovingTask, method: str, heading_limit: float, more: list[Evidence]) -> Alignment:

@@ -24,7 +24,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
-from truenorth.estimate.rivals import wandering_evidence
+from truenorth.estimate.rivals import noise_evidence, wandering_evidence
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import ImuRecord, MasterRecord
@@ -155,7 +155,8 @@ def align_transfer(
     rows = Matching(*noise, what.kind, GATE)
     track = transfer_filter(part, master, model, start, rows, linear=linear)
     again = partial(transfer_filter, part, master, start=start, matching=rows, linear=linear)
-    seen = _seen(slave, master, model, C_mb) + wandering_evidence(again, track, model, spec, part.duration)
+    seen = _seen(slave, master, model, C_mb) + noise_evidence(again, track, model, slave)
+    seen += wandering_evidence(again, track, model, spec, part.duration)
     answer = assemble_transfer(
         part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, seen
     )

@@ -63,6 +63,13 @@ def chi_square_quantile(probability: ArrayLike, dof: ArrayLike) -> Array:
     return np.where(dof > 0, chdtri(np.maximum(dof, 1), 1.0 - np.asarray(probability, dtype=np.float64)), 0.0)
 
 
+def student_limit(chance: float, dof: int) -> float:
+    """What the size of a Student's t variable exceeds with the given probability: of a mean over its own estimated sigma."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(dof, 1.0 - 0.5 * chance))
+
+
 def chi_square_band(dof: ArrayLike, runs: int = 1, level: float = 0.95) -> tuple[Array, Array]:
     """Two-sided band of the mean of a chi-square statistic over independent runs.
 

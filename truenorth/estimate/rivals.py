@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.quality.density import burst_evidence
 from truenorth.quality.innovations import whiteness
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -68,7 +69,15 @@ class Along(Protocol):
 
 
 class Walking(Protocol):
-    """A model whose biases walk."""
+    """A model of white noise and of biases that walk."""
+
+    @property
+    def gyro_random_walk(self) -> float:
+        """rad/sqrt(s)."""
+
+    @property
+    def accel_random_walk(self) -> float:
+        """m/s/sqrt(s)."""
 
     @property
     def gyro_rate_walk(self) -> float:
@@ -161,6 +170,31 @@ def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRe
         "ratio": ratio,
     }
     return [Evidence("record.clock_jumps", figures, "unknown", ANY_EFFECT, ("common_clock",))]
+
+
+def noise_evidence(run: Callable[[M], Along], first: Along, model: M, record: ImuRecord) -> list[Evidence]:
+    """What noise for a while does to an answer on the move: its own walk, and what the filter makes of it.
+
+    The filter takes for errors of attitude and biases what the noise does to velocity. With as much noise assumed all along it
+    would not: what that moves the answer by is about what it has taken in.
+
+    Parameters
+    ----------
+    run, first, model
+        As of :func:`wandering_evidence`.
+    record : ImuRecord
+    """
+    found = []
+    for item in burst_evidence(record):
+        name = "gyro_random_walk" if item.key == "noise.gyro_stretch" else "accel_random_walk"
+        louder = {name: math.hypot(getattr(model, name), float(item.figures["density"]))}
+        try:
+            taken = moved(first, run(replace(model, **louder)))  # type: ignore[type-var]  # a dataclass
+        except DataError:
+            taken = NO_EFFECT
+        effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(item.effect.items(), taken.items(), strict=True)))
+        found.append(replace(item, figures={**item.figures, "heading": effect.heading}, effect=effect))
+    return found
 
 
 def counted_once(evidence: Sequence[Evidence]) -> list[Evidence]:

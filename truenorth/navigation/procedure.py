@@ -19,7 +19,7 @@ from truenorth.core.position import Position
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
-from truenorth.estimate.rivals import counted_once, jump_evidence, wandering_evidence
+from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import second_look, slow_errors
@@ -28,6 +28,7 @@ from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
+from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -159,6 +160,8 @@ def navigate(
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
         evidence += _rivals(plan, track, given, noise, smooth)
+    else:
+        evidence += burst_evidence(record)
     result = Navigation(
         status="navigated",
         evidence=(),
@@ -222,13 +225,12 @@ def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> l
 def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
     """What other biases, clocks and mountings explain better."""
     aiding = plan.sources(given)
-    found = wandering_evidence(
-        lambda model: replace(plan, model=model).run(aiding, smooth=smooth),
-        track,
-        plan.model,
-        spec,
-        plan.record.duration,
-    )
+
+    def again(model: InsModel) -> Track:
+        return replace(plan, model=model).run(aiding, smooth=smooth)
+
+    found = noise_evidence(again, track, plan.model, plan.record)
+    found += wandering_evidence(again, track, plan.model, spec, plan.record.duration)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     return found + second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, _looked_at(given))
 

@@ -99,8 +99,13 @@ def burst_evidence(record: ImuRecord) -> list[Evidence]:
         if loud.size:
             walked = math.sqrt(float(np.diff(edges)[loud] @ extra[loud, channels].max(axis=1) ** 2))
             effect = Effect(heading=walked, level=walked) if name == "gyro" else Effect(velocity=walked)
-            figures: dict[str, Figure] = {"begin": float(edges[loud[0]]), "end": float(edges[loud[-1] + 1])}
-            found.append(Evidence(f"noise.{name}_stretch", figures | {"heading": effect.heading}, "known", effect))
+            figures: dict[str, Figure] = {
+                "begin": float(edges[loud[0]]),
+                "end": float(edges[loud[-1] + 1]),
+                "density": float(extra[:, channels].max()),
+                "heading": effect.heading,
+            }
+            found.append(Evidence(f"noise.{name}_stretch", figures, "known", effect))
     return found
 
 

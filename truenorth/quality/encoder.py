@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.consistency import student_limit
 from truenorth.core.attitude import dcm_from_quaternion, rotation_vector_from_dcm
 from truenorth.quality.tilt import whole_cells
 from truenorth.records import ImuRecord
@@ -20,7 +21,8 @@ Array = NDArray[np.float64]
 CLEARER = 4.0  # times smaller squares of the base's turns that another reading must leave
 NET_TURN = math.radians(8.0)  # of the base's mean attitude from the first third of a log to the last: more is no sway
 FEWEST_TURNS = 4  # of the outer axis, that show a wobble
-SURE = 7.0  # sigmas of it: of Student's t with three degrees of freedom one in 170, with eight one in 9,000
+SURE = 7.0  # sigmas of it at least: sway is alike from turn to turn
+CHANCE = 2e-4  # of a sound indexer, of whose few turns sigma is estimated
 LEAST_ZERO = math.radians(0.05)  # rad: indexers are mounted no better
 FASTEST = math.radians(60.0)  # rad/s RMS: no ship or vehicle that stays turns faster
 
@@ -85,7 +87,7 @@ def zero_evidence(record: ImuRecord, C_sb: Callable[[Array], Array], inner: Call
     if len(found) < FEWEST_TURNS:
         return []
     off, sigma = -float(np.mean(found)), float(np.std(found, ddof=1)) / math.sqrt(len(found))
-    if abs(off) < max(LEAST_ZERO, SURE * sigma):
+    if abs(off) < max(LEAST_ZERO, max(SURE, student_limit(CHANCE, len(found) - 1)) * sigma):
         return []
     return [Evidence("encoder.zero", {"off": off, "sigma": sigma}, "bounded", Effect(abs(off), abs(off)), ("encoder",))]
 

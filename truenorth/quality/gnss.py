@@ -1,8 +1,22 @@
-"""Velocities of a receiver or of a master against the changes of its positions: grid north, exchanged axes."""
+"""Velocities of a receiver or of a master against its positions: grid north, exchanged axes.
+
+Positions ``p``, as complex numbers (east + i north), follow the integral ``s`` of the velocities:
+
+    ``p = a + k s + tau v + n``,
+
+the turn is minus the phase of ``k``. A delay ``tau`` between the two is left open within a sigma: in a circle it is a turn. The
+noise ``n`` of cells is white plus a walk, the integral of the velocities' errors, which are white or last for a while. Of their
+ratio nothing is known: each of a ladder has its generalised least squares, with Student's t as the turn's distribution, and its
+weight by the restricted likelihood. A turn is shown where almost none of the weight has the other sign.
+
+Source: D. A. Harville, "Maximum likelihood approaches to variance component estimation", J. Am. Stat. Assoc. 72 (1977).
+"""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +29,14 @@ Array = NDArray[np.float64]
 
 PIECE = 20.0  # s, of a displacement
 LEAST_WAY = 20.0  # m of a piece: shorter ones do not show a direction
-FEWEST = 4
+FEWEST = 4  # pieces of such a way, that show wrong axes
 UNEXPLAINED = 0.3  # of the squares of displacements, that velocities turned as one may leave at most
-CLEAR = 4.0  # sigmas: six pieces of a sound log come so far in one of a hundred, twelve in one of five hundred
+CELLS = 60  # of a log, at most: means over them are compared
+FEWEST_CELLS = 4  # without a gap between them
+RATIOS = (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0)  # of the walk's variance in a cell to that of the white noise
+LASTING = (0.0, 20.0)  # s, for which errors of velocities are correlated
+CHANCE = 1e-4  # that a sound log shows a turn, of either sign
+LATE = 0.1  # s, one sigma: of velocities against the positions of the same receiver
 LEAST = math.radians(0.15)  # rad: a smaller turn is the drift of a receiver's positions
 
 
@@ -46,8 +65,7 @@ def turn_evidence(
 ) -> list[Evidence]:
     """By how much velocities are turned, where positions contradict them; heading would be as wrong.
 
-    Displacements ``p`` and integrals ``s`` of velocity of pieces, as complex numbers (east + i north): the turn is the phase
-    of ``sum p conj(s)``; its sigma from what the pieces leave. Velocities of exchanged or flipped axes fit no turn at all.
+    Velocities of exchanged or flipped axes fit no turn at all: displacements over pieces say so.
 
     Parameters
     ----------
@@ -59,29 +77,113 @@ def turn_evidence(
     velocity_error : float, m/s
         One-sigma of an error that stays: across the way it looks like a turn.
     """
-    if len(time) < 2 * FEWEST:
+    if len(time) < 2 * FEWEST_CELLS:
         return []
     R_M, R_N = radii(lat)
     at = (lon - lon[0]) * R_N * np.cos(lat) + 1j * (lat - lat[0]) * R_M
     velocity = v_n[:, 0] + 1j * v_n[:, 1]
     steps = np.diff(time)
     whole = np.append(0.0, np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * steps))
+    # Over a gap nothing is known of the way.
+    stretch = np.append(0, np.cumsum(steps > 3.0 * np.median(steps)))
     edges = np.searchsorted(time, np.arange(time[0], time[-1], PIECE))
-    gaps = np.append(0, np.cumsum(steps > 3.0 * np.median(steps)))
-    good = (np.diff(gaps[edges]) == 0) & (np.abs(np.diff(whole[edges])) > LEAST_WAY)
+    good = (np.diff(stretch[edges]) == 0) & (np.abs(np.diff(whole[edges])) > LEAST_WAY)
     p, s = np.diff(at[edges])[good], np.diff(whole[edges])[good]
-    if len(p) < FEWEST:
+    if not len(p):
         return []
-    energy = float(np.sum(np.abs(s) ** 2))
-    k = np.sum(p * np.conj(s)) / energy
-    if np.sum(np.abs(p - k * s) ** 2) > UNEXPLAINED * np.sum(np.abs(p) ** 2):
+    k = np.sum(p * np.conj(s)) / np.sum(np.abs(s) ** 2)
+    if len(p) >= FEWEST and np.sum(np.abs(p - k * s) ** 2) > UNEXPLAINED * np.sum(np.abs(p) ** 2):
         return [contradiction(f"{source}.velocity", "sensor_axes")]
-    angle = -float(np.angle(k))  # of the velocities against the positions, counter-clockwise
-    left = np.imag((p - k * s) * np.conj(k * s)) / np.abs(k)
-    sigma = math.sqrt(float(np.sum(left**2)) * len(p) / (len(p) - 1)) / energy
-    across = velocity_error * abs(np.sum(s * np.diff(time[edges])[good])) / energy
-    sigma = math.hypot(sigma, across)
-    if abs(angle) < max(CLEAR * sigma, LEAST):
+    number, t, places, ways, rates = _cells(stretch, time, at, k * whole, velocity)
+    turn = _turn(number, t, places, ways, rates, float(np.angle(k)), velocity_error)
+    if turn is None or abs(turn.angle) < LEAST or turn.otherwise > 0.5 * CHANCE:
         return []
-    figures: dict[str, Figure] = {"angle": angle, "sigma": sigma}
-    return [Evidence(f"{source}.turned", figures, "bounded", Effect(heading=abs(angle)), ("grid_north",))]
+    figures: dict[str, Figure] = {"angle": turn.angle, "sigma": turn.sigma}
+    return [Evidence(f"{source}.turned", figures, "bounded", Effect(heading=abs(turn.angle)), ("grid_north",))]
+
+
+class Turn(NamedTuple):
+    """Of velocities against positions, counter-clockwise."""
+
+    angle: float  # rad
+    sigma: float  # rad
+    otherwise: float  # probability that the turn has the other sign
+
+
+def _cells(stretch: NDArray[np.intp], *series: NDArray) -> tuple[NDArray, ...]:
+    """Number of the stretch (M,), and means (M,) of series (N,), of at most about so many cells, none over a gap."""
+    rows = max(1, math.ceil(len(stretch) / CELLS))
+    edges = np.flatnonzero(np.diff(stretch, prepend=-1))
+    numbers, first = [], []
+    for number, (a, b) in enumerate(pairwise((*edges, len(stretch)))):
+        starts = np.arange(a, b - rows + 1, rows)
+        if len(starts) >= FEWEST_CELLS:
+            numbers.append(np.full(len(starts), number))
+            first.append(starts)
+    if not first:
+        return (np.zeros(0, dtype=np.intp), *(x[:0] for x in series))
+    whole = np.concatenate(first)[:, None] + np.arange(rows)
+    return (np.concatenate(numbers), *(x[whole].mean(axis=1) for x in series))
+
+
+def _turn(
+    stretch: NDArray[np.intp],
+    time: Array,
+    at: NDArray,
+    whole: NDArray,
+    velocity: NDArray,
+    about: float,
+    velocity_error: float,
+) -> Turn | None:
+    """The turn of cells (M,), `whole` turned back about so far; None where they are too few."""
+    count = len(time)
+    own = stretch[:, None] == np.unique(stretch)  # a place of its own for each stretch
+    columns = [whole, 1j * whole, velocity, *own.T.astype(complex), *(1j * own.T)]
+    since = time - time[0]
+    X, y, slow = _parted(np.stack(columns, axis=1)), _parted(at), _parted(np.stack([since, 1j * since], axis=1))
+    dof = 2 * count - X.shape[1]
+    if dof < FEWEST_CELLS:
+        return None
+    X = X / (size := np.maximum(np.linalg.norm(X, axis=0), 1e-12))
+    found = []
+    for walk in (np.zeros((count, count)), *(r * _walk(time, stretch, lasts) for lasts in LASTING for r in RATIOS)):
+        C = np.eye(count) + walk
+        A, b, c = (np.concatenate([np.linalg.solve(C, half) for half in np.split(x, 2)]) for x in (X, y, slow))
+        N = X.T @ A
+        squares = max(float(b @ (y - X @ (np.linalg.pinv(N, rcond=1e-12, hermitian=True) @ (X.T @ b)))), 1e-300)
+        known = np.zeros(len(N))
+        known[2] = squares / dof / (LATE * size[2]) ** 2
+        inverse = np.linalg.pinv(N + np.diag(known), rcond=1e-12, hermitian=True)
+        x = inverse @ (X.T @ b)
+        variance = squares / dof * inverse[1, 1] + velocity_error**2 * float(np.sum((inverse @ (X.T @ c))[1] ** 2))
+        logs = np.linalg.slogdet(C)[1] + 0.5 * np.linalg.slogdet(N)[1] + 0.5 * dof * math.log(squares)
+        found.append((-about - float(x[1]) / size[1], math.sqrt(variance) / size[1], -logs))
+    angles, sigmas, likely = np.array(found).T
+    weights = np.exp(likely - likely.max())
+    weights /= weights.sum()
+    angle = float(weights @ angles)
+    sigma = math.sqrt(float(weights @ (sigmas**2 + (angles - angle) ** 2)))
+    if abs(angle) < 3.0 * sigma:
+        return Turn(angle, sigma, 0.5)
+    from scipy.special import stdtr
+
+    return Turn(angle, sigma, float(weights @ stdtr(dof, -math.copysign(1.0, angle) * angles / sigmas)))
+
+
+def _walk(time: Array, stretch: NDArray[np.intp], lasts: float) -> Array:
+    """(M, M) covariance of the integral of errors that last so long (s), of variance one in a step; none over a gap."""
+    first = np.searchsorted(stretch, stretch)
+    since = time - time[first]
+    a, b = since[:, None], since
+    step = float(np.median(np.diff(time)))
+    same = stretch[:, None] == stretch
+    if lasts == 0.0:
+        return np.asarray(np.where(same, np.minimum(a, b), 0.0) / step)
+    kept = np.exp(-since / lasts)
+    bend = 1.0 - kept[:, None] - kept + np.exp(-np.abs(a - b) / lasts)
+    return np.asarray(np.where(same, np.minimum(a, b) - 0.5 * lasts * bend, 0.0) / step)
+
+
+def _parted(values: NDArray) -> Array:
+    """Real parts (2M, ...) of complex values (M, ...), then their imaginary ones."""
+    return np.concatenate([values.real, values.imag])

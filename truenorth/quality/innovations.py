@@ -144,6 +144,8 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
     memory : float, s
         For which residuals are correlated: so many of them are independent; a constant or Schuler's period at least.
     """
+    from truenorth.analysis.consistency import chi_square_quantile
+
     found = []
     for source in sources:
         if len(source.time) < FEWEST:
@@ -152,8 +154,8 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
         size = math.sqrt(float(np.nanmean(squares)))
         length = float(source.time[-1] - source.time[0])
         apart = min(max(memory, SCHULER), length)
-        spread = math.sqrt(2.0 / max(2.0 * length / apart, 1.0))
-        if size**2 - 1.0 > limit("chance") * spread:
+        rows = max(round(2.0 * length / apart), 1)
+        if size**2 > float(chi_square_quantile(1.0 - CHANCE, rows)) / rows:
             grows = math.sqrt(size**2 - 1.0)
             effect = Effect(**{name: grows * own for name, own in sigma.items() if math.isfinite(own)})
             figures: dict[str, Figure] = {"name": source.name, "size": size}

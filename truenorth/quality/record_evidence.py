@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.quality.density import burst_evidence
 from truenorth.quality.plausibility import check_plausibility
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
@@ -48,8 +47,8 @@ def record_evidence(
 
 
 def moving_evidence(record: ImuRecord) -> list[Evidence]:
-    """Evidence of a record on the move."""
-    return sampling_evidence(record, turns=True) + burst_evidence(record)
+    """Evidence of a record on the move; of noise for a while see :func:`truenorth.estimate.rivals.noise_evidence`."""
+    return sampling_evidence(record, turns=True)
 
 
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:

@@ -18,6 +18,7 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.consistency import student_limit
 from truenorth.core.attitude import dcm_from_quaternion
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
@@ -36,8 +37,9 @@ PLAIN = (
 )
 CLEARER = 3.0  # times smaller squares that another reading must leave
 EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may leave at most
-SURE = 10.0  # sigmas of a small delay: of few pieces, in each of which the base's own motion is alike
-CLEAR = 7.0  # sigmas of a scale factor: of Student's t with six degrees of freedom one in two thousand is beyond
+# Of a small delay and of a scale factor of sound gyros: sigma is estimated from few pieces, and the base's own motion is alike in
+# them. Of eight pieces 10 and 7 sigmas.
+SURE, CLEAR = 2e-5, 2e-4
 LEAST_SCALE = 0.005  # no gyro of a specification has a larger error
 LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
 IDENTITY = "+x +y +z"
@@ -64,9 +66,11 @@ class Tilt:
     tilt : float, rad
         RMS of the tilt that such a delay makes.
     scale, scale_sigma : (3,) arrays
-        Errors of the gyros' scale factors, and their one-sigmas.
+        Errors of the gyros' scale factors, and their one-sigmas; infinite where gyros without these errors turn no better.
     turned : (3,) array, rad
         RMS of the turns about each axis in a piece.
+    pieces : int
+        From whose scatter the sigmas are.
     """
 
     given: float
@@ -79,6 +83,7 @@ class Tilt:
     scale: Array = field(default_factory=lambda: np.zeros(3))
     scale_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turned: Array = field(default_factory=lambda: np.zeros(3))
+    pieces: int = 2
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -95,10 +100,11 @@ class Tilt:
         if explains:
             return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
         found = []
-        if abs(self.delay) >= max(LEAST_DELAY, SURE * self.delay_sigma):
+        sure, clear = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR))
+        if abs(self.delay) >= max(LEAST_DELAY, sure * self.delay_sigma):
             found.append(Evidence(late, figures, "bounded", Effect(level=self.tilt), ("common_clock",)))
         off = np.abs(self.scale)
-        for i in np.flatnonzero(off >= np.maximum(LEAST_SCALE, CLEAR * self.scale_sigma)):
+        for i in np.flatnonzero(off >= np.maximum(LEAST_SCALE, clear * self.scale_sigma)):
             size = float(off[i] * self.turned[i])
             figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
             found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
@@ -147,7 +153,15 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     little, sigma = bench.small(theta)
     late = float(little[0])
     tilt = abs(late) * bench.rate(theta)
-    return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, little[1:], sigma[1:], turns)
+    # Scale factors are fitted on a straight line, and the base's motion along the sway may pass for them. With half of what was
+    # found taken off, and with all, the gyros must turn better and better.
+    clear = student_limit(CLEAR, len(theta) - 1)
+    wrong = np.where(np.abs(little[1:]) >= np.maximum(LEAST_SCALE, clear * sigma[1:]), little[1:], 0.0)
+    if wrong.any():
+        half, whole = (bench.left(theta / np.maximum(1.0 + part * wrong, 0.1)) for part in (0.5, 1.0))
+        if not whole < half < given:
+            sigma[1:] = np.inf
+    return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, little[1:], sigma[1:], turns, len(theta))
 
 
 READINGS = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))

@@ -1,0 +1,48 @@
+"""Velocities against positions: an honest sigma whatever the noise, no turn in a sound log, and none taken for a delay."""
+
+import numpy as np
+import pytest
+
+from truenorth.core.earth import radii
+from truenorth.quality.gnss import turn_evidence
+
+RUNS = 40
+
+
+def log(rng, kind, turn=0.0, late=0):
+    """Rows of a drive or of circles at 12 deg/s; velocities turned by so many degrees, and late by so many steps of .05 s."""
+    step, rows = 0.05, 20 * int(rng.uniform(60.0, 300.0))
+    t = step * np.arange(rows)
+    rate, speed = np.full(rows, np.radians(12.0)), np.full(rows, 8.0)
+    if kind != "circles":
+        rate = np.radians(9.0) * ((t % 40.0) > 30.0) * np.sign(np.sin(t / 40.0))
+        speed = 10.0 + 4.0 * np.sin(t / 11.0)
+    v = speed * np.exp(1j * (rng.uniform(0.0, 6.0) + np.cumsum(rate) * step))
+    p = np.append(0.0, np.cumsum(0.5 * (v[1:] + v[:-1]) * step))
+    at = slice(10, -10, 20)
+    p, v = p[at], np.roll(v, late)[at] * np.exp(1j * np.radians(turn))
+    white = rng.standard_normal((4, len(p)))
+    p = p + rng.choice([0.02, 1.0]) * (white[0] + 1j * white[1])
+    if kind == "wandering":
+        p = p + 0.3 * np.cumsum(rng.standard_normal(len(p)) + 1j * rng.standard_normal(len(p)))
+    v = v + 0.05 * (white[2] + 1j * white[3])
+    R_M, R_N = radii(0.7)
+    return t[at], 0.7 + p.imag / R_M, p.real / R_N / np.cos(0.7), np.stack([v.real, v.imag, 0.0 * v.real], axis=1)
+
+
+@pytest.mark.parametrize("kind", ["drive", "wandering", "circles"])
+def test_a_sound_log_shows_no_turn(kind):
+    """40 drawn logs of each; by chance one in 250 such tests fails."""
+    rng = np.random.default_rng(1)
+    assert not any(turn_evidence("gnss", *log(rng, kind, late=int(rng.integers(-6, 7)))) for _ in range(RUNS))
+
+
+@pytest.mark.parametrize(("kind", "most"), [("drive", 3.4), ("wandering", 3.6)])
+def test_a_turn_is_as_far_off_as_its_sigma_says(kind, most):
+    """Two degrees, found in nearly all; Student's t has 20 degrees of freedom and more."""
+    rng = np.random.default_rng(2)
+    found = [item.figures for _ in range(RUNS) for item in turn_evidence("gnss", *log(rng, kind, 2.0))]
+    assert len(found) > 0.85 * RUNS
+    off = np.array([(f["angle"] - np.radians(2.0)) / f["sigma"] for f in found])
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(1.0, abs=0.35)
+    assert np.abs(off).max() < most
