@@ -7,6 +7,7 @@ is the error of the answer.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,11 @@ from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import find_touch
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
 from truenorth.errors.staying import BA, BG, PHI
 from truenorth.filters.gains import times
+from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
@@ -26,18 +29,24 @@ Array = NDArray[np.float64]
 
 FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
+SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
 SENSORS = slice(BG.start, BA.stop)
 
 
-def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
-    """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves."""
-    Phi, H = fine.system.Phi, fine.system.H
-    count, n = len(fine.estimates.innovation), fine.system.states
-    first = np.array([round(onset * count) for onset in ONSETS])
-    d = np.zeros((n, 2 * len(first) * 6))
-    signature = np.empty((count, H.shape[-2], d.shape[1]))
-    _begin(np.ascontiguousarray(Phi), np.ascontiguousarray(H), first, SENSORS.start, d, signature)
-    ratio, size, x = matched(fine, signature)
+def bias_step_evidence(fine: FineAlignment, spec: ImuSpec | None = None) -> list[Evidence]:
+    """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves.
+
+    Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
+    that beats slowly. As large as `spec` says, they explain what they can.
+    """
+    count = len(fine.estimates.innovation)
+    shapes = np.zeros((count, len(SIGNATURES)))
+    for i, (kind, onset) in enumerate(SIGNATURES):
+        since = np.arange(count) - round(onset * count)
+        shapes[:, i] = since >= 0 if kind == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
+    bias = np.einsum("ki,jl->kjil", shapes, np.eye(6)).reshape(count, 6, -1)
+    d, signature = _seen(fine, bias)
+    ratio, size, x = matched(fine, signature, None if spec is None else _of_matrices(fine, spec))
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []
@@ -46,7 +55,7 @@ def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
     axis, sensor = best % 3, "gyro" if best % 6 < 3 else "accel"
     figures: dict[str, Figure] = {
         "axis": "xyz"[axis],
-        "onset": ONSETS[best // 6 % len(ONSETS)] * float(fine.integrals.time[-1]),
+        "onset": SIGNATURES[best // 6][1] * float(fine.integrals.time[-1]),
         "size": abs(float(size[best])),
         "ratio": float(ratio[best]),
         "chance": limit("hint"),
@@ -57,24 +66,39 @@ def bias_step_evidence(fine: FineAlignment) -> list[Evidence]:
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 
-@compiled
-def _begin(Phi: Any, H: Any, first: Any, sensors: int, d: Any, signature: Any) -> None:
-    """Measurements (K, m, 12 S) and last state (n, 12 S) of biases that change from the epochs `first` (S,) on.
+def _of_matrices(fine: FineAlignment, spec: ImuSpec) -> Array | None:
+    """Signatures (K, 3, 18) of scale factors and misalignments of one sigma; None where the specification has none."""
+    one = np.eye(3, dtype=np.bool_)
+    gyro = np.where(one, spec.gyro_scale_factor, spec.gyro_misalignment)
+    accel = np.where(one, spec.accel_scale_factor, spec.accel_misalignment)
+    if not (gyro.any() or accel.any()):
+        return None
+    log = fine.integrals
+    turn = rotation_vector_from_dcm(np.swapaxes(log.C_ib[:-1], 1, 2) @ log.C_ib[1:])
+    rate, force = turn / log.intervals[:, None], np.einsum("kji,kj->ki", log.C_mean, log.mean_force)
+    bias = np.zeros((len(rate), 6, 18))
+    for i, j in product(range(3), range(3)):
+        bias[:, i, 3 * i + j] = gyro[i, j] * (rate[:, j] - rate[:, j].mean())
+        bias[:, 3 + i, 9 + 3 * i + j] = accel[i, j] * (force[:, j] - force[:, j].mean())
+    return _seen(fine, bias)[1]
 
-    Columns: steps of size one, then ramps that are one at the end, of each of the six biases from each onset.
-    """
-    count, before = signature.shape[0], np.zeros_like(d)
-    for k in range(count):
+
+def _seen(fine: FineAlignment, bias: Array) -> tuple[Array, Array]:
+    """Last states (n, S) and measurements (K, 3, S) of errors of the six sensors (K, 6, S)."""
+    Phi, H = (np.ascontiguousarray(x) for x in (fine.system.Phi, fine.system.H))
+    d = np.zeros((fine.system.states, bias.shape[2]))
+    signature = np.empty((len(bias), H.shape[-2], bias.shape[2]))
+    _follow(Phi, H, np.ascontiguousarray(bias), SENSORS.start, d, signature)
+    return d, signature
+
+
+@compiled
+def _follow(Phi: Any, H: Any, bias: Any, sensors: int, d: Any, signature: Any) -> None:
+    """Measurements (K, m, S) and last state (n, S) of sensor errors (K, 6, S)."""
+    before = np.zeros_like(d)
+    for k in range(signature.shape[0]):
         before[:] = d
-        for kind in range(2):
-            for i in range(len(first)):
-                size = 1.0 if k >= first[i] else 0.0
-                if kind == 1:
-                    size = max(0.0, (k - first[i]) / (count - first[i]))
-                for j in range(6):
-                    column = 6 * (len(first) * kind + i) + j
-                    before[sensors : sensors + 6, column] = 0.0
-                    before[sensors + j, column] = size
+        before[sensors : sensors + 6] = bias[k]
         times(Phi[min(k, len(Phi) - 1)], before, d)
         times(H[min(k, len(H) - 1)], d, signature[k])
 

@@ -95,8 +95,13 @@ def detect_drift(fine: FineAlignment) -> Drift:
     return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 
 
-def matched(fine: FineAlignment, signature: Array) -> tuple[Array, Array, Array]:
+def matched(fine: FineAlignment, signature: Array, others: Array | None = None) -> tuple[Array, Array, Array]:
     """Match innovations with those that signatures (K, 3, S) in the measurements make.
+
+    Parameters
+    ----------
+    others : (K, 3, M) array, optional
+        Signatures, of one sigma each, of errors that the filter leaves out and any log may have: they explain what they can.
 
     Returns
     -------
@@ -107,8 +112,17 @@ def matched(fine: FineAlignment, signature: Array) -> tuple[Array, Array, Array]
     x : (n, S) array
         What the filter estimates in the end of a signature of size one.
     """
-    expected, x = through(fine.system, fine.gains, signature)
-    weighted = np.linalg.solve(fine.estimates.innovation_covariance, expected)
-    match = np.einsum("kis,ki->s", weighted, fine.estimates.innovation)
-    energy = np.maximum(np.einsum("kis,kis->s", weighted, expected), 1e-300)
-    return match**2 / energy, match / energy, x
+    count = signature.shape[-1]
+    both = signature if others is None else np.concatenate([signature, others], axis=-1)
+    expected, x = through(fine.system, fine.gains, both)
+    L = np.linalg.cholesky(fine.estimates.innovation_covariance)
+    white = np.linalg.solve(L, expected).reshape(-1, both.shape[-1])
+    e = np.linalg.solve(L, fine.estimates.innovation[..., None]).ravel()
+    shape, other = white[:, :count], white[:, count:]
+    match, energy = shape.T @ e, np.sum(shape**2, axis=0)
+    if others is not None:
+        shared = np.linalg.solve(np.eye(other.shape[1]) + other.T @ other, other.T @ np.column_stack([e, shape]))
+        match -= shape.T @ other @ shared[:, 0]
+        energy -= np.einsum("ks,ks->s", shape, other @ shared[:, 1:])
+    energy = np.maximum(energy, 1e-300)
+    return match**2 / energy, match / energy, x[:, :count]

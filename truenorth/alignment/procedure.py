@@ -260,7 +260,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     if spec is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    steps = [*bias_step_evidence(fine), *bad_stretches(fine, task.record)]
+    steps = [*bias_step_evidence(fine, used if sways else None), *bad_stretches(fine, task.record)]
     return _Found(answer, check, fine.settled, detect_drift(fine), "" if sways else form, steps)
 
 
