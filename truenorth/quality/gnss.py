@@ -15,6 +15,7 @@ Source: D. A. Harville, "Maximum likelihood approaches to variance component est
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -34,7 +35,13 @@ UNEXPLAINED = 0.3  # of the squares of displacements, that velocities turned as 
 CELLS = 60  # of a log, at most: means over them are compared
 FEWEST_CELLS = 4  # without a gap between them
 RATIOS = (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0)  # of the walk's variance in a cell to that of the white noise
-LASTING = (0.0, 20.0, 200.0)  # s, for which errors of velocities are correlated: noise, a receiver's filter, a master's jump
+LASTING = (
+    0.0,
+    20.0,
+    200.0,
+)  # s, for which errors of velocities are correlated: noise, a receiver's filter, a master's jump
+PARTS, DIFFERENT = 4, 4.0  # of a log, and sigmas by which one of them may differ from the mean of all
+SINGULAR = 1e-12  # of the largest power of a column
 CHANCE = 1e-4  # that a sound log shows a turn, of either sign
 LATE = 0.1  # s, one sigma: of velocities against the positions of the same receiver
 LEAST = math.radians(0.15)  # rad: a smaller turn is the drift of a receiver's positions
@@ -94,12 +101,31 @@ def turn_evidence(
     k = np.sum(p * np.conj(s)) / np.sum(np.abs(s) ** 2)
     if len(p) >= FEWEST and np.sum(np.abs(p - k * s) ** 2) > UNEXPLAINED * np.sum(np.abs(p) ** 2):
         return [contradiction(f"{source}.velocity", "sensor_axes")]
-    number, t, places, ways, rates = _cells(stretch, time, at, k * whole, velocity)
-    turn = _turn(number, t, places, ways, rates, float(np.angle(k)), velocity_error)
-    if turn is None or abs(turn.angle) < LEAST or turn.otherwise > 0.5 * CHANCE:
+    cells = _cells(stretch, time, at, k * whole, velocity)
+
+    def turn(part: slice) -> Turn | None:
+        number, t, places, ways, rates = (x[part] for x in cells)
+        return _turn(number, t, places, ways, rates, float(np.angle(k)), velocity_error)
+
+    count = len(cells[0])
+    found = turn(slice(None))
+    if found is None or abs(found.angle) < LEAST or found.otherwise > 0.5 * CHANCE:
         return []
-    figures: dict[str, Figure] = {"angle": turn.angle, "sigma": turn.sigma}
-    return [Evidence(f"{source}.turned", figures, "bounded", Effect(heading=abs(turn.angle)), ("grid_north",))]
+    edges = np.linspace(0, count, PARTS + 1).astype(int)
+    parts = [part for a, b in pairwise(edges) if (part := turn(slice(a, b))) is not None]
+    if not _alike(parts):
+        return []
+    figures: dict[str, Figure] = {"angle": found.angle, "sigma": found.sigma}
+    return [Evidence(f"{source}.turned", figures, "bounded", Effect(heading=abs(found.angle)), ("grid_north",))]
+
+
+def _alike(parts: Sequence[Turn]) -> bool:
+    """Whether the parts of a log show one turn: velocities that jump, or err for a while, are turned in a part of it."""
+    if len(parts) < 2:
+        return True
+    angle, sigma = np.array([part[:2] for part in parts]).T
+    mean = np.sum(angle / sigma**2) / np.sum(1.0 / sigma**2)
+    return bool(np.all(np.abs(angle - mean) < DIFFERENT * sigma))
 
 
 class Turn(NamedTuple):
@@ -150,14 +176,19 @@ def _turn(
         C = np.eye(count) + walk
         A, b, c = (np.concatenate([np.linalg.solve(C, half) for half in np.split(x, 2)]) for x in (X, y, slow))
         N = X.T @ A
-        squares = max(float(b @ (y - X @ (np.linalg.pinv(N, rcond=1e-12, hermitian=True) @ (X.T @ b)))), 1e-300)
+        squares = max(float(b @ (y - X @ (np.linalg.pinv(N, rcond=SINGULAR, hermitian=True) @ (X.T @ b)))), 1e-300)
         known = np.zeros(len(N))
         known[2] = squares / dof / (LATE * size[2]) ** 2
-        inverse = np.linalg.pinv(N + np.diag(known), rcond=1e-12, hermitian=True)
+        inverse = np.linalg.pinv(N + np.diag(known), rcond=SINGULAR, hermitian=True)
+        powers = np.linalg.eigvalsh(N + np.diag(known))
         x = inverse @ (X.T @ b)
         variance = squares / dof * inverse[1, 1] + velocity_error**2 * float(np.sum((inverse @ (X.T @ c))[1] ** 2))
-        logs = np.linalg.slogdet(C)[1] + 0.5 * np.linalg.slogdet(N)[1] + 0.5 * dof * math.log(squares)
-        found.append((-about - float(x[1]) / size[1], math.sqrt(variance) / size[1], -logs))
+        logs = (
+            np.linalg.slogdet(C)[1]
+            + 0.5 * float(np.sum(np.log(np.maximum(powers, SINGULAR * powers[-1]))))
+            + 0.5 * dof * math.log(squares)
+        )
+        found.append((-about - float(x[1]) / size[1], math.sqrt(max(variance, 1e-300)) / size[1], -logs))
     angles, sigmas, likely = np.array(found).T
     weights = np.exp(likely - likely.max())
     weights /= weights.sum()
