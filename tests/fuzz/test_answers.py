@@ -4,10 +4,8 @@ import json
 import math
 import os
 import re
-import signal
 import subprocess
 import sys
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +15,7 @@ from hypothesis import strategies as st
 
 import truenorth
 from tests.campaign.test_plan import PLAN
-from tests.fuzz.test_readers import EXAMPLES, SPICE
+from tests.fuzz.test_readers import EXAMPLES, SPICE, in_time
 from truenorth.campaign import read_plan
 from truenorth.core.errors import AlignmentError, DataError, TruenorthError
 from truenorth.core.position import Position
@@ -27,7 +25,6 @@ from truenorth.simulation import rest, simulate
 from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(45.0, 10.0)
-LONGEST = 10.0  # s of one input
 settled = settings(
     max_examples=EXAMPLES,
     derandomize="FUZZ" not in os.environ,
@@ -44,22 +41,6 @@ imu: navigation
 motion: {kind: sway, heading: 10 deg, tones: {roll: [{amplitude: 2 deg, period: 7 s}]}}
 gnss: {rate: 1 Hz, position_noise: 1 m}
 """
-
-
-@contextmanager
-def in_time():
-    """An input that takes longer than ten seconds is a failure."""
-
-    def late(number, frame):
-        raise AssertionError(f"longer than {LONGEST:g} s")
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def spoilt(data, content):

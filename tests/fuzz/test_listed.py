@@ -11,7 +11,7 @@ import pytest
 
 import truenorth
 from tests.campaign.test_plan import PLAN
-from tests.fuzz.test_answers import in_time
+from tests.fuzz.test_readers import in_time
 from tests.helpers import run_command
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.core.position import Position

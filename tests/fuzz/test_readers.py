@@ -4,7 +4,9 @@
 """
 
 import os
+import signal
 import struct
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -15,16 +17,34 @@ from scipy.io import savemat
 from tests.formats.corpus.dialects import DEG, SI, G, table
 from tests.formats.corpus.truth import truth
 from tests.formats.test_devices import dataflash_bytes, ulog_bytes
+from tests.fuzz.forked import Reader
 from truenorth.core.errors import TruenorthError
 from truenorth.core.yaml_file import read_mapping
-from truenorth.formats import read_gnss, read_imu, read_odometer, write_imu
+from truenorth.formats import mat, read_gnss, read_imu, read_odometer, write_imu
 from truenorth.records import ImuRecord
 
+LONGEST = 10.0  # s of one input
 EXAMPLES = int(os.environ.get("FUZZ", "25"))
 SPICE = [
     b"\n", b",", b"-", b"e9", b"1e200", b"nan", b"\0", b'"', b";", b"$", b"\xff", "١".encode(), "٫".encode(), b"9" * 400,
     b"\r", b"#", b"[", b"{{", b"*", b":", b"&a", b"inf", b"  ", b"\t", b"T", b"Z", struct.pack("<d", 1e200),
 ]  # fmt: skip
+
+
+@contextmanager
+def in_time():
+    """An input that takes longer than ten seconds is a failure."""
+
+    def late(number, frame):
+        raise AssertionError(f"longer than {LONGEST:g} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def logs(folder) -> dict[str, bytes]:
@@ -62,13 +82,15 @@ def whole(tmp_path_factory) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_damaged_is_a_record_or_an_error_of_ours(name, whole, tmp_path_factory):
+def test_what_is_damaged_is_a_record_or_an_error_of_ours(name, whole, tmp_path_factory, monkeypatch, request):
     folder = tmp_path_factory.mktemp("fuzz")
-    # Reading .mat starts a process each time.
-    examples = max(3, EXAMPLES // 8) if name == "log.mat" else EXAMPLES
+    if name == "log.mat":
+        reader = Reader()
+        request.addfinalizer(reader.close)
+        monkeypatch.setattr(mat, "subprocess", reader)
 
     @settings(
-        max_examples=examples,
+        max_examples=EXAMPLES,
         derandomize="FUZZ" not in os.environ,
         deadline=None,
         suppress_health_check=list(HealthCheck),
@@ -84,10 +106,11 @@ def test_what_is_damaged_is_a_record_or_an_error_of_ours(name, whole, tmp_path_f
             content = content[: data.draw(st.integers(0, len(content)))]
         path = folder / name
         path.write_bytes(content)
-        try:
-            record = READ.get(name, read_imu)(path)
-        except TruenorthError:
-            return
+        with in_time():
+            try:
+                record = READ.get(name, read_imu)(path)
+            except TruenorthError:
+                return
         if isinstance(record, ImuRecord):
             assert np.isfinite(record.gyro).all()
             assert np.isfinite(record.accel).all()

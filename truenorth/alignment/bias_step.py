@@ -41,9 +41,9 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec | None = None) -> list
     """
     count = len(fine.estimates.innovation)
     shapes = np.zeros((count, len(SIGNATURES)))
-    for i, (kind, onset) in enumerate(SIGNATURES):
+    for i, (course, onset) in enumerate(SIGNATURES):
         since = np.arange(count) - round(onset * count)
-        shapes[:, i] = since >= 0 if kind == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
+        shapes[:, i] = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
     bias = np.einsum("ki,jl->kjil", shapes, np.eye(6)).reshape(count, 6, -1)
     d, signature = _seen(fine, bias)
     ratio, size, x = matched(fine, signature, None if spec is None else _of_matrices(fine, spec))
