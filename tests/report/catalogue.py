@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import io
+import re
+from itertools import count
 from pathlib import Path
 
 from babel.messages.catalog import Catalog
@@ -11,11 +14,14 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
 import truenorth
-from truenorth.core.language import FOLDER, LANGUAGES
+from truenorth.core.language import FOLDER, FRAME, LANGUAGES
 from truenorth.report.words import WORDS
 from truenorth.state.english import REMEDIES, SENTENCES, TERMS, TITLES
 
 HOME = Path(truenorth.__file__).parent
+# Arrays and models of one's own code: their messages are for those who write Python, and stay English.
+NOT_SPOKEN = ("filters", "analysis")
+RAISED = re.compile(r"\w*Error|Finding|_missing|_damaged")
 METHODS = [
     ("report/**.py", "python"),
     ("cli/**.py", "python"),
@@ -31,7 +37,51 @@ def texts() -> set[str]:
     """Every English text that can reach a reader through the catalogue."""
     found = {text for _, _, text, *_ in extract_from_dir(HOME, METHODS, keywords=KEYWORDS) if isinstance(text, str)}
     tables = {text for table in (SENTENCES, REMEDIES, TERMS, TITLES) for text in table.values()}
-    return found | tables | set(WORDS)
+    return found | tables | set(WORDS) | messages() | {FRAME}
+
+
+def messages() -> set[str]:
+    """Templates of what is raised or found anywhere in the package, their figures as ``{0}``, ``{1}``, .."""
+    found: set[str] = set()
+    for file in sorted(HOME.rglob("*.py")):
+        if file.relative_to(HOME).parts[0] in NOT_SPOKEN:
+            continue
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        named: dict[str, list[ast.expr]] = {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                named.setdefault(node.targets[0].id, []).append(node.value)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and RAISED.fullmatch(_name(node.func)):
+                said = node.args[2:3] if _name(node.func) == "Finding" else node.args[:1]
+                found |= {_template(pieces) for value in said for pieces in _pieces(value, named) if any(pieces)}
+    return found
+
+
+def _name(function: ast.expr) -> str:
+    return function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
+
+
+def _pieces(node: ast.expr, named: dict[str, list[ast.expr]]) -> list[list[str | None]]:
+    """What a text is made of, in each way it may come out: fixed words, and None for a figure."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return [[node.value]]
+    if isinstance(node, ast.JoinedStr):
+        return [[piece.value if isinstance(piece, ast.Constant) else None for piece in node.values]]
+    if isinstance(node, ast.Name):
+        return [pieces for value in named.get(node.id, []) for pieces in _pieces(value, {})] or [[None]]
+    if isinstance(node, ast.IfExp):
+        return _pieces(node.body, named) + _pieces(node.orelse, named)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return [[*left, *right] for left in _pieces(node.left, named) for right in _pieces(node.right, named)]
+    return [[None]]
+
+
+def _template(pieces: list[str | None]) -> str:
+    numbers = count()
+    return "".join(
+        f"{{{next(numbers)}}}" if piece is None else piece.replace("{", "{{").replace("}", "}}") for piece in pieces
+    )
 
 
 def path(code: str, suffix: str) -> Path:

@@ -7,10 +7,10 @@ import string
 import pytest
 from typer.testing import CliRunner
 
-from tests.report.catalogue import OTHERS, catalogue, compiled, path, texts
-from truenorth.cli import _language_first, app
+from tests.report.catalogue import OTHERS, catalogue, compiled, messages, path, texts
+from truenorth.cli import _language_first, app, main
 from truenorth.core.errors import UsageError
-from truenorth.core.language import in_language, speak, translated
+from truenorth.core.language import in_language, retold, speak, translated
 from truenorth.core.position import Position
 from truenorth.formats import write_imu
 from truenorth.records.specs import imu_spec
@@ -43,6 +43,35 @@ def test_a_translation_has_the_fields_of_its_text(code):
 @pytest.mark.parametrize("code", OTHERS)
 def test_the_compiled_catalogue_is_that_of_the_text(code):
     assert path(code, "mo").read_bytes() == compiled(catalogue(code)), "run make messages"
+
+
+@pytest.mark.parametrize("code", OTHERS)
+def test_every_message_is_found_by_what_it_says(code):
+    """Whatever its figures are, a message comes back as the translation of its own template, not of one that looks like it."""
+    assert len(messages()) > 500
+    with in_language(code):
+        for text in messages():
+            figures = [f"q{i}z" for i in range(len(fields(text)))]
+            assert retold(text.format(*figures)) == translated(text).format(*figures)
+
+
+def test_a_message_inside_a_message_is_told_too():
+    said = "a.csv: latitude 95 deg; expected -90 to 90 deg, north positive: check `lat`"
+    assert retold(said) == said
+    with in_language("zh"):
+        assert retold(said) == "a.csv：纬度 95 deg；应为 -90 至 90 deg，北为正：请检查 `lat`"
+        assert retold("whatever another library says") == "whatever another library says"
+
+
+def test_an_error_of_the_program_speaks(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["truenorth", "align", "nothing.csv", "--lang", "zh"])
+    try:
+        with pytest.raises(SystemExit) as stop:
+            main()
+    finally:
+        speak("en")
+    assert stop.value.code == 2
+    assert "缺少纬度" in capsys.readouterr().err
 
 
 def test_a_language_is_in_force_inside_only():

@@ -30,6 +30,7 @@ from truenorth.cli.warm import warm
 from truenorth.cli.wording import in_options
 from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
+from truenorth.core.language import LANGUAGES, retold, speak
 from truenorth.core.version import __version__
 
 INTERRUPTED = 130
@@ -72,8 +73,6 @@ def _main(
         False, FORCE, help="Write over inputs, and into a folder with a result of another kind; anywhere on the line."
     ),
 ) -> None:
-    from truenorth.core.language import speak
-
     speak(lang)
 
 
@@ -86,6 +85,14 @@ def _language_first(arguments: list[str]) -> list[str]:
     return arguments
 
 
+def _speak_early(arguments: list[str]) -> None:
+    """The language of messages that come before the line is read; one that is not known is refused by then."""
+    first, *rest = [*_language_first(arguments), ""]
+    asked = rest[0] if first == "--lang" else first.removeprefix("--lang=")
+    if asked in LANGUAGES:
+        speak(asked)
+
+
 def main() -> None:
     """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
@@ -96,6 +103,7 @@ def main() -> None:
     explain_compiling()
     try:
         words = sys.argv[1:]
+        _speak_early(words)
         forced = FORCE in words
         words = [word for word in words if word != FORCE]
         if not forced:
@@ -103,7 +111,7 @@ def main() -> None:
         with protected([] if forced else inputs(words)):
             app(args=_language_first(words))
     except TruenorthError as error:
-        print(f"truenorth: {in_options(str(error))}", file=sys.stderr)
+        print(f"truenorth: {in_options(retold(str(error)))}", file=sys.stderr)
         sys.exit(error.exit_code)
     except SystemExit as stop:
         if stop.code == INTERRUPTED:  # typer has turned the interrupt into this

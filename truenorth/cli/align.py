@@ -19,6 +19,7 @@ from truenorth.cli.print_alignment import print_alignment
 from truenorth.cli.reading import Log, Place, ReadingWindow
 from truenorth.cli.remedies import reasons_of
 from truenorth.cli.wording import in_options
+from truenorth.core.language import retold, translated
 
 if TYPE_CHECKING:
     from truenorth.core.position import Position
@@ -181,8 +182,12 @@ def _refuse_implausible(record: ImuRecord, lat: float | None, any_attitude: bool
             continue
         doubtful_unit = finding.code == "gyro_unit" and not units_given
         if finding.severity == "error" or doubtful_unit:
-            extra = ", or --any-attitude if it really is" if finding.code == "axes_down" else ""
-            extra = "; if they are in rad/s, say so: --units rad/s,m/s^2" if doubtful_unit else extra
-            raise DataError(f"{record.source}: rows 1 to {len(record)}: {finding.message}{extra}")
+            said = f"{record.source}: rows 1 to {len(record)}: {finding.message}"
+            if doubtful_unit:
+                raise DataError(f"{said}; if they are in rad/s, say so: --units rad/s,m/s^2")
+            raise DataError(f"{said}, or --any-attitude if it really is" if finding.code == "axes_down" else said)
         if finding.severity == "warning":
-            print(f"truenorth: warning: {in_options(finding.message)}", file=sys.stderr)
+            print(
+                translated("truenorth: warning: {text}").format(text=in_options(retold(finding.message))),
+                file=sys.stderr,
+            )

@@ -70,6 +70,14 @@ def explain_compiling() -> None:
         log.propagate = False
 
 
+def in_reader_s_words(status: str) -> str:
+    """A status as programs read it, and what it means where the reader's language is another."""
+    from truenorth.core.language import language
+    from truenorth.state.english import TITLES
+
+    return status if language() == "en" else f"{status} {_(TITLES[status])}"
+
+
 def print_written(paths: Iterable[Path]) -> None:
     """Say which files were written."""
     console = make_console()

@@ -10,6 +10,7 @@ from truenorth.cli.console import make_console, print_written
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, ReadingWindow, in_line
 from truenorth.cli.wording import in_options
+from truenorth.core.language import retold
 from truenorth.core.language import translated as _
 
 FIGURES = (".png", ".svg", ".pdf")
@@ -71,7 +72,7 @@ def inspect(
     colours = {"error": "red", "warning": "yellow", "note": "cyan"}
     for finding in found.findings:
         console.print(finding.severity, end=" ", style=colours[finding.severity])
-        console.print(in_options(finding.message), soft_wrap=True)
+        console.print(in_options(retold(finding.message)), soft_wrap=True)
     if not found.findings:
         console.print(_("nothing wrong was found"))
     print_written(path for path in (plot, written) if path is not None)

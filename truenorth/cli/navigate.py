@@ -13,7 +13,7 @@ import typer
 
 from truenorth.cli.aiding_options import Sensors, shifted
 from truenorth.cli.attitude_options import OfAttitude
-from truenorth.cli.console import make_console, print_written, stages
+from truenorth.cli.console import in_reader_s_words, make_console, print_written, stages
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
@@ -300,7 +300,7 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
 
     console = make_console()
     s = result.summary()
-    status = Text(result.status, style=f"bold {'green' if result.status == 'navigated' else 'red'}")
+    status = Text(in_reader_s_words(result.status), style=f"bold {'green' if result.status == 'navigated' else 'red'}")
     duration = s["end_s"] - s["start_s"]
     console.print(status, f" {result.source}, {duration:.1f} s, {s['distance_m']:.0f} m", soft_wrap=True)
     for reason in reasons_of(result):

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from truenorth.cli.console import make_console, print_written
+from truenorth.cli.console import in_reader_s_words, make_console, print_written
 from truenorth.cli.remedies import reasons_of
 from truenorth.core.language import translated as _
 
@@ -25,7 +25,7 @@ def print_alignment(result: Alignment, paths: list[Path]) -> None:
     console = make_console()
     s = result.summary()
     colour = {"aligned": "green", "level_only": "yellow"}.get(result.status, "red")
-    status = Text(result.status, style=f"bold {colour}")
+    status = Text(in_reader_s_words(result.status), style=f"bold {colour}")
     console.print(status, f" {result.source}, {result.duration:.1f} s", soft_wrap=True)
     for reason in reasons_of(result):
         console.print(f"  {reason}", soft_wrap=True)

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from truenorth.core.language import language, translated
+from truenorth.core.language import language, retold, translated
 from truenorth.core.version import __version__
 from truenorth.report.chart import Chart
 
@@ -90,7 +90,7 @@ def _environment() -> Any:
     environment = Environment(
         loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals |= {"_": translated, "anchor": anchor, "packed": packed}
+    environment.globals |= {"_": translated, "retold": retold, "anchor": anchor, "packed": packed}
     return environment
 
 

@@ -12,7 +12,7 @@ import string
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from truenorth.core.language import translated
+from truenorth.core.language import retold, translated
 from truenorth.core.units import parse_unit, significant
 from truenorth.state.english import REMEDIES, SENTENCES, TERMS, TITLES
 from truenorth.state.evidence import Evidence
@@ -29,6 +29,8 @@ class _Figures(string.Formatter):
             return translated(TERMS.get(str(value), str(value).removeprefix("specification ")))
         if format_spec == "angle":
             return angle(float(value))
+        if not format_spec and isinstance(value, str):  # a name, or what was found in a log
+            return retold(value)
         unit, bar, spec = format_spec.partition("|")
         if not bar:
             return format(value, format_spec)
