@@ -1,6 +1,7 @@
 """Results are data: drawn, written, read back and shown by one registry."""
 
 from dataclasses import dataclass, fields, is_dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -89,14 +90,25 @@ def test_estimates_of_a_filter_are_a_table():
     assert "<table>" in found._repr_html_()
 
 
-def test_xarray_where_it_is_installed(results):
+@pytest.mark.parametrize("name", ["alignment", "navigation", "inspection", "advice", "manoeuvres", "record"])
+def test_xarray_where_it_is_installed(results, record, name):
+    result = record if name == "record" else results[name]
     try:
         import xarray  # noqa: F401
     except ImportError:
         with pytest.raises(UsageError, match="xarray is not installed"):
-            results["alignment"].to_xarray()
+            result.to_xarray()
     else:
-        assert "heading_deg" in results["alignment"].to_xarray()
+        assert set(result.to_xarray().data_vars) == set(result.to_frame().columns)
+
+
+def test_tables_and_data_sets_go_in(record):
+    """The same bits as the record they were made from."""
+    table = record.to_frame()
+    for given in (table, SimpleNamespace(to_dataframe=lambda: table)):  # as an xarray.Dataset has it
+        same_record = tn.ImuRecord.of(given)
+        np.testing.assert_array_equal(same_record.gyro, record.gyro)
+        np.testing.assert_array_equal(same_record.time, record.time)
 
 
 @dataclass(frozen=True, repr=False)

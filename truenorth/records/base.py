@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.core.shown import as_xarray
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
 
 Array = NDArray[np.float64]
 GAP_FACTOR = 1.5  # a step of more than 1.5 nominal intervals has lost at least one sample
@@ -186,6 +188,16 @@ class Record(_Ordered):
         import pandas as pd
 
         return pd.DataFrame(self.columns(), pd.Index(self.time, name="time"))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The table of `to_frame` as an xarray data set.
+
+        Raises
+        ------
+        UsageError
+            xarray is not installed.
+        """
+        return as_xarray(self.to_frame())
 
 
 def _own(given: Any, name: str, source: str) -> Array:

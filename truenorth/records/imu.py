@@ -118,11 +118,11 @@ class ImuRecord(Record):
 
     @classmethod
     def of(cls, table: Any) -> ImuRecord:
-        """A record as it is, or a pandas table as one.
+        """A record as it is, or a pandas table or an xarray data set as one.
 
         Parameters
         ----------
-        table : ImuRecord or DataFrame
+        table : ImuRecord, DataFrame or xarray.Dataset
             Columns ``gyro_x .. accel_z`` of rates (rad/s, m/s^2) or ``dtheta_x .. dvel_z`` of increments (rad, m/s), named as
             `to_frame` names them; ``time`` (s) as a column or the index, which may hold dates too.
 
@@ -133,8 +133,12 @@ class ImuRecord(Record):
         """
         if isinstance(table, cls):
             return table
+        if hasattr(table, "to_dataframe"):
+            table = table.to_dataframe()
         if not hasattr(table, "columns"):
-            raise UsageError(f"record is a {type(table).__name__}; expected an ImuRecord (read_imu) or a pandas table")
+            raise UsageError(
+                f"record is a {type(table).__name__}; expected an ImuRecord (read_imu), a pandas table or an xarray data set"
+            )
         kind: Any = next((k for k, names in COLUMNS.items() if set(names) <= set(table.columns)), None)
         if kind is None:
             raise UsageError(
