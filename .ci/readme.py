@@ -1,7 +1,8 @@
 """README from top to bottom as a newcomer follows it: a fresh clone, ``make``, its two commands, its ten lines, its samples.
 
 Nothing of this checkout but what is committed, and nothing of this environment but Python, make, git and the package registry,
-is used. Run by ``.ci/full``.
+is used. Run by ``.ci/full``. The lines of "Your log", which are about the reader's own logs, run on simulated ones in
+``tests/documents``: six with ``make test``, those that take longer with ``make test-all``.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def your_log() -> list[str]:
     return [line for line in block.splitlines() if line.startswith("truenorth ")]
 
 
-# Streams, turntables, indexers, days at sea, campaigns and studies have logs and tests of their own.
+# Streams, turntables, indexers, days at sea, campaigns and studies take longer: `make test-all` runs them, in test_long_commands.
 ELSEWHERE = ("live", "--indexer", "--positions", "--damping", "campaign", "reproduce")
 RUN = [line for line in your_log() if not any(word in shlex.split(line, comments=True) for word in ELSEWHERE)]
 
@@ -110,5 +110,8 @@ def test_a_line_of_your_log_runs(line, folder, monkeypatch):
     assert result.exit_code == 0, f"{result.output}\n{result.exception}"
 
 
-def test_the_block_has_lines_that_run():
+def test_every_line_is_run_here_or_there():
+    from tests.documents.test_long_commands import LONG
+
     assert len(RUN) >= 6
+    assert {line.split("#")[0].strip() for line in your_log()} == {line.split("#")[0].strip() for line in [*RUN, *LONG]}

@@ -84,7 +84,7 @@ def align(
     moving: OnTheMove,
     pointing: OfAttitude,
 ) -> None:
-    """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying."""
+    """Find pitch, roll and true heading of an IMU: still, swaying, turned on purpose, on the move, or against a master."""
     from dataclasses import replace
 
     from truenorth.alignment import align as align_record
