@@ -282,7 +282,8 @@ def read_scenario(source: str | PathLike[str] | Mapping[str, Any] | Scenario) ->
     path = Path(source)
     if path.suffix in (".yaml", ".yml") or path.is_file():
         return _checked(read_mapping(path), str(path), path.parent)
-    names = shipped()
+    with resources.as_file(SHIPPED) as folder:
+        names = sorted(file.stem for file in folder.glob("*.yaml"))
     if str(source) not in names:
         near = get_close_matches(str(source), names, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"those that ship with us: {', '.join(names)}"
