@@ -12,7 +12,7 @@ import yaml
 from typer.testing import CliRunner
 
 from tests.campaign.test_plan import PLAN, REST
-from tests.runs import few_and_all
+from tests.runs import few_and_all, some
 from truenorth.campaign import outcomes, read_campaign, read_plan, read_table, run_campaign
 from truenorth.campaign.bound import bounds
 from truenorth.campaign.store import Block, Store, opened
@@ -241,7 +241,8 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
 
 
-def test_alignment_in_motion_is_a_method_too(tmp_path):
+@pytest.mark.parametrize("workers", some([1], [2]))
+def test_alignment_in_motion_is_a_method_too(tmp_path, workers):
     """By the odometer that the scenario has; the same bits by two processes; no error beyond five sigma."""
     ring = {"kind": "ring", "radius": "60 m", "speed": "10 m/s", "wait": "20 s"}
     drive = REST | {
@@ -252,7 +253,10 @@ def test_alignment_in_motion_is_a_method_too(tmp_path):
     }
     plan = PLAN | {"scenarios": [drive], "methods": ["in_motion"], "runs": 2, "block": 1, "times": ["60 s"]}
     one = run_campaign(plan, tmp_path / "one").table
-    pd.testing.assert_frame_equal(run_campaign(plan, tmp_path / "two", workers=2).table, one, check_exact=True)
+    if workers > 1:
+        pd.testing.assert_frame_equal(
+            run_campaign(plan, tmp_path / "two", workers=workers).table, one, check_exact=True
+        )
     ends = outcomes(one)
     assert list(zip(ends["time_s"], ends["status"], ends["runs"], strict=True)) == [
         (60.0, "aligned", 2),

@@ -146,7 +146,7 @@ def test_two_fixes_calibrate_the_gyros(truth):
     assert np.abs(found.x[first - 1, DP] - x[first - 1, DP]).max() > 100.0  # before the fix it was off
 
 
-@few_and_all(24)
+@few_and_all(24, few=4)
 def test_bands_of_the_double_filter_follow_imu_and_place(runs):
     """Filters 1 and 2 fused, as `navigate` runs them: place, heading, IMU (five times better to worse) drawn in each voyage.
 

@@ -108,7 +108,7 @@ def test_every_method_calms_the_oscillation(ship, method):
         np.testing.assert_array_less(np.abs(left[late]), 4.5 * sigma[late])
 
 
-@few_and_all(12)
+@few_and_all(12, few=4)
 def test_bands_of_the_network_are_its_scatter(runs):
     """Propagated through the closed loop, against voyages with a log error drawn anew; RMS/sigma in its 99.9 % band."""
     ratios = []
