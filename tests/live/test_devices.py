@@ -1,6 +1,7 @@
 """Streams of devices and sensors: the bytes of their logs in pieces, noise in between, are the rows of those logs."""
 
 import socket
+import struct
 import time
 from types import SimpleNamespace
 
@@ -8,10 +9,10 @@ import numpy as np
 import pytest
 
 from tests.formats.test_devices import ALT, FRD, LAT, LON, SBF_HOME, SWAY, TIME, TOW, novatel_line, ubx_bytes
-from truenorth.core.errors import UsageError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_gnss, read_imu
 from truenorth.formats.layout import Layout
-from truenorth.live import GnssFeed, OdometerFeed, VelocityFeed
+from truenorth.live import GnssFeed, IndexerFeed, MagnetometerFeed, OdometerFeed, VelocityFeed
 from truenorth.live.aid_sources import open_aid
 from truenorth.live.decode import Decoder
 from truenorth.live.listening import Listener
@@ -154,3 +155,105 @@ def test_a_sensor_of_its_own_source_and_a_clock_that_is_another(tmp_path):
     assert "its clock is +43200 s off that of the IMU" in source.note
     with pytest.raises(UsageError, match="no file"):
         open_aid("replay:missing.csv", feed)
+
+
+def test_angles_of_an_encoder_that_wraps_are_counted_on():
+    """A stream is read some lines at a time: whole turns are those of the lines before."""
+    feed = IndexerFeed(("z",))
+    angles = np.arange(400) * 7.0
+    text = "time,angle_1\n" + "".join(f"{k * 0.1:.1f},{a % 360.0:.1f}\n" for k, a in enumerate(angles))
+    in_pieces(text.encode(), Listener(feed, "test").hear, longest=40)
+    assert feed.rows[-1, 0] == pytest.approx(39.9)
+    np.testing.assert_allclose(
+        np.degrees(feed.rows[:, 1] - feed.rows[0, 1]), angles[-len(feed.rows) :] - angles[0], atol=1e-9
+    )
+
+
+def test_a_magnetometer_in_a_stream_of_mavlink():
+    """In the axes of the device (FRD) and milligauss; turned to ours and tesla."""
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    link = mavutil.mavlink.MAVLink(SimpleNamespace(write=lambda _: None), srcSystem=1, srcComponent=1)
+    data = b"".join(
+        link.scaled_imu_encode(20 * k, 0, 0, -1000, 0, 0, 0, 200 + k, 10, 450).pack(link) for k in range(50)
+    )
+    feed = MagnetometerFeed(np.array([1.0, 20.0, -45.0]) * 1e-6)
+    in_pieces(data, Listener(feed, "test").hear, longest=200)
+    field = np.column_stack([np.full(50, 10.0), 200.0 + np.arange(50), np.full(50, -450.0)]) * 1e-7
+    np.testing.assert_allclose(feed.rows[:, 1:], field, atol=1e-12)
+
+
+def xbus(*packets):
+    """An MTData2 message of an Xsens."""
+    data = b"".join(kind.to_bytes(2, "big") + bytes([len(value)]) + value for kind, value in packets)
+    size = bytes([len(data)]) if len(data) < 255 else b"\xff" + len(data).to_bytes(2, "big")
+    message = b"\xff\x36" + size + data
+    return b"\xfa" + message + bytes([-sum(message) & 0xFF])
+
+
+def fixed(values):
+    """Fixed point 16.32: the fraction first."""
+    whole = np.floor(values).astype(int)
+    return b"".join(struct.pack(">Ih", round((x - w) * 2**32), w) for x, w in zip(values, whole, strict=True))
+
+
+FORMS = {
+    "float32": (0, lambda values: np.asarray(values, ">f4").tobytes(), 1e-6),
+    "12.20": (1, lambda values: np.round(np.asarray(values) * 2**20).astype(">i4").tobytes(), 1e-6),
+    "16.32": (2, fixed, 1e-9),
+    "float64": (3, lambda values: np.asarray(values, ">f8").tobytes(), 1e-15),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_xsens_in_pieces_is_the_log(form, tmp_path):
+    """Rates and specific forces in every form of number; the device's axes are forward, left, up."""
+    bits, write, off = FORMS[form]
+    gyro, accel = (np.stack([v[:, 1], -v[:, 0], v[:, 2]], axis=1) for v in (SWAY.gyro, SWAY.accel))
+    messages = [
+        xbus(
+            (0x1020, b"\x00\x07"),
+            (0x1060, round(t * 1e4).to_bytes(4, "big")),
+            (0x4020 + bits, write(a)),
+            (0x8020 + bits, write(g)),
+        )
+        for t, g, a in zip(TIME, gyro, accel, strict=True)
+    ]
+    path = tmp_path / "log.xbus"
+    path.write_bytes(b"".join(messages))
+    record = read_imu(path)
+    damaged = bytearray(messages[7])
+    damaged[-3] ^= 0x10
+    noisy = b"\xfa\xff" + b"".join([*messages[:7], bytes(damaged), *messages[8:]])
+    found = np.vstack(in_pieces(noisy, Decoder(Layout(), "test").feed))
+    assert record.kind == "rates"
+    np.testing.assert_allclose(record.gyro, SWAY.gyro, atol=off)
+    np.testing.assert_allclose(record.accel, SWAY.accel, atol=20 * off)
+    kept = np.delete(np.column_stack([record.time, record.gyro, record.accel]), 7, axis=0)
+    np.testing.assert_allclose(found, kept, atol=1e-12)
+
+
+def test_increments_of_an_xsens_go_before_its_rates_and_its_counter_may_begin_anew():
+    """Rotation over the interval as a quaternion, whatever its sign; a message with rates alone is no row then."""
+    dtheta, dvel = np.array([1e-3, -2e-3, 3e-3]), np.array([0.01, 0.02, 0.0981])
+    half = np.linalg.norm(dtheta) / 2.0
+    q = np.concatenate([[np.cos(half)], np.sin(half) * dtheta / (2.0 * half)])
+    write, data = FORMS["float64"][1], []
+    for k in range(40):
+        ticks = ((1 << 32) - 2000 + 100 * k) % (1 << 32)
+        rates = [(0x4023, write(dvel * 100.0)), (0x8023, write(dtheta * 100.0))]
+        steps = [(0x4013, write(dvel)), (0x8033, write(q if k % 2 else -q))] if k % 4 == 0 else []
+        data.append(xbus((0x1060, ticks.to_bytes(4, "big")), *rates, *steps))
+    decoder = Decoder(Layout(), "test")
+    found = np.vstack(in_pieces(b"".join(data), decoder.feed, longest=90))
+    assert decoder.kind == "increments"
+    np.testing.assert_allclose(np.diff(found[:, 0]), 0.04, atol=1e-6)
+    assert len(found) == 10
+    np.testing.assert_allclose(found[:, 1:4], np.tile([2e-3, 1e-3, 3e-3], (10, 1)), atol=1e-12)
+    np.testing.assert_allclose(found[:, 4:], np.tile([-0.02, 0.01, 0.0981], (10, 1)), atol=1e-12)
+
+
+def test_an_xsens_without_a_time_is_asked_for_it():
+    write = FORMS["float32"][1]
+    message = xbus((0x4020, write([0.0, 0.0, 9.8])), (0x8020, write([0.0, 0.0, 0.0])))
+    with pytest.raises(DataError, match="SampleTimeFine"):
+        Decoder(Layout(), "test").feed(message)

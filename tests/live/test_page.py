@@ -109,13 +109,17 @@ def test_the_page_is_watched_to_convergence(log, tmp_path):
             assert found["heading_sigma_deg"] < min(0.1, first)
             assert abs(found["heading_deg"] - 90.6) < 4.0 * found["heading_sigma_deg"] + 0.1
             browser.wait("innovations !== null && spectrum !== null", 30)
-            for width, height, name in ((1280, 1000, "desktop"), (390, 844, "phone")):
+            shapes = ((1280, 1000, "desktop", "light"), (390, 844, "phone", "light"), (1280, 1000, "dark", "dark"))
+            for width, height, name, scheme in shapes:
+                browser.prefer(scheme)
                 browser.resize(width, height)
                 browser.wait(f"innerWidth === {width}", 10)
                 browser.ask("new Promise(r => requestAnimationFrame(() => { draw(); r(true); }))")
                 assert browser.ask("document.documentElement.scrollWidth <= innerWidth"), name
                 for canvas in CANVASES:
                     assert browser.ask(f"{DRAWN}('{canvas}')") > 300, (name, canvas)
+                ground = browser.ask("getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
+                assert (max(ground[:3]) < 80) == (scheme == "dark"), ground
                 look(browser, name)
             assert all(url.startswith((page.address, "about:")) for url in browser.requests), browser.requests
             assert [text for text in browser.complaints if "net::ERR" not in text] == []

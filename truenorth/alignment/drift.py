@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 # Of fewer, a departure lies between two: one at .59 of a log matched with a ratio of 14 at quarters of it, of 22 close by.
 ONSETS = tuple(k / 16 for k in range(1, 16))
+AT_ONCE = 12  # signatures that are matched together: they take memory
 
 
 @dataclass(frozen=True)
@@ -74,23 +75,21 @@ def detect_drift(fine: FineAlignment) -> Drift:
     """Match the innovations of a fine alignment with the bank of drift signatures."""
     t = fine.integrals.time
     middle = (t[1:] + t[:-1]) / 2
-    names, columns = [], []
+    names: list[tuple[str, str, float]] = []
+    signature = np.zeros((len(middle), 3, 4 * len(ONSETS)))
     for onset in ONSETS:
         start = onset * t[-1]
         since = np.maximum((middle if fine.form == "velocity" else t) - start, 0.0)
         for kind, velocity in (("step", (since > 0).astype(float)), ("ramp", since / (t[-1] - start))):
             shape = velocity if fine.form == "velocity" else np.diff(velocity)
             for axis in (0, 1):
-                z = np.zeros((len(middle), 3))
-                z[:, axis] = shape
+                signature[:, axis, len(names)] = shape
                 names.append((kind, ("east", "north")[axis], start))
-                columns.append(z)
-    signature = np.stack(columns, axis=-1)  # (K, 3, 12)
 
     ratio, size, x = matched(fine, signature)
     best = int(np.argmax(ratio))
     kind, axis_name, start = names[best]
-    turned = np.where(ratio > limit("hint"), np.abs(x[PHI] * size), 0.0)  # (3, 12): E, N, U
+    turned = np.where(ratio > limit("hint"), np.abs(x[PHI] * size), 0.0)  # (3, S): E, N, U
     heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
     return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 
@@ -112,17 +111,22 @@ def matched(fine: FineAlignment, signature: Array, others: Array | None = None) 
     x : (n, S) array
         What the filter estimates in the end of a signature of size one.
     """
-    count = signature.shape[-1]
-    both = signature if others is None else np.concatenate([signature, others], axis=-1)
-    expected, x = through(fine.system, fine.gains, both)
     L = np.linalg.cholesky(fine.estimates.innovation_covariance)
-    white = np.linalg.solve(L, expected).reshape(-1, both.shape[-1])
     e = np.linalg.solve(L, fine.estimates.innovation[..., None]).ravel()
-    shape, other = white[:, :count], white[:, count:]
-    match, energy = shape.T @ e, np.sum(shape**2, axis=0)
-    if others is not None:
-        shared = np.linalg.solve(np.eye(other.shape[1]) + other.T @ other, other.T @ np.column_stack([e, shape]))
-        match -= shape.T @ other @ shared[:, 0]
-        energy -= np.einsum("ks,ks->s", shape, other @ shared[:, 1:])
+
+    def white(some: Array) -> tuple[Array, Array]:
+        expected, x = through(fine.system, fine.gains, some)
+        return np.linalg.solve(L, expected).reshape(-1, some.shape[-1]), x
+
+    other = np.zeros((len(e), 0)) if others is None else white(others)[0]
+    information = np.eye(other.shape[1]) + other.T @ other
+    count = signature.shape[-1]
+    match, energy, x = np.empty(count), np.empty(count), np.empty((fine.system.states, count))
+    for first in range(0, count, AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        shape, x[:, some] = white(signature[..., some])
+        shared = np.linalg.solve(information, other.T @ np.column_stack([e, shape]))
+        match[some] = shape.T @ e - shape.T @ other @ shared[:, 0]
+        energy[some] = np.sum(shape**2, axis=0) - np.einsum("ks,ks->s", shape, other @ shared[:, 1:])
     energy = np.maximum(energy, 1e-300)
-    return match**2 / energy, match / energy, x[:, :count]
+    return match**2 / energy, match / energy, x

@@ -208,7 +208,7 @@ def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> A
             f"axes {','.join(axes)} for {angles.shape[1]} angle(s) in {encoder.source}; expected one of x, y and z for each "
             "angle, the outermost first, such as z,x"
         )
-    slack = COVER + 1.5 * float(np.median(np.diff(encoder.time)))
+    slack = _slack(encoder)
     if time.min() < encoder.time[0] - slack or time.max() > encoder.time[-1] + slack:
         raise DataError(
             f"{encoder.source}: angles from {encoder.time[0]:.3f} s to {encoder.time[-1]:.3f} s, wanted from {time.min():.3f} s to "
@@ -222,6 +222,15 @@ def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> A
             edge = 0 if a == 0 else -1
             column[outside] = given[edge] + slope * (time[outside] - encoder.time[edge])
     return np.stack(columns, axis=-1)
+
+
+def _slack(encoder: EncoderRecord) -> float:
+    return COVER + 1.5 * float(np.median(np.diff(encoder.time)))
+
+
+def covered_until(encoder: EncoderRecord) -> float:
+    """Time up to which an encoder's log covers an IMU's, s."""
+    return float(encoder.time[-1]) + _slack(encoder)
 
 
 def angles_from_gyros(

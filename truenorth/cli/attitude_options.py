@@ -14,6 +14,7 @@ from truenorth.cli.reading import numbers_of
 if TYPE_CHECKING:
     from truenorth.core.position import Position
     from truenorth.records import ImuRecord
+    from truenorth.state.mounting import Mounting
 
 FIRST_DATE = 1e9  # s since 1970: a clock beyond it holds dates
 
@@ -53,27 +54,12 @@ class OfAttitude:
         return [*self._attitude(), *self._magnetometer(record, place)]
 
     def _attitude(self) -> list[Any]:
-        import numpy as np
-
         from truenorth.aiding.attitude import Attitude
-        from truenorth.core.errors import UsageError
         from truenorth.formats import read_master
-        from truenorth.state.mounting import Mounting, mounting_angles
 
         if self.attitude is None:
             return []
-        if self.attitude_sigma is None:
-            raise UsageError(
-                "--attitude without --attitude-sigma; expected how good it is, such as 0.1, or 0.1,0.3,300"
-            )
-        count = self.attitude_sigma.count(",") + 1
-        told = numbers_of(self.attitude_sigma, "--attitude-sigma", 3 if count == 3 else 1, "deg, or deg,deg,s")
-        sigmas = dict(zip(("noise", "slow", "slow_time"), [*np.radians(told[:2]), *told[2:]]))
-        mounting = Mounting()
-        if self.attitude_mounting is not None:
-            angles = numbers_of(self.attitude_mounting, "--attitude-mounting", 4, "heading,pitch,roll,sigma in degrees")
-            *sits, sigma = (math.radians(x) for x in angles)
-            mounting = Mounting(C_mb=mounting_angles(*sits), angle_sigma=sigma)
+        sigmas, mounting = attitude_sigmas(self.attitude_sigma), attitude_mounting(self.attitude_mounting)
         return [Attitude(read_master(self.attitude), mounting=mounting, **sigmas)]
 
     def _magnetometer(self, record: ImuRecord, place: Position | None) -> list[Any]:
@@ -86,17 +72,52 @@ class OfAttitude:
         if place is None:
             raise UsageError("--magnetometer without a place; expected --lat and --lon, or positions of GNSS")
         if self.date is not None:
-            try:
-                date = dt.date.fromisoformat(self.date)
-            except ValueError:
-                raise UsageError(f"--date {self.date!r}; expected a date such as 2025-06-01") from None
+            date = date_of(self.date)
         elif record.time[0] > FIRST_DATE:
             date = dt.datetime.fromtimestamp(float(record.time[0]), dt.UTC).date()
         else:
             raise UsageError("--magnetometer without a date; expected --date YYYY-MM-DD: north of the needle moves")
-        iron: dict[str, Any] = {}
-        if self.magnetometer_iron is not None:
-            parts = numbers_of(self.magnetometer_iron, "--magnetometer-iron", 2, "hard,soft in % of the earth's field")
-            iron = dict(zip(("hard_iron", "soft_iron"), (0.01 * x for x in parts)))
+        iron = iron_of(self.magnetometer_iron)
         log = read_magnetometer(self.magnetometer, axes=self.magnetometer_axes)
         return [Magnetometer(log, earth_field(place, date), **iron)]
+
+
+def attitude_sigmas(text: str | None) -> dict[str, float]:
+    """Noise, slow error and its time of an attitude, as `--attitude-sigma` says them."""
+    import numpy as np
+
+    from truenorth.core.errors import UsageError
+
+    if text is None:
+        raise UsageError("--attitude without --attitude-sigma; expected how good it is, such as 0.1, or 0.1,0.3,300")
+    given = numbers_of(text, "--attitude-sigma", 3 if text.count(",") == 2 else 1, "deg, or deg,deg,s")
+    return dict(zip(("noise", "slow", "slow_time"), [*np.radians(given[:2]).tolist(), *given[2:]]))
+
+
+def attitude_mounting(text: str | None) -> Mounting:
+    """How that system sits, as `--attitude-mounting` says it."""
+    from truenorth.state.mounting import Mounting, mounting_angles
+
+    if text is None:
+        return Mounting()
+    angles = numbers_of(text, "--attitude-mounting", 4, "heading,pitch,roll,sigma in degrees")
+    *sits, sigma = (math.radians(x) for x in angles)
+    return Mounting(C_mb=mounting_angles(*sits), angle_sigma=sigma)
+
+
+def iron_of(text: str | None) -> dict[str, Any]:
+    """Hard and soft iron, as `--magnetometer-iron` says them; nothing where it says nothing."""
+    if text is None:
+        return {}
+    parts = numbers_of(text, "--magnetometer-iron", 2, "hard,soft in % of the earth's field")
+    return dict(zip(("hard_iron", "soft_iron"), (0.01 * x for x in parts)))
+
+
+def date_of(text: str) -> dt.date:
+    """A day, as `--date` says it."""
+    from truenorth.core.errors import UsageError
+
+    try:
+        return dt.date.fromisoformat(text)
+    except ValueError:
+        raise UsageError(f"--date {text!r}; expected a date such as 2025-06-01") from None

@@ -7,20 +7,19 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from truenorth.cli.live_options import Aids, Turned
 from truenorth.cli.options import argument, command, option
 from truenorth.cli.reading import Place, Rows, names_of
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
     from truenorth.live.answer import Answer
-    from truenorth.live.feeds import Feed
     from truenorth.live.session import Listener, Run, Session
     from truenorth.navigation import Navigation
 
@@ -35,6 +34,7 @@ Examples:
   truenorth live replay:log.csv@max --lat 34.246 -o quay --resume
   truenorth live udp://:9000 --gnss udp://:9001 --imu industrial --until "0.5 deg" --navigate -o trip
   truenorth live replay:log.csv@20x --gnss replay:gnss.csv --odometer replay:odo.csv --imu tactical
+  truenorth live udp://:9000 --indexer udp://:9003 --indexer-axes z,x --lat 40 --imu navigation
   truenorth live bag:rosbag2_today?topic=/imu --gnss bag:rosbag2_today --imu tactical
   truenorth live "zenoh:imu/data?type=sensor_msgs/msg/Imu" --lat 48.1
 
@@ -43,46 +43,6 @@ Ctrl-C ends a run: the rows so far are aligned as `truenorth align` would.
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
-
-
-@dataclass(frozen=True)
-class Aids:
-    """Sensors that aid, each with a source of its own: `same` is that of the IMU's rows."""
-
-    PANEL: ClassVar = "Sensors that aid"
-    gnss: Annotated[str | None, option("Source of fixes: NMEA, UBX, SBF, NovAtel, MAVLink or CSV.")] = None
-    odometer: Annotated[str | None, option("Source of an odometer's rows: CSV.")] = None
-    velocity: Annotated[str | None, option("Source of a velocity log's rows: CSV; in navigation.")] = None
-    baro: Annotated[str | None, option("Source of heights: CSV; in navigation.")] = None
-    master: Annotated[str | None, option("Source of another INS's solution on the same vehicle: CSV.")] = None
-    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up.")] = None
-    latency: Annotated[
-        float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
-    ] = None
-
-    def sources(self) -> dict[str, str]:
-        """By the key of the feed."""
-        keys = ("gnss", "odometer", "velocity", "baro", "master")
-        return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
-
-    def feeds(self) -> list[Feed]:
-        """What keeps their rows."""
-        from dataclasses import replace
-
-        from truenorth.alignment.in_motion_task import usual_antenna
-        from truenorth.cli.aiding_options import arm_of
-        from truenorth.live.known_feeds import FEEDS
-
-        found = [FEEDS[key]() for key in self.sources()]
-        antenna = usual_antenna(None)
-        if self.lever_arm is not None:
-            antenna = replace(antenna, lever_arm=arm_of(self.lever_arm, "--lever-arm"))
-        if self.latency is not None:
-            antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
-        for feed in found:
-            if feed.key == "gnss" and (self.lever_arm is not None or self.latency is not None):
-                feed.mounting = antenna
-        return found
 
 
 @command(EXAMPLES)
@@ -97,6 +57,7 @@ def live(
     where: Place,
     rows: Rows,
     aids: Aids,
+    turned: Turned,
     imu: Annotated[
         str | None, option("Specification: a preset or a YAML file. Without it, it is inferred from the rows.")
     ] = None,
@@ -153,6 +114,8 @@ def live(
     place = where.position()
     if place is None and aids.gnss is None:
         raise UsageError("no place; expected --lat (and --lon), or --gnss SOURCE")
+    if turned.indexer is not None and navigate:
+        raise UsageError("--navigate with --indexer: an IMU that is turned in its body does not navigate; expected one")
     goal = None if until is None else parse(until, "angle")
     say = partial(print, flush=True) if to is None else open_sink(to)
     given = {"units": rows.units, "axes": rows.axes, "columns": names_of(rows.columns), "kind": rows.kind}
@@ -161,8 +124,9 @@ def live(
         place,
         imu,
         layout=layout_for(Path(source), given),
-        feeds=aids.feeds(),
-        aids=aids.sources(),
+        feeds=[*turned.feeds(), *aids.feeds(place, source)],
+        turner=turned.turner(),
+        aids=turned.sources() | aids.sources(),
         method=method,
         share=share,
         every=every,

@@ -102,10 +102,12 @@ def settle(
     most, least : int
         Passes.
     """
-    for passes in range(1, most + 1):
+    passes = 0
+    while True:
+        passes += 1
         found = estimate(log.linearise())
         by = moved(found)
-        if passes == most or (passes >= least and by < enough):
-            break
+        if passes >= most or (passes >= least and by < enough):
+            return Settled(found, passes, by)
         log.correct(found.end)
-    return Settled(found, passes, by)
+        del found  # a pass takes memory: none of it stays for the next

@@ -29,6 +29,7 @@ from truenorth.strapdown.inertial_integration import inertial_integrals
 Array = NDArray[np.float64]
 
 BLOCK = 10  # intervals
+AT_ONCE = 20  # blocks that are filtered together, as long as the base moves no more in them than in the log
 # Chi-square of 3 BLOCK and of 3 degrees of freedom exceeds these in one block of a thousand.
 LARGE, COLOURED = 59.7, 16.3
 CONTEXT = 3  # rows before the first one that the integration rules look back to
@@ -110,15 +111,12 @@ class Ongoing:
             Whether the base is where it was; else attitude and its uncertainty alone go on.
         """
         now = self
-        length = BLOCK * self.interval
-        while record.time[-1] - now.time >= length + 0.5 * record.interval:
-            stop = int(np.searchsorted(record.time, now.time + length + 0.5 * record.interval))
-            part = replace(record, time=record.time[:stop], gyro=record.gyro[:stop], accel=record.accel[:stop])
-            now = now._block(part, context, measured)
-            first = int(np.searchsorted(record.time, now.time + 0.5 * record.interval))
+        length, half = BLOCK * self.interval, 0.5 * record.interval
+        while (whole := int((record.time[-1] - now.time - half) // length)) > 0:
+            now = now._blocks(record, min(whole, AT_ONCE), context, measured)
+            first = int(np.searchsorted(record.time, now.time + half))
             context = min(first, CONTEXT)
-            kept = slice(first - context, None)
-            record = replace(record, time=record.time[kept], gyro=record.gyro[kept], accel=record.accel[kept])
+            record = _rows(record, slice(first - context, None))
             if len(record) < context + 2:
                 break
         return now
@@ -146,8 +144,11 @@ class Ongoing:
         C_n0_b = dcm_from_rotation_vector(J @ self.x[states]) @ self.C_n0_i @ C_ib
         return self.start + elapsed, C_n_n0 @ C_n0_b, C_n_n0 @ P @ C_n_n0.T
 
-    def _block(self, record: ImuRecord, context: int, measured: bool) -> Ongoing:
-        found = integrate(record, self.interval, self.bias[:3], self.bias[3:], context=context)
+    def _blocks(self, record: ImuRecord, count: int, context: int, measured: bool) -> Ongoing:
+        """Go on over `count` blocks; over fewer, at least one, where the base moves more in one of them than in the log."""
+        end = self.time + count * BLOCK * self.interval + 0.5 * record.interval
+        part = _rows(record, slice(int(np.searchsorted(record.time, end))))
+        found = integrate(part, self.interval, self.bias[:3], self.bias[3:], context=context)
         C, T = self.C_ib, found.time[:, None]
         whole = InertialIntegrals(
             start=self.start,
@@ -164,7 +165,11 @@ class Ongoing:
             system = replace(system, z=np.full_like(system.z, np.nan))
         state = FilterState(self.x, self.P, np.zeros(()), np.zeros(0))
         estimates = kalman(system, state, innovations=True)
-        disturbed = measured and bool(np.any(_sizes(estimates, len(system.z))[0] > self.largest))
+        sizes = _sizes(estimates, min(BLOCK, len(system.z)))
+        large = np.flatnonzero(np.any(sizes > self.largest, axis=1)) if measured else np.empty(0, np.intp)
+        if large.size and count > 1:
+            return self._blocks(record, max(1, int(large[0])), context, measured)
+        disturbed = bool(large.size)
         if disturbed:
             estimates = kalman(replace(system, R=system.R + _disturbance(estimates)), state)
         return replace(
@@ -193,6 +198,10 @@ class Ongoing:
         if self.motion:
             return with_motion(system, float(np.mean(integrals.intervals)), self.motion)
         return replace(system, R=system.R + np.diag(self.R - QUIETEST_BASE**2))
+
+
+def _rows(record: ImuRecord, rows: slice) -> ImuRecord:
+    return replace(record, time=record.time[rows], gyro=record.gyro[rows], accel=record.accel[rows])
 
 
 def block_limits(estimates: Estimates) -> Array:

@@ -15,6 +15,8 @@ from truenorth.core.errors import UsageError
 from truenorth.filters.stack import Array
 from truenorth.filters.system import Estimates, LinearSystem
 
+BLOCK = 512  # epochs that are worked on at once: what stands in between takes memory for these alone
+
 
 class Gains(NamedTuple):
     """Gains of each epoch.
@@ -54,17 +56,34 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
             f"the estimates hold P of {estimates.P.shape[-3]} and innovations of {estimates.innovation.shape[-2]} "
             f"epochs, expected all {system.epochs}: filter with history='full'"
         )
-    Phi, H = system.Phi, system.H
-    P0 = np.broadcast_to(system.P0, (*estimates.P.shape[:-3], n, n))
-    before = np.concatenate([P0[..., None, :, :], estimates.P[..., :-1, :, :]], axis=-3)
-    P_predicted = Phi @ before @ np.swapaxes(Phi, -1, -2) + system.Q
-    cross = P_predicted @ np.swapaxes(H, -1, -2) + (0.0 if system.S is None else system.S)
+    runs, K = estimates.P.shape[:-3], system.epochs
+    found = Gains(np.empty((*runs, K, n, m)), np.empty((*runs, K, n, n)), np.empty((*runs, K, n, n)))
+    for first in range(0, K, BLOCK):
+        epochs = slice(first, min(first + BLOCK, K))
+        for whole, part in zip(found, _gains(system, estimates, epochs), strict=True):
+            whole[..., epochs, :, :] = part
+    return found
+
+
+def _gains(system: LinearSystem, estimates: Estimates, epochs: slice) -> Gains:
+    """Gains of some epochs."""
+
+    def cut(a: Array) -> Array:
+        return a if a.shape[-3] == 1 else a[..., epochs, :, :]
+
+    Phi, H, first = cut(system.Phi), cut(system.H), epochs.start
+    P0 = np.broadcast_to(system.P0, (*estimates.P.shape[:-3], system.states, system.states))[..., None, :, :]
+    before = estimates.P[..., max(0, first - 1) : epochs.stop - 1, :, :]
+    before = before if first else np.concatenate([P0, before], axis=-3)
+    P_predicted = Phi @ before @ np.swapaxes(Phi, -1, -2) + cut(system.Q)
+    cross = P_predicted @ np.swapaxes(H, -1, -2) + (0.0 if system.S is None else cut(system.S))
     # An absent row becomes one of its own without information.
-    absent = np.isnan(estimates.innovation)
-    W = np.where(absent[..., :, None] | absent[..., None, :], np.eye(m), estimates.innovation_covariance)
+    absent = np.isnan(estimates.innovation[..., epochs, :])
+    covariance = estimates.innovation_covariance[..., epochs, :, :]
+    W = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), covariance)
     cross = np.where(absent[..., None, :], 0.0, cross)
     gain = np.swapaxes(np.linalg.solve(W, np.swapaxes(cross, -1, -2)), -1, -2)
-    keep = np.eye(n) - gain @ H
+    keep = np.eye(system.states) - gain @ H
     return Gains(gain, keep, keep @ Phi)
 
 
@@ -78,9 +97,15 @@ def initial_part(step: Array, P0: Array) -> Array:
     P0 : (n, n) array
         Initial covariance, or a part of it.
     """
-    response = np.empty(step.shape)
-    _products(np.ascontiguousarray(step), response)
-    return response @ P0 @ np.swapaxes(response, -1, -2)
+    part = np.empty(step.shape)
+    response = np.empty((min(BLOCK, len(step)), *step.shape[1:]))
+    before = np.eye(step.shape[-1])
+    for first in range(0, len(step), BLOCK):
+        block = response[: min(BLOCK, len(step) - first)]
+        _products(np.ascontiguousarray(step[first : first + BLOCK]), before, block)
+        part[first : first + BLOCK] = block @ P0 @ np.swapaxes(block, -1, -2)
+        before = block[-1].copy()
+    return part
 
 
 def through(system: LinearSystem, gains: Gains, signature: Array) -> tuple[Array, Array]:
@@ -106,9 +131,9 @@ def through(system: LinearSystem, gains: Gains, signature: Array) -> tuple[Array
 
 
 @compiled
-def _products(step: Any, response: Any) -> None:
-    """``response[k] = step[k] ... step[1] step[0]``, (K, n, n)."""
-    response[0] = step[0]
+def _products(step: Any, before: Any, response: Any) -> None:
+    """``response[k] = step[k] ... step[1] step[0] before``, (K, n, n)."""
+    times(step[0], before, response[0])
     for k in range(1, step.shape[0]):
         times(step[k], response[k - 1], response[k])
 

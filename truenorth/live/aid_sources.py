@@ -133,7 +133,7 @@ def open_aid(
         path = Path(text.removeprefix("replay:"))
         if not path.exists():
             raise UsageError(f"source {text}: there is no file {path}")
-        rows = feed.rows_of(READERS[feed.key](path, **options))
+        rows = feed.rows_of(READERS[feed.key](path, **feed.reading, **options))
         after = -np.inf if kept is None else kept.earlier[:, 0].max(initial=-np.inf)
         return Replayed(rows[rows[:, 0] > after], add), None
     listener = Listener(feed, text, shared=text == SAME, by_arrival=by_arrival, add=add, **options)

@@ -7,7 +7,8 @@ about the last solution, and sigma comes down with every ten seconds; on the mov
 the bit as long as the rows fit into memory one by one (see :mod:`.log`).
 
 With aiding sensors the regime is watched: as long as they say that the vehicle stays where it is, it is aligned as a base that
-stays; once they say that it moves, as a vehicle on the move, from all rows. A master INS aligns it from the first row on.
+stays; once they say that it moves, as a vehicle on the move, from all rows. A master INS aligns it from the first row on. An IMU
+that is turned, by an indexer or on a turntable, is aligned as such from the first row on; its answer is that of the last solution.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.aiding.aids import Positions
 from truenorth.alignment import Alignment, align
 from truenorth.alignment.in_motion_task import usual_antenna
-from truenorth.alignment.recipes import RECIPES
+from truenorth.alignment.rotary import SHORTEST
 from truenorth.core.attitude import angle_text, euler_sigma
-from truenorth.core.errors import UsageError
+from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.live.answer import Answer, Motion, under_way
 from truenorth.live.carry import Carry
@@ -38,6 +40,7 @@ from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.navigator import Navigator
 from truenorth.live.reasons import reasons_of
+from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.navigation.procedure import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
@@ -52,8 +55,8 @@ SHARE = 0.1  # of one core, for solutions
 SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "place", "imu", "method", "share", "feeds", "log", "intake", "left", "_gap_before", "until_then", "failure", "solutions",
-    "_solution", "_carry", "_earlier", "_newest", "_due",
+    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "left", "_gap_before", "until_then", "failure",
+    "solutions", "_solution", "_carry", "_earlier", "_newest", "_due",
 )  # fmt: skip
 UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
 BLOCK = 256  # rows, up to which blocks of the newest rows are put together
@@ -70,9 +73,10 @@ class Aligner:
         Not needed with GNSS positions.
     imu : ImuSpec, str, path or mapping, optional
         Specification; on a base that stays it is inferred from the rows when left out.
-    aid : sequence of Feed
+    aid : sequence of Feed, Positions or Indexer
         Aiding sensors, whose rows come by :meth:`push_gnss`, :meth:`push_odometer`, :meth:`push_velocity` or their own `push`. One
-        that is not named here begins with its first row, with the usual mounting.
+        that is not named here begins with its first row, with the usual mounting. ``Positions()``: a turntable turns the IMU;
+        ``Indexer(None)``: an indexer does, on a body that is still, without an encoder (with one: :class:`IndexerFeed`).
     kind : {"rates", "increments"}
         What a row is, see :class:`truenorth.ImuRecord`.
     method : str
@@ -91,7 +95,7 @@ class Aligner:
         place: Position | None = None,
         imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
         *,
-        aid: Sequence[Feed] = (),
+        aid: Sequence[Feed | Turner] = (),
         kind: Kind = "rates",
         method: Any = "auto",
         share: float = SHARE,
@@ -101,7 +105,8 @@ class Aligner:
         if not 0.0 < share <= 1.0:
             raise UsageError(f"share {share}; expected a part of one core above 0, at most 1")
         self.place, self.imu, self.method, self.share = place, None if imu is None else imu_spec(imu), method, share
-        self.feeds = {feed.key: feed for feed in aid}
+        self.feeds = {feed.key: feed for feed in aid if isinstance(feed, Feed)}
+        self.turner = next((a for a in aid if isinstance(a, Turner)), None)
         self.log = Log(kind, most_rows)
         self.on_taken(None)
         self.intake = Intake()
@@ -156,6 +161,10 @@ class Aligner:
         """Take rows of a master INS in, see :meth:`MasterFeed.push`."""
         self._feed("master").push(time, C_nb, v_n, **more)
 
+    def push_indexer(self, time: ArrayLike, angles: ArrayLike) -> None:
+        """Take angles of an indexer in, see :meth:`IndexerFeed.push`: rad, of the axes z and x unless `aid` holds other ones."""
+        self._feed("indexer").push(time, angles)
+
     def push_velocity(self, time: ArrayLike, velocity: ArrayLike, sigma: ArrayLike | None = None) -> None:
         """Take a velocity log's rows in, see :meth:`VelocityFeed.push`: body axes, unless `aid` holds another one."""
         self._feed("velocity").push(time, velocity, sigma)
@@ -166,7 +175,12 @@ class Aligner:
     @property
     def first_answer(self) -> float:
         """Length of log from which there is an answer, s."""
-        return FIRST
+        return SHORTEST if self._turned else FIRST
+
+    @property
+    def _turned(self) -> bool:
+        """Whether something turns the IMU on a base that stays."""
+        return self.turner is not None or "indexer" in self.feeds
 
     @property
     def residuals(self) -> tuple[Residuals, ...]:
@@ -221,7 +235,9 @@ class Aligner:
         self.close()
         aids = self._aids()
         left = None if aids else self.left
-        found = self._solve(self._record(aids, np.inf if left is None else left), aids)
+        if self._turned and not aids:
+            raise AlignmentError("no angles of the indexer came; expected its encoder's rows")
+        found = self._solve(self._record(aids, reach(aids) if left is None else left), aids)
         if left is None:
             self._take_over(found)
         return found
@@ -240,6 +256,10 @@ class Aligner:
             As :meth:`finish`; the heading may not be used.
         """
         found = self.finish()
+        if self._turned and not isinstance(self.turner, Positions):
+            raise UsageError(
+                "navigation of an IMU that an indexer turns; expected an IMU that stands still in its body"
+            )
         navigator = self._navigator(found, **options)
         for block in self._newest:
             navigator.push(block[:, 0], block[:, 1:4], block[:, 4:])
@@ -318,30 +338,23 @@ class Aligner:
         return found is not None and not under_way(found) and found.time <= self.log.last_gap
 
     def _start_when_due(self) -> None:
-        if not self._solving.free or self.duration < FIRST or self.log.end < self._due:
+        if not self._solving.free or self.duration < self.first_answer or self.log.end < self._due:
             return
         aids = self._aids()
-        if self.left is not None and not aids:
+        if not aids and (self.left is not None or self._turned):
             return
-        record = self._record(aids)
+        record = self._record(aids, reach(aids))
         self._newest_in = float(record.time[-1])
         self._solving.start(lambda: self._solve(record, aids))
         self._collect()
 
     def _aids(self) -> list[Any]:
-        """What aids an alignment on the move; nothing as long as the vehicle stays where it is, or no sensor says that it moves."""
-        master = self.feeds["master"].until(self.log.end) if "master" in self.feeds else None
-        if master is not None:
-            return [master]
-        if all(feed.moves_from() is None for feed in self.feeds.values()):
-            return []
-        found = [feed.until(self.log.end) for feed in self.feeds.values()]
-        return [aid for aid in found if aid is not None and any(recipe.fits({type(aid)}) for recipe in RECIPES)]
+        return aids_of(self.turner, self.feeds, self.log.end)
 
     def _record(self, aids: Sequence[Any], until: float = np.inf) -> ImuRecord:
         """The rows since the last gap that cannot be bridged."""
         since = self.log.last_gap if self.left is None else self._gap_before
-        if aids:
+        if aids and not self._turned:
             time = self.log.rows[:, 0]
             wide = np.flatnonzero(np.diff(time) > LONGEST_BRIDGE)
             since = float(time[wide[-1]]) if wide.size else -np.inf
@@ -378,7 +391,7 @@ class Aligner:
                 self._mover = self._navigator(found)
         elif self._earlier is None or self._carry is None or self._carry.elapsed > SETTLED:
             self._earlier = self._carry
-        if not under_way(found):
+        if not under_way(found) and not self._turned:
             self._carry = Carry(found, self.log.source_kind)
         for block in self._newest:
             if block[-1, 0] < found.time - BACK:

@@ -20,6 +20,7 @@ GAINED = 6.0  # sigmas
 LEAST_GAIN = 0.5  # m/s: people who get in and out, a gust at the quay
 SWAY = 6.0  # times the RMS of the base's own motion: its largest swing, and the lever arm's
 BLOCK = 0.25  # s: a block costs as much as a row
+SLACK = 10_000  # rows for which the filter waits when nobody asks: many at once cost it less
 LASTING = 5.0  # s
 QUIET = 0.1  # of the limit: a base that gains less stands, or swings through its place
 MARGIN = 2.0  # s, before the last quiet row: a drive may begin slower than can be seen
@@ -82,14 +83,21 @@ class Carry:
         self._before = both[-2:].copy()
         self.time = float(rows[-1, 0])
         self._watch()
-        if self.going is not None:
-            self.going.advance(self._quiet_at - MARGIN if self.left is None else self.left)
-            if self.left is not None:
-                self.going.advance(self.time - MARGIN, measured=False)
+        if self.going is not None and self.going.behind > SLACK:
+            self._filter()
+
+    def _filter(self) -> None:
+        """Let the filter go on: over rows of the base in its place, then over those since it left."""
+        assert self.going is not None
+        self.going.advance(self._quiet_at - MARGIN if self.left is None else self.left)
+        if self.left is not None:
+            self.going.advance(self.time - MARGIN, measured=False)
 
     def now(self) -> tuple[float, Array, Array]:
         """Time, attitude (3, 3) and covariance (3, 3) of the misalignment (E, N, U), at the newest row."""
         self.advance()
+        if self.going is not None:
+            self._filter()
         return (self.time, self.C_nb, self.phi_covariance) if self.going is None else self.going.now()
 
     @property

@@ -112,8 +112,9 @@ class Decoder:
         if self._by_arrival and len(result):
             self.arrival_time = True
             result[:, 0] += self._now() - result[-1, 0]
-        result[:, 1:4] = result[:, 1:4] @ self._turn.T
-        result[:, 4:] = result[:, 4:] @ self._turn.T
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is counted where rows are taken in
+            result[:, 1:4] = result[:, 1:4] @ self._turn.T
+            result[:, 4:] = result[:, 4:] @ self._turn.T
         return result
 
     def _table(self, table: dict[str, Array]) -> Array:

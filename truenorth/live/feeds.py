@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.source import Aiding
+from truenorth.core.errors import DataError
 from truenorth.core.position import Position
 from truenorth.records import GnssRecord, HeightRecord, OdometerRecord, VelocityRecord
 from truenorth.state.mounting import Mounting
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 
 MOST_ROWS = 200_000
 STEP = 2520  # rows by which the window of new measurements moves: an odometer is averaged in blocks, mostly of 1 to 10 rows
+LARGEST = 1e8  # SI units: beyond what any of these sensors measures
+FEW, OTHER_CLOCK = 5, 86400.0  # rows from which on, and s from their median beyond which, a row is of another clock
 FIXED = 5  # fixes whose median says where a vehicle began
 FAR, FAR_SIGMAS = 10.0, 5.0  # m, and sigmas of a fix: so far from there it has moved
 MOVES = 1.0  # m/s: faster than an antenna on a swaying mast
@@ -45,7 +48,8 @@ class Feed(ABC):
 
     def __init__(self, mounting: Mounting | None = None) -> None:
         self.mounting = mounting
-        self.left_out = 0  # rows without a finite time, without any number, or repeated
+        self.reading: dict[str, Any] = {}  # options of the reader of such logs
+        self.left_out = 0  # rows without a finite time, without any number, that cannot be, repeated, of another clock
         self.failure = ""  # of the last rows that could not be read
         self.clear()
 
@@ -83,21 +87,44 @@ class Feed(ABC):
         if waiting:
             rows = np.vstack([self._rows, *waiting])
             _, first = np.unique(rows[:, 0], return_index=True)
-            self.left_out += len(rows) - len(first)
             self._rows = rows[first]
+            if len(self._rows) >= FEW:
+                away = np.abs(self._rows[:, 0] - np.median(self._rows[:, 0]))
+                self._rows = self._rows[away < OTHER_CLOCK]
+            self.left_out += len(rows) - len(self._rows)
             if len(self._rows) > MOST_ROWS:
                 self._rows, self.thinned = self.halved(self._rows), 2 * self.thinned
         return self._rows
+
+    def continued(self, rows: Array) -> Array:
+        """Rows that were read for themselves, as those that go on from the rows so far."""
+        return rows
 
     def halved(self, rows: Array) -> Array:
         """Half as many rows that say the same, as far as they can."""
         return rows[1::2]
 
     def add(self, rows: Array) -> None:
-        """Take rows ``time, columns`` in, any order."""
-        sound = np.isfinite(rows[:, 0]) & np.isfinite(rows[:, 1:]).any(axis=1)
-        self.left_out += int(np.sum(~sound))
-        self._waiting.append(np.where(np.isfinite(rows), rows, np.nan)[sound])
+        """Take rows ``time, columns`` in, any order; those that cannot be are counted and left out."""
+        finite = np.where(np.isfinite(rows), rows, np.nan)
+        with np.errstate(invalid="ignore"):
+            sound = np.isfinite(rows[:, 0]) & np.isfinite(rows[:, 1:]).any(axis=1)
+            sound &= ~(np.abs(finite[:, 1:]) > LARGEST).any(axis=1)
+        found = finite[sound]
+        if not self._can_be(found):
+            found = found[[self._can_be(found[row : row + 1]) for row in range(len(found))]]
+        self.left_out += len(rows) - len(found)
+        self._waiting.append(found)
+
+    def _can_be(self, rows: Array) -> bool:
+        """Whether a record takes these numbers, next to some that are sound."""
+        both = np.vstack([self.dummy(), rows])
+        both[:, 0] = np.arange(len(both))
+        try:
+            self.aid_of(both)
+        except DataError:
+            return False
+        return True
 
     def until(self, until: float, mounting: Mounting | None = None) -> Aid | None:
         """The rows up to a time as an aid; None where there are fewer than two."""
@@ -113,6 +140,7 @@ class Feed(ABC):
 
     def sources(self, altitude: str, mounting: Mounting | None) -> list[Aiding]:
         """The measurements that may come, none of them there yet; `mounting` stands for one that is not given."""
+        _ = self.rows  # those that wait say what may come
         found = self._mounted(self.dummy(), mounting).sources(altitude)
         return [replace(source, **_rows_of(source, np.zeros(0, np.intp))) for source in found]
 
@@ -182,7 +210,7 @@ class GnssFeed(Feed):
     key = "gnss"
     columns = (
         "lat", "lon", "alt", "VE", "VN", "VU", "sigma_E", "sigma_N", "sigma_U", "sigma_VE", "sigma_VN", "sigma_VU", "hdop", "vdop",
-        "quality",
+        "quality", "heading", "sigma_heading",
     )  # fmt: skip
 
     def push(
@@ -197,10 +225,20 @@ class GnssFeed(Feed):
         velocity_sigma: ArrayLike | None = None,
         dop: ArrayLike | None = None,
         quality: ArrayLike | None = None,
+        heading: ArrayLike | None = None,
+        heading_sigma: ArrayLike | None = None,
     ) -> None:
         """Take fixes in, see :class:`truenorth.GnssRecord`: radians, metres, east, north, up."""
         place = [(value, 1) for value in (lat, lon, alt)]
-        rest = [(v_n, 3), (position_sigma, 3), (velocity_sigma, 3), (dop, 2), (quality, 1)]
+        rest = [
+            (v_n, 3),
+            (position_sigma, 3),
+            (velocity_sigma, 3),
+            (dop, 2),
+            (quality, 1),
+            (heading, 1),
+            (heading_sigma, 1),
+        ]
         self.add(table(time, *place, *rest))
 
     def rows_of(self, record: GnssRecord) -> Array:
@@ -212,6 +250,8 @@ class GnssFeed(Feed):
             (record.velocity_sigma, 3),
             (record.dop, 2),
             (record.quality, 1),
+            (record.heading, 1),
+            (record.heading_sigma, 1),
         ]
         return table(record.time, *place, *rest)
 
@@ -222,7 +262,10 @@ class GnssFeed(Feed):
             or_none(np.ascontiguousarray(rows[:, at : at + n])) for at, n in ((7, 3), (10, 3), (13, 2))
         )
         v_n = or_none(np.ascontiguousarray(rows[:, 4:7]))
-        record = GnssRecord(t[0], t[1], t[2], t[3], v_n, sigma, velocity_sigma, dop, or_none(t[15]), source="live GNSS")
+        quality, heading, heading_sigma = (or_none(t[at]) for at in (15, 16, 17))
+        record = GnssRecord(
+            t[0], t[1], t[2], t[3], v_n, sigma, velocity_sigma, dop, quality, heading, heading_sigma, "live GNSS"
+        )
         return Gnss(record, self.mounting)
 
     def speed_of(self, rows: Array) -> Array:
@@ -251,10 +294,11 @@ class GnssFeed(Feed):
         return np.column_stack([rows[:, 1] * scale, rows[:, 2] * scale * np.cos(rows[:, 1])])
 
     def dummy(self) -> Array:
-        """Positions and velocities of a vehicle at rest."""
+        """Positions and velocities of a vehicle at rest; headings where some have come."""
         rows = super().dummy()
-        rows[:, 4:7], rows[:, -1] = 0.0, 1.0
-        rows[:, 7:15] = 1.0
+        rows[:, 4:7] = 0.0
+        rows[:, 7:16] = 1.0
+        rows[:, 16:] = 1.0 if np.isfinite(self._rows[:, 16]).any() else np.nan
         return rows
 
 

@@ -31,6 +31,7 @@ class Going:
         self.filter: Ongoing = alignment.ongoing
         self._kind = kind
         self._waiting: list[Array] = []
+        self.behind = 0  # rows that came since the filter last went on
         # Of the answer, not of the filter: deflection of the vertical, creep of the base, what the checks have added.
         w, V = np.linalg.eigh(alignment.phi_covariance - self.filter.attitude(None, 0)[2])
         self._more = (V * np.maximum(w, 0.0)) @ V.T
@@ -38,6 +39,7 @@ class Going:
     def add(self, rows: Array) -> None:
         """Take rows ``time, gyro (3), accel (3)`` in."""
         self._waiting.append(rows)
+        self.behind += len(rows)
 
     def advance(self, until: float, *, measured: bool = True) -> None:
         """Filter the rows up to a time, in whole blocks.
@@ -48,6 +50,7 @@ class Going:
         measured : bool
             Whether the base is where it was.
         """
+        self.behind = 0
         if until - self.filter.time < BLOCK * self.filter.interval:
             return
         rows = self._rows()

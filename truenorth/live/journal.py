@@ -6,6 +6,7 @@ SI units and radians; pandas and pyarrow read each folder as one table.
 
 from __future__ import annotations
 
+import time as clock
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -26,7 +27,8 @@ Array = NDArray[np.float64]
 
 FOLDER = "rows"
 SPAN = 10.0  # s of rows in a part
-LARGEST = 200_000  # rows in a part
+PAUSE = 1.0  # s by the wall clock between two parts: a fast replay writes larger ones
+LARGEST = 50_000  # rows in a part
 
 
 class Parts:
@@ -110,6 +112,8 @@ class Journal:
             raise UsageError(f"{folder}: holds the rows of an earlier run; expected another folder, or resume")
         self.aids = {feed.key: AidJournal(folder, feed) for feed in feeds}
         self._open: list[Array] = []
+        self._count = 0  # rows in it
+        self._written = -np.inf
 
     def earlier(self) -> Iterator[tuple[Kind, Array]]:
         """Kind and rows of each part that is there.
@@ -136,10 +140,12 @@ class Journal:
         """Take rows in; write a part when there is enough for one."""
         if len(rows):
             self._open.append(rows)
+            self._count += len(rows)
         if not self._open:
             return
         span = self._open[-1][-1, 0] - self._open[0][0, 0]
-        if span >= SPAN or sum(map(len, self._open)) >= LARGEST:
+        rested = clock.monotonic() - self._written >= PAUSE
+        if (span >= SPAN and rested) or self._count >= LARGEST:
             self.flush(kind)
 
     def flush(self, kind: Kind) -> None:
@@ -149,7 +155,7 @@ class Journal:
         rows = np.vstack(self._open) if self._open else np.empty((0, 7))
         if len(rows) < 2:
             return
-        self._open = []
+        self._open, self._count, self._written = [], 0, clock.monotonic()
         rows = rows[np.argsort(rows[:, 0], kind="stable")]
         self._parts.write(record_of(rows, kind).to_frame())
 

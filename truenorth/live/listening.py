@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.attitude import body_axes
 from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
-from truenorth.formats import read_gnss, read_height, read_master, read_odometer, read_velocity
+from truenorth.formats import read_encoder, read_gnss, read_height, read_master, read_odometer, read_velocity
+from truenorth.formats.magnetometer import read_magnetometer
 from truenorth.live.feeds import Feed
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 
@@ -31,7 +33,11 @@ READERS: dict[str, Any] = {
     "velocity": read_velocity,
     "baro": read_height,
     "master": read_master,
+    "indexer": read_encoder,
+    "magnetometer": read_magnetometer,
+    "attitude": read_master,
 }
+PARTS = {"magnetometer": "mag"}  # what a device's tables are named, where it is not the feed's key
 DAY = 86400.0
 BEFORE = 2  # lines: a total of counts needs one before, a record two rows
 PLACE, MOTION = ("GGA",), ("RMC", "VTG")
@@ -99,7 +105,8 @@ class Listener:
             if protocol is not None:
                 self._messages = Messages(protocol, self._source)
         if self._messages is not None:
-            self._take(self._messages.feed(data, self.feed.key).get(self.feed.key, {}))
+            part = PARTS.get(self.feed.key, self.feed.key)
+            self._take(self._messages.feed(data, part).get(part, {}))
             return
         *lines, self._half = (self._half + data).split(b"\n")
         if len(self._half) > LONGEST_LINE:
@@ -121,7 +128,11 @@ class Listener:
         if "time" not in rows:
             return
         count = len(rows["time"])
-        self._give(np.column_stack([rows.get(name, np.full(count, np.nan)) for name in ("time", *self.feed.columns)]))
+        values = np.column_stack([rows.get(name, np.full(count, np.nan)) for name in ("time", *self.feed.columns)])
+        if self.feed.key == "magnetometer" and self._messages is not None:
+            axes = self.feed.reading.get("axes") or self._messages.module.AXES
+            values[:, 1:] = values[:, 1:] @ body_axes(axes).T
+        self._give(values)
 
     def _text(self, lines: list[bytes]) -> None:
         """Lines with named columns, the names first."""
@@ -156,7 +167,7 @@ class Listener:
             file.write(text + b"\n")
             file.flush()
             try:
-                record = READERS[self.feed.key](Path(file.name), **self._options)
+                record = READERS[self.feed.key](Path(file.name), **self.feed.reading, **self._options)
             except DataError as error:
                 self._broken += 1
                 self.feed.failure = str(error).replace(Path(file.name).name, self._source)
@@ -165,7 +176,7 @@ class Listener:
             if record.time[-1] + self._days < self._last - DAY / 2:
                 self._days += DAY
             record = record.shifted(self._days)
-        rows = self.feed.rows_of(record)
+        rows = self.feed.continued(self.feed.rows_of(record))
         self._give(rows[rows[:, 0] > self._last])
         self._last = float(rows[-1, 0])
 

@@ -1,7 +1,7 @@
 """Whole messages of a device's stream, handed to the reader of its logs: what a file of them holds, a stream holds as well.
 
-u-blox UBX, Septentrio SBF, NovAtel OEM, MAVLink, and ROS 2 in frames of ours: each message begins with two bytes that tell the
-protocol, and says its length in its first bytes. What does not begin so is passed over.
+u-blox UBX, Septentrio SBF, NovAtel OEM, Xsens Xbus, MAVLink, and ROS 2 in frames of ours: each message begins with bytes that tell
+the protocol, and says its length in its first bytes. What does not begin so is passed over.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.errors import UsageError
-from truenorth.formats.devices import module_of
+from truenorth.core.errors import DataError, UsageError
+from truenorth.formats.devices import module_of, xsens
 
 Array = NDArray[np.float64]
 Tables = dict[str, dict[str, Array]]
@@ -42,6 +42,7 @@ PROTOCOLS: dict[str, tuple[tuple[bytes, ...], int, Callable[[bytes], int]]] = {
     "ubx": ((b"\xb5\x62",), 6, lambda head: 8 + int.from_bytes(head[4:6], "little")),
     "sbf": ((b"$@",), 8, lambda head: int.from_bytes(head[6:8], "little")),
     "novatel": ((b"\xaa\x44\x12", b"\xaa\x44\x13", b"#BEST", b"#INS", b"#RAWIMU", b"%INS", b"%RAWIMU"), 10, _novatel),
+    "xsens": ((b"\xfa\xff\x36",), 6, xsens.length),
     "ros": ((b"TNRM",), 8, lambda head: int.from_bytes(head[4:8], "little")),
     "mavlink": ((b"\xfe", b"\xfd"), 3, _mavlink),
 }
@@ -83,8 +84,8 @@ class Messages:
 
         Raises
         ------
-        UsageError
-            The decoder is not installed.
+        UsageError, DataError
+            The decoder is not installed; messages that lack what is needed.
         """
         whole = self._whole(data)
         if not whole:
@@ -102,7 +103,7 @@ class Messages:
                 raise UsageError(
                     f"{self._source}: {self._protocol} needs a decoder: pip install 'truenorth[{self.module.EXTRA}]'"
                 ) from None
-            except UsageError:
+            except (UsageError, DataError):
                 raise
             except Exception:  # decoders let whatever a damaged message provokes through
                 self.broken += 1

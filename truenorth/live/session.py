@@ -28,6 +28,7 @@ from truenorth.live.feeds import Feed
 from truenorth.live.journal import Journal
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator
+from truenorth.live.regime import Turner
 from truenorth.live.sources import Source, Stream, open_source
 from truenorth.navigation import Navigation
 from truenorth.records.specs import ImuSpec
@@ -48,6 +49,7 @@ class Session:
     imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None
     layout: Layout = field(default_factory=Layout)  # columns, units and axes of the rows
     feeds: Sequence[Feed] = ()  # aiding sensors
+    turner: Turner | None = None  # a turntable, or an indexer without an encoder
     aids: Mapping[str, str] = field(default_factory=dict)  # where each feed's rows come from, see :func:`open_aid`
     method: str = "auto"
     share: float = SHARE  # of one core, for solutions
@@ -141,7 +143,8 @@ class Session:
         if earlier and start is not None and start.exists():
             run = Navigator(load(start), feeds=self.feeds, mountings=UNKNOWN, kind=kind)
         else:
-            run = Aligner(self.place, self.imu, aid=self.feeds, kind=kind, method=self.method, share=self.share)
+            aid = [*self.feeds, *([] if self.turner is None else [self.turner])]
+            run = Aligner(self.place, self.imu, aid=aid, kind=kind, method=self.method, share=self.share)
         for _, rows in earlier:
             _give(run, rows, aids)
         run.on_taken(None if journal is None else journal.taker(kind))

@@ -31,6 +31,7 @@ from truenorth.records import ImuRecord
 Array = NDArray[np.float64]
 
 CHUNK = 0.02  # s of a replayed log in a chunk
+FASTEST = 500.0  # times: a faster replay has chunks of ten seconds all the same
 BYTES = 65536
 WAIT = 0.5  # s: a silent line is asked again after it, so that an interrupt is noticed
 POLL = 0.05  # s, between two looks at a file that grows
@@ -77,7 +78,7 @@ class Replay:
         self._speed = speed
         first = int(np.searchsorted(record.time, after, side="right"))
         self._rows = np.column_stack([record.time, record.gyro, record.accel])[first:]
-        self._length = max(1, round(CHUNK / record.interval * max(1.0, min(speed, 100.0))))
+        self._length = max(1, round(CHUNK / record.interval * max(1.0, min(speed, FASTEST))))
 
     def __iter__(self) -> Iterator[Array]:
         begun = clock.monotonic()

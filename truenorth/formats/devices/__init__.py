@@ -3,7 +3,7 @@
 A module of this folder has
 
 - `SUFFIXES` and `BEGINNINGS`: how its files are named and begin;
-- `EXTRA`: what installs its decoder, ``pip install 'truenorth[EXTRA]'``;
+- `EXTRA`: what installs its decoder, ``pip install 'truenorth[EXTRA]'``; empty where none is needed;
 - `AXES`: where x, y and z of its IMU point;
 - ``tables(path, topic)``: tables by what they hold, ``imu``, ``gnss``, ``velocity``, ``poses``, ``mag``; each maps headings with
   their units, such as ``gyro_x [rad/s]``, to arrays. The clock is one and the same in all of them;
@@ -21,12 +21,13 @@ from types import ModuleType
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.formats.columns import Columns, columns_of_arrays
 
-DEVICES = ("ubx", "sbf", "novatel", "ulog", "dataflash", "mavlink", "ros")
+DEVICES = ("ubx", "sbf", "novatel", "xsens", "ulog", "dataflash", "mavlink", "ros")
 SUFFIXES = {
     ".ubx": "ubx",
     ".sbf": "sbf",
     ".gps": "novatel",
     ".novatel": "novatel",
+    ".xbus": "xsens",
     ".ulg": "ulog",
     ".ulog": "ulog",
     ".tlog": "mavlink",
@@ -44,6 +45,7 @@ BEGINNINGS = {
     b"%INS": "novatel",
     b"#RAWIMU": "novatel",
     b"%RAWIMU": "novatel",
+    b"\xfa\xff\x36": "xsens",
     b"ULog\x01\x12\x35": "ulog",
     b"\xa3\x95\x80": "dataflash",
     b"#ROSBAG": "ros",

@@ -1,0 +1,157 @@
+"""Options of `truenorth live`: sensors that aid, and what turns the IMU, each with a source of its own."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from truenorth.cli.aiding_options import GYROS, Baseline
+from truenorth.cli.options import option
+
+if TYPE_CHECKING:
+    from truenorth.core.position import Position
+    from truenorth.live.feeds import Feed
+    from truenorth.live.regime import Turner
+
+
+@dataclass(frozen=True)
+class Turned:
+    """What turns the IMU on a base that stays."""
+
+    PANEL: ClassVar = "What turns the IMU"
+    indexer: Annotated[
+        str | None,
+        option("Source of an indexer's angles: CSV; or 'gyros': the body is still, the gyros show how the IMU turns."),
+    ] = None
+    indexer_axes: Annotated[str, option("Axes of the indexer, the outermost first.")] = "z,x"
+    indexer_sigma: Annotated[str, option("One-sigma error of its own angles and axes: '10 arcsec'.")] = "0 arcsec"
+    positions: Annotated[str | None, option("auto: a turntable takes the IMU from position to position.")] = None
+
+    def sources(self) -> dict[str, str]:
+        """By the key of the feed."""
+        return {} if self.indexer in (None, GYROS) else {"indexer": str(self.indexer)}
+
+    def feeds(self) -> list[Feed]:
+        """The encoder."""
+        from truenorth.core.units import parse
+        from truenorth.live.indexer_feed import IndexerFeed
+
+        sigma = parse(self.indexer_sigma, "angle")
+        return [IndexerFeed(axes_of(self.indexer_axes), angle_sigma=sigma)] if self.sources() else []
+
+    def turner(self) -> Turner | None:
+        """A turntable, or an indexer without an encoder."""
+        from truenorth.aiding.aids import Indexer
+        from truenorth.cli.aiding_options import Turntable
+        from truenorth.core.errors import UsageError
+        from truenorth.core.units import parse
+
+        if self.positions is not None and self.indexer is not None:
+            raise UsageError("--positions and --indexer: expected one thing that turns the IMU")
+        if self.indexer == GYROS:
+            return Indexer(None, axes_of(self.indexer_axes), angle_sigma=parse(self.indexer_sigma, "angle"))
+        return next(iter(Turntable(self.positions).aids()), None)
+
+
+@dataclass(frozen=True)
+class Aids:
+    """Sensors that aid, each with a source of its own: `same` is that of the IMU's rows."""
+
+    PANEL: ClassVar = "Sensors that aid"
+    gnss: Annotated[str | None, option("Source of fixes: NMEA, UBX, SBF, NovAtel, MAVLink or CSV.")] = None
+    odometer: Annotated[str | None, option("Source of an odometer's rows: CSV.")] = None
+    velocity: Annotated[str | None, option("Source of a velocity log's rows: CSV.")] = None
+    baro: Annotated[str | None, option("Source of heights: CSV; in navigation.")] = None
+    master: Annotated[str | None, option("Source of another INS's solution on the same vehicle: CSV.")] = None
+    master_sigma: Annotated[
+        str | None, option("Slow errors of that solution: navigation or tactical; without it what its rows say.")
+    ] = None
+    magnetometer: Annotated[
+        str | None, option("Source of a magnetometer's rows: CSV or a device; on the move and in navigation.")
+    ] = None
+    magnetometer_axes: Annotated[str | None, option("Where its x, y and z point, such as FRD.")] = None
+    magnetometer_iron: Annotated[
+        str | None, option("One sigma of hard and soft iron, % of the earth's field; '10,3' without it.")
+    ] = None
+    date: Annotated[str | None, option("Of the rows, YYYY-MM-DD, for the earth's field; today without it.")] = None
+    attitude: Annotated[
+        str | None, option("Source of another system's heading, pitch and roll: CSV; needs --attitude-sigma.")
+    ] = None
+    attitude_sigma: Annotated[
+        str | None, option("Its one-sigma noise; and its slow error and its time: '0.1' or '0.1,0.3,300', deg and s.")
+    ] = None
+    attitude_mounting: Annotated[
+        str | None, option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg.")
+    ] = None
+    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up.")] = None
+    latency: Annotated[
+        float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
+    ] = None
+    baseline: Baseline = None
+
+    def sources(self) -> dict[str, str]:
+        """By the key of the feed."""
+        keys = ("gnss", "odometer", "velocity", "baro", "master", "magnetometer", "attitude")
+        return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
+
+    def feeds(self, place: Position | None, imu_source: str) -> list[Feed]:
+        """What keeps their rows; `place` is where the earth's field is taken."""
+        from truenorth.live.known_feeds import FEEDS
+        from truenorth.live.master_feed import MasterFeed
+
+        found: list[Feed] = []
+        for key in self.sources():
+            if key == "magnetometer":
+                found.append(self._magnetometer(place, imu_source))
+            elif key == "attitude":
+                found.append(self._attitude())
+            elif key == "master":
+                found.append(MasterFeed(errors=self.master_sigma))
+            else:
+                found.append(FEEDS[key]())
+            if key == "gnss":
+                found[-1].mounting = self._antenna()
+        return found
+
+    def _antenna(self) -> Any:
+        from dataclasses import replace
+
+        from truenorth.alignment.in_motion_task import usual_antenna
+        from truenorth.cli.aiding_options import arm_of, on_baseline
+
+        if self.lever_arm is None and self.latency is None and self.baseline is None:
+            return None
+        antenna = usual_antenna(None)
+        if self.lever_arm is not None:
+            antenna = replace(antenna, lever_arm=arm_of(self.lever_arm, "--lever-arm"))
+        if self.latency is not None:
+            antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
+        return on_baseline(antenna, self.baseline)
+
+    def _magnetometer(self, place: Position | None, imu_source: str) -> Feed:
+        from truenorth.aiding.magnetometer import earth_field
+        from truenorth.cli.attitude_options import date_of, iron_of
+        from truenorth.core.errors import UsageError
+        from truenorth.live.attitude_feeds import MagnetometerFeed
+
+        if place is None:
+            raise UsageError("--magnetometer without a place; expected --lat and --lon: north of the needle is there")
+        if self.date is None and imu_source.startswith("replay:"):
+            raise UsageError("--magnetometer without a date; expected --date YYYY-MM-DD of the log that is replayed")
+        date = dt.datetime.now(dt.UTC).date() if self.date is None else date_of(self.date)
+        return MagnetometerFeed(
+            earth_field(place, date), axes=self.magnetometer_axes, **iron_of(self.magnetometer_iron)
+        )
+
+    def _attitude(self) -> Feed:
+        from truenorth.cli.attitude_options import attitude_mounting, attitude_sigmas
+        from truenorth.live.attitude_feeds import AttitudeFeed
+
+        sigmas = attitude_sigmas(self.attitude_sigma)
+        return AttitudeFeed(**sigmas, mounting=attitude_mounting(self.attitude_mounting))
+
+
+def axes_of(text: str) -> tuple[str, ...]:
+    """Axes of an indexer, such as ``z,x``."""
+    return tuple(text.replace(" ", "").lower().replace(",", ""))
