@@ -8,6 +8,7 @@ import pytest
 import truenorth as tn
 from tests.runs import some
 from truenorth.aiding.aids import Gnss, Odometer
+from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
 from truenorth.simulation.scenario import read_scenario
@@ -202,3 +203,23 @@ def test_a_run_that_is_saved_goes_on_to_the_same_bits(van, tmp_path):
     assert np.array_equal(one.position, other.position)
     assert runs[0].answer.summary() == runs[1].answer.summary()
     assert np.array_equal(runs[0].finish().position, runs[1].finish().position)
+
+
+def test_without_a_place_the_first_solution_waits_for_a_fix(van):
+    """A receiver that starts cold gives none for a minute: the run says so, and goes on."""
+    sim, gnss, _ = van
+    record = sim.record
+    first = 60.0
+    with Aligner(imu="tactical", aid=[GnssFeed()], kind=record.kind, background=False) as aligner:
+        fed(aligner, record, gnss.between(first, None), None, 50, until=first)
+        assert aligner.answer is None
+        assert "no fix has come" in aligner.failure
+        with pytest.raises(AlignmentError, match="no fix has come"):
+            Aligner(imu="tactical", aid=[GnssFeed()], background=False).finish()
+        fed(aligner, record, gnss.between(first, None), None, 50, since=first)
+        assert aligner.answer is not None
+        assert aligner.failure == ""
+        found = aligner.finish()
+    whole = tn.align(record, imu="tactical", aid=[Gnss(kept(gnss, record.time[-1] - 0.4).between(first, None))])
+    assert np.array_equal(found.C_nb, whole.C_nb)
+    assert found.status == whole.status

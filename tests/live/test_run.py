@@ -158,7 +158,7 @@ def test_every_source_gives_the_answer_of_the_file(how, record, log):
                 sender.sendto(b"".join(lines[at : at + 20]), ("127.0.0.1", port))
                 time.sleep(0.002)
         time.sleep(2.0)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=120)
     else:
         with socket.create_server(("127.0.0.1", 0)) as server:
@@ -323,3 +323,21 @@ def test_page_addresses_that_cannot_be(address):
 
     with pytest.raises(UsageError, match="page address"):
         serve(address, 0.01)
+
+
+def test_before_the_first_answer_the_page_says_what_it_waits_for_and_what_failed():
+    pytest.importorskip("uvicorn")
+    from truenorth.live import Aligner
+    from truenorth.live.page import serve
+
+    page = serve(":0", 0.01)
+    try:
+        with Aligner(PLACE, "navigation") as aligner:
+            aligner.failure = "the log cannot be aligned"
+            page.publish(aligner, None, "2 lines could not be read")
+        event = json.loads(page._events[-1][1])
+    finally:
+        page.close()
+    assert event["waiting"] == "the first answer comes after 20 s of log"
+    assert event["note"] == "2 lines could not be read; the log cannot be aligned"
+    assert "status" not in event

@@ -61,10 +61,10 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         fitted=len(integrals.intervals),
         start=integrals.start,
         elapsed=float(integrals.time[-1]),
-        C_ib=integrals.C_ib[-1],
-        velocity=integrals.velocity[-1],
-        place=integrals.position[-1],
-        x=fine.x,
-        P=fine.P,
+        C_ib=integrals.C_ib[-1].copy(),  # not the whole log's, which a view would hold
+        velocity=integrals.velocity[-1].copy(),
+        place=integrals.position[-1].copy(),
+        x=fine.x.copy(),
+        P=fine.P.copy(),
         largest=block_limits(fine.estimates),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -39,7 +40,7 @@ Examples:
   truenorth live "zenoh:imu/data?type=sensor_msgs/msg/Imu" --lat 48.1
 
 Rows are CSV lines (a header with our names, or time and six numbers), binary rows or the messages of a device, see docs/live.md.
-Ctrl-C ends a run: the rows so far are aligned as `truenorth align` would.
+Ctrl-C ends a run, or SIGTERM: the rows so far are aligned as `truenorth align` would.
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """
@@ -138,7 +139,7 @@ def live(
         opened=lambda name: print(f"truenorth: rows from {name}; Ctrl-C ends the run", file=sys.stderr, flush=True),
     )
     lines = None if not (as_json or nmea) else _line_listener(say, as_json)
-    with _listeners(session, lines, page, goal) as listeners:
+    with _listeners(session, lines, page, goal) as listeners, _ended_by_sigterm():
         alignment = session.run(listeners)
     result: Alignment | Navigation = session.navigation or alignment
     if as_json:
@@ -165,6 +166,16 @@ def _line_listener(say: Callable[[str], None], as_json: bool) -> Listener:
                 say(line)
 
     return listener
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """A service that is stopped has its answer, too."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager

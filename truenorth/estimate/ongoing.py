@@ -176,11 +176,11 @@ class Ongoing:
             self,
             epochs=self.epochs + len(found.intervals),
             elapsed=float(whole.time[-1]),
-            C_ib=whole.C_ib[-1],
-            velocity=whole.velocity[-1],
-            place=whole.position[-1],
-            x=estimates.x[-1],
-            P=estimates.P[-1],
+            C_ib=whole.C_ib[-1].copy(),
+            velocity=whole.velocity[-1].copy(),
+            place=whole.position[-1].copy(),
+            x=estimates.x[-1].copy(),
+            P=estimates.P[-1].copy(),
             disturbed=self.disturbed + disturbed,
         )
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import devices
 from truenorth.formats.content import check_regular, first_bytes, suffix_of
+from truenorth.formats.parquet import parts_of
 
 SUFFIXES = {
     ".csv": "csv",
@@ -64,7 +65,7 @@ def format_of(
     Parameters
     ----------
     path : Path
-        An existing file, or a folder (a ROS 2 bag).
+        An existing file, or a folder (a ROS 2 bag, the rows of a live run).
     given : str, optional
         What the caller says; the content must still agree.
     suffixes : mapping
@@ -86,8 +87,12 @@ def format_of(
     if path.is_dir() and "ros" not in formats:
         raise UsageError(f"{path}: a folder; name a file")
     if path.is_dir():
+        if given in (None, "parquet") and suffixes is SUFFIXES and parts_of(path):
+            return "parquet"
         if given not in (None, "ros") or not (path / "metadata.yaml").is_file():
-            raise UsageError(f"{path}: a folder; only a ROS 2 bag is one (with metadata.yaml in it), name a file")
+            raise UsageError(
+                f"{path}: a folder; only a ROS 2 bag is one (with metadata.yaml in it), and the rows of a live run; name a file"
+            )
         return "ros"
     head = first_bytes(path)
     if not head:

@@ -1,4 +1,7 @@
-"""Parquet and Feather: the documented columns, or others by name; the index `time` of a pandas table is a column like any other."""
+"""Parquet and Feather: the documented columns, or others by name; the index `time` of a pandas table is a column like any other.
+
+A folder of numbered parts, as a live run leaves its rows, is one table.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +33,12 @@ def columns(path: Path, format: str) -> Columns:
 
     def table(names: Sequence[str] | None) -> pa.Table:
         wanted = None if names is None else list(dict.fromkeys(names))
+        if path.is_dir():
+            parts = parts_of(path)[: 1 if wanted is None else None]
+            return pa.concat_tables([columns_of(part, wanted) for part in parts])
+        return columns_of(path, wanted)
+
+    def columns_of(path: Path, wanted: list[str] | None) -> pa.Table:
         try:
             if format == "feather":
                 return pf.read_table(path, columns=wanted)
@@ -49,6 +58,11 @@ def columns(path: Path, format: str) -> Columns:
         return to_numpy([found.column(name).cast(pa.float64(), safe=False) for name in names])
 
     return Columns(path, list(table(None).column_names), read, lambda name: table([name]).column(name))
+
+
+def parts_of(folder: Path) -> list[Path]:
+    """The numbered parts of one table, as a live run writes its rows."""
+    return sorted(folder.glob("[0-9]*.parquet"))
 
 
 def write(record: Record, path: Path) -> None:

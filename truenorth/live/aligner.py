@@ -59,6 +59,7 @@ KEPT = (
     "solutions", "_solution", "_carry", "_earlier", "_newest", "_due",
 )  # fmt: skip
 UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
+NOWHERE = "no place is given, and no fix has come"
 BLOCK = 256  # rows, up to which blocks of the newest rows are put together
 BACK = 10.0  # s before a solution's end, from which its filter may need rows
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
@@ -235,6 +236,8 @@ class Aligner:
         self.close()
         aids = self._aids()
         left = None if aids else self.left
+        if self._nowhere:
+            raise AlignmentError(f"{NOWHERE}; expected a Position, or fixes of GNSS")
         if self._turned and not aids:
             raise AlignmentError("no angles of the indexer came; expected its encoder's rows")
         found = self._solve(self._record(aids, reach(aids) if left is None else left), aids)
@@ -341,7 +344,9 @@ class Aligner:
         if not self._solving.free or self.duration < self.first_answer or self.log.end < self._due:
             return
         aids = self._aids()
-        if not aids and (self.left is not None or self._turned):
+        if self._nowhere:
+            self.failure = NOWHERE
+        if self._nowhere or (not aids and (self.left is not None or self._turned)):
             return
         record = self._record(aids, reach(aids))
         self._newest_in = float(record.time[-1])
@@ -360,9 +365,19 @@ class Aligner:
             since = float(time[wide[-1]]) if wide.size else -np.inf
         return self.log.record(since, until)
 
-    def _solve(self, record: ImuRecord, aids: Sequence[Any]) -> Alignment:
+    @property
+    def _place(self) -> Position | None:
+        """What is given, or the fixes of a base that stays."""
         gnss = self.feeds.get("gnss")
-        place = self.place or (gnss.place if isinstance(gnss, GnssFeed) and not aids else None)
+        return self.place or (gnss.place if isinstance(gnss, GnssFeed) else None)
+
+    @property
+    def _nowhere(self) -> bool:
+        """Whether nothing says where this is."""
+        return self._place is None and "master" not in self.feeds
+
+    def _solve(self, record: ImuRecord, aids: Sequence[Any]) -> Alignment:
+        place = self._place if self._turned or not aids else self.place
         return align(record, place, self.imu, aid=list(aids), method=self.method)
 
     def _collect(self) -> None:

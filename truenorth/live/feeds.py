@@ -117,14 +117,18 @@ class Feed(ABC):
         self._waiting.append(found)
 
     def _can_be(self, rows: Array) -> bool:
-        """Whether a record takes these numbers, next to some that are sound."""
-        both = np.vstack([self.dummy(), rows])
-        both[:, 0] = np.arange(len(both))
-        try:
-            self.aid_of(both)
-        except DataError:
-            return False
-        return True
+        """Whether a record takes these numbers, next to some that are sound; there may be columns of which they say nothing."""
+        sound = self.dummy()
+        for absent in (np.zeros(rows.shape[1], dtype=bool), np.isnan(rows).all(axis=0)):
+            sound[:, absent] = np.nan
+            both = np.vstack([sound, rows])
+            both[:, 0] = np.arange(len(both))
+            try:
+                self.aid_of(both)
+            except DataError:
+                continue
+            return True
+        return False
 
     def until(self, until: float, mounting: Mounting | None = None) -> Aid | None:
         """The rows up to a time as an aid; None where there are fewer than two."""
@@ -133,6 +137,8 @@ class Feed(ABC):
 
     def moves_from(self) -> float | None:
         """Time from which the vehicle moves, s; None as long as it stays."""
+        if len(self.rows) < LASTING:
+            return None
         with np.errstate(invalid="ignore"):
             fast = self.speed_of(self.rows) > MOVES
         lasting = np.convolve(fast, np.ones(LASTING), "valid") == LASTING

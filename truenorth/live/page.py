@@ -68,7 +68,10 @@ class Page:
         event["log_s"] = aligner.duration
         event["left_out"] = aligner.intake.counts.words()
         event["may_go"] = self._go is not None and not self._go.is_set() and isinstance(aligner, Aligner)
-        if answer is not None:
+        if answer is None:
+            event["waiting"] = f"the first answer comes after {aligner.first_answer:g} s of log"
+            event["note"] = "; ".join(filter(None, (note, aligner.failure)))
+        else:
             event |= answer.summary() | {
                 "waiting": waiting(answer, self._goal),
                 "goal_deg": float(np.degrees(self._goal)),

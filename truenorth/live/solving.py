@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from truenorth.alignment import Alignment
 from truenorth.core.errors import AlignmentError, DataError
+from truenorth.core.free_memory import give_back
 
 
 class Solving:
@@ -73,3 +74,4 @@ class Solving:
             return solve()
         finally:
             self._cost = clock.thread_time() - begun
+            give_back()
