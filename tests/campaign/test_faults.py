@@ -241,3 +241,9 @@ def test_the_table_counts():
             "worst": 9.0,
         }
     ]
+
+
+def test_a_scale_factor_under_gravity_is_no_bias_beyond_its_specification():
+    """Drawn: 164 ug of bias and 130 ppm of scale factor, where both are 50: 283 ug as the filter finds it."""
+    inputs, _ = BENCHES["odometer"].draw(8204, 7)
+    assert BENCHES["odometer"].align(inputs).status == "aligned"

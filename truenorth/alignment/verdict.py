@@ -189,15 +189,17 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
     """Estimated biases that are larger than the specification allows.
 
     The one that takes the blame may be right, and the model wrong; on a base that stays, heading is what a gyro spoils, and
-    level what an accelerometer does.
+    level what an accelerometer does. On the move, what scale factors and misalignments make of gravity is in the bias of an
+    accelerometer.
     """
     found = []
     place = answer.position
     g = float(normal_gravity(place.lat, place.alt))
     stays = answer.moving is None and answer.transfer is None
+    gravity = np.zeros(3) if stays else answer.imu.acting_variance(answer.C_nb[2] * g)
     for kind, bias, sigma, prior in (
         ("gyro", answer.gyro_bias, answer.gyro_bias_sigma, answer.gyro_bias_prior),
-        ("accel", answer.accel_bias, answer.accel_bias_sigma, answer.accel_bias_prior),
+        ("accel", answer.accel_bias, answer.accel_bias_sigma, np.sqrt(answer.accel_bias_prior**2 + gravity)),
     ):
         for axis in range(3):
             size, allowed = abs(float(bias[axis])), float(prior[axis])
