@@ -6,7 +6,13 @@ A fault is here only with a derivation; all others that pass in silence are defe
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from truenorth.alignment.check import check_means
+from truenorth.alignment.result import Alignment
+from truenorth.alignment.task import make_task
 
 LEVEL = (
     "on a level base at rest gyros see two things, the earth's rate along the vertical and the length of that along north: both "
@@ -30,6 +36,12 @@ BY_LIKELIHOOD = (
     "and one that has to look for sensor, axis, shape, moment and size in some hundred ways would raise more than one false alarm "
     "in a thousand sound logs"
 )
+BY_MEANS = (
+    "measured, trial by trial: what gyros at rest see, the earth's rate along the vertical and the length of that along north, "
+    "prefers the sound log by less than 25 (twice the logarithm of the likelihood ratio, by the biases of the specification). Of "
+    "an axis that points about east, a scale error k turns heading by k times its angle from east, and changes the length by k "
+    "times the square of that angle"
+)
 LEAST_RATIO = 25.0
 # Faults that act as motion does: on the move only the aiding measurements speak of them.
 LIKE_MOTION = (
@@ -38,6 +50,9 @@ LIKE_MOTION = (
     "wrong arm",
     "slowly spoofed",
 )
+
+
+LIKE_HEADING = ("gyro scale",)  # that act on a base at rest as another heading does, to first order
 
 
 class Unseen(NamedTuple):
@@ -68,7 +83,18 @@ def unseen(procedure: str, fault: str, size: str, ratio: float | None = None) ->
     ratio : float, optional
         Twice the logarithm of the likelihood ratio by which the measurements prefer what is true over what is assumed.
     """
-    if fault in LIKE_MOTION and ratio is not None and ratio < LEAST_RATIO:
+    measured = ratio is not None and ratio < LEAST_RATIO
+    if measured and procedure in REST and fault in LIKE_HEADING:
+        return f"what gyros at rest see prefers the sound log by {ratio:.1f} only"
+    if measured and procedure not in REST and fault in LIKE_MOTION:
         return f"the measurements prefer the true sensors by {ratio:.1f} only"
     known = next((u for u in UNSEEN if procedure in u.procedures and fault == u.fault and re.match(u.size, size)), None)
     return None if known is None else known.why
+
+
+def misfit_at_rest(inputs: dict[str, Any], answer: Alignment) -> float:
+    """Squares by which the mean rates at rest miss the earth's, in sigmas of the biases that the answer takes for given."""
+    task = make_task(inputs["record"], inputs["place"], None)
+    check = check_means(task.means, inputs["place"].lat, task.gravity)
+    variance = float(np.max(answer.gyro_bias_prior)) ** 2 + check.rate_noise**2
+    return float(np.sum(check.rate_residual**2 / variance))

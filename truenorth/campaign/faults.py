@@ -16,7 +16,7 @@ from truenorth.campaign.fault import Fault
 from truenorth.campaign.fault_aids import AID_FAULTS
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
 from truenorth.campaign.fault_imu import IMU_FAULTS
-from truenorth.campaign.fault_limits import unseen
+from truenorth.campaign.fault_limits import REST, misfit_at_rest, unseen
 from truenorth.core.errors import TruenorthError, UsageError
 from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.navigation.result import Navigation
@@ -154,7 +154,7 @@ class _Draw:
             return self._ended(fault, size, "flagged", warned, worst)
         if not self._to_blame(off):
             return self._ended(fault, size, "harmless", reason, worst)
-        why = unseen(self.bench.name, fault, size, self._ratio(answer))
+        why = unseen(self.bench.name, fault, size, self._ratio(answer, inputs))
         return self._ended(fault, size, "silent" if why is None else "unseen", reason if why is None else why, worst)
 
     def _to_blame(self, off: dict[str, Any]) -> bool:
@@ -163,8 +163,10 @@ class _Draw:
         moved = {name: np.abs(x - without.get(name, 0.0)) for name, x in off.items()}
         return any(bool(np.any((np.abs(x) > HARMLESS) & (moved[name] > OF_THE_FAULT))) for name, x in off.items())
 
-    def _ratio(self, answer: Alignment | Navigation) -> float | None:
+    def _ratio(self, answer: Alignment | Navigation, inputs: dict[str, Any]) -> float | None:
         """By how much the same measurements prefer the sound log; None where they are not the same, or there are none."""
+        if self.bench.name in REST and isinstance(answer, Alignment):
+            return misfit_at_rest(inputs, answer) - misfit_at_rest(self.inputs, answer)
         if self.sound is None or not answer.residuals or not self.sound.residuals:
             return None
         both = zip(answer.residuals, self.sound.residuals, strict=False)
