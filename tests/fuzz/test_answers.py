@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import truenorth
 from tests.campaign.test_plan import PLAN
-from tests.fuzz.test_readers import EXAMPLES, SPICE, in_time
+from tests.fuzz.test_readers import EXAMPLES, PHASES, SPICE, in_time
 from truenorth.campaign import read_plan
 from truenorth.core.errors import AlignmentError, DataError, TruenorthError
 from truenorth.core.position import Position
@@ -28,6 +28,7 @@ PLACE = Position.from_degrees(45.0, 10.0)
 settled = settings(
     max_examples=EXAMPLES,
     derandomize="FUZZ" not in os.environ,
+    phases=PHASES,
     deadline=None,
     suppress_health_check=list(HealthCheck),
     database=None,

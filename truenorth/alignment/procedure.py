@@ -20,6 +20,7 @@ from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
+from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
 from truenorth.alignment.published import FADING, STATIONARY, Published, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
@@ -261,6 +262,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
     steps = [*bias_step_evidence(fine, used if sways else None), *bad_stretches(fine, task.record)]
+    steps += hemisphere_evidence(fine, task.position)
     return _Found(answer, check, fine.settled, detect_drift(fine), "" if sways else form, steps)
 
 

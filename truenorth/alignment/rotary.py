@@ -23,6 +23,7 @@ from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
@@ -152,6 +153,7 @@ def align_rotary(
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
     evidence += base_speed(answer) + bias_step_evidence(fine) + bad_stretches(fine, record)
+    evidence += hemisphere_evidence(fine, task.position)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}

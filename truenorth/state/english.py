@@ -85,6 +85,9 @@ SENTENCES = {
         "the base drifts {axis:term}: from about {onset:.0f} s on its velocity grows to {velocity:.2g} m/s (likelihood "
         "ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "place.hemisphere": (
+        "gravity turns as in the other hemisphere (likelihood ratio {ratio:.0f}): the latitude has the wrong sign"
+    ),
     "rate.misses": (
         "the gyros' mean rate along {axis:term} misses the earth's by {residual:deg/h|} deg/h, where the specification "
         "({imu:imu}) allows {allowed:deg/h|} deg/h"

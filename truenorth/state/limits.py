@@ -41,6 +41,11 @@ LIMITS: dict[str, Limit] = {
         "1",
         "the same, of which chance gives as much in 5e-4 of signatures: its effect is added to sigma, no more",
     ),
+    "hemisphere": Limit(
+        15.0,
+        "1",
+        "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 1,800, by Markov's inequality",
+    ),
     "rival": Limit(
         10.0,
         "1",

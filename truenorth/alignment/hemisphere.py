@@ -1,0 +1,32 @@
+"""Is the place in the other hemisphere? What gravity then does in the inertial frame, matched with the innovations.
+
+At latitude -L gravity goes round the earth's axis on the cone opposite to that at L: with the same level rate, and bent the other
+way, by ``g (w t)^2 sin L cos L`` along north. Where the base sways, no mean rate about the vertical shows that; gravity does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truenorth.alignment.drift import matched
+from truenorth.alignment.fine import FineAlignment
+from truenorth.core.position import Position
+from truenorth.errors.staying import gravity_position, gravity_velocity
+from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.limits import limit
+
+
+def hemisphere_evidence(fine: FineAlignment, position: Position) -> list[Evidence]:
+    """Whether the log fits the other hemisphere better: twice the logarithm of the likelihood ratio of the two."""
+    time, lat, alt = fine.integrals.time, position.lat, position.alt
+    if fine.form == "velocity":
+        off = np.diff(gravity_position(time, lat, alt) - gravity_position(time, -lat, alt), axis=0)
+        off /= fine.integrals.intervals[:, None]
+    else:
+        off = np.diff(gravity_velocity(time, lat, alt) - gravity_velocity(time, -lat, alt), axis=0)
+    ratio, size, _ = matched(fine, off[..., None])
+    if size[0] <= 0.0:
+        return []
+    # Of a signature of size one: 2 match - energy.
+    better = float(ratio[0] / size[0] * (2.0 - 1.0 / size[0]))
+    return [contradiction("place.hemisphere", "latitude", ratio=better)] if better > limit("hemisphere") else []
