@@ -21,7 +21,7 @@ test-all: $(WARM)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope --no-loadscope-reorder
 
 fuzz: $(READY)
-	FUZZ=$(or $(FUZZ),5000) $(BIN)/python -m pytest -q -n $(WORKERS) tests/fuzz
+	FUZZ=$(or $(FUZZ),6500) $(BIN)/python -m pytest -q -n $(WORKERS) tests/fuzz
 
 check: $(READY)
 	$(BIN)/ruff check .

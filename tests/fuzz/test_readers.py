@@ -1,6 +1,6 @@
 """Damaged logs of every format: a record, or one error of ours; no traceback, no crash, no NaN.
 
-`make test` tries a few dozen of each; ``FUZZ=5000 pytest tests/fuzz`` (`make fuzz`) as many as asked.
+`make test` tries a few dozen of each; `make fuzz` 6,500 of each, 100,000 in all (about .015 s of one core each).
 """
 
 import os
