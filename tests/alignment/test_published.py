@@ -1,6 +1,7 @@
 """Published filters on logs of a base that stays: honest where their assumptions hold, refused where they do not."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -167,3 +168,16 @@ def test_the_command_line(tmp_path):
     answer = run(app, ["align", *arguments])
     assert answer.exit_code == 0, answer.output
     assert json.loads(answer.stdout)["method"] == "sgkf"
+
+
+def test_each_published_filter_says_what_it_assumes_and_where_it_belongs():
+    """A method of another base is refused with its own; factors say in which share of the epochs they acted."""
+    record, spec, _ = next(iter(logs(SWAY, 1)))
+    plain, faded = (align(record, PLACE, spec, method=method).method_reason for method in ("kf", "imakf"))
+    assert "white noise of one size" in plain
+    assert "factor" not in plain
+    assert float(re.search(r"a factor acted in ([\d.]+)% of the epochs", faded)[1]) > 10.0
+    with pytest.raises(UsageError, match="'sgkf' is that of a vehicle with an odometer; choose one of auto, analytic"):
+        align(record, PLACE, spec, method="sgkf")
+    with pytest.raises(UsageError, match="'imkf' is not known; choose one of auto"):
+        align(record, PLACE, spec, method="imkf")

@@ -253,5 +253,7 @@ def test_a_published_filter_on_an_indexer_by_the_command_line(ship, tmp_path):
 
 
 def test_a_method_of_a_base_is_refused_on_an_indexer(ship):
-    with pytest.raises(UsageError, match="method 'states10' on an indexer; choose one of auto, swaying, kf"):
+    with pytest.raises(
+        UsageError, match="'states10' is that of a still base and a level IMU; choose one of auto, swaying, kf"
+    ):
         align(ship.record, ship.place, ship.imu, aid=IndexerAid(ship.encoder), method="states10")

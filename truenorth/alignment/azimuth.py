@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.azimuth_filters import METHODS, Begin, Logs, Solution, run_loop
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import skew
-from truenorth.core.errors import UsageError
+from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.in_motion_azimuth import BA, BG, DK, DV, PHI, STATES
 from truenorth.errors.walks import Walks
@@ -55,13 +55,17 @@ def azimuth_track(
     spec: ImuSpec,
     wheel: Mounting,  # its mounting, scale's sigma and latency are used
     method: str,  # one of `AZIMUTH_METHODS`
-) -> Track:
+) -> tuple[Track, float | None]:
     """Track of a vehicle by one of the published filters, from the end of coarse alignment on.
+
+    With the share of the epochs in which the factor of strong tracking acted; None where there is none.
 
     Raises
     ------
     UsageError
         No odometer.
+    AlignmentError
+        The filter left the tilts for which its model holds.
     """
     if odometer is None:
         raise UsageError(f"method {method!r} measures by an odometer; expected an odometer's log")
@@ -92,7 +96,13 @@ def azimuth_track(
     )
     name = ALIASES.get(method, method)
     found = run_loop(logs, np.zeros(1, dtype=np.int64), start, name, gated=True, keep_P=True)
-    return _track(found, edges[rows[epoch + 1 :]], C_mb, wheel)
+    if found.lost.any():
+        raise AlignmentError(
+            f"{record.source}: the filter {method} left a tilt of half a radian, where its model has no meaning: choose another "
+            "method"
+        )
+    acted = float(found.acted[0]) if METHODS[name].tracking else None
+    return _track(found, edges[rows[epoch + 1 :]], C_mb, wheel), acted
 
 
 def _turned(dtheta: Array) -> Array:

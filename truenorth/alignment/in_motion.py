@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import (
@@ -142,7 +143,7 @@ def align_in_motion(
     task = moving_task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
     task = replace(task, model=InsModel.from_spec(task.spec, groups=groups_of(errors, task.spec)), slow=velocity_errors)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
-        raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")
+        refuse(method, choices)
     if not heading_limit > 0.0 or passes < 1:
         raise UsageError(
             f"heading limit {math.degrees(heading_limit):g} deg, {passes} passes; expected a positive angle, one or more"
@@ -220,8 +221,8 @@ def _published(task: MovingTask, method: str, heading_limit: float, more: list[E
     """By a published filter of an odometer."""
     if not isinstance(task.odometer, OdometerRecord):
         raise UsageError(f"method {method!r} is that of an odometer; expected one, or auto, gyrocompass, motion")
-    track = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
-    answer = _answer(task, track, method, "asked for; a published filter, to be compared", 0.0)
+    track, acted = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
+    answer = _answer(task, track, method, reason(method, acted), 0.0)
     return judge_moving(answer, track, heading_limit, more)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
+from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import bias_step_evidence, turn_evidence
@@ -22,7 +23,7 @@ from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
-from truenorth.alignment.published import FADING, STATIONARY, Published, faded_align, stationary_align
+from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
@@ -97,7 +98,7 @@ def align_base(
     """
     tell = progress or (lambda stage: None)
     if method not in get_args(Method):
-        raise UsageError(f"method {method!r} is not known; choose one of {', '.join(get_args(Method))}")
+        refuse(method, get_args(Method))
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     spec = None if imu is None else imu_spec(imu).seen_in(record)
@@ -133,7 +134,7 @@ def align_base(
         found = _align_analytic(task, spec)
     else:
         found = _align_inertial(task, spec, chosen)
-    why = f"{why}; {found.form}" if found.form else why
+    why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     moves = None if chosen == "swaying" and _explained(task.motion, found) else _moves_from(task.motion)
     evidence = record_evidence(task.record, task.motion) + leaves(moves)
@@ -153,6 +154,7 @@ class _Found:
     drift: Drift | None = None
     form: str = ""
     steps: Sequence[Evidence] = ()
+    acted: float | None = None  # share of the epochs in which factors of a published filter acted
 
 
 def _choose(method: Method, task: Task) -> tuple[str, str]:
@@ -253,7 +255,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     start = (task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
     if method in FADING:
         fine = faded_align(*start, method)
-        return _Found(answer_of(task, fine, used, where, P), check, fine.settled)
+        return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
     sways = method == "swaying"
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)

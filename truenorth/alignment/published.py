@@ -106,6 +106,12 @@ def faded_align(
     return replace(fine, estimates=_allowing(last.found.estimates, fine.estimates))
 
 
+def factor_share(fine: FineAlignment) -> float | None:
+    """Share of the epochs in which a factor was above 1; None of a filter without factors."""
+    factors = fine.estimates.adaptation
+    return float(np.mean(np.any(factors > 1.0, axis=-1))) if factors.shape[-1] else None
+
+
 def turned_arm_velocity(record: ImuRecord, C_sb: Callable[[Array], Array], arm: Array, interval: float) -> Array:
     """(K+1, 3) velocity that a lever arm in a body makes of an IMU that turns in it, at the ends of the filter's intervals.
 

@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
-from truenorth.alignment.published import FADING, faded_align, turned_arm_velocity
+from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
 from truenorth.alignment.task import Task, bridged, make_task
@@ -104,7 +105,7 @@ def align_rotary(
     """
     tell = progress or (lambda stage: None)
     if method not in INDEXER_METHODS:
-        raise UsageError(f"method {method!r} on an indexer; choose one of {', '.join(INDEXER_METHODS)}")
+        refuse(method, INDEXER_METHODS)
     if not 0.0 <= angle_sigma < math.inf:
         raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
     spec = imu_spec(imu).seen_in(record)
@@ -148,7 +149,11 @@ def align_rotary(
         C_nb=answer.C_nb @ C_sb_at,
         method=own,
         method_reason=f"the IMU turns on an indexer ({how}), "
-        + (f"{own} was asked for" if own in FADING else "the base may sway: its own motion is fitted to the log"),
+        + (
+            reason(own, factor_share(fine))
+            if own in FADING
+            else "the base may sway: its own motion is fitted to the log"
+        ),
     )
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)

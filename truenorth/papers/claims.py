@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from truenorth.campaign.comparison import paired as compare_runs
 from truenorth.core.errors import UsageError
+from truenorth.core.units import significant
 from truenorth.papers.table import OF_RUNS, Reference, Table
 
 Array = NDArray[np.float64]
@@ -159,8 +160,9 @@ def check(condition: Condition, table: Table) -> Check:
     if condition.test != "interval" or B is not None:
         count = min(count, others)
     beyond = f"{condition.factor:g} x " if condition.factor != 1.0 else ""
-    against = f"{beyond}{other} ({b:.3g})" if other is not None else f"{beyond}{b:g}"
-    text = f"{one}, {one.statistic.replace('_', ' ')} {a:.3g}{'' if unit == '1' else ' ' + unit} {condition.relation} {against}"
+    against = f"{beyond}{other} ({significant(b)})" if other is not None else f"{beyond}{b:g}"
+    size = significant(a) if unit == "1" else f"{significant(a)} {unit}"
+    text = f"{one}, {one.statistic.replace('_', ' ')} {size} {condition.relation} {against}"
     if count < condition.needed:
         return Check(None, count, f"{text}: {condition.test} test needs {condition.needed} runs, there are {count}")
     met, why = _test(condition, a, b, A, B, one.statistic)
@@ -181,7 +183,9 @@ def _test(
         low, high = _interval(A, B, statistic)
         what = "ratio, " if B is not None else ""
         target = condition.factor if B is not None else limit
-        return bool(high < target if smaller else low > target), f" ({what}95 % interval {low:.3g} to {high:.3g})"
+        return bool(
+            high < target if smaller else low > target
+        ), f" ({what}95 % interval {significant(low)} to {significant(high)})"
     if B is None:
         raise UsageError(f"{condition.one}: a paired test needs another method")
     n = min(len(A), len(B))

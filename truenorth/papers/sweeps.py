@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,9 @@ from truenorth.papers.table import Reference, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+ACROSS = 3  # panels in a row
 
 
 @dataclass(frozen=True)
@@ -91,42 +94,53 @@ def _there(rule: Rule, table: Table) -> bool:
 
 
 def draw_sweeps(
-    table: Table, sweeps: Sequence[Sweep], found: Sequence[Swept], quantity: str = "heading@600", unit: str = "arcmin"
+    table: Table,
+    sweeps: Sequence[Sweep],
+    found: Sequence[Swept],
+    names: Mapping[str, str],
+    quantity: str = "heading@600",
+    unit: str = "arcmin",
 ) -> Figure:
-    """RMS of a quantity over the values of each choice, a line a method; the title says which verdicts depend on it."""
+    """RMS of a quantity over the values of each choice, a line a method; the title says which verdicts depend on it.
+
+    `names` are what the methods are called, each with the colour of its place.
+    """
     from matplotlib.ticker import LogLocator, NullLocator
 
     from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 
+    of, _, at = quantity.partition("@")
+    when = f"{at.replace('h', '')} {'h' if 'h' in at else 's'}"
+    columns = min(len(sweeps), ACROSS)
+    rows = -(-len(sweeps) // columns)
     with style():
-        figure = new_figure(4.2 * len(sweeps) + 0.6, 4.6)
-        axes = np.atleast_1d(figure.subplots(1, len(sweeps), sharey=True))
-        for ax, sweep in zip(axes, sweeps, strict=True):
+        figure = new_figure(4.2 * columns + 0.6, 3.8 * rows + 0.6)
+        grid = np.reshape(figure.subplots(rows, columns, sharey=True), -1)
+        for ax, sweep in zip(grid, sweeps, strict=False):
             first = sweep.case_of(sweep.values[0])
-            methods = sorted({f.method for f in table.figures if f.case == first})  # one order, one legend for all
-            for number, (method, colour) in enumerate(zip(methods, COLOURS, strict=False)):
+            methods = {f.method for f in table.figures if f.case == first}
+            for number, (method, name) in enumerate(names.items()):  # one order, one legend for all
+                if method not in methods:
+                    continue
                 values = [table.number_of(f"{sweep.case_of(v)} {method} {quantity}") for v in sweep.values]
-                ax.plot(
-                    sweep.values,
-                    values,
-                    "o-",
-                    markersize=4,
-                    linewidth=max(1.0, 3.0 - 0.5 * number),
-                    color=colour,
-                    label=method,
-                )
+                width = max(1.0, 3.0 - 0.5 * number)
+                ax.plot(sweep.values, values, "o-", markersize=4, linewidth=width, color=COLOURS[number], label=name)
             ax.axvline(sweep.chosen, color=REFERENCE, linestyle="--", linewidth=0.8)
             ax.set(yscale="log", xlabel=sweep.label, xscale="log" if sweep.logarithmic else "linear")
-            ax.set_xticks(sweep.values, [f"{v:g}" for v in sweep.values])
+            ax.set_xticks(sweep.values, [f"{v:g}" for v in sweep.values], fontsize=8)
             ax.xaxis.set_minor_locator(NullLocator())
+            ax.margins(x=0.07)
             ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_locator(NullLocator())
             depend = sum(s.depends for s in found if s.sweep == sweep)
-            of = sum(s.sweep == sweep for s in found)
+            all_of = sum(s.sweep == sweep for s in found)
             unsettled = any(s.open for s in found if s.sweep == sweep)
-            words = "too few runs to say" if unsettled else f"{depend} of {of} verdicts depend on it"
-            ax.set_title(words if of else "no verdict to be changed", fontsize=9)
-        axes[0].set_ylabel(f"{quantity.partition('@')[0]} RMS, {unit}")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
+            words = "too few runs to say" if unsettled else f"changes {depend} of {all_of} verdicts"
+            ax.set_title(words if all_of else "no verdict to be changed", fontsize=9)
+        for ax in grid[::columns]:
+            ax.set_ylabel(f"{of.replace('_', ' ')} RMS at {when}, {unit}")
+        for ax in grid[len(sweeps) :]:
+            ax.set_visible(False)
+        figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
     return figure

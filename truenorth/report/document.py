@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zlib
 from base64 import b64encode
 from collections.abc import Sequence
@@ -91,7 +92,15 @@ def _environment() -> Any:
         loader=PackageLoader("truenorth.report", "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.globals |= {"_": translated, "retold": retold, "anchor": anchor, "packed": packed}
+    environment.filters["coded"] = coded
     return environment
+
+
+def coded(text: str) -> Any:
+    """Text whose `names` in backticks are set as code; all else is escaped."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def packed(text: str) -> str:

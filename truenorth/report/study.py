@@ -14,6 +14,8 @@ from truenorth.report.document import render
 if TYPE_CHECKING:
     import pandas as pd
 
+BEST_FIRST = ("holds", "holds in part", "does not hold", "too few runs")
+
 
 def study_page(
     study: Any, beside: pd.DataFrame, of_paper: Sequence[str], more: Sequence[str], table: pd.DataFrame
@@ -42,6 +44,7 @@ def study_page(
         "study.html",
         interactive=False,
         study=study,
+        of_a_paper=any(claim.by == "paper" for claim in study.claims),
         summary=_summary(study.claims),
         beside="" if beside.empty else _html(beside),
         of_paper=drawn(of_paper),
@@ -64,7 +67,7 @@ def index_page(studies: Mapping[str, Any]) -> str:
 def _summary(claims: Sequence[Any]) -> str:
     """How many of the claims have which verdict."""
     settled = Counter(claim.verdict for claim in claims)
-    verdicts = ", ".join(f"{number} {_(verdict)}" for verdict, number in settled.items())
+    verdicts = ", ".join(f"{_(verdict)} {settled[verdict]}" for verdict in BEST_FIRST if settled[verdict])
     return _("Of {count} claims: {verdicts}.").format(count=len(claims), verdicts=verdicts)
 
 

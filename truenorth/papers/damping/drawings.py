@@ -33,6 +33,7 @@ NAMES = {
     "augmented": "15 states",
     "augmented_long": "15 states, long-run",
 }
+PAPERS = {name: NAMES[name] for name in ("filter1", "filter2", "fused")}
 DRAWN = ("filter1", "filter2", "fused", "augmented_long")
 PANELS = {
     "attitude": ((0, "phi E, deg"), (1, "phi N, deg"), (2, "phi U (heading), deg")),

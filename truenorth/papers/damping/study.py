@@ -129,7 +129,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "spectra": drawings.draw_spectra(main),
         "eigenvalues": drawings.draw_eigenvalues(modes, of_filters),
         "switching": drawings.draw_switching(main, switched),
-        "open_choices": draw_sweeps(table, choices.SWEEPS, sweeps, "phi_u@18h-24h", "deg"),
+        "open_choices": draw_sweeps(table, choices.SWEEPS, sweeps, drawings.PAPERS, "phi_u@18h-24h", "deg"),
     }
     captions = {
         "figure_3_attitude": "The paper's figure 3: attitude errors, log error -.3 m/s; filters on at 2.5 h.",

@@ -16,7 +16,7 @@ from truenorth.alignment.azimuth_filters import METHODS, Belief, reduced
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.filters.strong_tracking import StrongTracking
 from truenorth.papers.claims import settle
-from truenorth.papers.odometer.drawings import draw_paper_figures, draw_starts
+from truenorth.papers.odometer.drawings import STARTS, draw_paper_figures, draw_starts
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, Errors, run_method
 from truenorth.papers.odometer.paper_table import add_paper_table
@@ -127,7 +127,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     drawings = {
         "figures_1_to_4": draw_paper_figures(found, "start10"),
         "starts": draw_starts(found, ANGLES),
-        "open_choices": draw_sweeps(result, SWEEPS, sweeps),
+        "open_choices": draw_sweeps(result, SWEEPS, sweeps, STARTS),
     }
     captions = {
         "figures_1_to_4": "The paper's figures 1 to 4 are RMS errors on linear axes: ours over the runs (thick), and the signed "

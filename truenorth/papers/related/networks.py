@@ -145,12 +145,8 @@ def draw_networks(designs: Mapping[str, Design]) -> Figure:
         step, bode, leak = figure.subplots(1, 3)
         for (name, found), colour in zip(designs.items(), COLOURS, strict=False):
             y = step_response(found.network, time)
-            step.plot(time / 60.0, y, color=colour, label=NAMES[name])
-            top = int(np.argmax(y))
-            at = (time[top] / 60.0 + 60.0, y[top])
-            step.annotate(
-                f"+{found.overshoot:.0%}", (time[top] / 60.0, y[top]), at, color=colour, va="center", fontsize=9
-            )
+            words = f"{NAMES[name]}: overshoot {found.overshoot:.0%}, settled in {found.settling / 60.0:.0f} min"
+            step.plot(time / 60.0, y, color=colour, label=words)
             H = found.network.response(1j * rate)
             bode.plot(rate, np.abs(H), color=colour)
             leak.plot(rate, np.abs(1.0 - H), color=colour)
@@ -162,6 +158,10 @@ def draw_networks(designs: Mapping[str, Design]) -> Figure:
         for ax, title in ((bode, "|H|"), (leak, "|1 - H|, the leak")):
             ax.axvline(SCHULER_RATE, color=REFERENCE, linewidth=0.8, linestyle=":")
             ax.set(xscale="log", yscale="log", xlabel="rad/s", title=title)
+        bode.set_yticks([0.5, 1.0, 2.0, 5.0], ["0.5", "1", "2", "5"])
+        leak.set_yticks([0.03, 0.1, 0.3, 1.0, 3.0], ["0.03", "0.1", "0.3", "1", "3"])
+        for ax in (bode, leak):
+            ax.tick_params(axis="y", which="minor", left=False, labelleft=False)
         figure.legend(*step.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure
 

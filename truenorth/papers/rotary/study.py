@@ -12,6 +12,7 @@ from truenorth.papers.claims import settle
 from truenorth.papers.rotary.coarse import LAST, SOURCES
 from truenorth.papers.rotary.drawings import (
     ARCMIN,
+    LABELS,
     PAPER_COARSE,
     draw_coarse,
     draw_convergence,
@@ -77,7 +78,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
             "figure_4": draw_filters(_curves(found["A"]), TITLES),
             "convergence": draw_convergence(_curves(found["A"]), TITLES),
             "modulation": draw_modulation(),
-            "open_choices": draw_sweeps(table, SWEEPS, sweeps),
+            "open_choices": draw_sweeps(table, SWEEPS, sweeps, LABELS),
             "honesty": draw_honesty(_honesty(table)),
         },
         {

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.analysis.observability import Observability
+from truenorth.errors.stationary import KEPT
 from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
 from truenorth.papers.drawing import marked
 from truenorth.papers.static.filtering import Errors
@@ -91,7 +92,7 @@ def draw_degrees(seen: Mapping[tuple[str, int], Observability]) -> Figure:
             label = f"{case.replace('_', ' ')}, {states} states"
             seen_at_all = np.maximum(result.degrees, 1e-4)
             left.plot(np.arange(1, states + 1), seen_at_all, "o-", color=colour, label=label)
-            at = np.arange(states) + (number - 0.5 * (len(seen) - 1)) * width
+            at = np.arange(10)[KEPT[states]] + (number - 0.5 * (len(seen) - 1)) * width
             right.bar(at, result.sigma_ratio, width, color=colour)
         left.axhline(1.0, color=REFERENCE, linestyle="--", linewidth=1.0)
         left.set(
@@ -121,6 +122,6 @@ def draw_large(found: Mapping[str, tuple[Array, Array | None]], duration: float)
         ax.axvline(60.0, color=REFERENCE, linestyle="--", linewidth=1.0)
         ax.set_yticks(range(len(found)), [name.replace("_", " ") for name in found])
         ax.invert_yaxis()
-        ax.set(xscale="log", xlabel=f"heading error after {duration:.0f} s, arcmin", xlim=(0.01, 180 * 60))
+        ax.set(xscale="log", xlabel=f"heading error after {duration:.0f} s, arcmin", xlim=(0.008, 180 * 60))
         ax.set_title(f"From any azimuth, {len(next(iter(found.values()))[0])} runs; right: share below 1 deg, RMS")
     return figure

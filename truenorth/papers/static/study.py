@@ -120,7 +120,9 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "convergence": draw_convergence(TIMES, found, count),
         "observability": draw_degrees(degrees),
         "large_180": draw_large(large, DURATION),
-        "open_choices": draw_sweeps(table, SWEEPS, sweeps, "level@20"),
+        "open_choices": draw_sweeps(
+            table, SWEEPS, sweeps, {"states10": "10 states", "states8": "8 states"}, "level@20"
+        ),
     }
     captions = {
         "figures_1_to_6": "The paper's figures 1 to 6: one run of 20 s with its P0, Q and R. Estimated misalignment and "

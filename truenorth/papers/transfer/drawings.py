@@ -17,6 +17,7 @@ from truenorth.papers.transfer.truth import ARCMIN, BEGIN, STOP
 
 Array = NDArray[np.float64]
 SINGLE = 10  # runs drawn one by one
+STATES = {"states12": "12 states", "states13": "13 states", "states16": "16 states", "oracle": "delay and arm known"}
 
 
 def draw_misalignment(errors: Errors, title: str) -> Figure:
@@ -116,10 +117,9 @@ def draw_panels(found: Mapping[tuple[str, str], Errors], rows: Sequence[Sequence
 
 def draw_level(found: Mapping[tuple[str, str], Errors], cases: Sequence[str]) -> Figure:
     """Level in every manoeuvre, velocity matching above, with attitude below."""
-    names = {"states12": "12 states", "states13": "13 states", "states16": "16 states", "oracle": "delay and arm known"}
     rows = [
         [
-            Panel(case.replace("_", " ") + words, case, {m + suffix: label for m, label in names.items()})
+            Panel(case.replace("_", " ") + words, case, {m + suffix: label for m, label in STATES.items()})
             for case in cases
         ]
         for suffix, words in (("", ""), ("_att", ", attitude too"))

@@ -14,7 +14,7 @@ from truenorth.papers.claims import settle
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, draw_sweeps, swept
 from truenorth.papers.table import Table
-from truenorth.papers.transfer.drawings import Panel, draw_biases, draw_level, draw_misalignment, draw_panels
+from truenorth.papers.transfer.drawings import STATES, Panel, draw_biases, draw_level, draw_misalignment, draw_panels
 from truenorth.papers.transfer.filtering import EPOCHS, METHODS, Errors, errors_of
 from truenorth.papers.transfer.observability import told_by
 from truenorth.papers.transfer.rules import RULES
@@ -114,7 +114,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "level": draw_level(found, DRAWN),
         "matching": draw_panels(found, PANELS["matching"], "What is matched, RMS over the runs (grey: turn)"),
         "late": draw_panels(found, PANELS["late"], "A master 200 ms late, RMS over the runs (grey: turn)"),
-        "open_choices": draw_sweeps(table, list(SWEEPS.values()), sweeps, "level@120-150"),
+        "open_choices": draw_sweeps(table, list(SWEEPS.values()), sweeps, STATES, "level@120-150"),
     }
     captions = {
         "figure_1": "Left one run, as the paper draws it; right the errors of all: thin single runs, thick their RMS, dashed the "
