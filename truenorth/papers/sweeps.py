@@ -52,13 +52,18 @@ class Swept:
         """Whether there are too few runs to say."""
         return "too few runs" in self.verdicts.values()
 
+    @property
+    def always(self) -> Verdict:
+        """Of one that does not depend on the choice."""
+        return next(iter(self.verdicts.values()))
+
     def __str__(self) -> str:
         """In words."""
         name = f"{self.sweep.label} ({', '.join(f'{value:g}' for value in self.verdicts)})"
         if self.open:
             return f'Whether "{self.claim}" depends on {name}: too few runs.'
         if not self.depends:
-            return f'"{self.claim}" does not depend on {name}: {next(iter(self.verdicts.values()))}.'
+            return f'"{self.claim}" does not depend on {name}: {self.always}.'
         each = "; ".join(f"{value:g}: {verdict}" for value, verdict in self.verdicts.items())
         return f'"{self.claim}" depends on {self.sweep.label}: {each}.'
 
@@ -73,6 +78,21 @@ def swept(rules: Sequence[Rule], table: Table, sweeps: Sequence[Sweep]) -> list[
                 verdicts = {value: settled(m, table, {}).verdict for value, m in moved.items()}
                 found.append(Swept(sweep, rule.claim, verdicts))
     return found
+
+
+def dependences(found: Sequence[Swept]) -> list[str]:
+    """What depends on each choice, one by one, and what does not, together."""
+    lines = []
+    for sweep in dict.fromkeys(s.sweep for s in found):
+        own = [s for s in found if s.sweep == sweep]
+        same = [s for s in own if not s.depends and not s.open]
+        lines += [str(s) for s in own if s not in same]
+        if len(same) > 1:
+            claims = "; ".join(f'"{s.claim}" ({s.always})' for s in same)
+            lines.append(f"Not dependent on {sweep.label} ({', '.join(f'{v:g}' for v in sweep.values)}): {claims}.")
+        else:
+            lines += map(str, same)
+    return lines
 
 
 def _moved(rule: Rule, sweep: Sweep, value: float) -> Rule:
@@ -107,15 +127,15 @@ def draw_sweeps(
     """
     from matplotlib.ticker import LogLocator, NullLocator
 
-    from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+    from truenorth.figures.style import COLOURS, REFERENCE
+    from truenorth.papers.drawing import sheet
 
     of, _, at = quantity.partition("@")
     when = f"{at.replace('h', '')} {'h' if 'h' in at else 's'}"
     columns = min(len(sweeps), ACROSS)
     rows = -(-len(sweeps) // columns)
-    with style():
-        figure = new_figure(4.2 * columns + 0.6, 3.8 * rows + 0.6)
-        grid = np.reshape(figure.subplots(rows, columns, sharey=True), -1)
+    with sheet(4.2 * columns + 0.6, 3.8 * rows + 0.6, rows, columns, sharey=True, legend=6) as (figure, axes):
+        grid = np.reshape(axes, -1)
         for ax, sweep in zip(grid, sweeps, strict=False):
             first = sweep.case_of(sweep.values[0])
             methods = {f.method for f in table.figures if f.case == first}
@@ -142,5 +162,4 @@ def draw_sweeps(
             ax.set_ylabel(f"{of.replace('_', ' ')} RMS at {when}, {unit}")
         for ax in grid[len(sweeps) :]:
             ax.set_visible(False)
-        figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
     return figure

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from truenorth.damping.course import errors_of
 from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.prior import paper_prior
-from truenorth.errors.marine import BA, BG, DP, MarineModel
-from truenorth.papers.damping.methods import SWITCH
+from truenorth.errors.marine import BA, BG, MarineModel
+from truenorth.papers.damping.methods import SWITCH, left_of
 from truenorth.papers.damping.truth import LOG_NOISE, Voyage
 
 Array = NDArray[np.float64]
@@ -78,7 +78,4 @@ def left_by_filter1(voyage: Voyage, x0: Array, c: float) -> Array:
     start = round(SWITCH / course.interval)
     kind = Filter(MarineModel.of_paper(), paper_prior(course, start), LOG_NOISE / np.sqrt(course.interval))
     found = run_filters(course, voyage.reference(c), start=start, kinds={"filter1": kind})["filter1"]
-    left = errors_of(course, voyage.truth)
-    left[start:] -= found.x[:, :7]
-    left[:, DP] = voyage.truth.in_angles(left[:, DP])
-    return left
+    return left_of(voyage, errors_of(course, voyage.truth), found.x)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.damping.course import errors_of
 from truenorth.damping.filters import Filter, run_filters
-from truenorth.errors.marine import DP
-from truenorth.papers.damping.methods import R2, SPAN, SWITCH, filters_of, fused
+from truenorth.papers.damping.methods import R2, SPAN, SWITCH, filters_of, fused, left_of
 from truenorth.papers.damping.statistics import Signs, drawn_voyage
 from truenorth.papers.damping.truth import Voyage
 from truenorth.papers.sweeps import Sweep
@@ -47,10 +46,7 @@ def swept_signs(
             found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
             found["fused"] = fused(found, course.interval, value if name == "N" else SPAN)
             for method in methods:
-                left = free.copy()
-                left[start:] -= found[method].x[:, :7]
-                left[:, DP] = voyage.truth.in_angles(left[:, DP])
-                kept[case][method].append(left[::every])
+                kept[case][method].append(left_of(voyage, free, found[method].x)[::every])
     nothing = np.zeros(0)
     return {
         case: Signs(voyage.truth.time[::every], {m: np.array(v) for m, v in of.items()}, nothing, nothing)

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from truenorth.damping.loop import Mode
 from truenorth.damping.spectrum import spectrum
 from truenorth.errors.marine import DV
-from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style, trace
+from truenorth.figures.style import COLOURS, REFERENCE, trace
 from truenorth.papers.damping.methods import SWITCH, Case
 from truenorth.papers.damping.statistics import Signs
 from truenorth.papers.damping.switching import SETTLED, WAYS
 from truenorth.papers.damping.truth import HOUR
+from truenorth.papers.drawing import sheet
 
 Array = NDArray[np.float64]
 
@@ -46,9 +47,8 @@ def draw_errors(case: Case, kind: Literal["attitude", "position", "velocity"]) -
     """Errors of the filters over time, in the paper's manner; the undamped INS behind them."""
     panels = PANELS[kind]
     t = case.time / HOUR
-    with style():
-        figure = new_figure(9.0, 2.3 * len(panels) + 0.8)
-        axes = figure.subplots(len(panels), 1, sharex=True)
+    heading = f"{kind.capitalize()} errors, log error -.3 m/s"
+    with sheet(9.0, 2.3 * len(panels) + 0.8, len(panels), 1, sharex=True, heading=heading, legend=5) as (figure, axes):
         for (column, label), ax in zip(panels, axes, strict=True):
             scale = 1.0 if kind == "velocity" else np.degrees(1.0)
             free = case.errors["undamped"][:, column] * scale
@@ -63,8 +63,6 @@ def draw_errors(case: Case, kind: Literal["attitude", "position", "velocity"]) -
             ax.set_ylabel(label)
         axes[-1].set_xlabel("time, h")
         axes[-1].set_xticks(range(0, 49, 6))
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        headed(figure, f"{kind.capitalize()} errors, log error -.3 m/s")
     return figure
 
 
@@ -79,9 +77,8 @@ def draw_tables(ours: Mapping[str, Array], theirs: Mapping[str, Array], logs: Se
         (3, "v east, m/s", 1.0),
         (4, "v north, m/s", 1.0),
     )
-    with style():
-        figure = new_figure(12.0, 6.2)
-        axes = figure.subplots(2, 4, sharex=True).ravel()
+    with sheet(12.0, 6.2, 2, 4, sharex=True, heading="Tables 1 and 2: errors at 20 h", legend=4) as (figure, axes):
+        axes = axes.ravel()
         for ax, (column, label, scale) in zip(axes, order, strict=False):
             for number, method in enumerate(ours):
                 for values, mark, whose in ((ours, "o-", "ours"), (theirs, "x--", "paper")):
@@ -100,16 +97,12 @@ def draw_tables(ours: Mapping[str, Array], theirs: Mapping[str, Array], logs: Se
             ax.set_xlabel("log error, m/s")
             ax.tick_params(labelbottom=True)
         axes[7].set_visible(False)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        headed(figure, "Tables 1 and 2: errors at 20 h")
     return figure
 
 
 def draw_windows(signs: Signs, runs: int) -> Figure:
     """RMS of heading and latitude over runs against time, hour by hour."""
-    with style():
-        figure = new_figure(10.0, 4.0)
-        axes = figure.subplots(1, 2)
+    with sheet(10.0, 4.0, 1, 2, heading=f"{runs} voyages, all errors with random signs", legend=5) as (figure, axes):
         edges = np.arange(3, 49)
         for ax, (column, label) in zip(axes, ((2, "heading, deg"), (5, "latitude, deg")), strict=True):
             for number, method in enumerate(
@@ -124,17 +117,13 @@ def draw_windows(signs: Signs, runs: int) -> Figure:
             ax.yaxis.set_major_formatter("{x:g}")
             ax.yaxis.set_minor_formatter("{x:g}" if column == 2 else NullFormatter())
             ax.set_xticks(range(0, 49, 12))
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        headed(figure, f"{runs} voyages, all errors with random signs")
     return figure
 
 
 def draw_spectra(case: Case) -> Figure:
     """Amplitude of the velocity error over period, both senses of turning."""
     settled = case.time >= SWITCH + 3.0 * HOUR
-    with style():
-        figure = new_figure(10.0, 4.0)
-        axes = figure.subplots(1, 2, sharey=True)
+    with sheet(10.0, 4.0, 1, 2, sharey=True, legend=4) as (figure, axes):
         for number, method in enumerate(("undamped", "network_external", "filter1", "fused")):
             dv = case.errors[method][settled][:, DV]
             found = spectrum(dv[:, 0] + 1j * dv[:, 1], case.course.interval)
@@ -147,16 +136,13 @@ def draw_spectra(case: Case) -> Figure:
             ax.set_xticks([30, 60, 84.4, 180, 720, 1440], ["30", "60", "84", "180", "720", "1440"])
             ax.minorticks_off()
         axes[0].set_ylabel("velocity amplitude, m/s")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
     return figure
 
 
 def draw_eigenvalues(loops: Mapping[str, Sequence[Mode]], filters: Mapping[str, Sequence[Mode]]) -> Figure:
     """Eigenvalues in the s plane: about the Schuler rate, and about the earth's."""
     markers = "osD^v<"
-    with style():
-        figure = new_figure(10.0, 4.6)
-        axes = figure.subplots(1, 2)
+    with sheet(10.0, 4.6, 1, 2, legend=6) as (figure, axes):
         for number, (name, modes) in enumerate([*loops.items(), *filters.items()]):
             s = np.array([m.eigenvalue for m in modes if abs(m.eigenvalue) > 2e-6])
             label = NAMES.get(name, name)
@@ -182,7 +168,6 @@ def draw_eigenvalues(loops: Mapping[str, Sequence[Mode]], filters: Mapping[str, 
         )
         for ax in axes:
             ax.axvline(0.0, color=REFERENCE, linewidth=0.8)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
     return figure
 
 
@@ -191,14 +176,11 @@ def draw_switching(case: Case, switched: Mapping[str, Array]) -> Figure:
     at = SWITCH + SETTLED
     window = (case.time > at - 2.0 * HOUR) & (case.time < at + 8.0 * HOUR)
     t = (case.time[window] - at) / HOUR
-    with style():
-        figure = new_figure(9.0, 4.2)
-        ax = figure.subplots()
+    with sheet(9.0, 4.2, legend=3) as (figure, ax):
         free = np.linalg.norm(case.errors["undamped"][window, DV], axis=1)
         trace(ax, t, free, color="#BBBBBB", label="undamped")
         for number, (name, v) in enumerate(switched.items()):
             trace(ax, t, np.linalg.norm(v[window], axis=1), color=COLOURS[number], label=WAYS[name])
         ax.axvline(0.0, color=REFERENCE, linewidth=0.8)
         ax.set(xlabel="hours after the switch", ylabel="velocity error, m/s", ylim=(0.0, None))
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     return figure

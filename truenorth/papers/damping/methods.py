@@ -84,21 +84,23 @@ def run_all(
     found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
     found["fused"] = fused(found, course.interval)
     found["fused_tuned"] = tuned_fusion(voyage, course, reference, workers)
-    corrections = {"undamped": np.zeros((course.epochs + 1, 7))}
+    corrections = {"undamped": np.zeros((1, 7))}
     if networks:
         corrections["network_internal"] = network_correction(course, NETWORK, start=SWITCH, ramp=HOUR)
         corrections["network_external"] = network_correction(course, AZIMUTH, reference, start=SWITCH)
-    for name, estimate in found.items():
-        corrections[name] = np.zeros((course.epochs + 1, 7))
-        corrections[name][start:] = estimate.x[:, :7]
+    corrections |= {name: estimate.x for name, estimate in found.items()}
     runtime = time.process_time() - begun
     free = errors_of(course, voyage.truth)
-    errors = {}
-    for name, x in corrections.items():
-        left = free - x
-        left[:, DP] = voyage.truth.in_angles(left[:, DP])
-        errors[name] = left
+    errors = {name: left_of(voyage, free, x) for name, x in corrections.items()}
     return Case(course, course.time, errors, found, kinds, runtime)
+
+
+def left_of(voyage: Voyage, free: Array, x: Array) -> Array:
+    """(K+1, 7) errors in rad and m/s that the errors found, (M, 7 or more) at the last M epochs, leave of those of a free INS."""
+    left = free.copy()
+    left[len(free) - len(x) :] -= x[:, :7]
+    left[:, DP] = voyage.truth.in_angles(left[:, DP])
+    return left
 
 
 def fused(found: Mapping[str, Estimate], interval: float, span: float = SPAN) -> Estimate:
@@ -123,7 +125,4 @@ def without_overlap(voyage: Voyage, case: Case, reference: Array) -> tuple[Array
     start = round(SWITCH / case.course.interval)
     kinds = {"filter1": case.filters["filter1"], "filter2": replace(case.filters["filter2"], overlap=False)}
     found = run_filters(case.course, reference, start=start, kinds=kinds)["filter2"]
-    left = errors_of(case.course, voyage.truth)
-    left[start:] -= found.x[:, :7]
-    left[:, DP] = voyage.truth.in_angles(left[:, DP])
-    return left, found.sigma[:, :7]
+    return left_of(voyage, errors_of(case.course, voyage.truth), found.x), found.sigma[:, :7]

@@ -24,7 +24,7 @@ from truenorth.papers.damping.statistics import Signs, consistency, random_signs
 from truenorth.papers.damping.switching import overshoot, switches
 from truenorth.papers.damping.truth import HOUR, sail
 from truenorth.papers.study import Study
-from truenorth.papers.sweeps import draw_sweeps, swept
+from truenorth.papers.sweeps import dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
 
 Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "The fused longitude error at 20 h has the other sign in the paper's table 1; the bias signs that it took are not "
         "stated (ours are all positive), and longitude is observed by none of the filters.",
         *words,
-        *(str(sweep) for sweep in sweeps),
+        *dependences(sweeps),
     ]
     return Study(TITLE, table, claims, pictures, captions, remarks)
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
-from truenorth.papers.drawing import marked
+from truenorth.figures.style import COLOURS, REFERENCE, headed
+from truenorth.papers.drawing import marked, sheet
 from truenorth.papers.odometer.loop import Errors
 
 Array = NDArray[np.float64]
@@ -35,9 +35,7 @@ STARTS = {
 
 def draw_paper_figures(found: Mapping[tuple[str, str], Errors], case: str) -> Figure:
     """Velocity, attitude, accelerometer and gyro bias: signed errors of single runs, and the RMS over all; linear axes."""
-    with style():
-        figure = new_figure(12.0, 10.0)
-        axes = figure.subplots(4, 3, sharex=True)
+    with sheet(12.0, 10.0, 4, 3, sharex=True, legend=4) as (figure, axes):
         for row, (name, title, unit, letters, wide) in zip(axes, PANELS, strict=True):
             for i, ax in enumerate(row):
                 limits = (-wide[i], wide[i])
@@ -53,7 +51,6 @@ def draw_paper_figures(found: Mapping[tuple[str, str], Errors], case: str) -> Fi
                 ax.set(title=f"{title}, {letters[i]}", xlim=(0.0, time[-1]))
         for ax in axes[-1]:
             ax.set_xlabel("time, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
         runs = len(found[case, SINGLE_METHOD].phi)
         headed(figure, f"Errors of single runs and RMS over {runs}, from 10 deg of azimuth error")
     return figure
@@ -61,9 +58,7 @@ def draw_paper_figures(found: Mapping[tuple[str, str], Errors], case: str) -> Fi
 
 def draw_starts(found: Mapping[tuple[str, str], Errors], angles: Sequence[float]) -> Figure:
     """Median heading error over time from each start."""
-    with style():
-        figure = new_figure(12.0, 4.2)
-        axes = figure.subplots(1, len(angles), sharex=True, sharey=True)
+    with sheet(12.0, 4.2, 1, len(angles), sharex=True, sharey=True, legend=len(STARTS)) as (figure, axes):
         for ax, angle in zip(axes, angles, strict=True):
             for (method, label), colour in zip(STARTS.items(), COLOURS, strict=False):
                 errors = found[f"start{angle:g}", method]
@@ -77,5 +72,4 @@ def draw_starts(found: Mapping[tuple[str, str], Errors], angles: Sequence[float]
             ax.axhline(60.0, color=REFERENCE, linestyle="--", linewidth=0.8)
             ax.set(title=f"start {angle:g} deg off", yscale="log", xlabel="time, s")
         axes[0].set_ylabel("heading error, median, arcmin")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=len(STARTS))
     return figure

@@ -33,7 +33,7 @@ from truenorth.papers.odometer.scenario import (
     with_walk,
 )
 from truenorth.papers.study import Study
-from truenorth.papers.sweeps import Sweep, draw_sweeps, swept
+from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
 
 Array = NDArray[np.float64]
@@ -142,7 +142,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "All filters of the paper's model run in a closed loop: mechanised at 100 Hz, filtered and corrected at 1 Hz, "
         "displacement over 1 s, R = (.02 m)^2; a correction of the azimuth turns the covariance of tilts and of velocity with it. "
         "Methods with _tilts_only leave that of velocity: from 30 deg GH7 then ends at "
-        f"{_told(found['start30', 'gh7' + TILTS_ONLY])} instead of {_told(found['start30', 'gh7'])}.",
+        f"{_ended(found['start30', 'gh7' + TILTS_ONLY])} instead of {_ended(found['start30', 'gh7'])}.",
         "invariant_ekf is the product's closed loop: 10 Hz of the same odometer as body velocities, sideways and upward "
         "velocity zero to .05 m/s. ordinary_ekf is the same loop with the same measurements, its corrections fed back as ordinary "
         "velocity errors: what is left of the difference is the choice of the error alone.",
@@ -158,7 +158,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "The paper's velocity error of about .5 m/s is that of its figure 1; ours at the end is in figures.csv (`velocity`).",
         "chain takes the first 120 s twice: for coarse alignment, and again from the start by the filters, whose start error is "
         "then correlated with their data. chain_once begins the filters at 120 s, with the odometer's velocity.",
-        *(str(sweep) for sweep in sweeps),
+        *dependences(sweeps),
     ]
     return Study(TITLE, result, settle(RULES, result), drawings, captions, remarks)
 
@@ -226,7 +226,7 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
         )
 
 
-def _told(errors: Errors) -> str:
+def _ended(errors: Errors) -> str:
     off = heading(errors, TIMES[-1]) / ARCMIN
     rms, median = float(np.sqrt(np.mean(off**2))), float(np.median(np.abs(off)))
     return f"{rms:.1f}' RMS, median {median:.1f}', {np.mean(diverged(errors)):.0%} diverged"

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.units import MICRO_G
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.figures.style import COLOURS, REFERENCE
 from truenorth.papers.claims import Rule, interval, paired, settle
+from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
 from truenorth.simulation.streams import stream
@@ -123,13 +124,10 @@ def simulate(amplitude: Array, runs: int, seed: int, case: int) -> tuple[Array, 
 
 def draw_rate(errors: Mapping[str, Array]) -> Figure:
     """RMS of the rate's error over time."""
-    with style():
-        figure = new_figure(9.0, 4.2)
-        ax = figure.subplots()
+    with sheet(9.0, 4.2, legend=3) as (figure, ax):
         for (method, e), colour in zip(errors.items(), COLOURS, strict=False):
             rms = np.sqrt(np.mean(e**2, axis=(0, 2))) / DEGREE_PER_HOUR
             ax.plot(np.arange(1, len(rms) + 1) / RATE, rms, color=colour, linewidth=1.0, label=NAMES[method])
         ax.axhline(EARTH_RATE / DEGREE_PER_HOUR, color=REFERENCE, linestyle="--", linewidth=0.8)
         ax.set(yscale="log", xlabel="time, s", ylabel="error of the rate, deg/h", xlim=(0.0, DURATION))
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     return figure

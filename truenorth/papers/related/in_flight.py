@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from truenorth.alignment.transfer import align_transfer
 from truenorth.core import earth
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.figures.style import COLOURS, new_figure, style
+from truenorth.figures.style import COLOURS
 from truenorth.papers.claims import Rule, interval, paired, settle
+from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
 from truenorth.records import MasterRecord
@@ -178,13 +179,10 @@ def _add(table: Table, case: str, found: list[dict[str, Any]], time: Array) -> N
 
 def draw_released(since: Array, curves: Mapping[tuple[str, str], Array]) -> Figure:
     """RMS of the place's error after the release."""
-    with style():
-        figure = new_figure(9.0, 4.2)
-        ax = figure.subplots()
+    with sheet(9.0, 4.2, legend=2) as (figure, ax):
         for number, ((case, method), errors) in enumerate(curves.items()):
             rms = np.sqrt(np.mean(errors**2, axis=0))
             label, dash = f"{NAMES[method]}, {CASES[case]}", "-" if case == "manoeuvres" else "--"
             ax.plot(since, rms, dash, color=COLOURS[number % 2], linewidth=1.2, label=label)
         ax.set(xlabel="time since the release, s", ylabel="place, m", xlim=(0.0, since[-1]), ylim=(0.0, None))
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure

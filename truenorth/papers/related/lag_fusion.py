@@ -23,8 +23,9 @@ from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import Setting
 from truenorth.estimate.run import begin, go_on, navigate_track, with_states
-from truenorth.figures.style import COLOURS, new_figure, style
+from truenorth.figures.style import COLOURS
 from truenorth.papers.claims import Rule, interval, paired, settle
+from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
 from truenorth.records import ImuRecord
@@ -255,14 +256,11 @@ def _rows(source: Aiding, at: NDArray[np.intp]) -> Aiding:
 
 def draw_fusion(time: Array, curves: Mapping[str, Array]) -> Figure:
     """RMS of place and heading over time."""
-    with style():
-        figure = new_figure(11.0, 4.2)
-        place, heading = figure.subplots(1, 2)
+    with sheet(11.0, 4.2, 1, 2, legend=len(NAMES)) as (figure, (place, heading)):
         for (name, errors), colour in zip(curves.items(), COLOURS, strict=False):
             rms = np.sqrt(np.mean(errors**2, axis=0))
             place.plot(time, np.hypot(rms[:, 0], rms[:, 1]), color=colour, linewidth=1.0, label=NAMES[name])
             heading.plot(time, rms[:, 2] / ARCMIN, color=colour, linewidth=1.0)
         place.set(yscale="log", xlabel="time, s", ylabel="place, m", xlim=(0.0, time[-1]))
         heading.set(yscale="log", xlabel="time, s", ylabel="heading, arcmin", xlim=(0.0, time[-1]))
-        figure.legend(*place.get_legend_handles_labels(), loc="outside lower left", ncols=len(NAMES))
     return figure

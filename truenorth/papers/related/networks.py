@@ -18,9 +18,10 @@ from truenorth.damping.design import SPAN, Design, design, step_response
 from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import SCHULER_RATE
 from truenorth.errors.marine import DV
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.figures.style import COLOURS, REFERENCE
 from truenorth.papers.claims import Rule, exact, interval, paired, settle
 from truenorth.papers.damping.truth import HOUR, drawn, sail
+from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
 
@@ -140,9 +141,7 @@ def _within(time: Array, spans: tuple[tuple[float, float], ...]) -> NDArray[np.b
 def draw_networks(designs: Mapping[str, Design]) -> Figure:
     """Step responses with their overshoot, and the amplitude of H and of 1 - H."""
     time, rate = np.arange(0.0, SPAN / 2, 60.0), SCHULER_RATE * np.geomspace(0.02, 50.0, 300)
-    with style():
-        figure = new_figure(12.0, 4.2)
-        step, bode, leak = figure.subplots(1, 3)
+    with sheet(12.0, 4.2, 1, 3, legend=2) as (figure, (step, bode, leak)):
         for (name, found), colour in zip(designs.items(), COLOURS, strict=False):
             y = step_response(found.network, time)
             words = f"{NAMES[name]}: overshoot {found.overshoot:.0%}, settled in {found.settling / 60.0:.0f} min"
@@ -162,20 +161,16 @@ def draw_networks(designs: Mapping[str, Design]) -> Figure:
         leak.set_yticks([0.03, 0.1, 0.3, 1.0, 3.0], ["0.03", "0.1", "0.3", "1", "3"])
         for ax in (bode, leak):
             ax.tick_params(axis="y", which="minor", left=False, labelleft=False)
-        figure.legend(*step.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure
 
 
 def draw_voyage(time: Array, left: Mapping[str, Array]) -> Figure:
     """Size of the velocity error of one voyage."""
-    with style():
-        figure = new_figure(10.0, 4.2)
-        ax = figure.subplots()
+    with sheet(10.0, 4.2, legend=4) as (figure, ax):
         for (name, v), colour in zip(left.items(), ("#BBBBBB", *COLOURS), strict=False):
             ax.plot(time / HOUR, np.linalg.norm(v, axis=1), color=colour, linewidth=1.0, label=NAMES[name])
         for a, b in AFTER:
             ax.axvspan(a, b, color=REFERENCE, alpha=0.08, linewidth=0.0)
         ax.set(xlabel="time, h", ylabel="velocity error, m/s", yscale="log", ylim=(0.05, None), xlim=(0.0, 24.0))
         ax.set_xticks(range(0, 25, 4))
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower left", ncols=4)
     return figure

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
-from truenorth.papers.drawing import marked
+from truenorth.papers.drawing import marked, sheet
 from truenorth.papers.rotary.truth import AXES, INDEXER_RATES
 
 Array = NDArray[np.float64]
@@ -36,9 +36,8 @@ def modulated(time: Array, bias: Array) -> Array:
 def draw_modulation() -> Figure:
     """Gyro and accelerometer biases in the body over two turns of the slower axis, and their integrals."""
     time = np.linspace(0.0, 120.0, 1201)
-    with style():
-        figure = new_figure(10.0, 6.0)
-        axes = figure.subplots(2, 2, sharex=True)
+    heading = "Rotation modulation, w1 = 18 deg/s about x, w2 = 6 deg/s about z (eqs. 8, 9)"
+    with sheet(10.0, 6.0, 2, 2, sharex=True, heading=heading, legend=4) as (figure, axes):
         for column, (size, unit, name, whole) in enumerate(
             ((0.01, "deg/h", "gyro", "arcsec"), (100.0, "ug", "accelerometer", "mm/s"))
         ):
@@ -52,16 +51,12 @@ def draw_modulation() -> Figure:
             axes[1, column].plot(time, still[0] * scale * time, "--", color=REFERENCE, label="without rotation")
             axes[0, column].set(title=f"{name} bias in the body", ylabel=unit)
             axes[1, column].set(title="its integral", ylabel=whole, xlabel="time, s")
-        figure.legend(*axes[1, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        headed(figure, "Rotation modulation, w1 = 18 deg/s about x, w2 = 6 deg/s about z (eqs. 8, 9)")
     return figure
 
 
 def draw_coarse(errors: Mapping[str, Array]) -> Figure:
     """Misalignment at the end of coarse alignment by run (deg), with the paper's mean and range; linear, as there."""
-    with style():
-        figure = new_figure(12.0, 4.2)
-        axes = figure.subplots(1, 3)
+    with sheet(12.0, 4.2, 1, 3, heading="Coarse alignment, 120 s, configuration A", legend=5) as (figure, axes):
         for axis, ax in enumerate(axes):
             for (method, phi), colour in zip(errors.items(), COLOURS, strict=False):
                 count = np.arange(1.0, len(phi) + 1.0)
@@ -85,17 +80,14 @@ def draw_coarse(errors: Mapping[str, Array]) -> Figure:
             ax.set(title=f"{PHI_NAMES[axis]}, deg", xlabel="run")
             ax.set_xlim(0.0, len(count) + 1.0)
             ax.xaxis.get_major_locator().set_params(integer=True)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        headed(figure, "Coarse alignment, 120 s, configuration A")
     return figure
 
 
 def draw_filters(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str, str]) -> Figure:
     """The paper's figure 4: signed errors (arcmin) of the first run; a row a start, a column an angle."""
     cases = ("A", "A_max_start")
-    with style():
-        figure = new_figure(12.0, 6.5)
-        axes = figure.subplots(len(cases), 3, sharex=True)
+    heading = "Fine alignment by the paper's filters, one run; dotted: the 250 s within which it says they converge"
+    with sheet(12.0, 6.5, len(cases), 3, sharex=True, heading=heading, legend=5) as (figure, axes):
         for row, case in zip(axes, cases, strict=True):
             for axis, ax in enumerate(row):
                 for (method, phi), colour in zip(curves[case].items(), COLOURS, strict=False):
@@ -119,19 +111,12 @@ def draw_filters(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str,
             row[0].set_ylabel("error, arcmin")
         for ax in axes[-1]:
             ax.set_xlabel("time of fine alignment, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
-        headed(
-            figure,
-            "Fine alignment by the paper's filters, one run; dotted: the 250 s within which it says they converge",
-        )
     return figure
 
 
 def draw_convergence(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[str, str]) -> Figure:
     """RMS over the runs of the misalignment (arcmin) against the time of fine alignment; a row a case, a column an angle."""
-    with style():
-        figure = new_figure(12.0, 2.9 * len(curves) + 0.7)
-        axes = figure.subplots(len(curves), 3, sharex=True, squeeze=False)
+    with sheet(12.0, 2.9 * len(curves) + 0.7, len(curves), 3, sharex=True, squeeze=False, legend=5) as (figure, axes):
         for row, (case, methods) in zip(axes, curves.items(), strict=True):
             for axis, ax in enumerate(row):
                 for (method, phi), colour in zip(methods.items(), COLOURS, strict=False):
@@ -144,7 +129,6 @@ def draw_convergence(curves: Mapping[str, Mapping[str, Array]], titles: Mapping[
             row[0].set_ylabel("RMS, arcmin")
         for ax in axes[-1]:
             ax.set_xlabel("time of fine alignment, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=5)
         runs = len(next(iter(next(iter(curves.values())).values())))
         headed(figure, f"Fine alignment by the paper's filters, RMS over {runs} runs")
     return figure

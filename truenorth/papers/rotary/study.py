@@ -23,7 +23,7 @@ from truenorth.papers.rotary.drawings import (
 from truenorth.papers.rotary.rules import RULES
 from truenorth.papers.rotary.runs import FILTER_TIMES, FILTERS, SWEEPS, TIMES, Results, all_runs, processes
 from truenorth.papers.study import Study
-from truenorth.papers.sweeps import draw_sweeps, swept
+from truenorth.papers.sweeps import dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
 
 Array = NDArray[np.float64]
@@ -94,7 +94,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
             "open_choices": "What the paper does not state, changed one by one: heading RMS at 600 s; dashed: our choice.",
             "honesty": "RMS of heading over the runs compared with the sigma that the filter claims; grey: .85 to 1.2.",
         },
-        [*_remarks(found, table), *(str(sweep) for sweep in sweeps)],
+        [*_remarks(found, table), *dependences(sweeps)],
     )
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from truenorth.analysis.observability import Observability
 from truenorth.errors.stationary import KEPT
-from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
-from truenorth.papers.drawing import marked
+from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
+from truenorth.papers.drawing import marked, sheet
 from truenorth.papers.static.filtering import Errors
 from truenorth.papers.static.truth import ARCMIN, Truth
 
@@ -21,9 +21,8 @@ ANGLES = ("phi E (tilt)", "phi N (tilt)", "phi U (heading)")
 
 def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
     """Estimates of the three angles in one run of the paper's scenario, ten states above, eight below; signed, linear."""
-    with style():
-        figure = new_figure(12.0, 6.5)
-        axes = figure.subplots(2, 3, sharex=True)
+    heading = "The paper's scenario: P0 = 1e5 I, Q = 0, R = .001, 1000 steps of .02 s"
+    with sheet(12.0, 6.5, 2, 3, sharex=True, heading=heading, legend=3) as (figure, axes):
         for row, (states, (truth, x, sigma)) in zip(axes, literal.items(), strict=True):
             true = (truth.phi if states == 10 else truth.phi_platform)[0]
             for axis, ax in enumerate(row):
@@ -46,17 +45,17 @@ def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
             row[0].set_ylabel("arcmin")
         for ax in axes[1]:
             ax.set_xlabel("time, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
-        headed(figure, "The paper's scenario: P0 = 1e5 I, Q = 0, R = .001, 1000 steps of .02 s")
     return figure
 
 
 def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Errors], runs: int) -> Figure:
     """RMS of heading and level over time in every case, compared with the claimed sigma."""
     cases = list(dict.fromkeys(case for case, _ in found))
-    with style():
-        figure = new_figure(3.0 * len(cases) + 0.6, 6.5)
-        axes = figure.subplots(2, len(cases), sharex=True, sharey="row")
+    heading = f"Honest comparison, {runs} runs of each case"
+    with sheet(3.0 * len(cases) + 0.6, 6.5, 2, len(cases), sharex=True, sharey="row", heading=heading, legend=4) as (
+        figure,
+        axes,
+    ):
         for column, case in enumerate(cases):
             for states, colour in ((10, COLOURS[0]), (8, COLOURS[1])):
                 errors = found[case, states]
@@ -76,16 +75,12 @@ def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Err
                 ax.margins(x=0.06)
         axes[0, 0].set_ylabel("heading, arcmin")
         axes[1, 0].set_ylabel("level, arcmin")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        headed(figure, f"Honest comparison, {runs} runs of each case")
     return figure
 
 
 def draw_degrees(seen: Mapping[tuple[str, int], Observability]) -> Figure:
     """Degrees of each direction, and the part of its prior sigma that each state keeps."""
-    with style():
-        figure = new_figure(12.0, 4.6)
-        left, right = figure.subplots(1, 2)
+    with sheet(12.0, 4.6, 1, 2, legend=4) as (figure, (left, right)):
         width = 0.8 / len(seen)
         for number, ((case, states), result) in enumerate(seen.items()):
             colour = COLOURS[number]
@@ -103,7 +98,6 @@ def draw_degrees(seen: Mapping[tuple[str, int], Observability]) -> Figure:
         right.set_xticks(range(len(names)), names, rotation=45)
         right.set(ylabel="sigma after 600 s / prior sigma", title="What each state keeps")
         right.margins(x=0.02)
-        figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=4)
     return figure
 
 

@@ -76,7 +76,7 @@ def errors_at(
 ) -> Errors:
     """Filter in stretches between the times, and hold each estimate against the truth."""
     estimate = run or (lambda part, state: kalman(part, state, innovations=False, workers=workers))
-    told = KEPT[8] if system.states == 10 else slice(None)
+    kept = KEPT[8] if system.states == 10 else slice(None)
     true_phi = truth.phi if system.states == 10 else truth.phi_platform
     state: FilterState | None = None
     error, sigma, square, first = [], [], [], 0
@@ -84,9 +84,9 @@ def errors_at(
         last = int(np.searchsorted(truth.time, time * (1 - 1e-9))) + 1
         state = estimate(system.between(first, last), state).state
         x, P, first = state.x, state.P, last
-        e = x[:, told] - np.concatenate([true_phi[:, last - 1], truth.bias], axis=1)
+        e = x[:, kept] - np.concatenate([true_phi[:, last - 1], truth.bias], axis=1)
         P = np.broadcast_to(P, (len(e), *P.shape[-2:]))
         error.append(e)
-        sigma.append(np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, told]))
+        sigma.append(np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, kept]))
         square.append(nees(e[:, PHI], P[:, PHI, PHI]) / 3)
     return Errors(np.asarray(times, dtype=np.float64), np.stack(error), np.stack(sigma), np.stack(square))

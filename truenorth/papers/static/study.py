@@ -23,7 +23,7 @@ from truenorth.papers.static.large import DURATION, add_large, align_all, make_s
 from truenorth.papers.static.rules import RULES
 from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
-from truenorth.papers.sweeps import Sweep, draw_sweeps, swept
+from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
 from truenorth.records.specs import ImuSpec
 
@@ -147,7 +147,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         f"{hardly_in_words(degrees['two_position', 10])}.",
         "Any azimuth: logs of a simulated IMU at 10 Hz, heading and azimuth error uniform on the circle, nonlinear filters every "
         "5 s. Their normal prior of the azimuth has the uniform one's sigma, 104 deg.",
-        *(str(sweep) for sweep in sweeps),
+        *dependences(sweeps),
     ]
     return Study(TITLE, table, claims, drawings, captions, remarks)
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.core.units import DEG_PER_HOUR
-from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
-from truenorth.papers.drawing import marked
+from truenorth.figures.style import COLOURS, REFERENCE
+from truenorth.papers.drawing import marked, sheet
 from truenorth.papers.transfer.filtering import EPOCHS, Errors
 from truenorth.papers.transfer.truth import ARCMIN, BEGIN, STOP
 
@@ -46,14 +46,12 @@ def _draw(
     title: str,
 ) -> Figure:
     """Left the paper's kind of curve, one run, signed; right all runs: errors, their RMS, and the filter's sigma; axes linear."""
-    with style():
-        figure = new_figure(12.0, 7.5)
-        axes = figure.subplots(3, 2, sharex=True)
+    with sheet(12.0, 7.5, 3, 2, sharex=True, heading=title, legend=5) as (figure, axes):
         for i in range(3):
             left, right = axes[i]
             marked(left, EPOCHS, one[:, i], (-wide[i], wide[i]), color=COLOURS[0], label="one run, as in the paper")
             if true is not None:
-                left.axhline(true[0, i], color=REFERENCE, linestyle="--", linewidth=1.0)
+                left.axhline(true[0, i], color=REFERENCE, linestyle=":", linewidth=1.2, label="truth")
             for k, run in enumerate(values[:SINGLE, :, i]):
                 label = "errors of single runs" if k == 0 else None
                 right.plot(EPOCHS, run, color=COLOURS[0], linewidth=0.5, alpha=0.5, label=label)
@@ -69,9 +67,6 @@ def _draw(
                 _turn(ax)
         for ax in axes[-1]:
             ax.set_xlabel("time, s")
-        handles = [h for ax in axes[0] for h in ax.get_legend_handles_labels()[0]]
-        figure.legend(handles, [h.get_label() for h in handles], loc="outside lower left", ncols=5)
-        figure.suptitle(title, x=0.01, ha="left")
     return figure
 
 
@@ -91,9 +86,17 @@ class Panel(NamedTuple):
 
 def draw_panels(found: Mapping[tuple[str, str], Errors], rows: Sequence[Sequence[Panel]], title: str) -> Figure:
     """RMS over time, arcmin, on axes that a row shares."""
-    with style():
-        figure = new_figure(3.0 * len(rows[0]) + 0.6, 3.2 * len(rows) + 0.4)
-        axes = figure.subplots(len(rows), len(rows[0]), sharex=True, sharey="row", squeeze=False)
+    with sheet(
+        3.0 * len(rows[0]) + 0.6,
+        3.2 * len(rows) + 0.4,
+        len(rows),
+        len(rows[0]),
+        sharex=True,
+        sharey="row",
+        squeeze=False,
+        heading=title,
+        legend=6,
+    ) as (figure, axes):
         for row, panels in zip(axes, rows, strict=True):
             for ax, panel in zip(row, panels, strict=True):
                 for (method, label), colour in zip(panel.methods.items(), COLOURS, strict=False):
@@ -110,8 +113,6 @@ def draw_panels(found: Mapping[tuple[str, str], Errors], rows: Sequence[Sequence
             row[0].set_ylabel(f"{'heading' if panels[0].heading else 'level'}, arcmin")
         for ax in axes[-1]:
             ax.set_xlabel("time, s")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=6)
-        figure.suptitle(title, x=0.01, ha="left")
     return figure
 
 

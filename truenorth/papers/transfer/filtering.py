@@ -60,7 +60,7 @@ class Method:
     Attributes
     ----------
     delay, lever_arm : bool
-    told : bool
+    known : bool
         It knows the true delay and lever arm.
     translation : {"velocity", "position", "acceleration"} or None
     attitude : bool
@@ -79,7 +79,7 @@ class Method:
 
     delay: bool = False
     lever_arm: bool = False
-    told: bool = False
+    known: bool = False
     translation: Translation | None = "velocity"
     attitude: bool = False
     flexure: bool = False
@@ -94,7 +94,7 @@ VELOCITY = {
     "states12": Method(),
     "states13": Method(delay=True),
     "states16": Method(delay=True, lever_arm=True),
-    "oracle": Method(told=True),
+    "oracle": Method(known=True),
 }
 METHODS = {
     **VELOCITY,
@@ -218,8 +218,8 @@ def _track(flights: Flights, run: Run, method: Method) -> TransferTrack:
         float(at.lon),
         float(at.alt),
         prior_of(method, model, spec, at.C_nb),
-        arm=run.arm if method.told else np.zeros(3),
-        delay=run.tau if method.told else flights.case.extra_delay if method.late == "past" else 0.0,
+        arm=run.arm if method.known else np.zeros(3),
+        delay=run.tau if method.known else flights.case.extra_delay if method.late == "past" else 0.0,
     )
     kind = method.translation or "velocity"
     sigma = np.inf if method.translation is None else method.noise * NOISE[kind]

@@ -101,7 +101,7 @@ RULES = (
         "related work",
     ),
     Rule(
-        "A delay that is told can be compensated, and need not be a state.",
+        "A delay that is known can be compensated, and need not be a state.",
         (interval("late_known past_state level@120-150 < 1.1 * late_known augmented level@120-150"),),
         "200 ms, known: level in the turn {late_known past_state level@120-150:.2f}' by the state of the past time, "
         "{late_known augmented level@120-150:.2f}' with the delay as a state of which nothing is known, "

@@ -12,7 +12,7 @@ from truenorth.campaign.comparison import paired
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.papers.claims import settle
 from truenorth.papers.study import Study
-from truenorth.papers.sweeps import Sweep, draw_sweeps, swept
+from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
 from truenorth.papers.transfer.drawings import STATES, Panel, draw_biases, draw_level, draw_misalignment, draw_panels
 from truenorth.papers.transfer.filtering import EPOCHS, METHODS, Errors, errors_of
@@ -54,7 +54,7 @@ SWEEPS = {
     "noise": Sweep("flat_turn", "R", "velocity noise as believed, times the true", 1.0, (0.25, 0.5, 1.0, 2.0, 4.0)),
     "tau_sigma": Sweep("flat_turn", "P0_delay", "delay in P0, s", TAU_SIGMA, (0.01, 0.02, 0.05, 0.1, 0.3)),
     "arm_sigma": Sweep("flat_turn", "P0_arm", "lever arm in P0, m", ARM_SIGMA, (0.1, 0.3, 1.0, 3.0, 10.0)),
-    "every": Sweep("flat_turn", "step", "of ten rows a second, one in", 1, (1, 2, 5, 10)),
+    "every": Sweep("flat_turn", "step", "rows that are taken, one in", 1, (1, 2, 5, 10)),
 }
 SWEPT_RUNS = 30  # at most
 PANELS = {
@@ -119,7 +119,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     captions = {
         "figure_1": "Left one run, as the paper draws it; right the errors of all: thin single runs, thick their RMS, dashed the "
         "filter's own sigma. Axes are linear; triangles: beyond the axis.",
-        "figure_2": "Left the estimate of one run, as the paper draws it, dashed the truth; right the errors of all runs.",
+        "figure_2": "Left the estimate of one run, as the paper draws it, dotted the truth; right the errors of all runs.",
         "figure_3": "To be compared with figure 1. (The paper's text pairs 1 with 2 and 3 with 4.)",
         "figure_4": "To be compared with figure 2.",
         "level": "RMS of both tilts over the runs. Above: velocity matching. Below: velocity and attitude matching.",
@@ -146,7 +146,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "late_known, late_rough: 200 ms known, and 30 ms more that are not, with the paper's arm. `extrapolated`: along a line "
         "through the rows of the last second; `past_state`: the row is taken at its own time and the state carried on from there; "
         "`augmented`: nothing is known of the delay, .25 s in P0.",
-        *(str(sweep) for sweep in sweeps),
+        *dependences(sweeps),
         *(f"{name.replace('_', ' ')}: {words}" for name, words in seen.items()),
     ]
     return Study(TITLE, table, settle(RULES, table, {"flat_turn": str(seen["flat_turn"])}), drawings, captions, remarks)
