@@ -10,7 +10,7 @@ from tests.runs import few_and_all
 from truenorth.core.errors import UsageError
 from truenorth.papers.claims import Claim, Rule, check, condition, exact, interval, markdown, paired, settled
 from truenorth.papers.study import STUDIES, Study, save_all
-from truenorth.papers.sweeps import Sweep, swept
+from truenorth.papers.sweeps import Sweep, dependences, swept
 from truenorth.papers.table import OF_RUNS, STATISTICS, UNITS, Figure, Reference, Table
 
 RULES = [(name, rule) for name, module in STUDIES.items() for rule in import_module(module).RULES]
@@ -153,6 +153,17 @@ def test_a_sweep_says_whether_a_verdict_depends_on_a_choice():
     (few,) = swept([Rule("small", (exact("a one x mean < 1", 5),))], table, [sweep])
     assert not few.depends
     assert str(few) == 'Whether "small" depends on R, m/s (0.1, 1): too few runs.'
+    assert dependences([found, same, few]) == [
+        str(found),
+        'Not dependent on R, m/s (0.1, 1): "small" (holds).',
+        'Too few runs to say whether it depends on R, m/s (0.1, 1): "small".',
+    ]
+    # At our choice the study itself, with more runs, says another thing: the part of its runs is too small.
+    table.value("a", "one", "x", "value", 0.5, "1")
+    table.value("a", "two", "x", "value", 1.0, "1")
+    (few,) = swept(rules[:1], table, [sweep])
+    assert not few.depends
+    assert "at our choice they say: does not hold; all runs of the study: holds" in str(few)
 
 
 def test_claims_in_markdown():

@@ -165,11 +165,14 @@ def modes(M: Array) -> list[Mode]:
     return [Mode(name(v), v) for v in kept]
 
 
+STILL = 1e9  # s: what moves no faster stands still, but for rounding
+
+
 def in_words(modes: Sequence[Mode]) -> str:
     """Periods and damping ratios, or time constants, of all modes that move."""
     parts = []
     for m in modes:
-        if m.name == "still":
+        if m.name == "still" or abs(m.eigenvalue) * STILL < 1.0:
             continue
         label = "" if m.name == "filter" else f"{m.name} "
         if m.eigenvalue.imag:

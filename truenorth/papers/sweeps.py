@@ -41,6 +41,7 @@ class Swept:
     sweep: Sweep
     claim: str
     verdicts: dict[float, Verdict]
+    study: Verdict  # of the study itself, which may have more runs
 
     @property
     def depends(self) -> bool:
@@ -49,8 +50,10 @@ class Swept:
 
     @property
     def open(self) -> bool:
-        """Whether there are too few runs to say."""
-        return "too few runs" in self.verdicts.values()
+        """Whether there are too few runs to say, or too few to say at our choice what all runs of the study say."""
+        return (
+            "too few runs" in self.verdicts.values() or self.verdicts.get(self.sweep.chosen, self.study) != self.study
+        )
 
     @property
     def always(self) -> Verdict:
@@ -61,7 +64,11 @@ class Swept:
         """In words."""
         name = f"{self.sweep.label} ({', '.join(f'{value:g}' for value in self.verdicts)})"
         if self.open:
-            return f'Whether "{self.claim}" depends on {name}: too few runs.'
+            ours = self.verdicts.get(self.sweep.chosen, self.study)
+            why = (
+                "" if ours == self.study else f" (at our choice they say: {ours}; all runs of the study: {self.study})"
+            )
+            return f'Whether "{self.claim}" depends on {name}: too few runs{why}.'
         if not self.depends:
             return f'"{self.claim}" does not depend on {name}: {self.always}.'
         each = "; ".join(f"{value:g}: {verdict}" for value, verdict in self.verdicts.items())
@@ -76,22 +83,26 @@ def swept(rules: Sequence[Rule], table: Table, sweeps: Sequence[Sweep]) -> list[
             moved = {value: _moved(rule, sweep, value) for value in sweep.values}
             if moved[sweep.values[0]].conditions != rule.conditions and all(_there(m, table) for m in moved.values()):
                 verdicts = {value: settled(m, table, {}).verdict for value, m in moved.items()}
-                found.append(Swept(sweep, rule.claim, verdicts))
+                ours = replace(rule, words="") if _there(rule, table) else moved[sweep.chosen]
+                found.append(Swept(sweep, rule.claim, verdicts, settled(ours, table, {}).verdict))
     return found
 
 
 def dependences(found: Sequence[Swept]) -> list[str]:
-    """What depends on each choice, one by one, and what does not, together."""
+    """What depends on each choice, claim by claim; what does not, and what too few runs leave open, together."""
     lines = []
     for sweep in dict.fromkeys(s.sweep for s in found):
         own = [s for s in found if s.sweep == sweep]
+        name = f"{sweep.label} ({', '.join(f'{value:g}' for value in sweep.values)})"
         same = [s for s in own if not s.depends and not s.open]
-        lines += [str(s) for s in own if s not in same]
-        if len(same) > 1:
+        few = [s for s in own if s.open]
+        lines += [str(s) for s in own if s.depends]
+        if same:
             claims = "; ".join(f'"{s.claim}" ({s.always})' for s in same)
-            lines.append(f"Not dependent on {sweep.label} ({', '.join(f'{v:g}' for v in sweep.values)}): {claims}.")
-        else:
-            lines += map(str, same)
+            lines.append(f"Not dependent on {name}: {claims}.")
+        if few:
+            claims = "; ".join(f'"{s.claim}"' for s in few)
+            lines.append(f"Too few runs to say whether it depends on {name}: {claims}.")
     return lines
 
 

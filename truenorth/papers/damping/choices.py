@@ -23,7 +23,7 @@ SWEEPS = (
     Sweep("random_signs", "P0", "P0, times ours", 1.0, (0.1, 0.3, 1.0, 3.0, 10.0)),
     Sweep("random_signs", "N", "N of the fusion, s", SPAN, (600.0, SPAN, 18000.0)),
 )
-RUNS = 12  # at most
+RUNS = 30  # at most
 EVERY = 60.0  # s, of what is kept
 
 
@@ -34,16 +34,20 @@ def swept_signs(
     cases = {sweep.case_of(value): (sweep.name, value) for sweep in SWEEPS for value in sweep.values}
     methods = ("filter1", "filter2", "fused")
     kept: dict[str, dict[str, list[Array]]] = {case: {name: [] for name in methods} for case in cases}
+    chosen = {sweep.name: sweep.chosen for sweep in SWEEPS}
     every = round(EVERY / voyage.truth.interval)
     for run in range(runs):
         progress(f"open choices: voyage {run + 1} of {runs}")
         own, course, reference = drawn_voyage(voyage, c, seed, run)
         start = round(SWITCH / course.interval)
         usual = {name: kind for name, kind in filters_of(own, course, raw=False).items() if name in methods}
-        free = errors_of(course, voyage.truth)
+        free, by_choice = errors_of(course, voyage.truth), {}
         for case, (name, value) in cases.items():
-            kinds = {key: _changed(kind, name, value) for key, kind in usual.items()}
-            found = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
+            choice = None if name == "N" or value == chosen[name] else (name, value)  # None: the filters as they are
+            if choice not in by_choice:
+                kinds = {key: _changed(kind, name, value) for key, kind in usual.items()}
+                by_choice[choice] = run_filters(course, reference, start=start, kinds=kinds, workers=workers)
+            found = dict(by_choice[choice])
             found["fused"] = fused(found, course.interval, value if name == "N" else SPAN)
             for method in methods:
                 kept[case][method].append(left_of(voyage, free, found[method].x)[::every])

@@ -102,7 +102,7 @@ def draw_tables(ours: Mapping[str, Array], theirs: Mapping[str, Array], logs: Se
 
 def draw_windows(signs: Signs, runs: int) -> Figure:
     """RMS of heading and latitude over runs against time, hour by hour."""
-    with sheet(10.0, 4.0, 1, 2, heading=f"{runs} voyages, all errors with random signs", legend=5) as (figure, axes):
+    with sheet(10.0, 4.0, 1, 2, heading=f"{runs} voyages, all errors with random signs", legend=6) as (figure, axes):
         edges = np.arange(3, 49)
         for ax, (column, label) in zip(axes, ((2, "heading, deg"), (5, "latitude, deg")), strict=True):
             for number, method in enumerate(
@@ -114,8 +114,10 @@ def draw_windows(signs: Signs, runs: int) -> Figure:
                     rms.append(np.degrees(np.sqrt(np.mean(signs.errors[method][:, window, column] ** 2))))
                 ax.plot(edges[:-1] + 0.5, rms, color=COLOURS[number], label=NAMES[method])
             ax.set(yscale="log", xlabel="time, h", title=f"RMS of {label}")
+            if column == 2:
+                ax.set_yticks([0.03, 0.05, 0.1, 0.2])
             ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_formatter("{x:g}" if column == 2 else NullFormatter())
+            ax.yaxis.set_minor_formatter(NullFormatter())
             ax.set_xticks(range(0, 49, 12))
     return figure
 
