@@ -1,7 +1,9 @@
 """The rules of all studies: each on a table in which its claim is true, one in which it is false, and one with too few runs."""
 
 import math
+import string
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from truenorth.papers.claims import Claim, Rule, check, condition, exact, interv
 from truenorth.papers.study import STUDIES, Study, save_all
 from truenorth.papers.sweeps import Sweep, dependences, swept
 from truenorth.papers.table import OF_RUNS, STATISTICS, UNITS, Figure, Reference, Table
+from truenorth.papers.texts import read_texts
 
 RULES = [(name, rule) for name, module in STUDIES.items() for rule in import_module(module).RULES]
 IDS = [f"{name}: {rule.claim[:40]}" for name, rule in RULES]
@@ -82,6 +85,29 @@ def test_each_rule_can_say_all_of_it(name, rule):
     if any(c.needed > 1 for c in rule.conditions):
         few = max(c.needed for c in rule.conditions) - 1
         assert settled(rule, table_of(rule, solve(rule, True), few), {}).verdict == "too few runs"
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_texts_name_numbers_of_the_table_or_what_the_study_gives(name):
+    """Each place to be filled in is a reference, or the name of an argument in the study's own file; each drawing has a caption."""
+    module = import_module(STUDIES[name])
+    source = Path(module.__file__).read_text()
+    texts = module.TEXTS
+    every = [*texts.captions.values(), *texts.remarks, *(rule.words for rule in texts.rules)]
+    fields = {field for text in every for _, field, _, _ in string.Formatter().parse(text) if field}
+    for field in fields:
+        if " " in field:
+            Reference.read(field)
+        else:
+            assert f"{field}=" in source, field
+    for drawing in texts.captions:
+        assert f'"{drawing}": ' in source, drawing
+
+
+def test_a_test_that_is_not_understood_is_refused(tmp_path):
+    (tmp_path / "own.yaml").write_text("title: t\nclaims:\n- {claim: c, if: [often a b c < 1]}\ncaptions: {}\n")
+    with pytest.raises(UsageError, match="expected exact, interval or paired"):
+        read_texts(str(tmp_path / "own.py"))
 
 
 def test_some_conditions_met_is_in_part():

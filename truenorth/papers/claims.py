@@ -122,7 +122,7 @@ class Claim:
         return min(check.runs for check in self.checks)
 
 
-def settle(rules: Sequence[Rule], table: Table, more: Mapping[str, str] | None = None) -> list[Claim]:
+def settle(rules: Sequence[Rule], table: Table, more: Mapping[str, Any] | None = None) -> list[Claim]:
     """Settle the claims of a study.
 
     Parameters
@@ -140,14 +140,19 @@ def settle(rules: Sequence[Rule], table: Table, more: Mapping[str, str] | None =
     return [settled(rule, table, more or {}) for rule in rules]
 
 
-def settled(rule: Rule, table: Table, more: Mapping[str, str]) -> Claim:
+def settled(rule: Rule, table: Table, more: Mapping[str, Any]) -> Claim:
     """One of them."""
     checks = tuple(check(condition, table) for condition in rule.conditions)
     met = [c.met for c in checks]
     verdict: Verdict = "holds" if all(met) else "holds in part" if any(met) else "does not hold"
     if None in met:
         verdict = "too few runs"
-    return Claim(rule.claim, verdict, checks, _Words(table).vformat(rule.words, (), more), rule.by)
+    return Claim(rule.claim, verdict, checks, filled(rule.words, table, more), rule.by)
+
+
+def filled(text: str, table: Table, more: Mapping[str, Any]) -> str:
+    """A text with the numbers and words that it names."""
+    return _Words(table).vformat(text, (), more)
 
 
 def check(condition: Condition, table: Table) -> Check:

@@ -14,22 +14,22 @@ from truenorth.damping.networks import NO_NETWORK
 from truenorth.damping.poles import filter_modes
 from truenorth.damping.spectrum import earth_line, schuler_lines
 from truenorth.errors.marine import DP, DV
-from truenorth.papers.claims import settle
 from truenorth.papers.damping import choices, drawings
 from truenorth.papers.damping.bias_signs import BIASES, left_by_filter1, search
 from truenorth.papers.damping.choices import swept_signs
 from truenorth.papers.damping.methods import AZIMUTH, NETWORK, SWITCH, Case, run_all, without_overlap
-from truenorth.papers.damping.rules import RULES
 from truenorth.papers.damping.statistics import Signs, consistency, random_signs
 from truenorth.papers.damping.switching import overshoot, switches
 from truenorth.papers.damping.truth import HOUR, sail
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 
 Array = NDArray[np.float64]
 
-TITLE = "Double-filter external damping of a marine INS"
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 RUNS = 30
 COARSE = 5.0  # s, epochs of the statistical cases
 ERRORS = (0.0, -0.1, -0.2, -0.3, -0.4, -0.5)  # m/s, of the log
@@ -109,7 +109,6 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     for c in ERRORS[1:]:
         left = _read(coarse.truth.time, left_by_filter1(coarse, best, c))
         _add_readings(table, f"{name_of(c)}_best_signs", {"filter1": TABLE_2}, c, {"filter1": left})
-    claims = settle(RULES, table)
     loops = {"undamped": Loop(NO_NETWORK), "network": NETWORK, "network and azimuth": AZIMUTH}
     modes = {name: eigenvalues(course, loop, round(STEADY)) for name, loop in loops.items()}
     of_filters = {
@@ -131,50 +130,31 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "switching": drawings.draw_switching(main, switched),
         "open_choices": draw_sweeps(table, choices.SWEEPS, sweeps, drawings.PAPERS, "phi_u@18h-24h", "deg"),
     }
-    captions = {
-        "figure_3_attitude": "The paper's figure 3: attitude errors, log error -.3 m/s; filters on at 2.5 h.",
-        "figure_4_position": "The paper's figure 4. Longitude is not damped by any of them: nothing observes it.",
-        "figure_5_velocity": "The paper's figure 5. Filter 1 takes the log's error for the ship's velocity.",
-        "tables_1_and_2": "Errors at 20 h over the log's constant error, all seven columns, ours next to the paper's.",
-        "windows": f"RMS of heading over {count} voyages with random signs of all errors, window by window.",
-        "spectra": "Velocity error as one complex number: Foucault splits the Schuler line into a pair that turn in opposite "
-        "senses.",
-        "eigenvalues": "Rates of decay and periods of the error dynamics, undamped, with networks, and under the filters' gains.",
-        "open_choices": "What the paper does not state, changed one by one: heading RMS at 18 to 24 h; dashed: our choice.",
-        "switching": "Velocity error about the switch. A cold internal network takes the ship's own speed for an error.",
-    }
     words = [f"Eigenvalues, {name}: {in_words(found)}." for name, found in modes.items()]
     words += [f"Eigenvalues, {name} (its own gain at 48 h): {in_words(found)}." for name, found in of_filters.items()]
-    remarks = [
-        "The full strapdown navigates a simulated log (1 Hz increments); all methods correct its output. Filters as SYSTEMS "
-        "reads the paper: start 45.78 N, heading 0, updates every 1 s, tau = 300 s, Q as printed per second, N = 3600.",
-        "R2 has units m/s^2; beta needs no inverse of P; the limit of gamma is 1.",
-        f"All methods on 48 h took {max(case.runtime for case in cases.values()):.1f} s of CPU time at most.",
-        "`augmented` has the paper's P0, .5 m/s for the log's error and a random walk of .0001 deg/sqrt(h); `augmented_long` has "
-        "the P0 that the undamped INS carries to 2.5 h, all correlations included, and .001 deg/sqrt(h).",
-        f"Errors of filters 1 and 2 are correlated (same INS, same log): over {count} voyages the median coefficient at 18-24 h is "
-        f"{', '.join(f'{q} {r:+.2f}' for q, r in zip(QUANTITIES, _correlation(signs)))}. The fused filter's own sigma, which takes "
-        f"them as independent, is {', '.join(f'{q} {r:.1f}' for q, r in zip(QUANTITIES, signs.fused_ratio))} times too small "
-        "(RMS error over sigma, 18-24 h).",
-        f"Filter 2's windows of 5 s overlap in the paper, updated every 1 s, and its R takes no notice. Updated every 5 s it has a "
-        f"heading of {_window(sparse, main, (18, 24)):.4f} deg RMS at 18-24 h against "
-        f"{window_rms(main, 'filter2', (18, 24))[PHI_U]:.4f}, and claims a sigma of {_last(sparse_sigma):.3f} deg at 48 h against "
-        f"{_last(main.estimates['filter2'].sigma):.3f}: what overlaps makes the filter surer, not better.",
-        "`augmented` meets its bars (latitude and longitude below .02 deg at 6-12 h) with the paper's signs; over random signs see "
-        "figures.csv. The heading of all filters has the floor eps_E/(w_ie cos L), .028 deg at the start and .036 at 58 N.",
-        "Not as in the paper: with the signs that we took (all positive) filter 1's tilts change with each -.1 m/s by "
-        f"{1e3 * slopes[0]:+.1f}e-3 and {1e3 * slopes[1]:+.1f}e-3 deg, the paper's by {1e3 * _paper_slope('phi_e'):+.1f}e-3 and "
-        f"{1e3 * _paper_slope('phi_n'):+.1f}e-3; the fused v_E at -.3 m/s is {reading(main, 'fused')[DV.start]:+.2f} m/s, "
-        f"the paper's {TABLE_1[-0.3][5]:+.2f}. The signs of the biases do not change the slopes.",
-        f"Signs of the biases that fit table 2 best: {fits[0]}; misfit {fits[0].misfit:.2f} in units of each column's RMS, "
-        f"{next(f.misfit for f in fits if min(f.signs) > 0):.2f} with all positive. Errors with them are in figures.csv "
-        "(cases c..._best_signs).",
-        "The fused longitude error at 20 h has the other sign in the paper's table 1; the bias signs that it took are not "
-        "stated (ours are all positive), and longitude is observed by none of the filters.",
-        *words,
-        *dependences(sweeps),
-    ]
-    return Study(TITLE, table, claims, pictures, captions, remarks)
+    late = (18, 24)  # h
+    return TEXTS.study(
+        table,
+        pictures,
+        [*words, *dependences(sweeps)],
+        count=count,
+        seconds=max(case.runtime for case in cases.values()),
+        correlation=", ".join(f"{q} {r:+.2f}" for q, r in zip(QUANTITIES, _correlation(signs))),
+        too_small=", ".join(f"{q} {r:.1f}" for q, r in zip(QUANTITIES, signs.fused_ratio)),
+        sparse=_window(sparse, main, late),
+        overlapping=window_rms(main, "filter2", late)[PHI_U],
+        sparse_sigma=_last(sparse_sigma),
+        overlapping_sigma=_last(main.estimates["filter2"].sigma),
+        slope_e=1e3 * slopes[0],
+        slope_n=1e3 * slopes[1],
+        paper_e=1e3 * _paper_slope("phi_e"),
+        paper_n=1e3 * _paper_slope("phi_n"),
+        fused_v_e=reading(main, "fused")[DV.start],
+        paper_v_e=TABLE_1[-0.3][5],
+        best=str(fits[0]),
+        misfit=fits[0].misfit,
+        positive=next(f.misfit for f in fits if min(f.signs) > 0),
+    )
 
 
 def name_of(c: float) -> str:

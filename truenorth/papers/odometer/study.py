@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from truenorth.alignment.azimuth_filters import METHODS, Belief, reduced
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.filters.strong_tracking import StrongTracking
-from truenorth.papers.claims import settle
 from truenorth.papers.odometer.drawings import STARTS, draw_paper_figures, draw_starts
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, Errors, run_method
 from truenorth.papers.odometer.paper_table import add_paper_table
-from truenorth.papers.odometer.rules import RULES
 from truenorth.papers.odometer.scenario import (
     Drives,
     coarser,
@@ -35,10 +33,12 @@ from truenorth.papers.odometer.scenario import (
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 
 Array = NDArray[np.float64]
 
-TITLE = "Odometer-aided alignment on the move, strong tracking reduced Gauss-Hermite filter"
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 RUNS = 30
 ANGLES = (1.0, 10.0, 30.0, 60.0)
 TIMES = (60.0, 120.0, 150.0, 300.0, 600.0)
@@ -50,6 +50,7 @@ COARSE_TIMES = (120.0, 300.0, 600.0)
 INVARIANT, ORDINARY = "invariant_ekf", "ordinary_ekf"
 TILTS_ONLY = "_tilts_only"
 ORDINARY_METHODS = [m for m in METHODS if m != "sgkf3_capped"]
+ACTED = ("start1", "start10", "start30", "start60", "chain", "straight", "slip", "bias_step")
 TRACKED = ["ckf", "gh3", "sgkf3"]
 SWEEPS = (
     *(
@@ -129,38 +130,16 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "starts": draw_starts(found, ANGLES),
         "open_choices": draw_sweeps(result, SWEEPS, sweeps, STARTS),
     }
-    captions = {
-        "figures_1_to_4": "The paper's figures 1 to 4 are RMS errors on linear axes: ours over the runs (thick), and the signed "
-        "errors of single runs (thin), against the truth, from 10 deg of azimuth error. Triangles: beyond the axis.",
-        "starts": "Median over the runs of the heading error, from four azimuth errors at the start; dashed line: 1 deg.",
-        "open_choices": "What the paper does not state, and what it says a strong tracking filter need not know: P0, Q and R ten "
-        "times too small and too large, memory and weakening of the factor, the filter's step; heading RMS at 600 s from 30 deg.",
-    }
-    remarks = [
-        f"{count} runs a case, the same logs for all methods. Gyro noise is read as an angular random walk of .001 deg/sqrt(h); "
-        "case start10_arw_0.01 takes .01 deg/sqrt(h).",
-        "All filters of the paper's model run in a closed loop: mechanised at 100 Hz, filtered and corrected at 1 Hz, "
-        "displacement over 1 s, R = (.02 m)^2; a correction of the azimuth turns the covariance of tilts and of velocity with it. "
-        "Methods with _tilts_only leave that of velocity: from 30 deg GH7 then ends at "
-        f"{_ended(found['start30', 'gh7' + TILTS_ONLY])} instead of {_ended(found['start30', 'gh7'])}.",
-        "invariant_ekf is the product's closed loop: 10 Hz of the same odometer as body velocities, sideways and upward "
-        "velocity zero to .05 m/s. ordinary_ekf is the same loop with the same measurements, its corrections fed back as ordinary "
-        "velocity errors: what is left of the difference is the choice of the error alone.",
-        "diverged: the part of the runs that end more than 1 deg off, or were given up with a tilt beyond half a radian.",
-        "The factor of strong tracking is the one of Zhou and Frank with weakening 1, memory .95 and no cap: ours, as the paper "
-        "gives no formula (its eq. 58 names lambda alone). sgkf3_capped holds it below 1.2. A gate judges before fading.",
-        "A factor acted in a share of the epochs: "
-        + ", ".join(
-            f"{case} {result.number_of(f'{case} sgkf3 factor_share mean'):.1%}"
-            for case in ("start1", "start10", "start30", "start60", "chain", "straight", "slip", "bias_step")
-        )
-        + ". Where it is 0, SGKF is GH of the same order.",
-        "The paper's velocity error of about .5 m/s is that of its figure 1; ours at the end is in figures.csv (`velocity`).",
-        "chain takes the first 120 s twice: for coarse alignment, and again from the start by the filters, whose start error is "
-        "then correlated with their data. chain_once begins the filters at 120 s, with the odometer's velocity.",
-        *dependences(sweeps),
-    ]
-    return Study(TITLE, result, settle(RULES, result), drawings, captions, remarks)
+    acted = {case: result.number_of(f"{case} sgkf3 factor_share mean") for case in ACTED}
+    return TEXTS.study(
+        result,
+        drawings,
+        dependences(sweeps),
+        count=count,
+        tilts_only=_ended(found["start30", "gh7" + TILTS_ONLY]),
+        turned=_ended(found["start30", "gh7"]),
+        acted=", ".join(f"{case} {share:.1%}" for case, share in acted.items()),
+    )
 
 
 def _choice(drives: Drives, name: str, value: float) -> tuple[Drives, dict[str, Any]]:

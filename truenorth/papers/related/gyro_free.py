@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.units import MICRO_G
 from truenorth.figures.style import COLOURS, REFERENCE
-from truenorth.papers.claims import Rule, interval, paired, settle
 from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 from truenorth.simulation.streams import stream
 from truenorth.strapdown.gyro_free import field_of, rate_filter
 
 Array = NDArray[np.float64]
 
-TITLE = "Gyro-free INS: angular rate from twelve accelerometers"
 RUNS = 50
 RATE, DURATION, WINDOW = 100.0, 60.0, 10.0  # Hz, s, s
 ARM = 0.3  # m, of the places on the three axes
@@ -31,35 +30,8 @@ DEGREE_PER_HOUR = np.radians(1.0 / 3600.0)
 STREAM = 320
 NAMES = {"integrated": "w' integrated", "roots": "roots of the squares", "filter": "Kalman filter"}
 
-RULES = (
-    Rule(
-        "A Kalman filter on twelve accelerometers tells the rate better than integrating their angular acceleration.",
-        (paired("tumbling filter rate@50-60 < tumbling integrated rate@50-60"),),
-        "Over the last 10 s of 60: {tumbling filter rate@50-60:.0f} against {tumbling integrated rate@50-60:.0f} deg/h.",
-        "related work",
-    ),
-    Rule(
-        "A Kalman filter on twelve accelerometers tells the rate better than the roots of its squares.",
-        (paired("tumbling filter rate@50-60 < tumbling roots rate@50-60"),),
-        "The roots end at {tumbling roots rate@50-60:.0f} deg/h; they are given the true sign.",
-        "related work",
-    ),
-    Rule(
-        "Its sigma can be believed.",
-        (
-            interval("tumbling filter rate_z@60 rms_over_sigma < 1.5", runs=20),
-            interval("tumbling filter rate_x@60 rms_over_sigma < 1.5", runs=20),
-        ),
-        by="ours",
-    ),
-    Rule(
-        "A gyro-free INS at rest finds north by the earth's rate.",
-        (interval("rest filter rate@50-60 < 1.5"),),
-        "A tenth of the earth's rate is 1.5 deg/h. At rest the squares tell nothing (their slope is the rate "
-        "itself), and what remains is the start and its drift: {rest filter rate@50-60:.0f} deg/h.",
-        "ours",
-    ),
-)
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 
 
 def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
@@ -81,14 +53,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
                 )
         if case == "tumbling":
             drawn = {method: rate - true for method, rate in found.items()}
-    drawings = {"rate": draw_rate(drawn)}
-    captions = {"rate": "RMS over the runs and axes of the error of the rate; dashed: the earth's rate."}
-    remarks = [
-        f"Triads at the origin and at {ARM:g} m on each axis; accelerometers of 50 ug (constant) and 50 ug/sqrt(Hz), {RATE:g} Hz. "
-        "tumbling: 60, 45 and 30 deg/s with periods of 3, 4 and 5 s; rest: the earth's rate alone. The rate at the start is known "
-        "to .1 deg/s.",
-    ]
-    return Study(TITLE, table, settle(RULES, table), drawings, captions, remarks)
+    return TEXTS.study(table, {"rate": draw_rate(drawn)}, arm=ARM, rate=RATE)
 
 
 def simulate(amplitude: Array, runs: int, seed: int, case: int) -> tuple[Array, dict[str, Array], Array]:

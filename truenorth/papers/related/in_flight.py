@@ -19,10 +19,10 @@ from truenorth.alignment.transfer import align_transfer
 from truenorth.core import earth
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.style import COLOURS
-from truenorth.papers.claims import Rule, interval, paired, settle
 from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 from truenorth.records import MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.motion import Moving
@@ -31,48 +31,13 @@ from truenorth.strapdown.level import NavigationState, mechanise
 
 Array = NDArray[np.float64]
 
-TITLE = "In-flight calibration of a slave, and its flight after the release"
 RUNS = 30
 RELEASE = 180.0  # s
 NAMES = {"calibrated": "attitude and biases handed over", "attitude": "attitude alone"}
 CASES = {"manoeuvres": "turns and an acceleration", "straight": "straight flight"}
 
-RULES = (
-    Rule(
-        "Biases calibrated in flight make the slave's flight after its release more precise.",
-        (paired("manoeuvres calibrated place@300 < 0.5 * manoeuvres attitude place@300"),),
-        "120 s after the release: {manoeuvres calibrated place@300:.1f} m, with the attitude alone "
-        "{manoeuvres attitude place@300:.1f} m.",
-        "related work",
-    ),
-    Rule(
-        "Calibration in flight needs manoeuvres.",
-        (
-            paired("manoeuvres calibrated accel_bias_level@180 < 0.5 * straight calibrated accel_bias_level@180"),
-            paired("manoeuvres calibrated place@300 < straight calibrated place@300"),
-        ),
-        "Level accelerometers, a bias of 500 ug: {manoeuvres calibrated accel_bias_level@180:.0f} ug left with turns and an "
-        "acceleration, {straight calibrated accel_bias_level@180:.0f} ug in straight flight; 120 s after the release "
-        "{straight calibrated place@300:.1f} m.",
-        "related work",
-    ),
-    Rule(
-        "Gyros are calibrated in straight flight too, by velocity and attitude.",
-        (interval("straight calibrated gyro_bias@180 < 0.75"),),
-        "Calibrated: to a quarter of 3 deg/h. {straight calibrated gyro_bias@180:.2f} deg/h, with manoeuvres "
-        "{manoeuvres calibrated gyro_bias@180:.2f}.",
-        "related work",
-    ),
-    Rule(
-        "The sigma of the calibration can be believed.",
-        tuple(
-            interval(f"{case} calibrated {name}@180 rms_over_sigma < 1.5", runs=20)
-            for case in CASES
-            for name in ("gyro_bias_x", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "heading")
-        ),
-        by="ours",
-    ),
-)
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 
 
 def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
@@ -92,19 +57,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         _add(table, case, found, time)
         for method in NAMES:
             curves[case, method] = np.stack([one[method] for one in found])
-    return Study(
-        TITLE,
-        table,
-        settle(RULES, table),
-        {"released": draw_released(time - RELEASE, curves)},
-        {"released": "RMS over the flights of the horizontal error of place after the release."},
-        [
-            "The scenario is `transfer_release`, velocity and attitude matched, delay, arm and mounting estimated; `straight` "
-            "flies on in place of its manoeuvres. After the release both turn, which parts tilt from bias. Gyros 3 deg/h and "
-            ".05 deg/sqrt(h), accelerometers 500 ug; master .05 m/s and 1 arcmin, ten rows a second.",
-            "At the release the slave's place is the true one, height is held: what grows is of attitude, velocity and biases.",
-        ],
-    )
+    return TEXTS.study(table, {"released": draw_released(time - RELEASE, curves)})
 
 
 def scenarios() -> dict[str, Scenario]:

@@ -24,10 +24,10 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.events import Setting
 from truenorth.estimate.run import begin, go_on, navigate_track, with_states
 from truenorth.figures.style import COLOURS
-from truenorth.papers.claims import Rule, interval, paired, settle
 from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
@@ -40,7 +40,6 @@ from truenorth.strapdown.increments import ImuRows
 
 Array = NDArray[np.float64]
 
-TITLE = "Centralised fusion of late, asynchronous sensors"
 RUNS = 30
 STREAM = 321
 LEVEL, HEADING, VELOCITY, PLACE = math.radians(0.1), math.radians(2.0), 0.1, 1.0  # sigmas of the start
@@ -58,58 +57,8 @@ ARCMIN = math.radians(1.0 / 60.0)
 HALF_A_ROW = 0.5 / 7.0  # s: an odometer's row holds at the middle of its interval
 KEPT = ("time", "C_nb", "v_n", "position", "sensors", "P")  # of a track
 
-RULES = (
-    Rule(
-        "A central filter that takes late rows at their own time loses nothing to the lag.",
-        (
-            interval("traffic real_time place@100-300 < 1.05 * traffic in_time place@100-300"),
-            interval("traffic real_time heading@100-300 < 1.05 * traffic in_time heading@100-300"),
-        ),
-        "Each second by the rows that have come, against sensors without lag: place {traffic real_time place@100-300:.3f} and "
-        "{traffic in_time place@100-300:.3f} m, heading {traffic real_time heading@100-300:.2f}' and "
-        "{traffic in_time heading@100-300:.2f}'. Once all rows have come: {traffic own_time place@100-300:.3f} m and "
-        "{traffic own_time heading@100-300:.2f}'.",
-        "related work",
-    ),
-    Rule(
-        "The lags must be considered.",
-        (
-            paired("traffic own_time place@100-300 < 0.5 * traffic ignored place@100-300"),
-            paired("traffic own_time heading@100-300 < 0.5 * traffic ignored heading@100-300"),
-        ),
-        "Ignored, 150 and 600 ms leave {traffic ignored place@100-300:.1f} m and {traffic ignored heading@100-300:.0f}'.",
-        "related work",
-    ),
-    Rule(
-        "Lags that are not known can be states.",
-        (
-            interval("traffic states place@100-300 < 1.1 * traffic own_time place@100-300"),
-            interval("traffic states heading@100-300 < 1.1 * traffic own_time heading@100-300"),
-        ),
-        "Nothing known of them (.5 s): the receiver's is found to {traffic states gnss_lag@300:.4f} s, the wheel's to "
-        "{traffic states odometer_lag@300:.4f} s.",
-        "related work",
-    ),
-    Rule(
-        "One central filter is more precise than the fusion of two filters with a sensor each.",
-        (
-            paired("traffic own_time place@100-300 < traffic shared place@100-300"),
-            paired("traffic own_time heading@100-300 < traffic shared heading@100-300"),
-        ),
-        "Two filters with the same IMU, each knowing its sensor's lag, weighed by their covariances as if they were independent: "
-        "{traffic shared place@100-300:.2f} m and {traffic shared heading@100-300:.1f}'.",
-        "related work",
-    ),
-    Rule(
-        "Its sigma can be believed.",
-        tuple(
-            interval(f"traffic {method} {name}@300 rms_over_sigma < 1.5", runs=20)
-            for method in ("real_time", "own_time", "states")
-            for name in ("heading", "east", "north")
-        ),
-        by="ours",
-    ),
-)
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 
 
 def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
@@ -141,21 +90,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
             for i, quantity in enumerate(("odometer_lag", "gnss_lag")):
                 table.errors("traffic", name, quantity, lags[:, i], "s", time=float(time[-1]))
     curves = {name: np.stack([errors for errors, _, _ in runs_of]) for name, runs_of in kept.items()}
-    return Study(
-        TITLE,
-        table,
-        settle(RULES, table),
-        {"fusion": draw_fusion(time, curves)},
-        {
-            "fusion": "RMS over the drives of place and heading; all with the same odometer (7 Hz, 150 ms late) and receiver "
-            "(1 Hz, 600 ms late)."
-        },
-        [
-            "`in_time`: the same drives and noise without lag. `real_time`: the answer of each second holds the rows that have "
-            "come by then, the newest 150 and 600 ms old; `own_time` those that come later too. `shared`: two filters, weighed by "
-            "their covariances as if they were independent, which they are not: they have one IMU.",
-        ],
-    )
+    return TEXTS.study(table, {"fusion": draw_fusion(time, curves)})
 
 
 def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tuple[Array, Array, Array]]:

@@ -19,15 +19,14 @@ from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import SCHULER_RATE
 from truenorth.errors.marine import DV
 from truenorth.figures.style import COLOURS, REFERENCE
-from truenorth.papers.claims import Rule, exact, interval, paired, settle
 from truenorth.papers.damping.truth import HOUR, drawn, sail
 from truenorth.papers.drawing import sheet
 from truenorth.papers.study import Study
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 
 Array = NDArray[np.float64]
 
-TITLE = "Internal damping networks by design, and a fuzzy damping ratio"
 RUNS = 20
 OVERSHOOT, SETTLING = 0.4, 90.0 * 60.0
 EPOCH = 10.0  # s
@@ -36,52 +35,8 @@ CALM = ((6.5, 8.0), (11.5, 12.0), (15.5, 16.0), (21.0, 24.0))  # h: three hours 
 AFTER = ((8.3, 10.3), (12.3, 14.3), (16.3, 18.3))  # h: two hours from each
 NAMES = {"undamped": "undamped", "second": "second order", "third": "third order", "fuzzy": "second order, fuzzy"}
 
-RULES = (
-    Rule(
-        "An internal network can be designed to an overshoot of 40 % and a settling time of 90 min.",
-        tuple(
-            condition
-            for order in ("second", "third")
-            for condition in (
-                exact(f"design {order} overshoot value < 0.4001"),
-                exact(f"design {order} settling value < 90.01"),
-            )
-        ),
-        "Second order: {design second overshoot value:.2f} and {design second settling value:.0f} min; third order: "
-        "{design third overshoot value:.2f} and {design third settling value:.0f} min. None is without overshoot: the loop holds "
-        "two integrators.",
-        "related work",
-    ),
-    Rule(
-        "A network of third order lets less of a manoeuvre in than one of second order with the same overshoot and time.",
-        (
-            exact("design third leak value < design second leak value"),
-            paired("voyage third manoeuvre < voyage second manoeuvre"),
-        ),
-        "Largest |1 - H|: {design second leak value:.2f} and {design third leak value:.2f}; largest velocity error in two hours "
-        "after a change of speed by 6 to 9 m/s: {voyage second manoeuvre:.1f} and {voyage third manoeuvre:.1f} m/s.",
-        "related work",
-    ),
-    Rule(
-        "An internal network damps the Schuler oscillation of a ship that keeps its speed.",
-        (
-            paired("voyage second calm < 0.5 * voyage undamped calm"),
-            paired("voyage third calm < 0.5 * voyage undamped calm"),
-        ),
-        by="related work",
-    ),
-    Rule(
-        "A fuzzy damping ratio keeps manoeuvres out and damps as well when the ship is calm.",
-        (
-            paired("voyage fuzzy manoeuvre < 0.5 * voyage second manoeuvre"),
-            interval("voyage fuzzy calm < 1.2 * voyage second calm"),
-        ),
-        "Velocity error after changes of speed {voyage fuzzy manoeuvre:.2f} m/s against {voyage second manoeuvre:.2f} with the "
-        "same network always on; calm {voyage fuzzy calm:.2f} against {voyage second calm:.2f}, undamped "
-        "{voyage undamped calm:.2f} m/s.",
-        "related work",
-    ),
-)
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 
 
 def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: Callable[[str], None]) -> Study:
@@ -117,20 +72,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         for quantity, values in kinds.items():
             table.errors("voyage", name, quantity, np.array(values), "m/s", statistics=("rms", "max"))
     drawings = {"networks": draw_networks(designs), "voyage": draw_voyage(time, left)}
-    captions = {
-        "networks": "Left: tilt after a step of an accelerometer's bias, over its final value. Middle and right: |H| and |1 - H| "
-        "over frequency (Bode); the dotted line is Schuler's.",
-        "voyage": "Size of the velocity error in one voyage; grey: two hours from each change of speed. Networks on at 2.5 h.",
-    }
-    remarks = [
-        f"Among the networks on a grid of poles that meet {OVERSHOOT:.0%} and {SETTLING / 60:.0f} min, each order has the one "
-        "with the smallest leak.",
-        "Errors and biases of the INS are those of system 3 with random signs.",
-        "The fuzzy sets are on the size of what the network lets in, (1 - H) v: calm up to 3.5 m/s, a "
-        "manoeuvre from 6 m/s: above the 2.5 m/s "
-        "that the undamped oscillation makes of it.",
-    ]
-    return Study(TITLE, table, settle(RULES, table), drawings, captions, remarks)
+    return TEXTS.study(table, drawings, overshoot=OVERSHOOT, settling=SETTLING / 60)
 
 
 def _within(time: Array, spans: tuple[tuple[float, float], ...]) -> NDArray[np.bool_]:

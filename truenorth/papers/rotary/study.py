@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.papers.claims import settle
 from truenorth.papers.rotary.coarse import LAST, SOURCES
 from truenorth.papers.rotary.drawings import (
     ARCMIN,
@@ -20,15 +19,16 @@ from truenorth.papers.rotary.drawings import (
     draw_honesty,
     draw_modulation,
 )
-from truenorth.papers.rotary.rules import RULES
 from truenorth.papers.rotary.runs import FILTER_TIMES, FILTERS, SWEEPS, TIMES, Results, all_runs, processes
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import dependences, draw_sweeps, swept
-from truenorth.papers.table import Table
+from truenorth.papers.table import OF_RUNS, Table
+from truenorth.papers.texts import read_texts
 
 Array = NDArray[np.float64]
 
-TITLE = "Self-alignment of a rotary SINS under dynamic disturbance"
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 RUNS = 50
 SIDE = 5  # the cases other than A, B, C and jonswap get a part of the runs
 COARSE = ("dual_vector", "triad", "q_method")
@@ -69,32 +69,23 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     off, on = table.number_of("rotation_off kf heading@600"), table.number_of("A/per_sample kf heading@600")
     table.value("rotation_off", "kf", "heading", "ratio", off / on, "1", time=600.0, noise="per_sample", runs=few)
     sweeps = swept(RULES, table, SWEEPS)
-    return Study(
-        TITLE,
+    drawings = {
+        "figures_1_to_3": draw_coarse({m: _coarse(found["A"], m) for m in ("dual_vector", "triad", "q_method")}),
+        "figure_4": draw_filters(_curves(found["A"]), TITLES),
+        "convergence": draw_convergence(_curves(found["A"]), TITLES),
+        "modulation": draw_modulation(),
+        "open_choices": draw_sweeps(table, SWEEPS, sweeps, LABELS),
+        "honesty": draw_honesty(_honesty(table)),
+    }
+    by_source = {source: np.degrees(OF_RUNS["rms"](_coarse(found["A"], "triad", source)[:, 2])) for source in SOURCES}
+    return TEXTS.study(
         table,
-        settle(RULES, table),
-        {
-            "figures_1_to_3": draw_coarse({m: _coarse(found["A"], m) for m in ("dual_vector", "triad", "q_method")}),
-            "figure_4": draw_filters(_curves(found["A"]), TITLES),
-            "convergence": draw_convergence(_curves(found["A"]), TITLES),
-            "modulation": draw_modulation(),
-            "open_choices": draw_sweeps(table, SWEEPS, sweeps, LABELS),
-            "honesty": draw_honesty(_honesty(table)),
-        },
-        {
-            "modulation": "Constant biases of .01 deg/h and 100 ug on all three axes of the IMU, seen in the body. "
-            "Rotation makes them "
-            "periodic; their integrals stay bounded.",
-            "figures_1_to_3": "The paper's figures 1 to 3: error of each run on a linear axis; triangles: beyond it. Level "
-            "errors of the dual vector are far below the paper's, its heading error is the sway at 50 s.",
-            "figure_4": "The paper's figure 4: signed errors of one run on a linear axis; triangles: beyond it. Above (a) from its "
-            "mean coarse error, below (b) from its largest. MAKF and IMAKF lie upon each other.",
-            "convergence": "RMS over the runs. Above from the paper's mean coarse error, in the middle from its largest, below "
-            "with the lever arm's velocity at the start left in, as its text has it.",
-            "open_choices": "What the paper does not state, changed one by one: heading RMS at 600 s; dashed: our choice.",
-            "honesty": "RMS of heading over the runs compared with the sigma that the filter claims; grey: .85 to 1.2.",
-        },
-        [*_remarks(found, table), *dependences(sweeps)],
+        drawings,
+        dependences(sweeps),
+        times=", ".join(f"{t:g}" for t in FILTER_TIMES),
+        coarse=LAST,
+        by_source=", ".join(f"{source} {value:.3f}" for source, value in by_source.items()),
+        few=few,
     )
 
 
@@ -174,27 +165,4 @@ def _honesty(table: Table) -> list[tuple[str, float, float, float]]:
         (name, at, table.number_of(f"{of}@{at:g}"), table.number_of(f"{of}@{at:g} sigma"))
         for name, of in cases.items()
         for at in TIMES
-    ]
-
-
-def _remarks(found: Found, table: Table) -> list[str]:
-    by_source = ", ".join(
-        f"{source} {np.degrees(np.sqrt(np.mean(_coarse(found['A'], 'triad', source)[:, 2] ** 2))):.3f}"
-        for source in SOURCES
-    )
-    return [
-        "Times of dual_vector, triad, q_method, windowed_ls and coloured_noise_kf are lengths of the whole log; "
-        "those of the paper's filters "
-        f"({', '.join(f'{t:g}' for t in FILTER_TIMES)} s) count from the end of coarse alignment at {LAST} s.",
-        f"TRIAD, heading RMS in deg by the source of the base's rate for the lever arm: {by_source}: the source does not matter.",
-        "The paper's start errors are the mean and maximum of its own table 1. P0, R and Q are not stated there; "
-        "ours: .1 m/s, 1 deg, the "
-        "biases' specification; R = (.05 m/s)^2, Q the true density.",
-        "windowed_ls and coloured_noise_kf estimate the lever arm; the paper's filters are given it.",
-        "Noise read as a random walk (.001 deg/sqrt(h), 10 ug/sqrt(Hz)): heading at 600 s "
-        f"{table.number_of('A/random_walk kf heading@600'):.3f} arcmin by the Kalman filter, "
-        f"{table.number_of('A/random_walk coloured_noise_kf heading@600'):.3f} by the coloured one.",
-        f"The cases other than A, B, C and jonswap have a part of the runs, unless all are asked for: {len(found['A_walk'])}.",
-        "`sakf_r` is SAKF as the paper's introduction describes it, one factor on the measurement noise; `sakf` has one "
-        "factor on P (ours).",
     ]

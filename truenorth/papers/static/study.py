@@ -15,21 +15,21 @@ from truenorth.core.units import parse
 from truenorth.errors.stationary import DV, KEPT, StationaryModel, names_and_units
 from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
-from truenorth.papers.claims import settle
 from truenorth.papers.static.degrees import add_degrees, degrees_of, hardly_in_words
 from truenorth.papers.static.drawings import draw_convergence, draw_degrees, draw_large, draw_literal
 from truenorth.papers.static.filtering import Errors, errors_at, system_of
 from truenorth.papers.static.large import DURATION, add_large, align_all, make_setting, simulate_logs
-from truenorth.papers.static.rules import RULES
 from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 
-TITLE = "Kalman filters for static alignment, with ten and with eight states"
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 RUNS = 200
 LAT = math.radians(45.0)
 TIMES = (20.0, 60.0, 120.0, 300.0, 600.0)
@@ -114,7 +114,6 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     progress("cost of a step")
     _add_cost(table, seed)
     sweeps = swept(RULES, table, SWEEPS)
-    claims = settle(RULES, table, {"entangled": "; ".join(map(str, seen["still", 10].entangled))})
     drawings = {
         "figures_1_to_6": draw_literal(literal),
         "convergence": draw_convergence(TIMES, found, count),
@@ -124,32 +123,18 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
             table, SWEEPS, sweeps, {"states10": "10 states", "states8": "8 states"}, "level@20"
         ),
     }
-    captions = {
-        "figures_1_to_6": "The paper's figures 1 to 6: one run of 20 s with its P0, Q and R. Estimated misalignment and "
-        "truth, signed, on a linear scale; triangles: beyond the axis. "
-        "What they do not show: the filters' own sigmas, by which nothing has been estimated.",
-        "convergence": "RMS of heading and level over the runs, with noise that both filters know. Dashed: their own sigma.",
-        "observability": "Degrees: the measurements' information on each direction of the state, in units of the prior (600 s). "
-        "Below 1 a direction is hardly seen. Right: the part of its prior sigma that each state keeps.",
-        "open_choices": "The paper's scenario with other numbers, one by one: level RMS at 20 s; dashed: as in the paper.",
-        "large_180": "Heading error after 300 s of each run, started from any azimuth; the share below 1 deg, and the RMS of all.",
-    }
-    remarks = [
-        "The paper's gyro drift has the other sign: its positive drift is our negative.",
-        "R = .001 is (m/s)^2 for ten states and (m/s^2)^2 for eight: the paper's two filters never saw the same data.",
-        f"Honest cases: ARW .001 deg/sqrt(h), VRW 10 ug/sqrt(Hz), biases drawn from N(0, .01 deg/h) and N(0, 100 ug), initial "
-        f"misalignment from N(0, 10', 10', 60'), measurements every {PERIOD * EVERY:g} s, errors linear.",
-        "The paper's ten states leave out dv_E tan L/R in the azimuth and the Coriolis force on the velocity error; the honest "
-        f"cases have both. Without them two positions end at a heading RMS of {_rms(short, TIMES[-1]):.2f} arcmin, with them at "
-        f"{_rms(found['two_position', 10], TIMES[-1]):.2f}.",
-        "After 600 s these keep more than .9 of their prior sigma, still: ten states, "
-        f"{hardly_in_words(degrees['still', 10])}; eight, {hardly_in_words(degrees['still', 8])}; two positions, ten states: "
-        f"{hardly_in_words(degrees['two_position', 10])}.",
-        "Any azimuth: logs of a simulated IMU at 10 Hz, heading and azimuth error uniform on the circle, nonlinear filters every "
-        "5 s. Their normal prior of the azimuth has the uniform one's sigma, 104 deg.",
-        *dependences(sweeps),
-    ]
-    return Study(TITLE, table, claims, drawings, captions, remarks)
+    return TEXTS.study(
+        table,
+        drawings,
+        dependences(sweeps),
+        entangled="; ".join(map(str, seen["still", 10].entangled)),
+        every=PERIOD * EVERY,
+        short=_rms(short, TIMES[-1]),
+        complete=_rms(found["two_position", 10], TIMES[-1]),
+        still10=hardly_in_words(degrees["still", 10]),
+        still8=hardly_in_words(degrees["still", 8]),
+        turned10=hardly_in_words(degrees["two_position", 10]),
+    )
 
 
 def _honest_truth(base: Base, runs: int, seed: int) -> Truth:

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from truenorth.campaign.comparison import paired
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
-from truenorth.papers.claims import settle
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
+from truenorth.papers.texts import read_texts
 from truenorth.papers.transfer.drawings import STATES, Panel, draw_biases, draw_level, draw_misalignment, draw_panels
 from truenorth.papers.transfer.filtering import EPOCHS, METHODS, Errors, errors_of
 from truenorth.papers.transfer.observability import told_by
-from truenorth.papers.transfer.rules import RULES
 from truenorth.papers.transfer.truth import ARCMIN, ARM_SIGMA, BEGIN, END, STOP, TAU_SIGMA, Case, Flights
 
 Array = NDArray[np.float64]
 
-TITLE = "Transfer alignment with residual time delay and lever arm"
+TEXTS = read_texts(__file__)
+RULES = TEXTS.rules
 RUNS = 100
 KNOWN_DELAY = 0.2  # s, of the late master
 DROP = (128.0, 138.0)  # s: its silence, in the turn
@@ -116,40 +116,8 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         "late": draw_panels(found, PANELS["late"], "A master 200 ms late, RMS over the runs (grey: turn)"),
         "open_choices": draw_sweeps(table, list(SWEEPS.values()), sweeps, STATES, "level@120-150"),
     }
-    captions = {
-        "figure_1": "Left one run, as the paper draws it; right the errors of all: thin single runs, thick their RMS, dashed the "
-        "filter's own sigma. Axes are linear; triangles: beyond the axis.",
-        "figure_2": "Left the estimate of one run, as the paper draws it, dotted the truth; right the errors of all runs.",
-        "figure_3": "To be compared with figure 1. (The paper's text pairs 1 with 2 and 3 with 4.)",
-        "figure_4": "To be compared with figure 2.",
-        "level": "RMS of both tilts over the runs. Above: velocity matching. Below: velocity and attitude matching.",
-        "matching": "Velocity (noise .2 m/s), position (1 m) and force (.02 m/s^2), with 12 states and with delay and arm.",
-        "late": "Left the delay is known, right 30 ms of it are not. Rows as they come, carried on along a line, taken at the "
-        "time at which they hold, and with the whole delay as a state.",
-        "open_choices": "What the paper does not state, changed one by one: level RMS in the turn; dashed: our choice.",
-    }
-    remarks = [
-        "Ours, as the paper does not say: IMU 100 Hz, master 10 Hz, latitude 34, VRW 10 ug/sqrt(Hz); initial misalignment "
-        "and biases drawn with the paper's figures as sigmas, P0 the same, delay 50 ms and 1 m an axis; closed loop; onset of the "
-        "turn .5 s.",
-        "Attitude matching: the master's attitude has 1 arcmin of white noise; the slave's first attitude is the master's, so "
-        "that its error is the unknown mounting, and P0 says so.",
-        "The acceleration that multiplies the delay is the master's: the slave's less that of the lever arm as estimated.",
-        "late_master: 200 ms that are known, in addition to the paper's 30 ms, and no rows from "
-        f"{DROP[0]:g} to {DROP[1]:g} s; figures in the turn are those of the seconds with rows.",
-        "accelerate and wing_rock have 4 m/s^2 and a rock of 20 deg; accelerate_10.5 and wing_rock_10.5 have as much as the turn: "
-        "10.5 m/s^2 for 25 s, and a rock of 47 deg (g tan 47 deg = 10.5 m/s^2).",
-        "banked_turn_flexed: the slave's seat bends by 3, 3 and 6 arcmin (pitch, roll, heading) with a correlation time of 5 s; "
-        "`flexure` has second-order Gauss-Markov states for it, 25 in all.",
-        "position and acceleration: noise 1 m and .02 m/s^2 (ours). In acceleration matching the arm is considered, not estimated, "
-        "and the delay begins with what velocity tells of it, at three times its sigma.",
-        "late_known, late_rough: 200 ms known, and 30 ms more that are not, with the paper's arm. `extrapolated`: along a line "
-        "through the rows of the last second; `past_state`: the row is taken at its own time and the state carried on from there; "
-        "`augmented`: nothing is known of the delay, .25 s in P0.",
-        *dependences(sweeps),
-        *(f"{name.replace('_', ' ')}: {words}" for name, words in seen.items()),
-    ]
-    return Study(TITLE, table, settle(RULES, table, {"flat_turn": str(seen["flat_turn"])}), drawings, captions, remarks)
+    remarks = [*dependences(sweeps), *(f"{name.replace('_', ' ')}: {words}" for name, words in seen.items())]
+    return TEXTS.study(table, drawings, remarks, flat_turn=str(seen["flat_turn"]), drop_from=DROP[0], drop_to=DROP[1])
 
 
 def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
