@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.course import errors_of
-from truenorth.damping.filters import Filter, run_filters
+from truenorth.damping.filters import Estimate, Filter, run_filters
 from truenorth.papers.damping.methods import R2, SPAN, SWITCH, filters_of, fused, left_of
 from truenorth.papers.damping.statistics import Signs, drawn_voyage
 from truenorth.papers.damping.truth import Voyage
@@ -41,7 +41,8 @@ def swept_signs(
         own, course, reference = drawn_voyage(voyage, c, seed, run)
         start = round(SWITCH / course.interval)
         usual = {name: kind for name, kind in filters_of(own, course, raw=False).items() if name in methods}
-        free, by_choice = errors_of(course, voyage.truth), {}
+        free = errors_of(course, voyage.truth)
+        by_choice: dict[tuple[str, float] | None, dict[str, Estimate]] = {}
         for case, (name, value) in cases.items():
             choice = None if name == "N" or value == chosen[name] else (name, value)  # None: the filters as they are
             if choice not in by_choice:

@@ -181,7 +181,7 @@ def as_it_came(
             go_on(setting, state, samples, [_rows(s, k) for s, k in zip(aiding, come, strict=True)], last=True)[1]
         )
         state = go_on(setting, state, samples, [_rows(s, k) for s, k in zip(aiding, new, strict=True)])[0]
-    ends = {name: np.concatenate([getattr(a, name)[-1:] for a in answers]) for name in KEPT}
+    ends: dict[str, Any] = {name: np.concatenate([getattr(a, name)[-1:] for a in answers]) for name in KEPT}
     return replace(answers[-1], **ends)
 
 
