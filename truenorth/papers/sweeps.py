@@ -161,15 +161,18 @@ def draw_sweeps(
             ax.set_xticks(sweep.values, [f"{v:g}" for v in sweep.values], fontsize=8)
             ax.xaxis.set_minor_locator(NullLocator())
             ax.margins(x=0.07)
-            ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            ax.yaxis.set_major_formatter("{x:g}")
-            ax.yaxis.set_minor_locator(NullLocator())
             depend = sum(s.depends for s in found if s.sweep == sweep)
             all_of = sum(s.sweep == sweep for s in found)
             unsettled = any(s.open for s in found if s.sweep == sweep)
             words = "too few runs to say" if unsettled else f"changes {depend} of {all_of} verdicts"
             ax.set_title(words if all_of else "no verdict to be changed", fontsize=9)
-        for ax in grid[::columns]:
+        low, high = grid[0].get_ylim()
+        for ax in grid[::columns]:  # the others share it
+            ax.yaxis.set_major_locator(
+                LogLocator(subs=(1.0, 2.0, 5.0) if high > 10.0 * low else (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
+            )
+            ax.yaxis.set_major_formatter("{x:g}")
+            ax.yaxis.set_minor_locator(NullLocator())
             ax.set_ylabel(f"{of.replace('_', ' ')} RMS at {when}, {unit}")
         for ax in grid[len(sweeps) :]:
             ax.set_visible(False)
