@@ -143,7 +143,7 @@ def draw_sweeps(
 
     of, _, at = quantity.partition("@")
     when = f"{at.replace('h', '')} {'h' if 'h' in at else 's'}"
-    columns = min(len(sweeps), ACROSS)
+    columns = 2 if len(sweeps) == 4 else min(len(sweeps), ACROSS)
     rows = -(-len(sweeps) // columns)
     with sheet(4.2 * columns + 0.6, 3.8 * rows + 0.6, rows, columns, sharey=True, legend=6) as (figure, axes):
         grid = np.reshape(axes, -1)
