@@ -234,6 +234,7 @@ def test_published_filters_find_the_body_on_an_indexer(ship, method):
     answer = align(record, ship.place, ship.imu, aid=aid, method=method)
     off, sigma = error(answer, body_attitude(ship, answer.time)), np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN
     assert answer.method == method
+    assert "the lever arm is as given" in answer.method_reason
     assert np.all(np.abs(off) < 4.0 * sigma)
     without = align(record, ship.place, ship.imu, aid=IndexerAid(ship.encoder), method=method)
     assert without.phi_covariance[2, 2] > 4.0 * answer.phi_covariance[2, 2]

@@ -144,16 +144,15 @@ def align_rotary(
         how = f"angles of {len(axes)} axes from {encoder.source}"
     if answer.history is not None and mount.C_sb is not None:
         answer = replace(answer, history=replace(answer.history, C_nb=answer.history.C_nb @ mount.C_sb[1:]))
+    why = "the base may sway: its own motion is fitted to the log"
+    if own in FADING:
+        arm_is = "of length zero, as none is given" if lever_arm is None else "as given"
+        why = f"{reason(own, factor_share(fine))}; the lever arm is {arm_is}"
     answer = replace(
         answer,
         C_nb=answer.C_nb @ C_sb_at,
         method=own,
-        method_reason=f"the IMU turns on an indexer ({how}), "
-        + (
-            reason(own, factor_share(fine))
-            if own in FADING
-            else "the base may sway: its own motion is fitted to the log"
-        ),
+        method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
