@@ -27,12 +27,15 @@ from truenorth.records import MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.motion import Moving
 from truenorth.simulation.scenario import Scenario, read_scenario
+from truenorth.simulation.streams import stream
 from truenorth.strapdown.level import NavigationState, mechanise
 
 Array = NDArray[np.float64]
 
 RUNS = 30
 RELEASE = 180.0  # s
+MOUNTING = float(np.radians(1.0))  # one sigma of each angle, drawn for each flight
+STREAM = 322
 NAMES = {"calibrated": "attitude and biases handed over", "attitude": "attitude alone"}
 CASES = {"manoeuvres": "turns and an acceleration", "straight": "straight flight"}
 
@@ -51,7 +54,8 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         for run in range(count):
             progress(f"{case}: flight {run + 1} of {count}")
             log = scenario.simulate(seed=seed, run=run, number=number, ideal=ideal)
-            master = scenario.simulate_aiding(seed=seed, run=run, number=number)["master"].record
+            seat = mounted(scenario, MOUNTING * stream(seed, number, run, STREAM).standard_normal(3))
+            master = seat.simulate_aiding(seed=seed, run=run, number=number)["master"].record
             time, one = released(log.record, master, scenario, motion, log.errors.gyro_bias, log.errors.accel_bias)
             found.append(one)
         _add(table, case, found, time)
@@ -68,6 +72,13 @@ def scenarios() -> dict[str, Scenario]:
     return {"manoeuvres": usual, "straight": read_scenario({**content, "motion": {**content["motion"], "legs": legs}})}
 
 
+def mounted(scenario: Scenario, angles: Array) -> Scenario:
+    """The scenario with the slave in the aircraft at these angles (heading, pitch, roll; rad), which nobody knows."""
+    content = scenario.to_mapping()
+    seat = [f"{angle!r} deg" for angle in np.degrees(angles).tolist()]
+    return read_scenario({**content, "master": {**content["master"], "mounting": seat}})
+
+
 def released(
     record: Any, master: MasterRecord, scenario: Scenario, motion: Moving, gyro_bias: Array, accel_bias: Array
 ) -> tuple[Array, dict[str, Any]]:
@@ -82,7 +93,7 @@ def released(
     """
     before = master[: int(np.searchsorted(master.time, RELEASE))]
     answer = align_transfer(
-        record.between(None, RELEASE), before, scenario.imu_spec, matching="both", mounting_sigma=np.radians(1.0)
+        record.between(None, RELEASE), before, scenario.imu_spec, matching="both", mounting_sigma=MOUNTING
     )
     assert answer.transfer is not None
     at = motion.states(np.array(answer.time))
