@@ -44,7 +44,10 @@ RUNS = 30
 STREAM = 321
 LEVEL, HEADING, VELOCITY, PLACE = math.radians(0.1), math.radians(2.0), 0.1, 1.0  # sigmas of the start
 LAG = 0.5  # s, sigma of a lag that is a state
-LATER = 100.0  # s: errors are counted from then on
+LATER, JUDGED = (
+    100.0,
+    250.0,
+)  # s: errors are counted from then on, and held against their sigmas; at the end nothing is on its way
 NAMES = {
     "in_time": "no lag",
     "real_time": "lag known, what has come by now",
@@ -84,8 +87,10 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         for i, (quantity, unit, scale) in enumerate(
             (("east", "m", 1.0), ("north", "m", 1.0), ("heading", "arcmin", ARCMIN))
         ):
-            last, claimed = errors[:, -1, i] / scale, sigmas[:, -1, i] / scale
-            table.errors("traffic", name, quantity, last, unit, claimed, time=float(time[-1]))
+            at = int(np.searchsorted(time, JUDGED))
+            table.errors(
+                "traffic", name, quantity, errors[:, at, i] / scale, unit, sigmas[:, at, i] / scale, time=JUDGED
+            )
         if name == "states":
             for i, quantity in enumerate(("odometer_lag", "gnss_lag")):
                 table.errors("traffic", name, quantity, lags[:, i], "s", time=float(time[-1]))
