@@ -86,6 +86,20 @@ def test_a_function_is_tried(system):
         replace(system, transition=forgetful)
 
 
+def test_other_arrays_are_checked_and_functions_not_tried_again(system, monkeypatch):
+    replaced = replace(system, x0=system.x0 + 1.0)
+    monkeypatch.setattr("truenorth.filters.nonlinear_system._try", lambda *_: pytest.fail("tried again"))
+    other = system.with_arrays(x0=system.x0 + 1.0)
+    for name in system.axes:
+        np.testing.assert_array_equal(getattr(other, name), getattr(replaced, name))
+    assert other.transition is system.transition
+    np.testing.assert_array_equal(system.x0 + 1.0, other.x0)
+    with pytest.raises(DataError, match="x0 is inf"):
+        system.with_arrays(x0=np.full_like(system.x0, np.inf))
+    with pytest.raises(UsageError, match="n = 2 as in x0"):
+        system.with_arrays(x0=system.x0[..., :2])
+
+
 @matrix_function
 def a_sign_is_wrong(x, p, out):
     s, c = np.sin(x[2]), np.cos(x[2])

@@ -201,7 +201,7 @@ def run_loop(
                 measurement_jacobian=model.measurement_jacobian,
             )
         else:
-            system = replace(system, z=z[:, None, :], p=p[:, None, :])
+            system = system.with_arrays(z=z[:, None, :], p=p[:, None, :])
         found = kind.run(system, state, gate)
         if tracking:
             out.acted[:] += found.adaptation[:, -1, 0] > 1.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import Any, Literal, TypedDict, TypeVar, get_args
 
 import numpy as np
@@ -77,7 +76,7 @@ def drive(
     if history not in get_args(History):
         raise UsageError(f'history is {history!r}, expected "last", "sigma" or "full"')
     if state is not None:
-        system = replace(system, x0=state.x, P0=state.P)  # type: ignore[type-var]
+        system = system.with_arrays(x0=state.x, P0=state.P)
     shape, epochs = system.runs, system.epochs
     runs = flatten(system, shape)
     keep_innovations = history != "last" if innovations is None else innovations

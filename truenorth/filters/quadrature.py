@@ -10,6 +10,7 @@ der Merwe, The unscented Kalman filter for nonlinear estimation, 2000 (alpha, be
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ class QuadratureRule(NamedTuple):
     covariance: Array  # (M,): weights of second moments about the mean; differ from `mean` in the unscented rule only
 
 
+@cache
 def gauss_hermite_rule(dimensions: int, order: int) -> QuadratureRule:
     """Tensor product of Gauss and Hermite's rule: ``order**dimensions`` nodes.
 

@@ -75,6 +75,10 @@ class System(ABC):
         """Shape of the run axes; ``()`` for a single run."""
         return np.broadcast_shapes(*(a.shape[: a.ndim - len(self.axes[name])] for name, a in self._arrays()))
 
+    def with_arrays(self: S, **arrays: Array) -> S:
+        """The same system with other arrays of some names."""
+        return replace(self, **arrays)  # type: ignore[type-var]
+
     def between(self: S, start: int, stop: int) -> S:
         """Epochs ``start <= k < stop``; go on from the state that a filter left behind epoch ``start - 1``."""
         cut = {}
