@@ -67,7 +67,7 @@ def index_page(studies: Mapping[str, Any]) -> str:
 def _summary(claims: Sequence[Any]) -> str:
     """How many of the claims have which verdict."""
     settled = Counter(claim.verdict for claim in claims)
-    verdicts = ", ".join(f"{_(verdict)} {settled[verdict]}" for verdict in BEST_FIRST if settled[verdict])
+    verdicts = ", ".join(f"{settled[verdict]} × {_(verdict)}" for verdict in BEST_FIRST if settled[verdict])
     return _("Of {count} claims: {verdicts}.").format(count=len(claims), verdicts=verdicts)
 
 
