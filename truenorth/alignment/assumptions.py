@@ -47,5 +47,6 @@ def refuse(method: str, choices: Sequence[str]) -> NoReturn:
     """
     known = {**dict.fromkeys(STAYING, "a base that stays"), **dict.fromkeys(MOVING, "a vehicle with an odometer")}
     known |= {"states10": LEVEL, "states8": LEVEL}
-    what = f"that of {known[method]}" if method in known else "not known"
-    raise UsageError(f"method {method!r} is {what}; choose one of {', '.join(choices)}")
+    if method in known:
+        raise UsageError(f"method {method!r} is that of {known[method]}; choose one of {', '.join(choices)}")
+    raise UsageError(f"method {method!r} is not known; choose one of {', '.join(choices)}")

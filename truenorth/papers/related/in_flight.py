@@ -148,5 +148,7 @@ def draw_released(since: Array, curves: Mapping[tuple[str, str], Array]) -> Figu
             rms = np.sqrt(np.mean(errors**2, axis=0))
             label, dash = f"{NAMES[method]}, {CASES[case]}", "-" if case == "manoeuvres" else "--"
             ax.plot(since, rms, dash, color=COLOURS[number % 2], linewidth=1.2, label=label)
-        ax.set(xlabel="time since the release, s", ylabel="place, m", xlim=(0.0, since[-1]), yscale="log", ylim=(0.1, None))
+        ax.set(
+            xlabel="time since the release, s", ylabel="place, m", xlim=(0.0, since[-1]), yscale="log", ylim=(0.1, None)
+        )
     return figure
