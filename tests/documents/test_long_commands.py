@@ -38,8 +38,8 @@ def run(folder: Path, *words: str) -> None:
 def simulate(folder: Path, name: str, **changes: object) -> Path:
     """A scenario of the package, perhaps shorter, as CSV."""
     content = yaml.safe_load((SCENARIOS / f"{name}.yaml").read_text(encoding="utf-8")) | changes
-    (folder / f"{name}.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    run(folder, "simulate", f"{name}.yaml", "--csv", "--no-plot", "-o", name)
+    (folder / "scenario.yaml").write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    run(folder, "simulate", "scenario.yaml", "--csv", "--no-plot", "-o", name)
     return folder / name
 
 
@@ -56,7 +56,7 @@ def test_a_turntable(tmp_path):
 
 
 def test_a_voyage(tmp_path):
-    logs = simulate(tmp_path, "marine_damping", duration="6 h")
+    logs = simulate(tmp_path, "marine_damping", duration="6 h", imu="navigation", errors={})
     (logs / "imu.csv").rename(tmp_path / "voyage.csv")
     (logs / "velocity_log.csv").rename(tmp_path / "log.csv")
     run(

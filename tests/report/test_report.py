@@ -183,3 +183,8 @@ def test_a_failure_leaves_nothing_half_written(aligned, tmp_path, monkeypatch):
     with pytest.raises(UsageError, match="No space left"):
         write_report(aligned, tmp_path / "report.html")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_zero_but_for_rounding_is_zero():
+    assert short(3e-17) == "0"
+    assert short(-0.0123456) == "-0.0123"

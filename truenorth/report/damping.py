@@ -44,7 +44,7 @@ def _log(damping: Damping, clock: Clock) -> Panel | None:
     log = damping.log
     if log is None or not log.names:
         return None
-    chart = Chart([f"{_(name)}, {SHOWN[unit][1]}" for name, unit in _unique(log)], over_time(clock))
+    chart = Chart([f"{_(name)}<br>{SHOWN[unit][1]}" for name, unit in _unique(log)], over_time(clock))
     row, t = {name: i for i, (name, _unit) in enumerate(_unique(log))}, clock(log.time)
     for i, (name, unit) in enumerate(zip(log.names, log.units, strict=True)):
         scale, number = SHOWN[unit][0], log.names[:i].count(name)

@@ -6,10 +6,12 @@ import numpy as np
 
 from truenorth.core.units import parse_unit
 
+LEAST = 1e-12  # of any quantity in its unit
+
 
 def short(x: float) -> str:
-    """Three significant digits, never with an exponent."""
-    return str(np.format_float_positional(x, precision=3, fractional=False, trim="-"))
+    """Three significant digits, never with an exponent; what is zero but for rounding is zero."""
+    return "0" if abs(x) < LEAST else str(np.format_float_positional(x, precision=3, fractional=False, trim="-"))
 
 
 def quantity(value: float, unit: str) -> str:
