@@ -15,6 +15,7 @@ from truenorth.core.position import Position
 from truenorth.quality import inspect
 from truenorth.records.specs import imu_spec
 from truenorth.report import write_report
+from truenorth.report.numbers import short
 from truenorth.results import save
 from truenorth.simulation import rest, simulate
 
