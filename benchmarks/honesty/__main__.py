@@ -6,7 +6,7 @@ into the page. The worlds are drawn from seed and run.
 
 from __future__ import annotations
 
-from benchmarks.honesty import circling, damping, moving, navigation, staying, transfer, turning, underway
+from benchmarks.honesty import circling, damping, driving, moving, navigation, staying, transfer, turning, underway
 from benchmarks.honesty.frame import main
 from benchmarks.honesty.harness import framed
 
@@ -19,6 +19,7 @@ CASES = (
     *damping.CASES,
     *navigation.CASES,
     *circling.CASES,
+    *driving.CASES,
 )
 
 if __name__ == "__main__":

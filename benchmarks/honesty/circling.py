@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.honesty.frame import Case, Outcome, main
 from benchmarks.honesty.voyage import DEG
@@ -17,13 +18,67 @@ from truenorth.core.earth import radii
 from truenorth.core.position import Position
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.records import GnssRecord
-from truenorth.records.specs import imu_spec
+from truenorth.records.motion import Moving
+from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import ideal_log, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import s_turn, straight, turn
 from truenorth.state.layout import BA, BG, DP, DV, PHI
 
+Array = NDArray[np.float64]
 ARM = np.array([0.3, 0.5, 0.8])  # m, to the antenna
+PLACE, SPEED = 1.0, 0.05  # m, m/s: white noise of the fixes
+
+
+def drawn_start(motion: Moving, spec: ImuSpec, rng: np.random.Generator) -> Start:
+    """A start whose level (.2 deg), heading (2 deg), velocity and place are off as its covariance says."""
+    sigma = np.concatenate([np.repeat([0.2 * DEG, 0.05, 2.0], 3), np.zeros(6)])
+    sigma[2] = 2.0 * DEG
+    x0 = sigma * rng.standard_normal(15)
+    sigma[BG], sigma[BA] = spec.gyro_bias, spec.accel_bias
+    at = motion.states(np.array([0.0]))
+    R_M, R_N = radii(at.lat[0])
+    lat, lon = at.lat[0] + x0[DP][1] / R_M, at.lon[0] + x0[DP][0] / (R_N * np.cos(at.lat[0]))
+    C = dcm_from_rotation_vector(-x0[PHI]) @ at.C_nb[0]
+    zero = np.zeros(3)
+    return Start(0.0, C, at.v_n[0] + x0[DV], lat, lon, at.alt[0] + x0[DP][2], zero, zero, np.diag(sigma**2))
+
+
+def received(motion: Moving, duration: float, every: float, rng: np.random.Generator) -> Gnss:
+    """Fixes of an antenna on its arm, with velocities."""
+    time = np.arange(0.4, duration, every)
+    fix = motion.states(time)
+    R_M, R_N = radii(fix.lat[0])
+    antenna = fix.v_n + np.einsum("kij,kj->ki", fix.C_nb, np.cross(fix.w_ib_b, ARM))
+    arm = np.einsum("kij,j->ki", fix.C_nb, ARM)
+    noise = rng.standard_normal((2, len(time), 3)) * np.array([PLACE, SPEED])[:, None, None]
+    off = arm + noise[0]
+    record = GnssRecord(
+        time,
+        fix.lat + off[:, 1] / R_M,
+        fix.lon + off[:, 0] / (R_N * np.cos(fix.lat)),
+        fix.alt + off[:, 2],
+        v_n=antenna + noise[1],
+        position_sigma=np.full_like(off, PLACE),
+        velocity_sigma=np.full_like(off, SPEED),
+    )
+    return Gnss(record, Mounting(lever_arm=ARM))
+
+
+def compared(result: Any, motion: Moving, times: tuple[float, ...]) -> Outcome:
+    """Errors of a navigation over its sigmas at some times."""
+    k = [int(np.argmin(np.abs(result.time - t))) for t in times]
+    true = motion.states(result.time[k])
+    phi = np.array([-rotation_vector_from_dcm(a @ b.T) for a, b in zip(result.C_nb[k], true.C_nb, strict=True)])
+    s = result.track.sigma[k]
+    ratio = phi / s[:, PHI]
+    R_M, R_N = radii(true.lat)
+    lat, lon, alt = (result.position[k] - np.stack([true.lat, true.lon, true.alt], axis=1)).T
+    dp = np.stack([lon * (R_N + true.alt) * np.cos(true.lat), lat * (R_M + true.alt), alt], axis=1) / s[:, DP]
+    dv = (result.v_n[k] - true.v_n) / s[:, DV]
+    bad = "" if result.status == "navigated" else f"{result.status}: {result.reasons[0]}"
+    said = f"sigma {np.degrees(s[-1, PHI]).round(3)} deg"
+    return Outcome({"heading": ratio[:, 2], "level": ratio[:, :2], "velocity": dv, "position": dp}, bad, said)
 
 
 def circling(grade: str, circles: float, **options: Any) -> Any:
@@ -42,41 +97,10 @@ def circling(grade: str, circles: float, **options: Any) -> Any:
         motion = course(place, legs, heading=rng.uniform(0.0, 6.28), speed=8.0)
         duration = 45.0 + 30.0 * circles
         sim = simulate(ideal_log(motion, rate=50.0, duration=duration), imu=spec, seed=seed, run=number)
-        sigma = np.concatenate([np.repeat([0.2 * DEG, 0.05, 2.0], 3), np.zeros(6)])
-        sigma[2] = 2.0 * DEG
-        x0 = sigma * rng.standard_normal(15)
-        sigma[BG], sigma[BA] = spec.gyro_bias, spec.accel_bias
-        at = motion.states(np.array([0.0]))
-        R_M, R_N = radii(at.lat[0])
-        lat, lon = at.lat[0] + x0[DP][1] / R_M, at.lon[0] + x0[DP][0] / (R_N * np.cos(at.lat[0]))
-        C = dcm_from_rotation_vector(-x0[PHI]) @ at.C_nb[0]
-        start = Start(
-            0.0, C, at.v_n[0] + x0[DV], lat, lon, at.alt[0] + x0[DP][2], np.zeros(3), np.zeros(3), np.diag(sigma**2)
-        )
-        fix = motion.states(np.arange(0.4, duration, 0.2))
-        antenna = fix.v_n + np.einsum("kij,kj->ki", fix.C_nb, np.cross(fix.w_ib_b, ARM))
-        arm = np.einsum("kij,j->ki", fix.C_nb, ARM)
-        noise = rng.standard_normal((2, len(fix.lat), 3)) * np.array([1.0, 0.05])[:, None, None]
-        off = arm + noise[0]
-        record = GnssRecord(
-            np.arange(0.4, duration, 0.2),
-            fix.lat + off[:, 1] / R_M,
-            fix.lon + off[:, 0] / (R_N * np.cos(fix.lat)),
-            fix.alt + off[:, 2],
-            v_n=antenna + noise[1],
-            position_sigma=np.ones_like(off),
-            velocity_sigma=np.full_like(off, 0.05),
-        )
-        result = navigate(sim.record, start, aid=Gnss(record, Mounting(lever_arm=ARM)), imu=spec, **options)
-        k = [int(np.argmin(np.abs(result.time - t))) for t in (0.35 * duration, 0.6 * duration, duration)]
-        true = motion.states(result.time[k])
-        phi = np.array([-rotation_vector_from_dcm(a @ b.T) for a, b in zip(result.C_nb[k], true.C_nb, strict=True)])
-        s = result.track.sigma[k]
-        ratio = phi / s[:, PHI]
-        bad = "" if result.status == "navigated" else f"{result.status}: {result.reasons[0]}"
-        said = f"sigma {np.degrees(s[-1, PHI]).round(3)} deg"
-        dv = (result.v_n[k] - true.v_n) / s[:, DV]
-        return Outcome({"heading": ratio[:, 2], "level": ratio[:, :2], "velocity": dv}, bad, said)
+        start = drawn_start(motion, spec, rng)
+        fixes = received(motion, duration, 0.2, rng)
+        result = navigate(sim.record, start, aid=fixes, imu=spec, **options)
+        return compared(result, motion, (0.35 * duration, 0.6 * duration, duration))
 
     return run
 

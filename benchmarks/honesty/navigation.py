@@ -73,9 +73,11 @@ def with_log(true: LogErrors, assumed: LogErrors | None) -> Any:
 
 CASES = (
     Case("navigation, free", "plumb line straight", navigated(NONE, NONE)),
+    Case("navigation, free", "plumb line straight, deflection assumed", navigated(NONE, PLUMB)),
     Case("navigation, free", "deflection 6 arcsec over 20 km, not modelled", navigated(PLUMB, NONE), left_out=True),
     Case("navigation, free", "deflection 6 arcsec over 20 km", navigated(PLUMB, PLUMB)),
     Case("navigation, GNSS", "plumb line straight", navigated(NONE, NONE, "gnss", 6.0)),
+    Case("navigation, GNSS", "plumb line straight, deflection assumed", navigated(NONE, PLUMB, "gnss", 6.0)),
     Case(
         "navigation, GNSS",
         "deflection 6 arcsec over 20 km, not modelled",

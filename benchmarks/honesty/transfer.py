@@ -53,8 +53,8 @@ def straight_flight() -> Any:
     return course(Position.from_degrees(62.0, 20.0, 3000.0), straight(400.0), heading=0.6, speed=150.0)
 
 
-def transferred(motion: Any, errors: MasterErrors | None) -> Any:
-    """A run against a master with these errors; None: it is taken for the truth."""
+def transferred(motion: Any, errors: MasterErrors | None, grade: str = "tactical") -> Any:
+    """A run of a slave of a grade against a master with these errors; None: it is taken for the truth."""
 
     def run(seed: int, number: int) -> Outcome:
         rng = np.random.default_rng([seed, number])
@@ -71,7 +71,7 @@ def transferred(motion: Any, errors: MasterErrors | None) -> Any:
             attitude_noise=ARCMIN,
             **sigma,
         )
-        way, spec = motion(), imu_spec("tactical")
+        way, spec = motion(), imu_spec(grade)
         slave = simulate(way, rate=RATE, duration=SECONDS, imu=spec, seed=seed, run=number).record
         master = simulate_sensor(way, of_master, duration=SECONDS, seed=seed, run=number).record
         answer = align_transfer(slave, master, spec, master_errors=errors)

@@ -88,7 +88,8 @@ def _without(gnss, start, stop):
 
 
 def test_car_with_gnss_and_odometer(car):
-    """Innovations as large as expected; the car looks where it drives; the record's gap is bridged and told."""
+    """Innovations no larger than expected, smaller where the receiver's dilutions say more than it errs by; the car looks where it
+    drives; the record's gap is bridged and told."""
     imu, odometer, gnss, start, wheel = car
     result = navigate(
         imu, start, aid=[Gnss(gnss, RECEIVER), Odometer(odometer, wheel)], imu="consumer", zupt=[(1.0, 20.0)]
@@ -99,7 +100,7 @@ def test_car_with_gnss_and_odometer(car):
     assert told["GNSS position"]["rejected"] == 0
     assert told["odometer"]["rejected"] < 30
     for name in ("GNSS position", "odometer"):
-        assert 0.3 < told[name]["nis_over_rows"] < 1.5
+        assert 0.2 < told[name]["nis_over_rows"] < 1.5
     forward = np.einsum("kij,j->ki", result.C_nb, wheel.C_mb[1])
     fast = np.hypot(result.v_n[:, 0], result.v_n[:, 1]) > 4.0
     course = np.arctan2(result.v_n[fast, 0], result.v_n[fast, 1])

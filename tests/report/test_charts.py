@@ -2,15 +2,19 @@
 
 import base64
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from truenorth.alignment.transfer_result import Relation
 from truenorth.core.units import significant
 from truenorth.figures.convergence import Course
 from truenorth.report.chart import Chart, Clock, angle_unit, length_unit, speed_unit
 from truenorth.report.charts import _convergence, _sigmas
 from truenorth.report.coast import coast_within
+from truenorth.report.transfer import transfer_panels
+from truenorth.state.track import Residuals
 
 T = np.arange(20.0)
 ANGLES = [Course(name, 0.1 / (1 + T), 0.2 / (1 + T), np.full(20, 0.005)) for name in ("heading", "pitch", "roll")]
@@ -103,3 +107,20 @@ def test_no_coast_jumps():
     lon, lat = coast_within(44.0, 60.0, 117.0, 164.0)
     steps = np.hypot(np.diff(lon), np.diff(lat))
     assert np.nanmax(steps) < 1.5
+
+
+def test_a_transfer_shows_what_it_found_on_the_way():
+    """Delay and arm with bands, no mounting where it was given, innovations of what the page does not show already."""
+    one, three = np.full(20, 0.02), np.full((20, 3), 0.5)
+    course = Relation(T, one, one / 4.0, three, three, three, np.zeros((20, 3)))
+    axes = ("east", "north", "up")
+    sources = [
+        Residuals(name, T, three, three, one, one > 0.0, 0, T, one < 0.0, unit, axes)
+        for name, unit in (("master velocity", "m/s"), ("master attitude", "rad"))
+    ]
+    panels = transfer_panels(SimpleNamespace(course=course, residuals=sources), "velocity of the master")
+    assert [panel.title for panel in panels] == ["Delay of the master", "Lever arm", "Innovations: master attitude"]
+    delay = panels[0].chart.data
+    assert [trace.get("fill") for trace in delay] == ["toself", None]
+    np.testing.assert_allclose(decoded(delay[1]["y"]), 20.0)  # ms
+    assert transfer_panels(None, "") == []

@@ -42,6 +42,7 @@ from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
+from truenorth.errors.axes import standing
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
@@ -140,8 +141,14 @@ def align_in_motion(
     """
     tell = progress or (lambda stage: None)
     body = in_body_axes(odometer, velocity)
+
+    def model_of(spec: ImuSpec) -> InsModel:
+        # A gate that begins with any heading must bear what constants do not hold: without noise in turns the filter loses a cart
+        # (`stim300_cart_chicago`) whose axes are not constants.
+        return InsModel.from_spec(spec, standing=standing(), unsteady=True, groups=groups_of(errors, spec))
+
     task = moving_task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
-    task = replace(task, model=InsModel.from_spec(task.spec, groups=groups_of(errors, task.spec)), slow=velocity_errors)
+    task = replace(task, model=model_of(task.spec), slow=velocity_errors)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
         refuse(method, choices)
     if not heading_limit > 0.0 or passes < 1:
@@ -154,8 +161,7 @@ def align_in_motion(
     unknown = position is None and not has_fixes(gnss)
 
     def aligned(spec: ImuSpec) -> Alignment:
-        other = InsModel.from_spec(spec, groups=groups_of(errors, spec))
-        return _aligned(replace(task, spec=spec, model=other), method, heading_limit, passes, unknown, tell)
+        return _aligned(replace(task, spec=spec, model=model_of(spec)), method, heading_limit, passes, unknown, tell)
 
     answer = _aligned(task, method, heading_limit, passes, unknown, tell)
     return name_specification(answer, aligned)
@@ -281,6 +287,7 @@ def _answer(task: MovingTask, track: Track, method: str, why: str, spread: float
     speed = np.linalg.norm(track.v_n, axis=1)
     distance = float(np.trapezoid(speed, track.time))
     prior = np.sqrt(task.spec.bias_variance)
+    prior[3:] = np.hypot(prior[3:], np.sqrt(task.spec.acting_variance(standing())))
     moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting)
     delays = {
         name: (sensor.latency + found[0], found[1])

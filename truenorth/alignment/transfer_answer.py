@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.matching import Matched
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
-from truenorth.alignment.transfer_result import Transfer
+from truenorth.alignment.transfer_result import Relation, Transfer
 from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_verdict import judge_transfer
@@ -167,6 +167,24 @@ def _transfer(
         position_noise=fitted["position"],
         acceleration_noise=fitted["acceleration"],
         residuals=track.residuals,
+        course=_course(model, assumed, track),
+    )
+
+
+def _course(model: TransferModel, assumed: Assumed, track: TransferTrack) -> Relation:
+    """Delay, lever arm and mounting row by row."""
+    k = np.arange(0, len(track.time), max(1, -(-len(track.time) // MOST_ROWS)))
+    aux, sigma, C_mb = track.aux[k], track.sigma[k], track.C_mb[k]
+    tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
+    none, nothing = np.zeros(len(k)), np.zeros((len(k), 3))
+    return Relation(
+        track.time[k],
+        assumed.delay + (none if tau is None else aux[:, tau][:, 0]),
+        none if tau is None else sigma[:, tau][:, 0],
+        assumed.lever_arm + (nothing if arm is None else aux[:, arm]),
+        nothing if arm is None else sigma[:, arm],
+        _signed(np.stack(euler_from_dcm(C_mb), axis=1)),
+        np.array([sigma_of_mounting(P, mount, C) for P, C in zip(track.P[k], C_mb, strict=True)]),
     )
 
 

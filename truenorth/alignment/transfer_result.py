@@ -17,6 +17,19 @@ NOT_ESTIMATED = 0.9  # of its prior sigma: what stays above has not been estimat
 
 
 @dataclass(frozen=True)
+class Relation:
+    """How the slave sits on its master as known at each time, (K,) and (K, 3), in the units of :class:`Transfer`."""
+
+    time: Array  # s
+    delay: Array
+    delay_sigma: Array
+    lever_arm: Array
+    lever_arm_sigma: Array
+    mounting: Array
+    mounting_sigma: Array
+
+
+@dataclass(frozen=True)
 class Transfer:
     """Relation of the slave to its master, each with one-sigma now and before; sigma 0 where it was taken as known.
 
@@ -50,6 +63,8 @@ class Transfer:
         What was found and mended on the way: delay of another clock, drop-outs.
     residuals : tuple of Residuals
         Of the master's rows, source by source.
+    course : Relation or None
+        Delay, lever arm and mounting on the way.
     """
 
     matching: str
@@ -76,6 +91,7 @@ class Transfer:
     position_noise: float = math.nan
     acceleration_noise: float = math.nan
     residuals: tuple[Residuals, ...] = ()
+    course: Relation | None = None
 
     @property
     def delay_estimated(self) -> bool:

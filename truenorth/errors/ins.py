@@ -132,17 +132,15 @@ def error_dynamics(C: Any, f: Any, v: Any, axis: Any, alt: float, north: bool, f
 
 
 @compiled
-def couple_sensors(C: Any, w: Any, f_b: Any, at: Any, fixed_altitude: bool, F: Any) -> None:
-    """Fill in the columns by which slow biases and scale factors act as gyro and accelerometer errors.
+def couple_sensors(C: Any, at: Any, fixed_altitude: bool, F: Any) -> None:
+    """Fill in the columns by which slow biases act as gyro and accelerometer errors.
 
     Parameters
     ----------
     C : (3, 3) array
         Body to level frame.
-    w, f_b : (3,) arrays, rad/s and m/s^2
-        Measured rate and specific force, body axes.
-    at : (4,) array of int
-        First state of the slow gyro and accelerometer bias, of the gyro and accelerometer scale factor; -1: none.
+    at : (2,) array of int
+        First state of the slow gyro and accelerometer bias; -1: none.
     fixed_altitude : bool
         Vertical velocity is zero: nothing drives it.
     F : (N, N) array
@@ -151,14 +149,8 @@ def couple_sensors(C: Any, w: Any, f_b: Any, at: Any, fixed_altitude: bool, F: A
         for j in range(3):
             if at[0] >= 0:
                 F[_PHI + i, at[0] + j] = -C[i, j]
-            if at[2] >= 0:
-                F[_PHI + i, at[2] + j] = -C[i, j] * w[j]
-            if fixed_altitude and i == 2:
-                continue
-            if at[1] >= 0:
+            if at[1] >= 0 and not (fixed_altitude and i == 2):
                 F[_DV + i, at[1] + j] = C[i, j]
-            if at[3] >= 0:
-                F[_DV + i, at[3] + j] = C[i, j] * f_b[j]
 
 
 @compiled

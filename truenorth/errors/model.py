@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,18 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.compiled import compiled
 from truenorth.core.linalg import padded
+from truenorth.errors.axes import axis_groups
 from truenorth.errors.dynamics import Dynamics, couple_pairs, dynamics_of, noise_of_pairs
-from truenorth.errors.group import Group
+from truenorth.errors.group import Group, columns_at
 from truenorth.errors.ins import TURN_TIME, couple_sensors, error_dynamics, transition
 from truenorth.errors.intervals import Intervals
 from truenorth.errors.walks import Walks
 from truenorth.records.specs import ImuSpec
-from truenorth.state.layout import BA, BG, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
+from truenorth.state.layout import BA, BG, DV, GYRO_AXES, PHI, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
+from truenorth.state.now import NOW_C, NOW_FORCE_B, NOW_FORCE_W, NOW_LENGTH, NOW_MEAN_RATE, NOW_SINCE
 from truenorth.state.prior import joined
 
 Array = NDArray[np.float64]
-
-GYRO_SCALE, ACCEL_SCALE = "gyro scale factor", "accelerometer scale factor"
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,9 @@ class InsModel(Walks):
         cls,
         spec: ImuSpec,
         *,
-        scale_factors: bool = False,
+        standing: ArrayLike | None = None,
+        every_axis: bool = False,
+        unsteady: bool = False,
         groups: tuple[Group, ...] = (),
         fixed_altitude: bool = False,
     ) -> InsModel:
@@ -48,26 +49,30 @@ class InsModel(Walks):
 
         Parameters
         ----------
-        scale_factors : bool
-            States for the scale factors; else they count as noise in turns, as the gyros' misalignments do.
+        standing : (3,) array, optional, m/s^2
+            Specific force at rest as the vehicle stands at the start, body axes: scale factors and misalignments are states
+            (:mod:`truenorth.errors.axes`). Without it those of the gyros count as noise in turns, those of the accelerometers not.
+        every_axis : bool
+            Such states even where their effect is small.
+        unsteady : bool
+            Those of the gyros are no constants: they count as noise in turns as well.
         groups : tuple of Group
             On top.
         """
         own: list[Group] = []
-        for name, sigma, time in (
-            (SLOW_GYRO, spec.gyro_bias_instability, spec.correlation_time),
-            (SLOW_ACCEL, spec.accel_bias_instability, spec.correlation_time),
-            (GYRO_SCALE, spec.gyro_scale_factor * scale_factors, math.inf),
-            (ACCEL_SCALE, spec.accel_scale_factor * scale_factors, math.inf),
+        for name, sigma in (
+            (SLOW_GYRO, spec.gyro_bias_instability),
+            (SLOW_ACCEL, spec.accel_bias_instability),
         ):
             if sigma > 0.0:
-                own.append(Group(name, np.full(3, sigma), time))
-        scale = 0.0 if scale_factors else spec.gyro_scale_factor
+                own.append(Group(name, np.full(3, sigma), spec.correlation_time))
+        axes = () if standing is None else axis_groups(spec, standing, always=every_axis)
+        as_noise = TURN_TIME if unsteady or not any(group.name == GYRO_AXES for group in axes) else 0.0
         return cls.of(
             spec,
             "state",
-            turn_noise=(scale**2 * TURN_TIME, spec.gyro_misalignment**2 * TURN_TIME),
-            groups=(*own, *groups),
+            turn_noise=(spec.gyro_scale_factor**2 * as_noise, spec.gyro_misalignment**2 * as_noise),
+            groups=(*own, *axes, *groups),
             fixed_altitude=fixed_altitude,
         )
 
@@ -83,8 +88,8 @@ class InsModel(Walks):
 
     @property
     def sensor_states(self) -> NDArray[np.int64]:
-        """(4,) what :func:`couple_sensors` asks for."""
-        return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL, GYRO_SCALE, ACCEL_SCALE)])
+        """(2,) what :func:`couple_sensors` asks for."""
+        return np.array([self.layout.first_of(name) for name in (SLOW_GYRO, SLOW_ACCEL)])
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -113,14 +118,13 @@ class InsModel(Walks):
         ``Q = (Phi q Phi' + q) T/2``: the noise's density by the trapezoid.
         """
         T, C, f, v, w_b = along.T, along.C_nb, along.f_n, along.v_n, along.w_ib_b
-        f_b = np.einsum("kij,ki->kj", C, f)
         n = self.states
         Phi = np.empty((len(T), n, n))
         fixed, at = self.fixed_altitude, self.sensor_states
         dynamics = self.dynamics
         pairs = np.zeros((len(T), n, n))
         speed = np.ascontiguousarray(np.linalg.norm(v, axis=1))
-        _stack(padded(n), T, C, f, f_b, w_b, v, speed, along.axis, along.alt, fixed, at, dynamics, Phi, pairs)
+        _stack(padded(n), T, C, f, w_b, v, speed, along.axis, along.alt, fixed, at, dynamics, Phi, pairs)
         q = np.zeros((len(T), n, n))
         q[:, range(n), range(n)] = dynamics.noise + speed[:, None] * dynamics.wander
         square = w_b**2
@@ -135,7 +139,6 @@ def _stack(
     T: Any,
     C: Any,
     f_n: Any,
-    f_b: Any,
     w_b: Any,
     v: Any,
     speed: Any,
@@ -149,12 +152,29 @@ def _stack(
 ) -> None:
     N, n = len(size), len(dynamics.decay)
     F, Phi, Phi_t = np.zeros((N, N)), np.zeros((N, N)), np.zeros((N, N))
+    now, assumed = np.zeros(NOW_LENGTH), np.zeros(n)
     for k in range(len(T)):
         error_dynamics(C[k], f_n[k], v[k], axis[k], alt[k], True, fixed, F)
-        couple_sensors(C[k], w_b[k], f_b[k], at, fixed, F)
+        couple_sensors(C[k], at, fixed, F)
+        if len(dynamics.acts) > 0:
+            _describe(C[k], f_n[k], w_b[k], v[k], T[k], now)
+            for g in range(len(dynamics.acts)):
+                columns_at(dynamics.acts[g])(now, dynamics.figures[g], dynamics.first[g], assumed, F)
         transition(size, F, dynamics.decay + speed[k] * dynamics.along, T[k], Phi, Phi_t)
         couple_pairs(dynamics, F, T[k], Phi, Phi_t)
         noise_of_pairs(dynamics, Phi, pairs[k])
         for i in range(n):
             for j in range(n):
                 out[k, i, j] = Phi[i, j]
+
+
+@compiled
+def _describe(C: Any, f_n: Any, w_b: Any, v: Any, T: float, now: Any) -> None:
+    """What columns are given of an interval that is known in its middle: the attitude is that at its end."""
+    for i in range(3):
+        now[4 + i], now[NOW_MEAN_RATE + i], now[NOW_FORCE_W + i] = v[i], w_b[i], f_n[i]
+        now[NOW_FORCE_B + i] = C[0, i] * f_n[0] + C[1, i] * f_n[1] + C[2, i] * f_n[2]
+        for j in range(3):
+            a, b = (j + 1) % 3, (j + 2) % 3
+            now[NOW_C + 3 * i + j] = C[i, j] + 0.5 * T * (C[i, a] * w_b[b] - C[i, b] * w_b[a])
+    now[NOW_SINCE] = T

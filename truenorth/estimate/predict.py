@@ -17,6 +17,7 @@ from truenorth.state.now import (
     NOW_C,
     NOW_EARTH,
     NOW_FORCE,
+    NOW_FORCE_B,
     NOW_FORCE_W,
     NOW_GYRO_NOISE,
     NOW_MEAN_RATE,
@@ -60,15 +61,11 @@ def take_sample(
     f = (samples.dvel[i, 0], samples.dvel[i, 1], samples.dvel[i, 2])
     w = (w[0] - T * aux[9], w[1] - T * aux[10], w[2] - T * aux[11])
     f = (f[0] - T * aux[12], f[1] - T * aux[13], f[2] - T * aux[14])
-    a, b, c, d = sensors[0], sensors[1], sensors[2], sensors[3]
+    a, b = sensors[0], sensors[1]
     if a >= 0:
         w = (w[0] - T * aux[a], w[1] - T * aux[a + 1], w[2] - T * aux[a + 2])
     if b >= 0:
         f = (f[0] - T * aux[b], f[1] - T * aux[b + 1], f[2] - T * aux[b + 2])
-    if c >= 0:
-        w = (w[0] * (1.0 - aux[c]), w[1] * (1.0 - aux[c + 1]), w[2] * (1.0 - aux[c + 2]))
-    if d >= 0:
-        f = (f[0] * (1.0 - aux[d]), f[1] * (1.0 - aux[d + 1]), f[2] * (1.0 - aux[d + 2]))
     half = 0.5 * part * T
     for j in range(3):
         sums.vectors[1, j] += half * s[4 + j]
@@ -102,6 +99,7 @@ def describe(m: Memory, model: Model, now: Any) -> None:
         now[NOW_MEAN_RATE + j] = m.means.vectors[2, j]
         now[NOW_PUSH + j] = push[j]
         now[NOW_FORCE_W + j] = force[j]
+        now[NOW_FORCE_B + j] = m.means.vectors[3, j]
     for j in range(3):
         now[NOW_TURN + j] = m.means.vectors[2, j] - (
             C[0, j] * now[NOW_EARTH] + C[1, j] * now[NOW_EARTH + 1] + C[2, j] * now[NOW_EARTH + 2]
@@ -171,15 +169,19 @@ def predict_to_event(
     means.T[0], sums.T[0] = T, 0.0
     axis = earth_axis(m.s)
     error_dynamics(means.C, means.vectors[0], means.vectors[1], axis, m.s[11], False, model.fixed_altitude, F)
-    couple_sensors(means.C, means.vectors[2], means.vectors[3], model.sensors, model.fixed_altitude, F)
+    couple_sensors(means.C, model.sensors, model.fixed_altitude, F)
     if len(d.acts) > 0:
-        act(m, model, F, now, w.x)
+        act(m, model, F, now)
     n = len(d.decay)
     speed = (means.vectors[1, 0] ** 2 + means.vectors[1, 1] ** 2 + means.vectors[1, 2] ** 2) ** 0.5
     for i in range(n):
         rate[i] = d.decay[i] + speed * d.along[i]
     transition(size, F, rate, T, w.Phi, w.Phi_t)
     couple_pairs(d, F, T, w.Phi, w.Phi_t)
+    for g in range(len(d.acts)):
+        for i in range(DYNAMIC):
+            for j in range(d.first[g], d.first[g] + d.width[g]):
+                w.x[i] += w.Phi[i, j] * aux[j]  # what is assumed of a group that acts is taken off
     for i in range(n):
         w.Q[i, i] = 0.5 * T * (d.noise[i] + speed * d.wander[i])
     for i in range(9, n):
@@ -258,11 +260,10 @@ def propagate_errors(size: Any, pair: Any, Phi: Any, Phi_t: Any, Q: Any, P: Any,
 
 
 @compiled
-def act(m: Memory, model: Model, F: Any, now: Any, x: Any) -> None:
-    """Columns of the groups that act on the INS; what is assumed of them is taken off it."""
+def act(m: Memory, model: Model, F: Any, now: Any) -> None:
+    """Columns of the groups that act on the INS."""
     d = model.dynamics
     describe(m, model, now)
-    T = m.means.T[0]
     for g in range(len(d.acts)):
         first = d.first[g]
         for i in range(9):
@@ -273,4 +274,3 @@ def act(m: Memory, model: Model, F: Any, now: Any, x: Any) -> None:
             for j in range(first, first + d.width[g]):
                 if model.fixed_altitude and (i == 5 or i == 8):
                     F[i, j] = 0.0
-                x[i] += T * F[i, j] * m.aux[j]

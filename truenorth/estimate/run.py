@@ -12,6 +12,7 @@ from truenorth.aiding import row
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.linalg import padded
+from truenorth.errors.axes import known_as_bias
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.deflection import at_rest
 from truenorth.errors.model import InsModel
@@ -37,7 +38,7 @@ from truenorth.estimate.memory import (
 )
 from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
 from truenorth.records import ImuRecord
-from truenorth.state.layout import BA, BG
+from truenorth.state.layout import ACCEL_AXES, BA, BG
 from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
 from truenorth.strapdown import wander
@@ -81,6 +82,10 @@ def begin(
     deflected = model.layout.first_of(DEFLECTION)
     if prior is None and start.plumb > 0.0 and deflected >= 0:
         P0 = at_rest(P0, deflected, start.C_nb, start.lat, start.alt, start.plumb)
+    for group in model.groups if prior is None else ():
+        if group.name == ACCEL_AXES:
+            constant = None if start.whole is None else start.whole.constant[3:]
+            P0, aux = known_as_bias(P0, aux, group, model.layout.first_of(ACCEL_AXES), constant)
     place = np.array([[start.lat, start.lon, start.alt]])
     P0 = np.array(P0)[None]
     turn(np.linalg.inv(convergence(np.eye(3)[None], s[None, wander.VELOCITY], place)), P0)

@@ -21,6 +21,7 @@ from truenorth.aiding.aids import Aid
 from truenorth.aiding.source import Aiding
 from truenorth.alignment import Alignment
 from truenorth.core.errors import DataError
+from truenorth.errors.axes import standing
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
 from truenorth.estimate.run import begin, go_on, with_states
@@ -241,7 +242,9 @@ class Navigator:
             sources += feed.sources(self.altitude, self._mountings.get(key))
         sources.append(Aiding("gap", "velocity", np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), does="disturbance"))
         noise, fixed = self.spec.with_random_walks(self._interval), self.altitude == "fixed"
-        model = InsModel.from_spec(noise, groups=PLUMB_LINE.groups, fixed_altitude=fixed)
+        model = InsModel.from_spec(
+            noise, standing=standing(self.start.C_nb), groups=PLUMB_LINE.groups, fixed_altitude=fixed
+        )
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
         return Setting(with_states(model, sources), tuple(sources), stride, every)
 

@@ -16,6 +16,7 @@ from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.axes import standing
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
@@ -100,7 +101,7 @@ def navigate(
     imu : ImuSpec or str, optional
         Specification; the alignment's own when left out.
     scale_factors : bool
-        Estimate the IMU's scale factors.
+        Estimate the IMU's scale factors and misalignments even where they seem too small to matter.
     errors : sequence of Group or str
         Further error states of the INS, or names of plug-ins that make them.
     deflection : Deflection
@@ -143,8 +144,8 @@ def navigate(
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
     found = _sits_as_found(given, begin)
     height, why = kept_altitude(altitude, given)
-    fixed, groups = height == "fixed", groups_of((*errors, *deflection.groups), noise)
-    model = InsModel.from_spec(noise, scale_factors=scale_factors, groups=groups, fixed_altitude=fixed)
+    groups = groups_of((*errors, *deflection.groups), noise)
+    model = _model(begin, noise, groups, scale_factors, height)
     plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
@@ -181,6 +182,12 @@ def navigate(
     tell(f"damping: {damping.method}")
     fine = plan.finest() if reference is not None and plan.every > 1 else None
     return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, groups, fixes, fine)
+
+
+def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: bool, height: Altitude) -> InsModel:
+    """The INS of a specification, with these groups, as it stands at the start."""
+    force, fixed = standing(begin.C_nb), height == "fixed"
+    return InsModel.from_spec(noise, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 
 @dataclass(frozen=True)

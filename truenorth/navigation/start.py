@@ -17,6 +17,7 @@ from truenorth.core.earth import DEFLECTION, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError
 from truenorth.core.json_file import read_object
 from truenorth.core.position import Position
+from truenorth.errors.axes import standing
 from truenorth.navigation.handover import Handover
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.layout import BA, BG, PHI, STATES
@@ -146,7 +147,11 @@ def moving_start(
     spec: ImuSpec,
 ) -> Start:
     """Of an alignment on the move, which knows velocity and how all errors are correlated."""
-    whole = WholeBiases(spec.constant_variance)
+    constant = spec.constant_variance
+    constant[3:] += spec.acting_variance(
+        standing()
+    )  # scale factors and misalignments under gravity are a part of the bias
+    whole = WholeBiases(constant)
     lat, lon, alt = position.lat, position.lon, position.alt
     return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
 

@@ -10,6 +10,7 @@ from truenorth.core.language import translated as _
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.report.document import Table
 from truenorth.report.numbers import short
+from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
 
 if TYPE_CHECKING:
     from truenorth.alignment.moving import Moving
@@ -21,6 +22,7 @@ DEG = ("deg", 180.0 / np.pi)
 UNITS = {
     "lever arm": ("m", 1.0),
     "scale": ("%", 100.0),
+    "scale factors": ("ppm", 1e6),
     "mounting": DEG,
     "heading bias": DEG,
     "attitude bias": DEG,
@@ -29,6 +31,7 @@ UNITS = {
     "iron": ("% of the field", 100.0),
     "anomaly": ("% of the field", 100.0),
 }
+SCALES = {GYRO_AXES: "gyro scale factors", ACCEL_AXES: "accelerometer scale factors"}
 NOT_ESTIMATED = 0.9  # of its prior: a sigma above it
 AXES = ("x", "y", "z")
 
@@ -38,11 +41,13 @@ def estimated_rows(result: Navigation) -> list[tuple[str, str, str]]:
     rows = []
     priors = dict(zip(result.track.layout.names, result.track.layout.priors, strict=True))
     for name, found in result.estimated().items():
-        open_ = np.all(np.array(found["sigma"]) > NOT_ESTIMATED * np.array(priors[name]))
-        if name.startswith("slow") or (open_ and name == DEFLECTION):
-            continue  # the slow parts of the IMU's biases, which the track holds; a deflection of which the log shows nothing
+        own = slice(None, None, 4) if name in SCALES else slice(None)  # of nine elements by rows the diagonal
+        open_ = np.all(np.array(found["sigma"])[own] > NOT_ESTIMATED * np.array(priors[name])[own])
+        if name.startswith("slow") or (open_ and name in (DEFLECTION, *SCALES)):
+            continue  # the slow parts of the IMU's biases, which the track holds; what is of earth or IMU and does not show
+        name = SCALES.get(name, name)
         unit, factor = _unit(name)
-        value, sigma = (", ".join(short(factor * x) for x in found[key]) for key in ("value", "sigma"))
+        value, sigma = (", ".join(short(factor * x) for x in found[key][own]) for key in ("value", "sigma"))
         shown = _("not estimated") if open_ else f"{value} {_(unit)}"
         rows.append((_(name).capitalize().replace("Gnss", "GNSS"), shown, f"{sigma} {_(unit)}"))
     return rows

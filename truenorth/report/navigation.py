@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.language import translated as _
-from truenorth.figures.thinning import evenly
 from truenorth.quality.innovations import mean_nis
-from truenorth.report.chart import POINTS, Chart, Clock, angle_unit, length_unit, speed_unit, unit_of
-from truenorth.report.charts import limits, over_time
+from truenorth.report.chart import Chart, Clock, angle_unit, length_unit, speed_unit
+from truenorth.report.charts import over_time
 from truenorth.report.damping import damping_facts, damping_panels
 from truenorth.report.document import Panel, Table, render
 from truenorth.report.estimated import estimated_rows
 from truenorth.report.numbers import short
 from truenorth.report.page import head_of
+from truenorth.report.residuals import innovation_panels
 from truenorth.report.track import track_panel
 
 if TYPE_CHECKING:
@@ -151,13 +151,7 @@ def _panels(result: Navigation) -> list[Panel]:
     ]
     if result.damping is not None:
         shown += damping_panels(result.damping)
-    explained = _("Predicted less measured. Dotted: two sigma; dashed: three sigma; crosses: rejected.")
-    shown += [
-        Panel(_("Innovations: {sensor}").format(sensor=_(r.name)), explained, _innovations(r, clock))
-        for r in result.residuals
-        if len(r.time)
-    ]
-    return shown
+    return shown + innovation_panels(result.residuals, clock)
 
 
 def _bands(
@@ -183,24 +177,4 @@ def _sigmas(
         if np.all(sigmas[:, i] > 0.0):
             chart.line(0, clock(result.time), sigmas[:, i] / scale, f"c{i}", name, key=True)
     chart.axis(0, type="log")
-    return chart
-
-
-def _innovations(r: Residuals, clock: Clock) -> Chart:
-    there = [i for i in range(3) if np.isfinite(r.innovation[:, i]).any()]
-    scale, unit = unit_of(r.unit, r.sigma)
-    chart = Chart([f"{_(r.axes[i])}, {unit}" for i in there], over_time(clock))
-    for row, i in enumerate(there):
-        rows = np.flatnonzero(np.isfinite(r.innovation[:, i]))
-        rows = rows[evenly(len(rows), POINTS)]
-        for kept, colour, name, symbol in (
-            (r.used[rows], "c0", _("used"), "circle"),
-            (~r.used[rows], "c1", _("rejected"), "x"),
-        ):
-            if kept.any():
-                x, y = clock(r.time[rows][kept]), r.innovation[rows, i][kept] / scale
-                chart.points(row, x, y, colour, name, symbol=symbol, key=row == 0)
-        limits(chart, row, clock(r.time[rows]), r.sigma[rows, i] / scale)
-        reach = 4.0 * float(np.median(r.sigma[rows, i])) / scale
-        chart.axis(row, range=[-reach, reach])
     return chart

@@ -14,6 +14,7 @@ from truenorth.report.charts import panels
 from truenorth.report.document import render, verdict_lines
 from truenorth.report.estimated import relation_table
 from truenorth.report.numbers import quantity, short
+from truenorth.report.transfer import transfer_panels
 from truenorth.state.wording import headline
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def head_of(result: Any, warned: str, doubts: Sequence[Any] = ()) -> dict[str, A
 def alignment_page(result: Alignment) -> str:
     """HTML text of the page; everything is inside, so that it works offline."""
     shown, health = panels(result), _health(result)
+    shown += transfer_panels(result.transfer, "" if result.history is None else result.history.innovation_of)
     relation = relation_table(result.transfer, result.moving)
     findings = () if result.inspection is None else result.inspection.findings
     doubts = [finding for finding in findings if finding.severity != "note"]

@@ -13,5 +13,5 @@ WORDS = (
     "RMS/bound", "claimed sigma", "RMS/sigma", "95 % band",
     "velocity of the base", "velocity of the master", "position of the master",
     "acceleration of the master", "attitude of the master", "odometer displacement", "height", "attitude",
-    "GNSS heading", "magnetometer",
+    "GNSS heading", "magnetometer", "gyro scale factors", "accelerometer scale factors",
 )  # fmt: skip

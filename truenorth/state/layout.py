@@ -13,6 +13,7 @@ BA = slice(12, 15)
 STATES = 15
 
 SLOW_GYRO, SLOW_ACCEL = "slow gyro bias", "slow accelerometer bias"
+GYRO_AXES, ACCEL_AXES = "gyro axes", "accelerometer axes"
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ NOW_GYRO_NOISE = 55  # density of the gyros' white noise, rad^2/s
 NOW_BEHIND = 56  # s by which this epoch is later than the stamp: 0 but for rows that are re-timed
 NOW_NORTH = 57  # sine and cosine of the direction of north in w (x, y)
 NOW_FORCE_W = 59  # mean specific force along w since the last event, m/s^2
-NOW_LENGTH = 62
+NOW_FORCE_B = 62  # the same along the body
+NOW_LENGTH = 65
 
 
 @compiled
