@@ -33,11 +33,11 @@ SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
 SENSORS = slice(BG.start, BA.stop)
 
 
-def bias_step_evidence(fine: FineAlignment, spec: ImuSpec | None = None) -> list[Evidence]:
+def bias_step_evidence(fine: FineAlignment, others: Array | None = None) -> list[Evidence]:
     """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves.
 
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
-    that beats slowly. As large as `spec` says, they explain what they can.
+    that beats slowly. They explain what they can (:func:`matrix_signatures`, `others`).
     """
     count = len(fine.estimates.innovation)
     shapes = np.zeros((count, len(SIGNATURES)))
@@ -46,7 +46,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec | None = None) -> list
         shapes[:, i] = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
     bias = np.einsum("ki,jl->kjil", shapes, np.eye(6)).reshape(count, 6, -1)
     d, signature = _seen(fine, bias)
-    ratio, size, x = matched(fine, signature, None if spec is None else _of_matrices(fine, spec))
+    ratio, size, x = matched(fine, signature, others)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []
@@ -66,7 +66,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec | None = None) -> list
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 
-def _of_matrices(fine: FineAlignment, spec: ImuSpec) -> Array | None:
+def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:
     """Signatures (K, 3, 18) of scale factors and misalignments of one sigma; None where the specification has none."""
     one = np.eye(3, dtype=np.bool_)
     gyro = np.where(one, spec.gyro_scale_factor, spec.gyro_misalignment)

@@ -71,8 +71,8 @@ class Drift:
         return Evidence(f"drift.{self.kind}", figures, kind, Effect(self.heading, self.level), remedies=("still_part",))
 
 
-def detect_drift(fine: FineAlignment) -> Drift:
-    """Match the innovations of a fine alignment with the bank of drift signatures."""
+def detect_drift(fine: FineAlignment, others: Array | None = None) -> Drift:
+    """Match the innovations of a fine alignment with the bank of drift signatures; `others` as of :func:`matched`."""
     t = fine.integrals.time
     middle = (t[1:] + t[:-1]) / 2
     names: list[tuple[str, str, float]] = []
@@ -86,7 +86,7 @@ def detect_drift(fine: FineAlignment) -> Drift:
                 signature[:, axis, len(names)] = shape
                 names.append((kind, ("east", "north")[axis], start))
 
-    ratio, size, x = matched(fine, signature)
+    ratio, size, x = matched(fine, signature, others)
     best = int(np.argmax(ratio))
     kind, axis_name, start = names[best]
     turned = np.where(ratio > limit("hint"), np.abs(x[PHI] * size), 0.0)  # (3, S): E, N, U

@@ -7,6 +7,7 @@ way, by ``g (w t)^2 sin L cos L`` along north. Where the base sways, no mean rat
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
@@ -15,16 +16,21 @@ from truenorth.errors.staying import gravity_position, gravity_velocity
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.limits import limit
 
+Array = NDArray[np.float64]
 
-def hemisphere_evidence(fine: FineAlignment, position: Position) -> list[Evidence]:
-    """Whether the log fits the other hemisphere better: twice the logarithm of the likelihood ratio of the two."""
+
+def hemisphere_evidence(fine: FineAlignment, position: Position, others: Array | None = None) -> list[Evidence]:
+    """Whether the log fits the other hemisphere better: twice the logarithm of the likelihood ratio of the two.
+
+    `others` are signatures of errors that any log may have, as of :func:`truenorth.alignment.drift.matched`.
+    """
     time, lat, alt = fine.integrals.time, position.lat, position.alt
     if fine.form == "velocity":
         off = np.diff(gravity_position(time, lat, alt) - gravity_position(time, -lat, alt), axis=0)
         off /= fine.integrals.intervals[:, None]
     else:
         off = np.diff(gravity_velocity(time, lat, alt) - gravity_velocity(time, -lat, alt), axis=0)
-    ratio, size, _ = matched(fine, off[..., None])
+    ratio, size, _ = matched(fine, off[..., None], others)
     if size[0] <= 0.0:
         return []
     # Of a signature of size one: 2 match - energy.

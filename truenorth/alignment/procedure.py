@@ -15,7 +15,7 @@ from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, 
 from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
-from truenorth.alignment.bias_step import bias_step_evidence, turn_evidence
+from truenorth.alignment.bias_step import bias_step_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
 from truenorth.alignment.fine import FineAlignment, fine_align
@@ -263,9 +263,10 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     if spec is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    steps = [*bias_step_evidence(fine, used if sways else None), *bad_stretches(fine, task.record)]
-    steps += hemisphere_evidence(fine, task.position)
-    return _Found(answer, check, fine.settled, detect_drift(fine), "" if sways else form, steps)
+    others = matrix_signatures(fine, used) if sways else None
+    steps = [*bias_step_evidence(fine, others), *bad_stretches(fine, task.record)]
+    steps += hemisphere_evidence(fine, task.position, others)
+    return _Found(answer, check, fine.settled, detect_drift(fine, others), "" if sways else form, steps)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
