@@ -14,6 +14,7 @@ from tests.quality.made import LAT, G, as_increments, base, car, changed, codes
 from tests.runs import few_and_all
 from truenorth.quality import inspect, motion_summary
 from truenorth.records import ImuRecord
+from truenorth.simulation.scenario import read_scenario
 
 
 def test_a_sound_record_has_no_finding_but_the_earth():
@@ -55,6 +56,26 @@ def test_frozen_and_dead_channels():
     assert "row 3001" in frozen.message
     assert found.sampling.longest_runs[1] == 200
     assert "accel_x" in next(f for f in found.findings if f.code == "constant_channel").message
+
+
+def voyage(gyro_noise):
+    """A ship on its course, with a turn: rates and forces that stay the same to the bit, but for the noise of the gyros."""
+    scenario = read_scenario("marine_damping").to_mapping() | {"duration": "2 h", "errors": {}}
+    record = read_scenario(scenario).simulate().record
+    noise = gyro_noise * np.random.default_rng(3).standard_normal(record.gyro.shape)
+    return ImuRecord(record.time, record.gyro + noise, record.accel, record.kind)
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_what_stays_in_a_simulation_without_noise_is_not_stuck(written):
+    """As it is made, and with the ten digits of a file; gyros with noise make of the same accelerometers stuck ones."""
+    record = voyage(0.0)
+    if written:
+        gyro, accel = (np.vectorize(lambda x: float(f"{x:.10g}"))(values) for values in (record.gyro, record.accel))
+        record = ImuRecord(record.time, gyro, accel, record.kind)
+    assert codes(inspect(record)) & {"frozen", "saturated"} == set()
+    assert "no_noise" in codes(inspect(record), "note")
+    assert "frozen" in codes(inspect(voyage(1e-9)))
 
 
 def test_coarse_quanta_are_neither_frozen_nor_saturated():
@@ -201,7 +222,6 @@ def test_the_summary_is_cheap():
 def test_waves_do_not_carry_a_moored_ship_away(runs):
     """A swell that shakes the mast by .1 m/s^2 and turns the hull by a fifth of a degree; a start of a van, beside it."""
     from truenorth.quality.regimes import motion_summary
-    from truenorth.simulation.scenario import read_scenario
 
     for run in range(runs):
         ship = motion_summary(read_scenario("quay").simulate(run=run).record)

@@ -17,6 +17,8 @@ JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
 REPEATED_SHARE = 0.002  # of the rows, beyond chance
 HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
 ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
+NOISELESS = 1e-7  # of the same: noise and quantum of every sensor are larger
+FEWEST = 20  # rows that say whether there is noise
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
 FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
@@ -70,8 +72,15 @@ def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
     data = np.ascontiguousarray(np.hstack([record.gyro, record.accel]).T)
     same = data[:, 1:] == data[:, :-1]
     repeated = _repeated(record, same, findings)
-    runs, at = _frozen(record, data, same, findings)
-    saturated = _saturated(record, data, findings)
+    found: list[Finding] = []
+    runs, at = _frozen(record, data, same, found)
+    saturated = _saturated(record, data, found)
+    if any(finding.code in ("frozen", "saturated") for finding in found) and _without_noise(data, same):
+        saturated[:] = 0
+        found = [
+            Finding("note", "no_noise", "no channel has noise; expected a sensor's: the log is simulated without it")
+        ]
+    findings += found
     gaps = record.gaps
     sampling = Sampling(jitter_rms, jitter_max, record.time[gaps], record.steps[gaps], repeated, runs, at, saturated)
     return sampling, findings
@@ -170,6 +179,23 @@ def _frozen(
                 )
             )
     return runs, at
+
+
+def _without_noise(data: Array, same: NDArray[np.bool_]) -> bool:
+    """Whether a simulation without noise made the log: values that stay, and that follow a line where they do not.
+
+    A sensor or a log that is stuck for a while has noise elsewhere, in these channels or in others; a coarse quantum, which may
+    hide the noise of a sensor at rest, shows in its steps.
+    """
+    changes = ~same.all(axis=0)
+    inside = changes[1:] & changes[:-1]
+    if np.count_nonzero(inside) < FEWEST:
+        return False
+    size = np.repeat([np.abs(data[:3]).max(), np.abs(data[3:]).max()], 3)
+    rough = np.median(np.abs(np.diff(data, n=2))[:, inside], axis=1)
+    steps = np.abs(np.diff(data))
+    finest = np.min(steps, axis=1, initial=np.inf, where=steps > 0.0)
+    return bool(np.all(rough <= NOISELESS * size) and np.any(finest <= NOISELESS * size))
 
 
 def _is_dead(data: Array, channel: int) -> bool:
