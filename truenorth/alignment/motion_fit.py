@@ -200,6 +200,8 @@ def _climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
     u = np.zeros(size)
     value = cost(u[None])[0]
     slope, inverse = gradient(u, value), inverse_curvatures(u, value)
+    if not np.isfinite(slope).all():  # the guess stands at the edge of what is a model at all: nothing says where to go
+        return guess
     for _ in range(iterations):
         held = ((u <= scale.low) & (slope > 0)) | ((u >= scale.high) & (slope < 0))
         step = -np.where(held, 0.0, inverse @ np.where(held, 0.0, slope))
