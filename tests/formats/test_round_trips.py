@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -109,23 +108,14 @@ def test_a_killed_writer_leaves_what_stood_there(tmp_path):
     assert path.read_bytes() == b"what stood here"
 
 
-def test_reading_a_csv_imports_nothing_heavy_and_is_fast(tmp_path):
-    """900 s at 100 Hz in .1 s of CPU: measured .065 s; the bound here leaves room for a slower machine."""
-    write_imu(record_of(np.random.default_rng(0).normal(size=(90_000, 6))), tmp_path / "log.csv")
+def test_reading_a_csv_imports_nothing_heavy(tmp_path):
+    """What it costs is in the benchmarks; what would make it slow is seen here."""
+    write_imu(record_of(np.random.default_rng(0).normal(size=(900, 6))), tmp_path / "log.csv")
     program = (
-        "import sys, time, numpy\n"
-        "start = time.process_time()\n"
+        "import sys, numpy\n"
         "from truenorth import read_imu\n"
         "record = read_imu(sys.argv[1])\n"
-        "print(time.process_time() - start)\n"
         "heavy = {'pandas', 'numba', 'scipy', 'pydantic', 'matplotlib', 'yaml'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
-    times = []
-    for _ in range(3):
-        done = subprocess.run(
-            [sys.executable, "-c", program, str(tmp_path / "log.csv")], capture_output=True, text=True, check=True
-        )
-        times.append(float(done.stdout))
-        time.sleep(0.05)
-    assert min(times) < 0.3
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "log.csv")], check=True)
