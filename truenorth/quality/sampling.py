@@ -187,7 +187,7 @@ def _without_noise(data: Array, same: NDArray[np.bool_]) -> bool:
     A sensor or a log that is stuck for a while has noise elsewhere, in these channels or in others; a coarse quantum, which may
     hide the noise of a sensor at rest, shows in its steps.
     """
-    changes = ~same.all(axis=0)
+    changes: NDArray[np.bool_] = ~np.asarray(same.all(axis=0))
     inside = changes[1:] & changes[:-1]
     if np.count_nonzero(inside) < FEWEST:
         return False
