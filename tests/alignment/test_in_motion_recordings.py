@@ -1,6 +1,7 @@
 """Alignment on the move on real recordings."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,10 +46,18 @@ def test_cart_gets_its_heading_from_motion():
     """Its IMU looks backwards: the course is 180 deg from the y axis, along the whole way."""
     imu, _ = recordings.stim300_cart_chicago()
     gnss = recordings.stim300_cart_chicago_gnss()
-    antenna = Mounting(lever_arm=np.array([0.0, 0.0, 2.0]))
+    on_time = Mounting(lever_arm=np.array([0.0, 0.0, 2.0]))
+    antenna = replace(on_time, latency_sigma=0.2)
     answer = align_in_motion(imu, "industrial", gnss=gnss, antenna=antenna)
     assert answer.status == "aligned", answer.reasons
     assert answer.moving.heading_from == "motion"
+    # Its stamps are nearly a second late; a receiver said to be on time is contradicted.
+    late, sigma = answer.moving.delays["GNSS"]
+    assert abs(late - 0.9) < 0.15
+    assert sigma < 0.05
+    said = align_in_motion(imu, "industrial", gnss=gnss, antenna=on_time)
+    assert said.status == "inconsistent"
+    assert said.evidence[0].key == "second_look.late"
     v = gnss.v_n[:, :2]
     fast = (np.hypot(*v.T) > 0.6) & (gnss.time < answer.time)
     track = answer.moving.track

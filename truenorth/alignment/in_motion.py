@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
+from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import (
     delay_of,
@@ -214,7 +215,12 @@ def _seen(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[
     """What the receiver, the log itself and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
-    found += jump_evidence(lambda record: replace(task, record=record).run(guess, gated=gated), track, task.record)
+
+    def other(record: ImuRecord) -> Track:
+        return replace(task, record=record).run(guess, gated=gated)
+
+    found += jump_evidence(other, track, task.record)
+    found += clock_evidence(task, track, guess, gated=gated)
 
     def again(model: InsModel) -> Track:
         return replace(task, model=model).run(guess, gated=gated)

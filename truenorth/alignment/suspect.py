@@ -1,7 +1,8 @@
 """Is it the specification that the measurements contradict? The same log once more with poorer IMUs.
 
 A class of IMU that is too good makes the filter follow its gyros where it should follow the measurements: these are rejected by the
-thousand, and seem to be at fault. Where an IMU some times poorer is contradicted no more, the specification is.
+thousand, and seem to be at fault. Where an IMU some times poorer is contradicted no more, the specification is; but it is no
+suspect where a clock is found to be, that of the receiver or of the gyros: a poorer IMU would cover it as well.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import contradiction
 
 FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
+CLOCKS = ("second_look.late", "second_look.early", "delay.gyros_")  # evidence of them
 FIELDS = ("bias", "turn_on_bias", "random_walk", "bias_instability", "rate_random_walk", "scale_factor", "misalignment")
 
 
@@ -33,7 +35,12 @@ def name_specification(answer: Alignment, again: Callable[[ImuSpec], Alignment])
     again : callable
         The same log with another specification.
     """
-    if answer.status != "inconsistent" or not any(item.key.startswith("innovations.") for item in answer.evidence):
+    if answer.status != "inconsistent":
+        return answer
+    clocks = [item for name in CLOCKS for item in answer.evidence if item.key.startswith(name)]
+    if clocks:
+        return replace(answer, evidence=(*clocks, *(item for item in answer.evidence if item not in clocks)))
+    if not any(item.key.startswith("innovations.") for item in answer.evidence):
         return answer
     for factor in FACTORS:
         try:

@@ -169,22 +169,10 @@ def _loosened(name: str, mounting: Mounting) -> Mounting:
 def _contradiction(role: Role, name: str, key: str, given: Mounting, value: Array, sigma: Array) -> Evidence:
     """What the data say of one property, without its effect."""
     if role == "lag":
-        found = float(value[0])
-        figures: dict[str, Figure] = {"name": name, "sensor": key, "size": abs(found), "sigma": float(sigma[0])}
-        if found > 0.0 and key == "gnss":  # of a receiver that is late, its latency; the lag is what is left of it
-            return Evidence(
-                "second_look.late",
-                figures | {"latency": given.latency + found},
-                remedies=("latency", "estimate.lag"),
-                urgent=True,
-            )
-        late = "late" if found > 0.0 else "early"
-        return Evidence(
-            f"second_look.{late}", figures | {"offset": -found}, remedies=("offset", "estimate.lag"), urgent=True
-        )
+        return wrong_lag(name, key, given, float(value[0]), float(sigma[0]))
     if role == "lever arm":
         arm = given.lever_arm + value
-        figures = {"name": name, "given": ",".join(f"{x:.4g}" for x in given.lever_arm)}
+        figures: dict[str, Figure] = {"name": name, "given": ",".join(f"{x:.4g}" for x in given.lever_arm)}
         for axis, v, s in zip(AXES, arm, sigma, strict=True):
             figures |= {axis: float(v), f"{axis}_sigma": float(s)}
         unit = _smaller_unit(arm, sigma, given)
@@ -197,6 +185,18 @@ def _contradiction(role: Role, name: str, key: str, given: Mounting, value: Arra
     for axis, v, s in zip("xz", value, sigma, strict=True):
         figures |= {axis: float(v), f"{axis}_sigma": float(s)}
     return Evidence("second_look.mounting", figures, remedies=("mounting", "estimate.mounting"), urgent=True)
+
+
+def wrong_lag(name: str, key: str, given: Mounting, found: float, sigma: float) -> Evidence:
+    """That a sensor's clock is off by `found` (s, behind the latency given), without its effect."""
+    figures: dict[str, Figure] = {"name": name, "sensor": key, "size": abs(found), "sigma": sigma}
+    if found > 0.0 and key == "gnss":  # of a receiver that is late, its latency; the lag is what is left of it
+        more: dict[str, Figure] = {"latency": given.latency + found}
+        return Evidence("second_look.late", figures | more, remedies=("latency", "estimate.lag"), urgent=True)
+    late = "late" if found > 0.0 else "early"
+    return Evidence(
+        f"second_look.{late}", figures | {"offset": -found}, remedies=("offset", "estimate.lag"), urgent=True
+    )
 
 
 def _smaller_unit(arm: Array, sigma: Array, given: Mounting) -> str | None:

@@ -152,6 +152,14 @@ SENTENCES = {
         "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
         "by {level:angle}"
     ),
+    "delay.gyros_late": (
+        "gyros taken {delay:.3f} s earlier fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
+        "most): they are late against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
+    ),
+    "delay.gyros_early": (
+        "gyros taken {delay:.3f} s later fit the measurements better (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at "
+        "most): they are early against the accelerometers; heading moves by {heading:angle}, level by {level:angle}"
+    ),
     "noise.gyro_stretch": (
         "the gyros are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
     ),

@@ -1,0 +1,114 @@
+"""Are gyros and accelerometers of one moment? The same log with its gyros earlier and later, and which of them it fits.
+
+On a base that stays gravity says it (:mod:`truenorth.quality.tilt`). On the move the aiding measurements do: gyros that are late by
+``d`` leave the attitude behind by ``w d`` while the vehicle turns, and the specific force is resolved along axes of another moment.
+Twice the logarithm of a likelihood ratio is a parabola of the delay as long as that is short beside a turn; from the ends of a
+ladder of delays it leads to the likeliest one. Each rival is one fixed shift: by chance it exceeds c in less than exp(-c / 2) of
+sound logs (Markov's inequality).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.errors import DataError
+from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved
+from truenorth.records import ImuRecord
+from truenorth.state.evidence import Evidence, Figure
+from truenorth.state.limits import limit
+
+Array = NDArray[np.float64]
+
+LADDER = (0.05, 0.1, 0.2, 0.4)  # s; sensors' own filters differ by less than .02 s
+CLIMBS = 3  # from one delay to a likelier one: with the first taken off fewer measurements seem to be outliers
+
+
+def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRecord) -> list[Evidence]:
+    """Whether gyros that are taken earlier or later explain the measurements better, and what that does to the answer.
+
+    Parameters
+    ----------
+    run : callable
+        The same measurements with another record.
+    first : track
+        Of the record as it is.
+    record : ImuRecord
+
+    Returns
+    -------
+    list of Evidence
+        None, or one: of the likeliest delay, which may stand for what else the model leaves out (of the cart of
+        `stim300_cart_chicago` gyros .056 s early): what it moves the answer by is its effect.
+    """
+    rows, track, ratio = 0, first, 0.0
+    for _ in range(CLIMBS):
+        step = _likelier(run, track, record, rows)
+        if step is None:
+            break
+        ratio = ratio or step[2]
+        rows, track = step[:2]
+    if rows == 0:
+        return []
+    effect = moved(first, track)
+    figures: dict[str, Figure] = {
+        "delay": abs(rows) * record.interval,
+        "ratio": ratio,
+        "chance": limit("rival"),
+        "heading": effect.heading,
+        "level": effect.level,
+    }
+    return [Evidence(f"delay.gyros_{'late' if rows > 0 else 'early'}", figures, "known", effect, ("common_clock",))]
+
+
+def _likelier(
+    run: Callable[[ImuRecord], Along], base: Along, record: ImuRecord, at: int
+) -> tuple[int, Along, float] | None:
+    """Rows by which the gyros are more likely late than by `at`, the track without that delay, and the ratio; None: no others.
+
+    `base` is the track with the delay `at` taken off.
+    """
+    ratios: dict[int, float] = {at: 0.0}
+    tracks: dict[int, Along] = {}
+
+    def tried(rows: int) -> float:
+        if rows not in ratios:
+            try:
+                tracks[rows] = run(gyros_later(record, -rows))
+                ratios[rows] = likelihood_ratio(base.residuals, tracks[rows].residuals)
+            except DataError:  # the filter broke down: no explanation
+                ratios[rows] = -math.inf
+        return ratios[rows]
+
+    for sign in (1, -1):
+        for size in LADDER:
+            rows = at + sign * max(1, round(size / record.interval))
+            if 2 * abs(rows) >= len(record) or tried(rows) < RULED_OUT:
+                break
+    best = max(ratios, key=ratios.__getitem__)
+    if ratios[best] <= limit("rival"):
+        return None
+    tried(_peak(ratios, best))
+    best = max(ratios, key=ratios.__getitem__)
+    return best, tracks[best], ratios[best]
+
+
+def gyros_later(record: ImuRecord, rows: int) -> ImuRecord:
+    """The record with its gyros so many rows later; where there are none the nearest are held."""
+    at = np.clip(np.arange(len(record)) - rows, 0, len(record) - 1)
+    return replace(record, gyro=record.gyro[at])
+
+
+def _peak(ratios: dict[int, float], best: int) -> int:
+    """Where the parabola through the likeliest delay and its neighbours is highest, in rows; at an end of them the end itself."""
+    tried = sorted(rows for rows, ratio in ratios.items() if math.isfinite(ratio))
+    k = tried.index(best)
+    if not 0 < k < len(tried) - 1:
+        return best
+    x = np.array(tried[k - 1 : k + 2], dtype=np.float64)
+    a, b, _ = np.polyfit(x, [ratios[rows] for rows in tried[k - 1 : k + 2]], 2)
+    return best if a >= 0.0 else round(float(np.clip(-b / (2.0 * a), x[0], x[-1])))
