@@ -12,14 +12,15 @@ from typer.testing import CliRunner
 
 from tests.runs import few_and_all, some
 from truenorth import Odometer, align
+from truenorth.alignment.against import against
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.published import FADING, STATIONARY
 from truenorth.cli import app
-from truenorth.core.attitude import dcm_from_euler, misalignment
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, misalignment
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.records import GnssRecord
-from truenorth.simulation.scenario import read_scenario
+from truenorth.simulation.scenario import SHIPPED, read_scenario
 from truenorth.state.mounting import Mounting
 
 IMU = {
@@ -137,6 +138,52 @@ def test_filters_of_the_odometer_paper(drives, method):
         turned, spec, odometer=odometer, position=place, method=method, wheel=Mounting(C_mb=C_mb, scale_sigma=0.03)
     )
     np.testing.assert_allclose(answer.C_nb, usual.C_nb @ C_mb, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", some(["sgkf"], ["ekf", "gh3", "ckf"]))
+def test_an_azimuth_that_the_closed_loop_contradicts_is_not_believed(method):
+    """A van in town with tactical gyros: none of three drives is more than four sigmas off unsaid, and sgkf loses its way in one.
+
+    Before they were held against the closed loop, sgkf was off by up to 86 deg as `aligned`.
+    """
+    scenario, statuses = read_scenario(yaml.safe_load((SHIPPED / "van.yaml").read_text()) | {"imu": "tactical"}), []
+    for run in range(3):
+        made = scenario.simulate(seed=3, run=run)
+        odometer = scenario.simulate_aiding(seed=3, run=run)["odometer"].record
+        at = made.motion.states(np.array([0.0]))
+        place = Position(float(at.lat[0]), float(at.lon[0]), float(at.alt[0]), 5.0, 5.0)
+        answer = align(made.record, place, scenario.imu_spec, aid=Odometer(odometer), method=method)
+        off = np.abs(phi_of(answer, made.motion, np.eye(3))) / np.sqrt(np.diag(answer.phi_covariance))
+        assert answer.status != "aligned" or np.all(off < 4.0), answer.reasons
+        statuses.append(answer.status)
+        if answer.status == "inconsistent":
+            assert "the method that the library chooses finds another attitude" in " ".join(answer.reasons)
+    assert method != "sgkf" or "inconsistent" in statuses
+
+
+def test_gyros_that_do_not_see_the_earth_turn_are_refused(drives):
+    record, odometer, place, _, _ = drives[0]
+    with pytest.raises(AlignmentError, match=r"which gyro biases of 100 deg/h hide: choose auto or motion"):
+        align(record, place, "industrial", aid=Odometer(odometer), method="sgkf")
+
+
+def test_two_answers_from_one_log(drives):
+    """What the other answer leaves is added to sigma; two that exclude each other are a contradiction; equal ones say nothing."""
+    record, odometer, place, spec, _ = drives[0]
+    own = align(record, place, spec, aid=Odometer(odometer))
+    sigma = np.sqrt(np.diag(own.phi_covariance))
+
+    def other(turn, size):
+        phi = np.array([0.0, 0.0, turn * sigma[2]])
+        return replace(own, C_nb=dcm_from_rotation_vector(phi) @ own.C_nb, phi_covariance=size**2 * own.phi_covariance)
+
+    assert against(own, own) == []
+    assert against(own, other(1.9, 1.5)) == []
+    (tight,) = against(own, other(1.0, 0.5))
+    assert tight.key == "answers.tight"
+    np.testing.assert_allclose(tight.effect.heading, np.sqrt(1.0 + 1.0 - 0.25) * sigma[2])
+    (differs,) = against(own, other(5.0, 1.0))
+    assert (differs.key, differs.kind) == ("answers.differ", "unknown")
 
 
 def test_an_odometer_is_needed(drives):

@@ -21,6 +21,7 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
 from truenorth.errors.staying import BA, BG, PHI
 from truenorth.filters.gains import times
+from truenorth.quality.regimes import KINDS
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -104,15 +105,25 @@ def _follow(Phi: Any, H: Any, bias: Any, sensors: int, d: Any, signature: Any) -
 
 
 def turn_evidence(task: Task) -> list[Evidence]:
-    """On a quiet base: a step of the rate about the vertical. No force shows it, and heading turns with it."""
+    """On a quiet base: a step of the rate about the vertical. No force shows it, and heading turns with it.
+
+    Between two turns of the base, and away from them: where the IMU turns, its rate steps.
+    """
     motion = task.motion
-    if motion.overall not in ("still", "disturbed") or len(motion.time) < FEWEST:
+    if motion.overall not in ("still", "disturbed"):
         return []
-    up = motion.specific_force.mean(axis=0)
-    rate = motion.rate @ (up / np.linalg.norm(up))
-    found = find_touch(motion.time, np.stack([rate, 0.0 * rate], axis=1), 0.0)
-    if found is None:
+    turns = np.convolve(motion.kind == KINDS.index("rotating"), np.ones(3), "same") > 0.0
+    found = []
+    for part in np.split(np.arange(len(turns)), np.flatnonzero(np.diff(turns)) + 1):
+        if len(part) < FEWEST or turns[part[0]]:
+            continue
+        up = motion.specific_force[part].mean(axis=0)
+        rate = motion.rate[part] @ (up / np.linalg.norm(up))
+        step = find_touch(motion.time[part], np.stack([rate, 0.0 * rate], axis=1), 0.0)
+        found += [] if step is None else [step]
+    if not found:
         return []
-    turned = found.size * max(0.0, float(motion.time[-1]) - found.time)
-    figures: dict[str, Figure] = {"onset": found.time, "size": found.size, "heading": turned}
+    last = float(motion.time[-1])
+    turned, step = max(((item.size * max(0.0, last - item.time), item) for item in found), key=lambda pair: pair[0])
+    figures: dict[str, Figure] = {"onset": step.time, "size": step.size, "heading": turned}
     return [Evidence("bias.vertical_steps", figures, "bounded", Effect(heading=turned), ("still_part",))]

@@ -32,12 +32,14 @@ from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import Estimates, LinearSystem
 from truenorth.filters.gains import Gains, filter_gains, initial_part
 from truenorth.records import ImuRecord
+from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
 
 MAX_PASSES = 8
 MAX_NOISE_PASSES = 6
+TURN_ARM = 1.0  # m, one sigma along each axis: from the axis of a turntable to the IMU
 SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at least
 
 
@@ -128,6 +130,7 @@ class FineAlignment:
         J = np.zeros((9, len(self.x)))
         J[PHI, PHI] = np.eye(3)
         J[PHI, BG] = self._turned_between(time)  # phi(t) = phi_end + int_t^end C_n0_b eps
+        J[PHI, STATES:] = -np.einsum("k,kij->ij", self._after(time), self.system.Phi[:, PHI, STATES:])
         J[3:6, BG] = J[6:9, BA] = np.eye(3)
         return J
 
@@ -141,11 +144,13 @@ class FineAlignment:
 
     def _turned_between(self, time: float) -> Array:
         """``int C_n0_b dt`` from `time` to the last epoch; negative beyond it."""
-        t, T = self.integrals.time, self.integrals.intervals
         C = self.C_n0_i @ self.integrals.C_mean
-        part = np.clip((t[1:] - time) / T, 0.0, 1.0)
-        inside = np.einsum("k,kab->ab", part * T, C)
-        return inside + min(t[-1] - time, 0.0) * C[-1]
+        inside = np.einsum("k,kab->ab", self._after(time) * self.integrals.intervals, C)
+        return inside + min(self.integrals.time[-1] - time, 0.0) * C[-1]
+
+    def _after(self, time: float) -> Array:
+        """(K,) the share of each interval that lies behind a time."""
+        return np.asarray(np.clip((self.integrals.time[1:] - time) / self.integrals.intervals, 0.0, 1.0))
 
 
 def fine_align(
@@ -158,6 +163,7 @@ def fine_align(
     rows_at: Array | None = None,
     integrals: InertialIntegrals | None = None,
     form: Form = "velocity",
+    turned: ImuSpec | None = None,
 ) -> FineAlignment:
     """Estimate attitude and biases from a whole log.
 
@@ -175,8 +181,11 @@ def fine_align(
         Of the log as it is, with `interval` and `rows_at`, where they are known already.
     form : {"velocity", "force"}
         Measure the mean velocity of each interval, or the velocity gained in it.
+    turned : ImuSpec, optional
+        Of an IMU that is turned about on its base: scale factors, misalignments and the arm from the axis of the turns are states
+        then, and `P_bias` is of the biases proper.
     """
-    prior = prior_of(P_bias)
+    prior = prior_of(P_bias) if turned is None else prior_of(P_bias, spec=turned, arm=np.zeros(3), arm_sigma=TURN_ARM)
     log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)
     if form == "velocity":
         R = white_variance(mean_velocity(log.integrals, C_n0_i, position.lat, position.alt))

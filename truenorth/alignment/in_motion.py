@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
+from truenorth.alignment.against import against
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_clocks import clock_evidence
@@ -40,7 +41,7 @@ from truenorth.alignment.suspect import name_specification
 from truenorth.alignment.task import deflection_covariance
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity
-from truenorth.core.errors import DataError, UsageError
+from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
 from truenorth.errors.axes import standing
@@ -156,10 +157,10 @@ def align_in_motion(
         raise UsageError(
             f"heading limit {math.degrees(heading_limit):g} deg, {passes} passes; expected a positive angle, one or more"
         )
+    unknown = position is None and not has_fixes(gnss)
     if method in AZIMUTH_METHODS:
         tell(f"aligning: {method}")
-        return _published(task, method, heading_limit, [n for log in (body, gnss) if log for n in notes(log.notes)])
-    unknown = position is None and not has_fixes(gnss)
+        return _published(task, method, heading_limit, unknown, tell)
 
     def aligned(spec: ImuSpec) -> Alignment:
         return _aligned(replace(task, spec=spec, model=model_of(spec)), method, heading_limit, passes, unknown, tell)
@@ -172,9 +173,7 @@ def _aligned(
     task: MovingTask, method: str, heading_limit: float, passes: int, unknown: bool, tell: Callable[[str], None]
 ) -> Alignment:
     """Coarse alignment or a bank, passes over the log, verdict; `unknown`: nobody gave the latitude."""
-    bias = float(np.sqrt(task.spec.bias_variance[0]))
-    level_rate = EARTH_RATE * math.cos(task.position.lat)
-    able = bias < level_rate * math.sin(GYROCOMPASS)
+    bias, able = _north_by_gyros(task)
     if unknown and able:
         tell("latitude")
         task = replace(task, position=find_latitude(lambda lat: _cost_at(task, lat)))
@@ -229,13 +228,29 @@ def _seen(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[
     return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration)
 
 
-def _published(task: MovingTask, method: str, heading_limit: float, more: list[Evidence]) -> Alignment:
-    """By a published filter of an odometer."""
+def _published(
+    task: MovingTask, method: str, heading_limit: float, unknown: bool, tell: Callable[[str], None]
+) -> Alignment:
+    """By a published filter of an odometer, held against the closed loop on the same logs."""
     if not isinstance(task.odometer, OdometerRecord):
         raise UsageError(f"method {method!r} is that of an odometer; expected one, or auto, gyrocompass, motion")
+    bias, able = _north_by_gyros(task)
+    if not able:
+        raise AlignmentError(
+            f"{task.record.source}: the filter {method} begins near the heading that the earth's rate gives, which gyro biases of "
+            f"{significant(math.degrees(bias) * 3600)} deg/h hide: choose auto or motion, or use better gyros"
+        )
     track, acted = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
     answer = _answer(task, track, method, reason(method, acted), 0.0)
-    return judge_moving(answer, track, heading_limit, more)
+    own = _aligned(task, "auto", heading_limit, PASSES, unknown, tell)
+    more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
+    return judge_moving(answer, track, heading_limit, more + against(own, answer))
+
+
+def _north_by_gyros(task: MovingTask) -> tuple[float, bool]:
+    """Bias of a gyro by the specification, rad/s, and whether it lets the earth's rate tell heading."""
+    bias = float(np.sqrt(task.spec.bias_variance[0]))
+    return bias, bias < EARTH_RATE * math.cos(task.position.lat) * math.sin(GYROCOMPASS)
 
 
 def _cost_at(task: MovingTask, lat: float) -> float:

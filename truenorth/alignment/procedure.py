@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.against import against
 from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
 from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
@@ -27,7 +28,7 @@ from truenorth.alignment.published import FADING, STATIONARY, Published, factor_
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
-from truenorth.alignment.turning import infer_turning, turning_align, turns_blindly
+from truenorth.alignment.turning import infer_turning, turning_align, turning_noise, turns_blindly, with_usual
 from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.analytic import static_covariance
@@ -50,6 +51,7 @@ Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying", Pub
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
+SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
 MOSTLY = 0.95  # of the seconds
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
@@ -140,6 +142,9 @@ def align_base(
     evidence = record_evidence(task.record, task.motion) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task)
+    if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
+        own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress)
+        evidence += against(own, answer)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     return judged(answer, evidence, heading_limit)
 
@@ -241,7 +246,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         task, integrals, coarse.C_n0_i, usual_noise(), None if spec is None else StaticModel.of(spec)
     )
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
-    used, where = _specification(spec, check, noise)
+    turns = task.motion.fraction("rotating") > 0.0
+    used, where = _specification(spec, check, turning_noise(task.record) if turns else noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
     if method in STATIONARY:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
@@ -252,15 +258,25 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         answer = at_epoch(task, used, where, C_n0_b, covariance, floor)
         return _Found(replace(answer, disturbance=disturbance), check)
 
+    sways, turned = method == "swaying", None
+    if turns and method not in FADING:
+        turned = used = with_usual(used) if spec is None else used
+        P = np.diag(used.bias_variance)
     start = (task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
     if method in FADING:
         fine = faded_align(*start, method)
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
-    sways = method == "swaying"
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
-    fine = sway_align(*start) if sways else fine_align(*start, integrals, picked)
+    if sways:
+        fine = sway_align(*start, turned=turned)
+    elif turned is not None:
+        fine = fine_align(*start, turned=turned)
+    else:
+        fine = fine_align(*start, integrals, picked)
     answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
-    if spec is not None:
+    if turned is not None:  # the check knows no scale factors
+        check = replace(check, rate_residual=np.zeros(2), rate_noise=np.full(2, math.inf))
+    if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
     others = matrix_signatures(fine, used) if sways else None

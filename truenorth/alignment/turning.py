@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import BLIND_RATE, LogCheck
-from truenorth.alignment.fine import MAX_NOISE_PASSES, FineAlignment
+from truenorth.alignment.fine import MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, usual
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.core.earth import EARTH_RATE
@@ -27,13 +27,13 @@ from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
 from truenorth.quality.signals import white_noise
+from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 
 Array = NDArray[np.float64]
 
 FIRST = 8.0  # s, the shortest part; gyros that are off by .3 deg/s have turned by 2.4 deg in it
 LEVELLED = 1.0  # s, whose mean specific force levels to begin with
-ARM = 1.0  # m, one sigma along each axis: from the axis of the turns to the IMU
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
 ROUND, LAST = 4, 16  # passes over a part, and over the whole
@@ -49,20 +49,29 @@ def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
 
 def infer_turning(task: Task) -> ImuSpec:
     """Specification of an IMU that turns: by its noise, and by gravity, whose size the accelerometers show at any attitude."""
-    walks = white_noise(task.record)
-    gyro_walk, accel_walk = float(walks[:3].max()), float(walks[3:].max())
+    noise = turning_noise(task.record)
     size = np.linalg.norm(task.motion.specific_force, axis=1)
     none = np.zeros(0)
     check = LogCheck(none, none, float(size.mean()) - task.gravity, float(size.std()) / math.sqrt(len(size)))
-    inferred = infer_spec(check, StaticModel(gyro_walk, accel_walk))
+    inferred = infer_spec(check, noise)
     # With no rate to check, one sigma above the usual: the mean over all that a bias might be has the longest of tails.
-    more: dict[str, Any] = {"gyro_bias": math.exp(GYRO_WIDTH) * usual("gyro", "bias", gyro_walk)}
-    more |= {
-        f"{sensor}_{what}": usual(sensor, what, walk)
-        for sensor, walk in (("gyro", gyro_walk), ("accel", accel_walk))
-        for what in ("bias_instability", "scale_factor", "misalignment")
+    return with_usual(replace(inferred, gyro_bias=math.exp(GYRO_WIDTH) * usual("gyro", "bias", noise.gyro_random_walk)))
+
+
+def turning_noise(record: ImuRecord) -> StaticModel:
+    """Random walks of the worst axes, from row to row: a filter that knows no scale factors takes turns for noise."""
+    walks = white_noise(record)
+    return StaticModel(float(walks[:3].max()), float(walks[3:].max()))
+
+
+def with_usual(spec: ImuSpec) -> ImuSpec:
+    """A specification with the errors that no log of a few turns shows, as they are usual of sensors with such random walks."""
+    found: dict[str, Any] = {
+        f"{sensor}_{name}": usual(sensor, name, walk)
+        for sensor, walk in (("gyro", spec.gyro_random_walk), ("accel", spec.accel_random_walk))
+        for name in ("bias_instability", "scale_factor", "misalignment")
     }
-    return replace(inferred, **more)
+    return replace(spec, **found)
 
 
 def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
@@ -75,7 +84,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
     """
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large
-    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=ARM, level_rate=rate)
+    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=TURN_ARM, level_rate=rate)
     begin = record.time[0] - record.interval
     C, taken = level_of(record.between(None, begin + LEVELLED).accel.mean(axis=0)), prior.mean
     length = FIRST

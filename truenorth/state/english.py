@@ -134,6 +134,14 @@ SENTENCES = {
     "bias.accel": (
         "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:imu}) allows {allowed:ug|} ug"
     ),
+    "answers.differ": (
+        "the method that the library chooses finds another attitude in the same logs: heading differs by {heading:angle}, level by "
+        "{level:angle}, {sigmas:.1f} times what both sigmas allow"
+    ),
+    "answers.tight": (
+        "this method claims more than the one that the library chooses finds in the same logs: heading {heading:angle}, "
+        "level {level:angle} are added to sigma"
+    ),
     "bias.gyro_steps": (
         "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
         "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"

@@ -28,6 +28,14 @@ LIMITS: dict[str, Limit] = {
     "pole": Limit(0.1, "1", "cosine of 84 deg latitude, from which the place, not the gyro, is what hides north"),
     # ---- checks of the sensors against earth and gravity
     "specification": Limit(5.0, "sigma", "a sound IMU misses its specification by that much once in a million"),
+    "two answers": Limit(
+        3.0,
+        "sigma of both",
+        "two sound answers from one log differ by that much less than once in a hundred, over three axes",
+    ),
+    "by chance": Limit(
+        2.0, "sigma", "a sound answer is that far off in one of twenty: from there on the excess is in sigma"
+    ),
     "doubt": Limit(
         2.5,
         "sigma",
