@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.helpers import run_command
 from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.formats import write_imu
@@ -46,14 +47,13 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_a_folder_with_all_results(folder):
+def test_a_folder_with_all_results(capsys, monkeypatch, folder):
     out = folder / "track"
-    done = run(
-        "navigate", folder / "log.parquet", "--start", folder / "start", "--gnss", folder / "gnss.csv", "-o", out
-    )
-    assert done.returncode == 0, done.stderr
-    assert "navigated" in done.stdout
-    assert "GNSS position: 59 measurements" in done.stdout
+    words = ["navigate", folder / "log.parquet", "--start", folder / "start", "--gnss", folder / "gnss.csv", "-o", out]
+    code, said = run_command(capsys, monkeypatch, *words)
+    assert code == 0, said.err
+    assert "navigated" in said.out
+    assert "GNSS position: 59 measurements" in said.out
     names = {"summary.json", "track.parquet", "innovations.parquet", "track.geojson", "report.html", "result.npz"}
     assert {path.name for path in out.iterdir()} == names
     assert json.loads((out / "summary.json").read_text())["altitude"] == "gnss"
@@ -81,10 +81,11 @@ def test_json_alone(folder):
         (["--start", "{nothing}"], 3, "cannot be read"),
     ],
 )
-def test_exit_codes_and_messages(folder, options, code, message):
+def test_exit_codes_and_messages(capsys, monkeypatch, folder, options, code, message):
     files = {name: folder / f"{name}.csv" for name in ("gnss", "late", "moved")}
     files |= {"start": folder / "start", "nothing": folder / "nothing"}
-    done = run("navigate", folder / "log.parquet", *(option.format(**files) for option in options))
-    assert done.returncode == code, done.stdout + done.stderr
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
+    words = ["navigate", folder / "log.parquet", *(option.format(**files) for option in options)]
+    ended, said = run_command(capsys, monkeypatch, *words)
+    assert ended == code, said.out + said.err
+    assert message in said.err
+    assert "Traceback" not in said.err

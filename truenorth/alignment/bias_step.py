@@ -98,8 +98,11 @@ def _follow(Phi: Any, H: Any, bias: Any, sensors: int, d: Any, signature: Any) -
     """Measurements (K, m, S) and last state (n, S) of sensor errors (K, 6, S)."""
     before = np.zeros_like(d)
     for k in range(signature.shape[0]):
-        before[:] = d
-        before[sensors : sensors + 6] = bias[k]
+        for j in range(d.shape[1]):
+            for i in range(len(d)):
+                before[i, j] = d[i, j]
+            for i in range(6):
+                before[sensors + i, j] = bias[k, i, j]
         times(Phi[min(k, len(Phi) - 1)], before, d)
         times(H[min(k, len(H) - 1)], d, signature[k])
 

@@ -113,7 +113,7 @@ def damp_height(size: Any, C: Any, T: float, time_constant: float, w: Any) -> No
     ``e_h' = e_v - c1 e_h``, ``e_v' = (2 g/R - c2) e_h + b``, ``b' = -c3 e_h``: ``c1 = 3/tau``, ``c2 = 3/tau^2 + 2 g/R``,
     ``c3 = 1/tau^3``. The covariance is that of these gains: ``P = (I - k h) P (I - k h)' + k r k'``.
     """
-    nu, variance, _ = row_variance(size, w, 0, False)
+    nu, variance, _ = row_variance(size, w, np.int64(0), False)
     rate = 1.0 / time_constant
     last = T * rate * rate * rate
     for i in range(len(size)):

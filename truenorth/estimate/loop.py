@@ -229,7 +229,8 @@ def run(
     n, N = len(m.aux), len(size)
     w = workspace(size, 3)
     load(size, m.P, w.P)
-    w.largest[:n] = m.largest
+    for a in range(n):  # no slices are assigned here: to report a wrong shape costs seconds of compilation
+        w.largest[a] = m.largest[a]
     F, rate, S, R, now = np.zeros((N, N)), np.zeros(n), np.zeros((3, 4)), np.zeros(3), np.zeros(NOW_LENGTH)
     smoothing = kept.Phi.shape[0] > 0
     Phi, Q = np.zeros((N * smoothing, N * smoothing)), np.zeros((N * smoothing, N * smoothing))
@@ -238,8 +239,10 @@ def run(
     set_matrix(m.s, m.sums.C_now)
     # Taken out of their tuples once: a tuple handed to a function counts references to all that it holds, at each sample.
     s, aux, sums, sensors, fixed_altitude = m.s, m.aux, m.sums, model.sensors, model.fixed_altitude
-    i, k, r, j, link = start, 0, 0, 0, 0
-    failure, number, took = SOUND, 0, False
+    # Typed: for a plain 0 Numba compiles what it is handed to once more, for a literal.
+    zero = np.int64(0)
+    i, k, r, j, link = start, zero, zero, zero, zero
+    failure, number, took = SOUND, zero, np.bool_(False)
     while k < len(events.time) or r < len(late.time):
         target, together, retimed, time = next_event(events, late, sources, aux, k, r, took)
         reached = True
@@ -301,6 +304,8 @@ def run(
             r += 1
         else:
             k += 1
-    m.largest[:] = w.largest[:n]
-    m.P[:] = w.P[:n, :n]
+    for a in range(n):
+        m.largest[a] = w.largest[a]
+        for b in range(n):
+            m.P[a, b] = w.P[a, b]
     return failure, i, number if failure != SOUND else k, r, j

@@ -80,18 +80,20 @@ def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int,
                 for i in range(n):
                     g[i] += Phi_X[i, columns + c] * My[c]
         if k == 0:  # P_1 - P_0: the noise of the states that begin at zero, and what the first measurement takes
-            M[: rank - 1, : rank - 1] = Q[stationary:, stationary:]
             M[rank - 1, rank - 1] = -1.0 / F
             for c in range(rank - 1):
                 X[stationary + c, columns + c] = 1.0
-            X[:, width - 1] = g
+                for d in range(rank - 1):
+                    M[c, d] = Q[stationary + c, stationary + d]
+            for i in range(n):
+                X[i, width - 1] = g[i]
         else:
             for i in range(rank):
                 for j in range(rank):
                     M[i, j] -= My[i] * My[j] / F
         log_F += math.log(F)
-        e[:columns] = Y[k]
-        e[columns:] = 0.0
+        for c in range(width):
+            e[c] = Y[k, c] if c < columns else 0.0
         for i in range(n):
             if h[i] != 0.0:
                 for c in range(width):

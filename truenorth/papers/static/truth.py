@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 PERIOD = 0.02  # s, the paper's
 EVERY = 5  # periods between two measurements of the honest cases: 10 Hz
+BLOCK = 1000  # measurements whose noise is drawn at once
 DRIVEN = slice(PHI.start, DV.stop)  # by white noise
 STUDY_STREAMS = {"initial": 300, "gyro": 301, "accel": 302, "base": 303}
 ARCMIN = math.radians(1.0) / 60.0
@@ -87,35 +88,34 @@ def simulate(
     x[:, PHI] = initial[:, :3] * phi_sigma
     x[:, BG], x[:, BA] = initial[:, 3:6] * gyro_bias, initial[:, 6:] * accel_bias
     bias = x[:, BG.start :].copy()
-    platform = x.copy()
 
     turns = attitudes(base)
     which = np.minimum(np.arange(steps) * len(turns) // steps, len(turns) - 1)
-    fed, free = zip(*(_exact(model, C) for C in turns), strict=True)
-    velocity, force = np.empty((runs, count, 2)), np.empty((runs, count, 2))
-    phi, phi_platform = np.empty((runs, count, 3)), np.empty((runs, count, 3))
+    # From one measurement to the next, of the INS and of the platform: what becomes of the state, and of the noise between.
+    moves, adds = (np.stack(parts) for parts in zip(*(_from_to(model, C, every) for C in turns), strict=True))
+    among = which[every - 1 :: every][:count]
+    states = np.empty((2, runs, count, 10))
     walk = np.sqrt(PERIOD) * np.array([model.walks.gyro_random_walk] * 3 + [model.walks.accel_random_walk] * 2)
-    before = platform[:, DV].copy()
-    for k in range(steps):
-        if k % 1000 == 0:  # noise in blocks: the same whatever the number of runs
-            block = min(1000, steps - k)
-            noise = np.concatenate(
-                [
-                    np.stack([rng.standard_normal((block, 3)) for rng in draw["gyro"]]),
-                    np.stack([rng.standard_normal((block, 2)) for rng in draw["accel"]]),
-                ],
-                axis=2,
-            )
-        w = walk * noise[:, k % 1000]
-        x = x @ fed[which[k]].T
-        platform = platform @ free[which[k]].T
-        x[:, DRIVEN] += w
-        platform[:, DRIVEN] += w
-        if (k + 1) % every == 0:
-            at = (k + 1) // every - 1
-            velocity[:, at], phi[:, at] = x[:, DV], x[:, PHI]
-            force[:, at], phi_platform[:, at] = (platform[:, DV] - before) / T, platform[:, PHI]
-            before = platform[:, DV].copy()
+    now = np.stack([x, x])
+    for first in range(0, count, BLOCK):  # noise in blocks: the same whatever the number of runs
+        block = slice(first, min(first + BLOCK, count))
+        number = (block.stop - first) * every
+        noise = np.concatenate(
+            [
+                np.stack([rng.standard_normal((number, n)) for rng in draw[name]])
+                for name, n in (("gyro", 3), ("accel", 2))
+            ],
+            axis=2,
+        )
+        kicks = (walk * noise).reshape(runs, -1, every * len(walk))
+        for turn in range(len(turns)):
+            here = first + np.flatnonzero(among[block] == turn)
+            states[:, :, here] = np.einsum("rkn,snx->srkx", kicks[:, here - first], adds[turn], optimize=True)
+        for k in range(block.start, block.stop):
+            now = now @ moves[among[k]] + states[:, :, k]
+            states[:, :, k] = now
+    (velocity, integrated), (phi, phi_platform) = states[..., DV], states[..., PHI]
+    force = np.diff(integrated, axis=1, prepend=np.broadcast_to(x[:, None, DV], (runs, 1, 2))) / T
     time: Array = T * np.arange(1.0, count + 1.0)
     moved = np.stack([_base_velocity(base, np.concatenate([[0.0], time]), rng) for rng in draw["base"]])
     velocity += moved[:, 1:]
@@ -129,14 +129,25 @@ def attitudes(base: Base) -> list[Array]:
     return [dcm_from_euler(heading, 0.0, 0.0) for heading in base.headings]
 
 
-def _exact(model: StationaryModel, C_nb: Array) -> tuple[Array, Array]:
-    """Transition of a period with the velocity error fed back through the transport rate, and without."""
+def _from_to(model: StationaryModel, C_nb: Array, every: int) -> tuple[Array, Array]:
+    """Over `every` periods: transitions (2, 10, 10) and what each period's noise adds (2, 5 every, 10), for rows of states.
+
+    First with the velocity error fed back through the transport rate, then without.
+    """
     from scipy.linalg import expm
 
     fed = model.dynamics(C_nb)
     free = fed.copy()
     free[:, DV] = 0.0  # its "velocity" is the integral of the accelerometers, and turns nothing
-    return expm(fed * PERIOD), expm(free * PERIOD)
+    moves, adds = [], []
+    for F in (fed, free):
+        period = expm(F * PERIOD).T
+        powers = [np.eye(10)]
+        for _ in range(every):
+            powers.append(powers[-1] @ period)
+        moves.append(powers[-1])
+        adds.append(np.concatenate([power[DRIVEN] for power in powers[-2::-1]]))  # noise comes at the end of its period
+    return np.stack(moves), np.stack(adds)
 
 
 def _base_velocity(base: Base, time: Array, rng: np.random.Generator) -> Array:
