@@ -184,6 +184,25 @@ def next_event(events: Events, late: Events, sources: Sources, aux: Any, k: int,
 
 
 @compiled
+def take_up(size: Any, m: Memory) -> Any:
+    """A workspace with the covariance as it was left."""
+    w = workspace(size, 3)
+    load(size, m.P, w.P)
+    for a in range(len(m.aux)):
+        w.largest[a] = m.largest[a]
+    return w
+
+
+@compiled
+def put_back(m: Memory, w: Any) -> None:
+    """Remember the covariance. No slice is assigned: what would report a wrong shape takes seconds to compile."""
+    for a in range(len(m.aux)):
+        m.largest[a] = w.largest[a]
+        for b in range(len(m.aux)):
+            m.P[a, b] = w.P[a, b]
+
+
+@compiled
 def run(
     size: Any,
     samples: Samples,
@@ -227,10 +246,7 @@ def run(
     outputs : int
     """
     n, N = len(m.aux), len(size)
-    w = workspace(size, 3)
-    load(size, m.P, w.P)
-    for a in range(n):  # no slices are assigned here: to report a wrong shape costs seconds of compilation
-        w.largest[a] = m.largest[a]
+    w = take_up(size, m)
     F, rate, S, R, now = np.zeros((N, N)), np.zeros(n), np.zeros((3, 4)), np.zeros(3), np.zeros(NOW_LENGTH)
     smoothing = kept.Phi.shape[0] > 0
     Phi, Q = np.zeros((N * smoothing, N * smoothing)), np.zeros((N * smoothing, N * smoothing))
@@ -239,8 +255,7 @@ def run(
     set_matrix(m.s, m.sums.C_now)
     # Taken out of their tuples once: a tuple handed to a function counts references to all that it holds, at each sample.
     s, aux, sums, sensors, fixed_altitude = m.s, m.aux, m.sums, model.sensors, model.fixed_altitude
-    # Typed: for a plain 0 Numba compiles what it is handed to once more, for a literal.
-    zero = np.int64(0)
+    zero = np.int64(0)  # typed: what is handed a plain 0 is compiled once more, for a literal
     i, k, r, j, link = start, zero, zero, zero, zero
     failure, number, took = SOUND, zero, np.bool_(False)
     while k < len(events.time) or r < len(late.time):
@@ -304,8 +319,5 @@ def run(
             r += 1
         else:
             k += 1
-    for a in range(n):
-        m.largest[a] = w.largest[a]
-        for b in range(n):
-            m.P[a, b] = w.P[a, b]
+    put_back(m, w)
     return failure, i, number if failure != SOUND else k, r, j
