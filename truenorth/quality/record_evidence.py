@@ -56,11 +56,12 @@ def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     _, findings = check_sampling(record)
     found = []
     for finding in findings:
-        if finding.code in ALWAYS or (turns and finding.code in TURNING and finding.severity != "note"):
+        serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
+        if finding.code in ALWAYS or (turns and serious):
             found.append(_error(finding))
         elif finding.code == "jitter":
             found.append(_jitter(record, finding))
-        elif finding.severity == "warning":
+        elif finding.severity != "note":
             found.append(note(f"record.{finding.code}", text=finding.message))
     return found
 

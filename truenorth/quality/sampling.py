@@ -8,12 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.quality.packets import exchanged_packets
 from truenorth.records import COLUMNS, ImuRecord
 
 Array = NDArray[np.float64]
 Severity = Literal["error", "warning", "note"]
 
 JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
+EXCHANGED_SHARE = 0.01  # of the rows that have changed places, from which they are an error
 REPEATED_SHARE = 0.002  # of the rows, beyond chance
 HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
 ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
@@ -72,6 +74,7 @@ def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
     data = np.ascontiguousarray(np.hstack([record.gyro, record.accel]).T)
     same = data[:, 1:] == data[:, :-1]
     repeated = _repeated(record, same, findings)
+    _exchanged(record, data, findings)
     found: list[Finding] = []
     runs, at = _frozen(record, data, same, found)
     saturated = _saturated(record, data, found)
@@ -142,6 +145,23 @@ def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding
             )
         )
     return repeated
+
+
+def _exchanged(record: ImuRecord, data: Array, findings: list[Finding]) -> None:
+    packets = exchanged_packets(data)
+    if packets is None:
+        return
+    length, first = packets.length, int(packets.rows[0])
+    share = 2.0 * length * len(packets.rows) / len(record)
+    findings.append(
+        Finding(
+            "error" if share > EXCHANGED_SHARE else "warning",
+            "reordered_rows",
+            f"packets of {length} row(s) have changed places with the next at {len(packets.rows)} places at least, first "
+            f"before row {first + 1} (t = {record.time[first]:.3f} s): exchanged back the log is smooth there; expected rows in "
+            "the order in which they were measured: order them by the sensor's own counter or clock",
+        )
+    )
 
 
 def _frozen(

@@ -115,6 +115,7 @@ SENTENCES = {
     "record.gaps": "{text}",
     "record.jitter": "{text}",
     "record.time_unit": "{text}",
+    "record.reordered_rows": "{text}",
     "record.clock_jumps": (
         "the log has {count:d} gap(s) of {lost:.2f} s in all, and fits the measurements better without them (likelihood ratio "
         "{ratio:.0f}): its clock has jumped, no rows are lost"

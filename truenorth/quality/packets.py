@@ -1,0 +1,83 @@
+"""Packets of rows that have changed places: a log that is smooth again with two neighbours exchanged.
+
+Some loggers write packets as they arrive and stamp the rows evenly. Where two packets of `L` rows have changed places the log jumps
+at three edges, `L` rows from each other, and exchanged back it does not. A jump is what lies between the rows of an edge beyond the
+mean of the slopes on either side; it counts by the median of its square over the log, of each channel. Shocks, steps and
+vibration jump as well, but no exchange of rows makes them smooth.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LONGEST = 20  # rows of a packet
+ORDINARY, JUMP = 50.0, 200.0  # six squares over their medians: white noise exceeds the first once in 1,000 edges
+FEWEST = 3  # exchanges of one length
+MOST = 50_000  # edges that are looked at closely
+
+
+class Exchanged(NamedTuple):
+    """Packets that have changed places."""
+
+    length: int  # rows of a packet
+    rows: NDArray[np.intp]  # first row of each pair
+
+
+def exchanged_packets(data: Array) -> Exchanged | None:
+    """Pairs of packets of one length that have changed places, or None.
+
+    Parameters
+    ----------
+    data : (6, N) array
+        Gyros and accelerometers.
+    """
+    count = data.shape[1]
+    if count < 2 * LONGEST + 6:
+        return None
+    squares = _beyond(data[:, :-3], data[:, 1:-2], data[:, 2:-1], data[:, 3:])
+    usual = np.median(squares, axis=1)
+    known = usual > 0.0
+    if not known.any():
+        return None
+    data, usual = data[known], usual[known]
+    jumps = np.zeros(count + 1, dtype=np.bool_)  # between row k - 1 and row k
+    jumps[2 : count - 1] = np.einsum("ik,i->k", squares[known], 1.0 / usual) > JUMP
+    best: Exchanged | None = None
+    for length in range(1, LONGEST + 1):
+        edges = jumps[: -2 * length] & jumps[length:-length] & jumps[2 * length :]
+        first = np.flatnonzero(edges[: count - 2 * length - 1])[:MOST]
+        first = _apart(first[_smooth_exchanged(data, usual, first, length)], 2 * length)
+        if len(first) >= FEWEST and (best is None or len(first) > len(best.rows)):
+            best = Exchanged(length, first)
+    return best
+
+
+def _smooth_exchanged(data: Array, usual: Array, first: NDArray[np.intp], length: int) -> NDArray[np.bool_]:
+    """Whether all three edges are ordinary, with the packets from these rows on exchanged back."""
+    offset = np.arange(-2, 2 * length + 2)
+    inside = (offset >= 0) & (offset < 2 * length)
+    offset[inside] = (offset[inside] + length) % (2 * length)
+    smooth = np.ones(len(first), dtype=np.bool_)
+    for edge in (2, 2 + length, 2 + 2 * length):
+        a, b, c, d = (data[:, first + offset[edge + k]] for k in (-2, -1, 0, 1))
+        smooth &= np.einsum("ik,i->k", _beyond(a, b, c, d), 1.0 / usual) < ORDINARY
+    return smooth
+
+
+def _beyond(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Squares of the jumps from `b` to `c` beyond the mean of the slopes from `a` to `b` and from `c` to `d`."""
+    return np.asarray((c - b - 0.5 * (b - a + d - c)) ** 2)
+
+
+def _apart(rows: NDArray[np.intp], least: int) -> NDArray[np.intp]:
+    """Of ascending rows those that follow the one kept before by so many at least."""
+    kept: list[int] = []
+    for row in rows.tolist():
+        if not kept or row >= kept[-1] + least:
+            kept.append(row)
+    return np.array(kept, dtype=np.intp)
