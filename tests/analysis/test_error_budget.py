@@ -46,7 +46,8 @@ def test_parts_add_up_to_the_covariance(S, constant):
 def test_gains_are_those_of_the_filter():
     system = random_system(epochs=10)
     estimates = kalman(system, history="full")
-    gain, keep, step = filter_gains(system, estimates)
+    gains = filter_gains(system, estimates)
+    gain, step, keep = gains.gain, gains.step, gains.keep
     x = system.x0
     for k in range(10):
         predicted = system.Phi[k] @ x + system.u[k]

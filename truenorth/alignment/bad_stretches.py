@@ -35,8 +35,8 @@ def _noisy(fine: FineAlignment, record: ImuRecord) -> list[Evidence]:
     time = fine.integrals.start + fine.integrals.time[1:]
     at = np.clip(np.searchsorted(edges, time) - 1, 0, len(extra) - 1)
     gyro, accel = (np.where(time <= edges[-1], part[at].max(axis=1), 0.0) for part in (extra[:, :3], extra[:, 3:]))
-    _, keep, step = fine.gains
-    gain, n = fine.gains.gain, fine.system.states
+    gain, step, keep = fine.gains.gain, fine.gains.step, fine.gains.keep
+    n = fine.system.states
     P = np.zeros((n, n))
     for k, T in enumerate(np.diff(fine.integrals.time)):
         P = step[k] @ P @ step[k].T
@@ -79,7 +79,7 @@ def _pulse(fine: FineAlignment, channel: int, begin: float, end: float, size: fl
     time = fine.integrals.start + fine.integrals.time
     share = np.clip((np.minimum(time[1:], end) - np.maximum(time[:-1], begin)) / np.diff(time), 0.0, 1.0)
     Phi, H = fine.system.Phi, fine.system.H
-    gain, _, step = fine.gains
+    gain, step, _ = fine.gains
     d, x = np.zeros(fine.system.states), np.zeros(fine.system.states)
     state = BG.start + channel
     for k in range(len(share)):

@@ -41,12 +41,13 @@ def bias_step_evidence(fine: FineAlignment, others: Array | None = None) -> list
     that beats slowly. They explain what they can (:func:`matrix_signatures`, `others`).
     """
     count = len(fine.estimates.innovation)
-    shapes = np.zeros((count, len(SIGNATURES)))
-    for i, (course, onset) in enumerate(SIGNATURES):
+    signature = np.empty((count, 3, 6 * len(SIGNATURES)))
+    d = np.empty((fine.system.states, 6 * len(SIGNATURES)))
+    for i, (course, onset) in enumerate(SIGNATURES):  # one after the other: the errors of all of them take much memory
         since = np.arange(count) - round(onset * count)
-        shapes[:, i] = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
-    bias = np.einsum("ki,jl->kjil", shapes, np.eye(6)).reshape(count, 6, -1)
-    d, signature = _seen(fine, bias)
+        shape = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
+        some = slice(6 * i, 6 * (i + 1))
+        d[:, some], signature[..., some] = _seen(fine, shape[:, None, None] * np.eye(6))
     ratio, size, x = matched(fine, signature, others)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):

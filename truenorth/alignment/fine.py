@@ -53,8 +53,9 @@ class FineAlignment:
     system: LinearSystem
     estimates: Estimates  # with the whole history of x and P
     gains: Gains  # that the filter used
-    # (K, n, n): the part of the covariance that the biases alone make, ``P = floor + random``: what waiting does not improve
+    # (n, n): the part of the last covariance that the biases alone make, ``P = floor + random``: what waiting does not improve
     floor: Array
+    floors: Array  # (K, 3, 3): of the misalignment, at each epoch
     disturbance: Array  # (3,) m/s: RMS mean velocity of the base (E, N, U) as the filter took it
     passes: int
     settled: bool  # whether the last pass moved nothing by more than a small part of its sigma
@@ -68,6 +69,7 @@ class FineAlignment:
         gains = filter_gains(system, estimates)
         P0 = np.zeros((system.states, system.states))
         P0[kept, kept] = log.prior.P[kept, kept]
+        floors, floor = initial_part(gains.step, P0, PHI)
         return cls(
             integrals=log.integrals,
             C_n0_i=log.C_n0_i,
@@ -75,7 +77,8 @@ class FineAlignment:
             system=system,
             estimates=estimates,
             gains=gains,
-            floor=initial_part(gains.step, P0),
+            floor=floor,
+            floors=floors,
             disturbance=disturbance,
             passes=last.passes,
             settled=last.moved < ROUGHLY,
@@ -115,7 +118,7 @@ class FineAlignment:
         """
         J = self._carried_to(time)[PHI]
         C_n0_b = dcm_from_rotation_vector(J @ self.x) @ self.C_n0_i @ C_ib
-        return C_n0_b, self.joint_at(time)[PHI, PHI], J @ self.floor[-1] @ J.T
+        return C_n0_b, self.joint_at(time)[PHI, PHI], J @ self.floor @ J.T
 
     def joint_at(self, time: float) -> Array:
         """(9, 9) covariance of misalignment (``n0``), gyro and accelerometer bias (body axes) at any time of the log."""
@@ -206,4 +209,4 @@ def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Arr
     turn = dcm_from_rotation_vector(fine.estimates.x[:, PHI])
     C_nb = C_n_n0 @ turn @ fine.C_n0_i @ fine.integrals.C_ib[1:]
     C_n0_n = np.swapaxes(C_n_n0, 1, 2)
-    return C_nb, C_n_n0 @ fine.estimates.P[:, PHI, PHI] @ C_n0_n, C_n_n0 @ fine.floor[:, PHI, PHI] @ C_n0_n
+    return C_nb, C_n_n0 @ fine.estimates.P[:, PHI, PHI] @ C_n0_n, C_n_n0 @ fine.floors @ C_n0_n

@@ -273,6 +273,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         fine = fine_align(*start, turned=turned)
     else:
         fine = fine_align(*start, integrals, picked)
+    del integrals, filtered, coarse  # of the first pass; what follows takes memory
     answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
     if turned is not None:  # the check knows no scale factors
         check = replace(check, rate_residual=np.zeros(2), rate_noise=np.full(2, math.inf))

@@ -226,7 +226,7 @@ def stationary_align(task: Task, C_n0_i: Array, model: StaticModel, P_bias: Arra
     C_n0_i, C_ib = log.begun(found.end)
     P_floor = log.P0.copy()
     P_floor[: log.biases.start, : log.biases.start] = 0.0
-    floor = initial_part(filter_gains(found.system, found.estimates).step, P_floor)[-1]
+    _, floor = initial_part(filter_gains(found.system, found.estimates).step, P_floor, PHI)
     return Stationary(
         C_n0_i @ task.epoch.attitude(C_ib),
         C_n0_n @ found.P[PHI, PHI] @ C_n0_n.T,

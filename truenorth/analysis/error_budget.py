@@ -99,7 +99,8 @@ def error_budget(
         raise UsageError(f"error_budget: the system has runs {system.runs}, expected one run without a run axis")
     if not sources:
         raise UsageError("error_budget: no sources; sources_of(system, groups) gives the model's own")
-    gain, keep, step = filter_gains(system, kalman(system, history="full"))
+    gains = filter_gains(system, kalman(system, history="full"))
+    gain, keep, step = gains.gain, gains.keep, gains.step
     epochs, n = len(step), system.states
     variance = np.empty((len(sources), epochs, n))
     last: list[Array] = []
@@ -112,7 +113,7 @@ def error_budget(
                 C = step[k] @ C @ step[k].T + noise[k]
                 part[k] = C
         if source.P0 is not None:
-            part += initial_part(step, _fitting(name, "P0", source.P0, system.P0.shape))
+            part += initial_part(step, _fitting(name, "P0", source.P0, system.P0.shape))[0]
         variance[g] = np.diagonal(part, axis1=-2, axis2=-1)
         last.append(part if history == "full" else part[-1:])
     return ErrorBudget(tuple(sources), variance, np.array(last))

@@ -25,15 +25,20 @@ class Gains(NamedTuple):
     ----------
     gain : (..., K, n, m) array
         ``K_k``; zero for absent rows.
-    keep : (..., K, n, n) array
-        ``I - K_k H_k``.
     step : (..., K, n, n) array
         ``(I - K_k H_k) Phi_k``: how an error goes on.
+    H : (..., K, m, n) array
+        The system's own; of one epoch where all are the same.
     """
 
     gain: Array
-    keep: Array
     step: Array
+    H: Array
+
+    @property
+    def keep(self) -> Array:
+        """``I - K_k H_k``, (..., K, n, n)."""
+        return np.asarray(np.eye(self.gain.shape[-2]) - self.gain @ self.H)
 
 
 def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
@@ -57,16 +62,15 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
             f"epochs, expected all {system.epochs}: filter with history='full'"
         )
     runs, K = estimates.P.shape[:-3], system.epochs
-    found = Gains(np.empty((*runs, K, n, m)), np.empty((*runs, K, n, n)), np.empty((*runs, K, n, n)))
+    found = Gains(np.empty((*runs, K, n, m)), np.empty((*runs, K, n, n)), system.H)
     for first in range(0, K, BLOCK):
         epochs = slice(first, min(first + BLOCK, K))
-        for whole, part in zip(found, _gains(system, estimates, epochs), strict=True):
-            whole[..., epochs, :, :] = part
+        found.gain[..., epochs, :, :], found.step[..., epochs, :, :] = _gains(system, estimates, epochs)
     return found
 
 
-def _gains(system: LinearSystem, estimates: Estimates, epochs: slice) -> Gains:
-    """Gains of some epochs."""
+def _gains(system: LinearSystem, estimates: Estimates, epochs: slice) -> tuple[Array, Array]:
+    """Gains of some epochs, and how an error goes on in them."""
 
     def cut(a: Array) -> Array:
         return a if a.shape[-3] == 1 else a[..., epochs, :, :]
@@ -83,12 +87,11 @@ def _gains(system: LinearSystem, estimates: Estimates, epochs: slice) -> Gains:
     W = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), covariance)
     cross = np.where(absent[..., None, :], 0.0, cross)
     gain = np.swapaxes(np.linalg.solve(W, np.swapaxes(cross, -1, -2)), -1, -2)
-    keep = np.eye(system.states) - gain @ H
-    return Gains(gain, keep, keep @ Phi)
+    return gain, (np.eye(system.states) - gain @ H) @ Phi
 
 
-def initial_part(step: Array, P0: Array) -> Array:
-    """Part of each epoch's covariance that an initial one makes, (K, n, n).
+def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[Array, Array]:
+    """Part of each epoch's covariance that an initial one makes.
 
     Parameters
     ----------
@@ -96,16 +99,26 @@ def initial_part(step: Array, P0: Array) -> Array:
         Of :func:`filter_gains`.
     P0 : (n, n) array
         Initial covariance, or a part of it.
+    states : slice
+        The p states of which it is wanted at each epoch.
+
+    Returns
+    -------
+    part : (K, p, p) array
+    last : (n, n) array
+        Of all states, at the last epoch.
     """
-    part = np.empty(step.shape)
+    whole = np.asarray(P0, dtype=np.float64)
+    part = np.empty((len(step), *whole[states, states].shape))
     response = np.empty((min(BLOCK, len(step)), *step.shape[1:]))
     before = np.eye(step.shape[-1])
     for first in range(0, len(step), BLOCK):
         block = response[: min(BLOCK, len(step) - first)]
         _products(np.ascontiguousarray(step[first : first + BLOCK]), before, block)
-        part[first : first + BLOCK] = block @ P0 @ np.swapaxes(block, -1, -2)
+        whole = block @ P0 @ np.swapaxes(block, -1, -2)
+        part[first : first + BLOCK] = whole[:, states, states]
         before = block[-1].copy()
-    return part
+    return part, whole[-1]
 
 
 def through(system: LinearSystem, gains: Gains, signature: Array) -> tuple[Array, Array]:
