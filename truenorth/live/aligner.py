@@ -14,7 +14,6 @@ that is turned, by an indexer or on a turntable, is aligned as such from the fir
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -30,6 +29,7 @@ from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.rotary import SHORTEST
 from truenorth.core.attitude import angle_text, euler_sigma
 from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.free_memory import give_back
 from truenorth.core.position import Position
 from truenorth.live.answer import Answer, Motion, under_way
 from truenorth.live.carry import Carry
@@ -40,6 +40,7 @@ from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.navigator import Navigator
 from truenorth.live.reasons import reasons_of
+from truenorth.live.recent import Recent
 from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.navigation.procedure import LONGEST_BRIDGE
@@ -60,7 +61,6 @@ KEPT = (
 )  # fmt: skip
 UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
 NOWHERE = "no place is given, and no fix has come"
-BLOCK = 256  # rows, up to which blocks of the newest rows are put together
 BACK = 10.0  # s before a solution's end, from which its filter may need rows
 RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
 
@@ -120,7 +120,7 @@ class Aligner:
         self._carry: Carry | None = None
         self._earlier: Carry | None = None  # of the solution before, which knows no row of a drive that has just begun
         self._mover: Navigator | None = None  # on the move
-        self._newest: deque[Array] = deque()  # blocks as they came: `RECENT`, and what a running solution lacks
+        self._newest = Recent()  # of the last `RECENT`, and what a running solution lacks
         self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
         self._due = -np.inf
         self._lock = threading.Lock()
@@ -313,13 +313,8 @@ class Aligner:
         if self._lost(self._solution) and self.log.end - self.log.start > LATE:
             self._solution = self._carry = self._earlier = None
             self._due = -np.inf
-        if self._newest and len(self._newest[-1]) + len(block) <= BLOCK:
-            self._newest[-1] = np.vstack([self._newest[-1], block])
-        else:
-            self._newest.append(block)
-        oldest = min(self.log.end - RECENT, self._newest_in)
-        while self._newest[0][-1, 0] < oldest:
-            self._newest.popleft()
+        self._newest.add(block)
+        self._newest.forget(min(self.log.end - RECENT, self._newest_in))
         if self._mover is not None:
             self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
         for carry in (self._earlier, self._carry):
@@ -393,6 +388,8 @@ class Aligner:
         self.solutions += 1
         if under_way(found) or (self.left is None and not self._lost(found)):
             self._take_over(found)
+        self._newest.forget(self.log.end - RECENT)
+        give_back()  # the rows that came meanwhile, and what the solution before held
 
     def _take_over(self, found: Alignment) -> None:
         """Carry a new solution on: by the closed loop on the move, by the gyros alone on a base that stays."""

@@ -9,7 +9,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
 from truenorth.core.errors import DataError
 from truenorth.estimate.ongoing import BLOCK, CONTEXT, Ongoing
-from truenorth.live.log import Kind, record_of
+from truenorth.live.log import INTERVAL_ROWS, Kind, record_of
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -78,8 +78,8 @@ class Going:
         """Rows as a record, and how many of them are not after the last epoch; None where no row is."""
         if len(rows) < 2:
             return None, 0
-        record = record_of(rows, self._kind)
-        first = int(np.searchsorted(rows[:, 0], self.filter.time + 0.5 * record.interval))
+        half = 0.5 * float(np.median(np.diff(rows[:INTERVAL_ROWS, 0])))
+        first = int(np.searchsorted(rows[:, 0], self.filter.time + half))
         context = min(first, CONTEXT)
         record = record_of(rows[first - context :], self._kind)
         if len(record) < context + 1 or len(record) < 2:

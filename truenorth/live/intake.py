@@ -63,15 +63,19 @@ def as_rows(time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> Array:
     UsageError
         Shapes that do not fit.
     """
-    times = np.atleast_1d(np.asarray(time, dtype=np.float64))
     try:
-        rows = np.column_stack([times, np.atleast_2d(gyro), np.atleast_2d(accel)]).astype(np.float64)
+        times, rates, forces = (np.asarray(values, dtype=np.float64) for values in (time, gyro, accel))
     except (ValueError, TypeError):
-        rows = np.empty((0, 0))
-    if rows.shape != (len(times), 7):
+        fits = False
+    else:
+        shapes = ((times.size, 3), (3,) if times.size == 1 else (times.size, 3))
+        fits = times.ndim <= 1 and rates.shape in shapes and forces.shape in shapes
+    if not fits:
         raise UsageError(
             f"rows of shapes {np.shape(time)}, {np.shape(gyro)}, {np.shape(accel)}; expected (K,), (K, 3) and (K, 3)"
         )
+    rows = np.empty((times.size, 7))
+    rows[:, 0], rows[:, 1:4], rows[:, 4:] = times, rates, forces
     return rows
 
 
@@ -94,15 +98,23 @@ class Intake:
         sound = self._sound(rows)
         if not len(sound):
             return []
-        time = sound[:, 0]
-        steps = np.diff(time, prepend=time[0] if self._newest == -np.inf else self._newest)
-        if not self._ahead and np.all(steps[1:] > 0.0) and np.all(steps < JUMP) and time[0] > self._newest:
+        if not self._ahead and self._goes_on(sound[:, 0]):
             self._take(sound)
             return [sound]
         blocks: list[Array] = []
         for row in sound:
             blocks += self._one(row)
         return blocks
+
+    def _goes_on(self, time: Array) -> bool:
+        """Whether rows follow the newest one and each other without a jump."""
+        first = float(time[0])
+        if not (first > self._newest and (first - self._newest < JUMP or self._newest == -np.inf)):
+            return False
+        if len(time) == 1:
+            return True
+        steps = time[1:] - time[:-1]
+        return float(steps.min()) > 0.0 and float(steps.max()) < JUMP
 
     def _sound(self, rows: Array) -> Array:
         if np.abs(rows[:, 1:]).max(initial=0.0) < LARGEST_RATE and np.isfinite(rows[:, 0]).all():  # NaN is not below

@@ -97,17 +97,21 @@ class Log:
     @property
     def start(self) -> float:
         """Time of the first row after that gap, s; infinity where there is no row."""
-        return float(self.rows[np.searchsorted(self.rows[:, 0], self._gap, side="right"), 0]) if self._size else np.inf
+        if not self._size:
+            return np.inf
+        first = 0 if self._gap == -np.inf else np.searchsorted(self.rows[:, 0], self._gap, side="right")
+        return float(self._rows[first, 0])
 
     def _look_for_gaps(self, first: int) -> None:
         """Find the last gap among the steps to row `first` and after it."""
         time = self.rows[:, 0]
         if len(time) > 2 and (first < INTERVAL_ROWS or not np.isfinite(self._interval)):
             self._interval = float(np.median(np.diff(time[:INTERVAL_ROWS])))
-        steps = np.diff(time[max(0, first - 1) :])
-        gaps = np.flatnonzero(steps > LONGEST_BRIDGE * self._interval)
-        if gaps.size:
-            self._gap = float(time[max(0, first - 1) + gaps[-1]])
+        before = max(0, first - 1)
+        steps = time[before + 1 :] - time[before:-1]
+        longest = LONGEST_BRIDGE * self._interval
+        if steps.size and steps.max() > longest:
+            self._gap = float(time[before + np.flatnonzero(steps > longest)[-1]])
 
     def _insert(self, block: Array) -> None:
         need = self._size + len(block)
