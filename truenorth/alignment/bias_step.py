@@ -7,6 +7,7 @@ is the error of the answer.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
 SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
+AT_ONCE = 2  # courses that are matched together: they take memory
 SENSORS = slice(BG.start, BA.stop)
 
 
@@ -40,15 +42,9 @@ def bias_step_evidence(fine: FineAlignment, others: Array | None = None) -> list
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
     that beats slowly. They explain what they can (:func:`matrix_signatures`, `others`).
     """
-    count = len(fine.estimates.innovation)
-    signature = np.empty((count, 3, 6 * len(SIGNATURES)))
-    d = np.empty((fine.system.states, 6 * len(SIGNATURES)))
-    for i, (course, onset) in enumerate(SIGNATURES):  # one after the other: the errors of all of them take much memory
-        since = np.arange(count) - round(onset * count)
-        shape = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
-        some = slice(6 * i, 6 * (i + 1))
-        d[:, some], signature[..., some] = _seen(fine, shape[:, None, None] * np.eye(6))
-    ratio, size, x = matched(fine, signature, others)
+    ends: list[Array] = []
+    ratio, size, x = matched(fine, _signatures(fine, ends), others)
+    d = np.hstack(ends)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []
@@ -66,6 +62,20 @@ def bias_step_evidence(fine: FineAlignment, others: Array | None = None) -> list
     }
     kind: Kind = "bounded" if ratio[best] > limit("drift") else "known"  # what may be chance is added to sigma
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
+
+
+def _signatures(fine: FineAlignment, ends: list[Array]) -> Iterator[Array]:
+    """Signatures (K, 3, 6 AT_ONCE) of some courses at a time, in all six biases; their last states (n, 6 AT_ONCE) go to `ends`."""
+    count = len(fine.estimates.innovation)
+    for first in range(0, len(SIGNATURES), AT_ONCE):
+        courses = SIGNATURES[first : first + AT_ONCE]
+        shapes = np.zeros((count, len(courses)))
+        for i, (course, onset) in enumerate(courses):
+            since = np.arange(count) - round(onset * count)
+            shapes[:, i] = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
+        end, signature = _seen(fine, np.einsum("ki,jl->kjil", shapes, np.eye(6)).reshape(count, 6, -1))
+        ends.append(end)
+        yield signature
 
 
 def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:

@@ -14,7 +14,9 @@ the signature alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +31,8 @@ Array = NDArray[np.float64]
 
 # Of fewer, a departure lies between two: one at .59 of a log matched with a ratio of 14 at quarters of it, of 22 close by.
 ONSETS = tuple(k / 16 for k in range(1, 16))
-AT_ONCE = 12  # signatures that are matched together: they take memory
+KINDS, AXES = ("step", "ramp"), ("east", "north")
+AT_ONCE = 3  # onsets that are matched together: they take memory
 
 
 @dataclass(frozen=True)
@@ -73,32 +76,39 @@ class Drift:
 
 def detect_drift(fine: FineAlignment, others: Array | None = None) -> Drift:
     """Match the innovations of a fine alignment with the bank of drift signatures; `others` as of :func:`matched`."""
-    t = fine.integrals.time
-    middle = (t[1:] + t[:-1]) / 2
-    names: list[tuple[str, str, float]] = []
-    signature = np.zeros((len(middle), 3, 4 * len(ONSETS)))
-    for onset in ONSETS:
-        start = onset * t[-1]
-        since = np.maximum((middle if fine.form == "velocity" else t) - start, 0.0)
-        for kind, velocity in (("step", (since > 0).astype(float)), ("ramp", since / (t[-1] - start))):
-            shape = velocity if fine.form == "velocity" else np.diff(velocity)
-            for axis in (0, 1):
-                signature[:, axis, len(names)] = shape
-                names.append((kind, ("east", "north")[axis], start))
-
-    ratio, size, x = matched(fine, signature, others)
+    ratio, size, x = matched(fine, _signatures(fine), others)
     best = int(np.argmax(ratio))
-    kind, axis_name, start = names[best]
+    onset, kind, axis_name = list(product(ONSETS, KINDS, AXES))[best]
+    start = onset * fine.integrals.time[-1]
     turned = np.where(ratio > limit("hint"), np.abs(x[PHI] * size), 0.0)  # (3, S): E, N, U
     heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
     return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 
 
-def matched(fine: FineAlignment, signature: Array, others: Array | None = None) -> tuple[Array, Array, Array]:
-    """Match innovations with those that signatures (K, 3, S) in the measurements make.
+def _signatures(fine: FineAlignment) -> Iterator[Array]:
+    """Signatures (K, 3, 4 AT_ONCE) of some onsets at a time: of each kind, along each axis."""
+    t = fine.integrals.time
+    middle = (t[1:] + t[:-1]) / 2
+    for first in range(0, len(ONSETS), AT_ONCE):
+        courses = list(product(ONSETS[first : first + AT_ONCE], KINDS, (0, 1)))
+        signature = np.zeros((len(middle), 3, len(courses)))
+        for i, (onset, kind, axis) in enumerate(courses):
+            start = onset * t[-1]
+            since = np.maximum((middle if fine.form == "velocity" else t) - start, 0.0)
+            velocity = (since > 0).astype(float) if kind == "step" else since / (t[-1] - start)
+            signature[:, axis, i] = velocity if fine.form == "velocity" else np.diff(velocity)
+        yield signature
+
+
+def matched(
+    fine: FineAlignment, signatures: Iterable[Array], others: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """Match innovations with those that signatures in the measurements make.
 
     Parameters
     ----------
+    signatures : iterable of (K, 3, s) arrays
+        Some of them at a time: they take memory.
     others : (K, 3, M) array, optional
         Signatures, of one sigma each, of errors that the filter leaves out and any log may have: they explain what they can.
 
@@ -120,13 +130,13 @@ def matched(fine: FineAlignment, signature: Array, others: Array | None = None) 
 
     other = np.zeros((len(e), 0)) if others is None else white(others)[0]
     information = np.eye(other.shape[1]) + other.T @ other
-    count = signature.shape[-1]
-    match, energy, x = np.empty(count), np.empty(count), np.empty((fine.system.states, count))
-    for first in range(0, count, AT_ONCE):
-        some = slice(first, first + AT_ONCE)
-        shape, x[:, some] = white(signature[..., some])
+    found: list[tuple[Array, Array, Array]] = []
+    for signature in signatures:
+        shape, x = white(signature)
         shared = np.linalg.solve(information, other.T @ np.column_stack([e, shape]))
-        match[some] = shape.T @ e - shape.T @ other @ shared[:, 0]
-        energy[some] = np.sum(shape**2, axis=0) - np.einsum("ks,ks->s", shape, other @ shared[:, 1:])
-    energy = np.maximum(energy, 1e-300)
-    return match**2 / energy, match / energy, x
+        match = shape.T @ e - shape.T @ other @ shared[:, 0]
+        energy = np.sum(shape**2, axis=0) - np.einsum("ks,ks->s", shape, other @ shared[:, 1:])
+        energy = np.maximum(energy, 1e-300)
+        found.append((match**2 / energy, match / energy, x))
+    ratio, size, end = (np.concatenate(values, axis=-1) for values in zip(*found, strict=True))
+    return ratio, size, end

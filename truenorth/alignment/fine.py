@@ -7,7 +7,7 @@ it is, is read from the log itself, axis by axis, by making the innovations as l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -70,6 +70,8 @@ class FineAlignment:
         P0 = np.zeros((system.states, system.states))
         P0[kept, kept] = log.prior.P[kept, kept]
         floors, floor = initial_part(gains.step, P0, PHI)
+        # What follows needs the noise of the first interval alone; that of all takes memory.
+        system = replace(system, Q=system.Q[:1].copy(), S=None if system.S is None else system.S[:1].copy())
         return cls(
             integrals=log.integrals,
             C_n0_i=log.C_n0_i,

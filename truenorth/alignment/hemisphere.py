@@ -30,7 +30,7 @@ def hemisphere_evidence(fine: FineAlignment, position: Position, others: Array |
         off /= fine.integrals.intervals[:, None]
     else:
         off = np.diff(gravity_velocity(time, lat, alt) - gravity_velocity(time, -lat, alt), axis=0)
-    ratio, size, _ = matched(fine, off[..., None], others)
+    ratio, size, _ = matched(fine, [off[..., None]], others)
     if size[0] <= 0.0:
         return []
     # Of a signature of size one: 2 match - energy.

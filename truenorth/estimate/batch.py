@@ -109,5 +109,6 @@ def settle(
         by = moved(found)
         if passes >= most or (passes >= least and by < enough):
             return Settled(found, passes, by)
-        log.correct(found.end)
+        end = np.array(found.end)
         del found  # a pass takes memory: none of it stays for the next
+        log.correct(end)
