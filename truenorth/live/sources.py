@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 CHUNK = 0.02  # s of a replayed log in a chunk
 FASTEST = 500.0  # times: a faster replay has chunks of ten seconds all the same
 BYTES = 65536
+QUEUE = 4 * 2**20  # bytes of datagrams that wait while other programs have the cores; what does not fit is lost
 WAIT = 0.5  # s: a silent line is asked again after it, so that an interrupt is noticed
 POLL = 0.05  # s, between two looks at a file that grows
 EXAMPLES = (
@@ -213,6 +214,7 @@ def _follow(path: Path) -> Callable[[], bytes | None]:
 
 def _udp(host: str, port: int) -> Callable[[], bytes | None]:
     line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, QUEUE)  # the system takes as much of it as it allows
     line.bind((host, port))
     line.settimeout(WAIT)
 
