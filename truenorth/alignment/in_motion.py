@@ -205,6 +205,7 @@ def _aligned(
     answer = _answer(task, track, method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
+    more += [note("aids.late", waited=task.waited)] if task.waited else []
     more += learnt_evidence(task.factors, answer.moving.delays) if answer.moving is not None else []
     more += _seen(task, track, guess, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)

@@ -34,6 +34,7 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
+from truenorth.quality.regimes import motion_summary
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -47,6 +48,8 @@ INTERVAL = 0.5  # s, of the filter's prediction
 OUTPUT = 1.0  # s, of the history
 NO_LOG_ERRORS = LogErrors()
 WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
+LONGEST_ALONE = 5.0  # s, that any IMU carries a vehicle before its first aid
+USUAL_SPEED = 30.0  # m/s, of a vehicle
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
@@ -69,6 +72,7 @@ class MovingTask:
     more: Sequence[Aiding]
     slow: LogErrors = NO_LOG_ERRORS
     factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
+    waited: float = 0.0  # s, that the vehicle drove before anything aided: left out of the record
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
         """The task with what a pass has taught of its sensors, and whether that is much."""
@@ -142,6 +146,10 @@ def moving_task(
         raise AlignmentError(f"{record.source}: {record.duration:g} s; at least {SHORTEST:g} s are needed on the move")
     odometer = None if odometer is None else odometer.shifted(offset)
     gnss = None if gnss is None else _with_floors(gnss.shifted(offset))
+    record, waited = _from_the_first_aid(record, odometer, gnss)
+    if waited and position is not None:
+        far = math.hypot(position.horizontal_sigma, USUAL_SPEED * waited)
+        position = None if has_fixes(gnss) else replace(position, horizontal_sigma=far)
     if position is None:
         position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
@@ -162,7 +170,25 @@ def moving_task(
         usual_antenna(gnss) if antenna is None else antenna,
         stops,
         more,
+        waited=waited,
     )
+
+
+def _from_the_first_aid(
+    record: ImuRecord, odometer: OdometerRecord | VelocityRecord | None, gnss: GnssRecord | None
+) -> tuple[ImuRecord, float]:
+    """The record from where its aiding begins, and how much of it is left out, s: nothing where the vehicle stands until then.
+
+    A vehicle that drives before the first fix has neither speed nor place nor heading: no guess of the attitude leads anywhere.
+    """
+    begin = float(record.time[0])
+    first = min(float(log.time[0]) for log in (odometer, gnss) if log is not None)
+    if first - begin < LONGEST_ALONE or record.time[-1] - first < SHORTEST:
+        return record, 0.0
+    motion = motion_summary(record.between(begin, first))
+    if motion.fraction("moving") + motion.fraction("rotating") == 0.0:
+        return record, 0.0
+    return record.between(first, None), first - begin
 
 
 def in_body_axes(

@@ -135,6 +135,7 @@ SENTENCES = {
     "bias.accel": (
         "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:imu}) allows {allowed:ug|} ug"
     ),
+    "aids.late": "the vehicle drives for {waited:.0f} s before anything aids: the log is used from then on",
     "answers.differ": (
         "the method that the library chooses finds another attitude in the same logs: heading differs by {heading:angle}, level by "
         "{level:angle}, {sigmas:.1f} times what both sigmas allow"
