@@ -12,7 +12,7 @@ from truenorth.errors.group import Group
 from truenorth.errors.model import InsModel
 from truenorth.estimate.correct import feed_back, measure
 from truenorth.estimate.memory import Model, memory
-from truenorth.estimate.predict import describe, set_matrix
+from truenorth.estimate.predict import describe
 from truenorth.estimate.run import kernel_sources, with_states
 from truenorth.filters.recursion import workspace
 from truenorth.state.layout import BG
@@ -61,7 +61,7 @@ def _predicted(kind, dx):
     x = -dx.copy()
     feed_back(s, aux, x, np.zeros(0, np.int64))
     m = memory(s, aux, np.eye(n), 0.0, 1)
-    set_matrix(s, m.sums.C_now)
+    wander.set_matrix(s, m.sums.C_now)
     m.means.vectors[2] = W_B + dx[BG] + dx[model.layout.slice_of("slow gyro bias")]
     w, now, R = workspace(padded(n), 3), np.zeros(NOW_LENGTH), np.ones(3)
     compiled_model = Model(model.dynamics, model.sensor_states, False, 0.0, 0.0, False, True, False)

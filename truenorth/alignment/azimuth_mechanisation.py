@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.compiled import compiled
 from truenorth.errors.in_motion_azimuth import PARAMETERS
-from truenorth.estimate.predict import set_matrix
-from truenorth.strapdown.wander import advance, curvature, earth_axis
+from truenorth.strapdown.wander import advance, curvature, earth_axis, set_matrix
 
 Array = NDArray[np.float64]
 

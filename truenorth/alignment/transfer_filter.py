@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,9 +99,9 @@ class TransferTrack:
     position: Array  # 3)
     # (K, n): what is assumed in the places of the states: biases, delay and lever arm besides the known ones, flexure
     aux: Array
-    C_mb: Array  # (K, 3, 3)
-    sigma: Array  # (K, n)
     P: Array  # (K, n, n)
+    C_mb_assumed: Array  # (3, 3): the given axes, from which `aux` turns where there are states of the mounting
+    mount: slice | None  # where these stand
     innovation: Array  # (K: velocity (m/s; or position, acceleration) and attitude (rad); NaN where absent
     innovation_sigma: Array  # 6)
     nis: Array  # (K, 2)
@@ -108,6 +109,18 @@ class TransferTrack:
     # (6,): variance of what in the innovations is an error of the master's own, which does not change from row to row
     slow: Array
     residuals: tuple[Residuals, ...]  # the innovations source by source
+
+    @cached_property
+    def sigma(self) -> Array:
+        """(K, n) one-sigma of the states."""
+        return np.sqrt(np.maximum(np.einsum("kii->ki", self.P), 0.0))
+
+    @cached_property
+    def C_mb(self) -> Array:
+        """(K, 3, 3) slave to master axes."""
+        if self.mount is None:
+            return np.broadcast_to(self.C_mb_assumed, (len(self.time), 3, 3))
+        return np.asarray(dcm_from_rotation_vector(self.aux[:, self.mount]) @ self.C_mb_assumed)
 
     @property
     def last_P(self) -> Array:
@@ -274,7 +287,7 @@ def _translation(master: MasterRecord, kind: Translation, place: Array | None, l
     measured = np.full((len(master), 10), np.nan)
     measured[:, :3] = master.v_n
     measured[:, 3:6] = _acceleration(master, place)
-    if linear is not None:
+    if linear is not None and np.isnan(measured[:, 3]).any():
         measured[:, 6:] = _quaternions(linear.C_nb)
     return measured
 
@@ -341,10 +354,6 @@ def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStar
         columns = slice(3 * kind, 3 * kind + 3)
         innovation[at, columns], sigma[at, columns], nis[at, kind] = r.innovation, r.sigma, r.nis
         verdict[at, kind] = np.where(r.jumped, REOPENED, np.where(r.used, USED, REJECTED))
-    mount = model.slice_of(MOUNTING)
-    C_mb = np.broadcast_to(start.C_mb, (count, 3, 3))
-    if mount is not None:
-        C_mb = dcm_from_rotation_vector(track.sensors[:, mount]) @ start.C_mb
     return TransferTrack(
         time=track.time,
         delay=start.delay,
@@ -353,9 +362,9 @@ def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStar
         v_n=track.v_n,
         position=track.position,
         aux=track.sensors,
-        C_mb=C_mb,
-        sigma=track.sigma,
         P=track.P,
+        C_mb_assumed=start.C_mb,
+        mount=model.slice_of(MOUNTING),
         innovation=innovation,
         innovation_sigma=sigma,
         nis=nis,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -77,24 +77,15 @@ def quaternion_from_dcm(C: ArrayLike) -> Array:
     divided by (S. Shepperd, J. Guid. Control 1 (1978)).
     """
     C = np.asarray(C, dtype=np.float64)
-    t = np.trace(C, axis1=-2, axis2=-1)
-    d = np.stack([t, C[..., 0, 0], C[..., 1, 1], C[..., 2, 2]], -1)
-    x, y, z = (
-        C[..., 2, 1] - C[..., 1, 2],
-        C[..., 0, 2] - C[..., 2, 0],
-        C[..., 1, 0] - C[..., 0, 1],
-    )
-    xy, xz, yz = C[..., 0, 1] + C[..., 1, 0], C[..., 0, 2] + C[..., 2, 0], C[..., 1, 2] + C[..., 2, 1]
-    one = np.ones_like(t)
-    rows = np.stack(
-        [
-            np.stack([one + t, x, y, z], -1),
-            np.stack([x, one + 2 * C[..., 0, 0] - t, xy, xz], -1),
-            np.stack([y, xy, one + 2 * C[..., 1, 1] - t, yz], -1),
-            np.stack([z, xz, yz, one + 2 * C[..., 2, 2] - t], -1),
-        ],
-        -2,
-    )
+    d = np.empty((*C.shape[:-2], 4))
+    d[..., 1:] = np.diagonal(C, axis1=-2, axis2=-1)
+    d[..., 0] = t = d[..., 1] + d[..., 2] + d[..., 3]
+    rows = np.empty((*C.shape[:-2], 4, 4))
+    rows[..., 0, 0] = 1.0 + t
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        rows[..., 0, 1 + i] = rows[..., 1 + i, 0] = C[..., k, j] - C[..., j, k]
+        rows[..., 1 + j, 1 + k] = rows[..., 1 + k, 1 + j] = C[..., j, k] + C[..., k, j]
+        rows[..., 1 + i, 1 + i] = 1.0 + 2.0 * d[..., 1 + i] - t
     largest = np.argmax(d, axis=-1)
     q = np.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
@@ -237,7 +228,7 @@ def cross(a: Any, b: Any) -> Any:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@compiled
+@borrowing
 def times(C: Any, v: Any) -> Any:
     """``C v`` of a (3, 3) matrix and a vector as a tuple."""
     return (
@@ -247,7 +238,7 @@ def times(C: Any, v: Any) -> Any:
     )
 
 
-@compiled
+@borrowing
 def times_back(C: Any, v: Any) -> Any:
     """``C^T v`` of a (3, 3) matrix and a vector as a tuple."""
     return times(C.T, v)

@@ -1,6 +1,6 @@
 """Matrix work of the recursions: small symmetric and square matrices, padded, without BLAS and without allocation.
 
-A matrix of n rows lives in the corner of an N x N array with N the next multiple of 8 and zeros beyond n. Each
+A matrix of n rows lives in the corner of an N x N array with N the next multiple of 4 and zeros beyond n. Each
 function takes `size`, a tuple of N nothings, first: its length is part of its *type*, so that Numba compiles every
 function once for each N with loops of constant length, and one source serves all. With the innermost loop of constant
 length summing into a scalar, LLVM unrolls it and turns the loop around it into vector instructions.
@@ -13,20 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 
 Array = NDArray[np.float64]
 Size = tuple[Any, ...]
 
-MULTIPLE = 8
+MULTIPLE = 4
 
 
 def padded(n: int) -> Size:
-    """Give the `size` of matrices with `n` rows: a tuple as long as the next multiple of 8."""
+    """Give the `size` of matrices with `n` rows: a tuple as long as the next multiple of 4."""
     return (None,) * (MULTIPLE * -(-n // MULTIPLE))
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def load(size: Size, source: Array, M: Array) -> None:
     """``M = source``, with `source` (rows, n) in the corner of `M` (at least as many rows, N); the rest stays."""
     for i in range(source.shape[0]):
@@ -34,7 +34,7 @@ def load(size: Size, source: Array, M: Array) -> None:
             M[i, j] = source[i, j]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def load_transposed(size: Size, source: Array, M: Array) -> None:
     """``M = source'``; as :func:`load`."""
     for i in range(source.shape[0]):
@@ -42,7 +42,7 @@ def load_transposed(size: Size, source: Array, M: Array) -> None:
             M[j, i] = source[i, j]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def dot(size: Size, a: Array, b: Array) -> float:
     """``a' b``."""
     total = 0.0
@@ -51,7 +51,7 @@ def dot(size: Size, a: Array, b: Array) -> float:
     return total
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def transposed_times(size: Size, A: Array, x: Array, y: Array) -> None:
     """``y = A' x``: for a symmetric `A` the product itself; the transpose runs along rows."""
     for j in range(len(size)):
@@ -61,7 +61,7 @@ def transposed_times(size: Size, A: Array, x: Array, y: Array) -> None:
         y[j] = total
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def multiply(size: Size, A: Array, B: Array, C: Array) -> None:
     """``C = A B``; `C` is neither `A` nor `B`."""
     for i in range(len(size)):
@@ -72,7 +72,7 @@ def multiply(size: Size, A: Array, B: Array, C: Array) -> None:
             C[i, j] = total
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def propagate_covariance(size: Size, Phi: Array, Phi_t: Array, Q: Array, P: Array, work: Array) -> None:
     """``P = Phi P Phi' + Q``, symmetric to the bit; `Phi_t` is the transpose of `Phi`."""
     multiply(size, Phi, P, work)
@@ -85,7 +85,7 @@ def propagate_covariance(size: Size, Phi: Array, Phi_t: Array, Q: Array, P: Arra
     mirror(size, P)
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def mirror(size: Size, P: Array) -> None:
     """Make `P` symmetric: the upper triangle becomes the lower one."""
     for i in range(len(size)):
@@ -93,7 +93,7 @@ def mirror(size: Size, P: Array) -> None:
             P[j, i] = P[i, j]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def take_off(size: Size, P: Array, a: Array, scale: float) -> None:
     """``P = P - scale a a'``, symmetric to the bit."""
     for i in range(len(size)):
@@ -101,7 +101,7 @@ def take_off(size: Size, P: Array, a: Array, scale: float) -> None:
             P[i, j] -= scale * (a[i] * a[j])
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def take_off_pair(size: Size, P: Array, a: Array, b: Array) -> None:
     """``P = P - (a b' + b a') / 2``, symmetric to the bit."""
     for i in range(len(size)):

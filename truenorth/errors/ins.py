@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from truenorth.core import earth
 from truenorth.core.attitude import cross
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.strapdown.wander import curvature
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ _W = earth.EARTH_RATE
 _normal_gravity_at = compiled(earth.normal_gravity_at)
 
 
-@compiled
+@borrowing
 def error_dynamics(C: Any, f: Any, v: Any, axis: Any, alt: float, north: bool, fixed_altitude: bool, F: Any) -> None:
     """Fill in ``F`` of ``x' = F x + w`` for the 15 states; the sensors' own rows (9 and on) are left as they are.
 
@@ -131,7 +131,7 @@ def error_dynamics(C: Any, f: Any, v: Any, axis: Any, alt: float, north: bool, f
             F[_DP + 2, j] = 0.0
 
 
-@compiled
+@borrowing
 def couple_sensors(C: Any, at: Any, fixed_altitude: bool, F: Any) -> None:
     """Fill in the columns by which slow biases act as gyro and accelerometer errors.
 
@@ -153,7 +153,7 @@ def couple_sensors(C: Any, at: Any, fixed_altitude: bool, F: Any) -> None:
                 F[_DV + i, at[1] + j] = C[i, j]
 
 
-@compiled
+@borrowing
 def transition(size: Any, F: Any, decay: Any, T: float, Phi: Any, Phi_t: Any) -> None:
     """``Phi = I + F T + (F T)^2/2`` of the first nine states, exact exponentials of the others', and its transpose.
 

@@ -35,13 +35,13 @@ import math
 from typing import Any
 
 from truenorth.core.attitude import cross, quaternion_from_rotation_vector, rotate
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 
 _PHI, _DV = 0, 3
 SMALL = 1e-4  # rad, below which the Jacobian's series is exact to rounding
 
 
-@compiled
+@borrowing
 def left_jacobian(phi: Any, e: Any) -> Any:
     """``J(phi) e``: what ``exp([-(phi + e) x])`` leaves of itself after ``exp([phi x])``, as a rotation vector; tuples."""
     angle = math.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
@@ -55,7 +55,7 @@ def left_jacobian(phi: Any, e: Any) -> Any:
     return e[0] + a * first[0] + b * second[0], e[1] + a * first[1] + b * second[1], e[2] + a * first[2] + b * second[2]
 
 
-@compiled
+@borrowing
 def corrected_velocity(v: Any, phi: Any, xi: Any) -> Any:
     """``exp([phi x]) v - J(phi) xi``; tuples."""
     back = left_jacobian(phi, xi)
@@ -63,7 +63,7 @@ def corrected_velocity(v: Any, phi: Any, xi: Any) -> Any:
     return turned[0] - back[0], turned[1] - back[1], turned[2] - back[2]
 
 
-@compiled
+@borrowing
 def reset(s: Any, x: Any, P: Any) -> None:
     """Prepare a correction for being fed back as one of invariant errors.
 

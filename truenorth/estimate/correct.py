@@ -10,7 +10,7 @@ import numpy as np
 from truenorth.aiding.row import row_at
 from truenorth.core import earth
 from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.estimate.memory import Memory, Model, Sources
 from truenorth.filters.recursion import (
     NO_INNOVATION_VARIANCE,
@@ -27,7 +27,7 @@ _PHI, _DV, _DP, _BG, _BA = 0, 3, 6, 9, 12
 GRAVITY_GRADIENT = 2.0 * earth.GRAVITY_EQUATOR / earth.SEMI_MAJOR  # 1/s^2: of the free vertical channel
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def measure(m: Memory, model: Model, sources: Sources, source: int, measured: Any, now: Any, w: Any, R: Any) -> None:
     """Fill in `H`, `z` and what the row adds to `R` (3,)."""
     for i in range(3):
@@ -42,7 +42,7 @@ def measure(m: Memory, model: Model, sources: Sources, source: int, measured: An
                     w.H[i, slow + j] = w.H[i, whole + j]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
     """How many rows are present, and ``nu' S^-1 nu`` of them together, by Cholesky's factor of ``S``."""
     count = 0
@@ -75,7 +75,7 @@ def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
     return count, nis
 
 
-@compiled
+@borrowing
 def update_held(size: Any, w: Any, held: Any) -> int:
     """Condition on all rows with the optimal gain, but none for the states that are considered only (Schmidt).
 
@@ -106,7 +106,7 @@ def update_held(size: Any, w: Any, held: Any) -> int:
     return SOUND if still_positive(size, w) else NOT_POSITIVE
 
 
-@compiled
+@borrowing
 def damp_height(size: Any, C: Any, T: float, time_constant: float, w: Any) -> None:
     """Third-order loop in place of a Kalman gain: height, velocity and accelerometer bias, all poles at -1/time_constant.
 
@@ -128,7 +128,7 @@ def damp_height(size: Any, C: Any, T: float, time_constant: float, w: Any) -> No
             w.P[i, j] += variance * w.k[i] * w.k[j] - (w.k[i] * w.a[j] + w.a[i] * w.k[j])
 
 
-@compiled
+@borrowing
 def rotation_vector_of(q: Any) -> Any:
     """The rotation vector of a quaternion, tuples; the shorter way round."""
     sign = 1.0 if q[0] >= 0.0 else -1.0
@@ -139,7 +139,7 @@ def rotation_vector_of(q: Any) -> Any:
     return scale * q[1], scale * q[2], scale * q[3]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def feed_back(s: Any, aux: Any, x: Any, turns: Any) -> None:
     """Take the estimated errors off the state and the sensors; the estimate is zero again.
 
@@ -161,7 +161,7 @@ def feed_back(s: Any, aux: Any, x: Any, turns: Any) -> None:
         x[j] = 0.0
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def set_place(size: Any, m: Memory, now: Any, variance: Any, w: Any) -> None:
     """Put the vehicle where a row of position says (`z`, along east, north, up), its error independent of all others."""
     s, c = now[NOW_NORTH], now[NOW_NORTH + 1]

@@ -28,11 +28,21 @@ class Setting:
     # the sensors; of the rows they hold, :func:`begin` takes note, more come with :func:`go_on`
     sources: tuple[Aiding, ...] = ()
     stride: int = 1  # samples from one prediction of the filter to the next
-    # output at every so many of these, at the beginning and at the end; 0: only after measurements that ask for it
+    # output at every so many of these, at the beginning and at the end; 0: only after measurements that ask for it, and the
+    # stride is the longest step of the filter, which predicts at measurements where these come as often
     every: int = 1
     covariance: bool = True  # carry the covariance; needed for any aiding
     smooth: bool = False  # keep what the smoother needs: of a log in one chunk
     invariant: bool = False  # corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`)
+
+    @property
+    def grid(self) -> int:
+        """Samples from one event of the filter's own to the next; half a stride where such events may be passed over."""
+        return self.stride if self.every else max(1, self.stride // 2)
+
+    def spare(self, interval: float) -> float:
+        """How long (s) the filter may wait at an event of its own until the next one, with samples of this interval (s)."""
+        return 0.0 if self.every else (self.stride - self.grid + 0.5) * interval
 
 
 class Rows(NamedTuple):
@@ -69,6 +79,8 @@ class LoopState:
 
 def received(setting: Setting, state: LoopState, aiding: Sequence[Aiding]) -> LoopState:
     """Measurements put where they wait."""
+    if not aiding:
+        return state
     names = [source.name for source in setting.sources]
     width = state.waiting.measured.shape[1]
     parts: dict[bool, list[Rows]] = {False: [state.waiting], True: [state.late]}
@@ -90,7 +102,7 @@ def planned(setting: Setting, state: LoopState, horizon: int, last: bool) -> tup
     """Events up to the horizon in order: the filter's grid, output and measurements; the state without those."""
     ends, count = state.samples.end, state.count
     number = 1 + np.arange(count + state.taken, count + horizon)
-    on, output = number % setting.stride == 0, np.zeros(len(number), dtype=bool)
+    on, output = number % setting.grid == 0, np.zeros(len(number), dtype=bool)
     if setting.every:
         output = number % (setting.stride * setting.every) == 0
     if last and len(on):

@@ -4,19 +4,19 @@ An event is an epoch of the filter's own grid, an epoch of output, or a measurem
 falls is taken in two parts. A re-timed measurement holds at its stamp less a delay as it is known *now*: when it comes is
 decided as the loop goes. Corrections are fed back at once, so that the error state is zero between events.
 
-``run(samples, events, memory) -> memory``: all that the loop knows is in its memory, and samples after the last event stay
+``run(task, memory)``: all that the loop knows is in its memory, and samples after the last event stay
 with the caller; handed in again with the next ones, chunks of any size give the bits of one batch.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.row import AT_LAG
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import load
 from truenorth.errors.invariant import reset
 from truenorth.estimate.correct import damp_height, feed_back, joint_nis, measure, set_place, update_held
@@ -33,10 +33,12 @@ from truenorth.estimate.memory import (
     Model,
     Samples,
     Sources,
+    Task,
 )
-from truenorth.estimate.predict import describe, describe_instant, predict_to_event, set_matrix, take_sample
+from truenorth.estimate.predict import describe, describe_instant, predict_to_event, take_sample
 from truenorth.filters.recursion import SOUND, update, workspace
 from truenorth.state.now import NOW_BEHIND, NOW_LENGTH
+from truenorth.strapdown.wander import set_matrix
 
 Array = NDArray[np.float64]
 
@@ -45,7 +47,19 @@ SAME_TIME = 1e-6  # s: an event this near the end of a sample is at its end
 _PHI, _DV = 0, 3
 
 
-@compiled(forceinline=True)
+class Room(NamedTuple):
+    """What an event is worked out in: `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0)."""
+
+    F: Array
+    rate: Array
+    S: Array
+    R: Array
+    now: Array
+    Phi: Array
+    Q: Array
+
+
+@borrowing(forceinline=True)
 def correct(
     size: Any,
     m: Memory,
@@ -123,7 +137,7 @@ def correct(
     return SOUND
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def keep(m: Memory, w: Any, time: float, j: int, kept: Kept) -> None:
     """Put out the state at an epoch."""
     kept.time[j] = time
@@ -137,7 +151,7 @@ def keep(m: Memory, w: Any, time: float, j: int, kept: Kept) -> None:
                 kept.P[j, a, b] = w.P[a, b]
 
 
-@compiled
+@borrowing
 def keep_link(kept: Kept, link: int, n: int, Phi: Any, Q: Any) -> None:
     """Put out transition and noise since the last event, for the smoother, and begin them anew."""
     for a in range(n):
@@ -150,7 +164,7 @@ def keep_link(kept: Kept, link: int, n: int, Phi: Any, Q: Any) -> None:
             Q[a, b] = 0.0
 
 
-@compiled
+@borrowing
 def disturb(of: Events, e: int, P: Any) -> None:
     """Add what the base may have done in a gap to the variances of attitude and velocity."""
     for a in range(3):
@@ -158,7 +172,7 @@ def disturb(of: Events, e: int, P: Any) -> None:
         P[_DV + a, _DV + a] += of.measured[e, a]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def time_of(samples: Samples, i: int, done: float) -> float:
     """Where the loop stands, a part `done` of sample i taken."""
     if i < len(samples.step):
@@ -168,7 +182,7 @@ def time_of(samples: Samples, i: int, done: float) -> float:
     return samples.end[i - 1]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def next_event(events: Events, late: Events, sources: Sources, aux: Any, k: int, r: int, took: bool) -> Any:
     """The next re-timed event's time, whether it shares its stamp with one just taken, whether it is the next, and when."""
     target = np.inf
@@ -193,7 +207,7 @@ def take_up(size: Any, m: Memory) -> Any:
     return w
 
 
-@compiled
+@borrowing
 def put_back(m: Memory, w: Any) -> None:
     """Remember the covariance. No slice is assigned: what would report a wrong shape takes seconds to compile."""
     for a in range(len(m.aux)):
@@ -202,58 +216,13 @@ def put_back(m: Memory, w: Any) -> None:
             m.P[a, b] = w.P[a, b]
 
 
-@compiled
-def run(
-    size: Any,
-    samples: Samples,
-    start: int,
-    events: Events,
-    late: Events,
-    sources: Sources,
-    model: Model,
-    horizon: int,
-    m: Memory,
-    kept: Kept,
-) -> Any:
-    """Go on through all events that the samples reach.
-
-    Parameters
-    ----------
-    samples : Samples
-        From some that are done with (for rates) to the newest.
-    start : int
-        The first that is not.
-    events : Events
-        In order of time.
-    late : Events
-        Re-timed ones, in order of their stamps; all of one delay.
-    sources : Sources
-    model : Model
-    horizon : int
-        Samples to be taken: those behind it are only there for rates.
-    m : Memory
-        Changed in place.
-    kept : Kept
-
-    Returns
-    -------
-    failure : int
-        Of :mod:`truenorth.filters.recursion`.
-    sample : int
-        The next to be taken.
-    event, row : int
-        The next events of either kind; with a failure, event is where, counted as the histories are.
-    outputs : int
-    """
-    n, N = len(m.aux), len(size)
-    w = take_up(size, m)
-    F, rate, S, R, now = np.zeros((N, N)), np.zeros(n), np.zeros((3, 4)), np.zeros(3), np.zeros(NOW_LENGTH)
-    smoothing = kept.Phi.shape[0] > 0
-    Phi, Q = np.zeros((N * smoothing, N * smoothing)), np.zeros((N * smoothing, N * smoothing))
-    for a in range(len(Phi)):
-        Phi[a, a] = 1.0
+@borrowing
+def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room) -> Any:
+    """The loop of :func:`run`, in what that made room for."""
+    samples, start, events, late, sources, model, horizon = task
+    F, rate, S, R, now, Phi, Q = room
+    n, smoothing = len(m.aux), kept.Phi.shape[0] > 0
     set_matrix(m.s, m.sums.C_now)
-    # Taken out of their tuples once: a tuple handed to a function counts references to all that it holds, at each sample.
     s, aux, sums, sensors, fixed_altitude = m.s, m.aux, m.sums, model.sensors, model.fixed_altitude
     zero = np.int64(0)  # typed: what is handed a plain 0 is compiled once more, for a literal
     i, k, r, j, link = start, zero, zero, zero, zero
@@ -279,6 +248,9 @@ def run(
                 m.done[0] += ahead / T
         if not reached:
             break
+        if not retimed and events.source[k] < 0 and not events.output[k] and m.sums.T[0] <= model.spare:
+            k += 1
+            continue
         if model.covariance and m.sums.T[0] > 0.0:
             predict_to_event(size, m, model, F, rate, now, w, Q, Phi)
             if len(model.dynamics.acts) > 0:
@@ -319,5 +291,43 @@ def run(
             r += 1
         else:
             k += 1
-    put_back(m, w)
     return failure, i, number if failure != SOUND else k, r, j
+
+
+@compiled
+def run(size: Any, task: Task, m: Memory, kept: Kept) -> Any:
+    """Go on through all events that the samples reach.
+
+    Parameters
+    ----------
+    task : Task
+    m, kept : Memory, Kept
+        Changed in place.
+
+    Returns
+    -------
+    failure : int
+        Of :mod:`truenorth.filters.recursion`.
+    sample : int
+        The next to be taken.
+    event, row : int
+        The next events of either kind; with a failure, event is where, counted as the histories are.
+    outputs : int
+    """
+    n, N = len(m.aux), len(size)
+    w = take_up(size, m)
+    links = N * (kept.Phi.shape[0] > 0)
+    room = Room(
+        np.zeros((N, N)),
+        np.zeros(n),
+        np.zeros((3, 4)),
+        np.zeros(3),
+        np.zeros(NOW_LENGTH),
+        np.zeros((links, links)),
+        np.zeros((links, links)),
+    )
+    for a in range(links):
+        room.Phi[a, a] = 1.0
+    result = go_through(size, task, m, kept, w, room)
+    put_back(m, w)
+    return result

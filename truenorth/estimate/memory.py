@@ -57,7 +57,7 @@ class Sources(NamedTuple):
 
 
 class Model(NamedTuple):
-    """What of the error model the kernel needs."""
+    """What of the error model the kernel needs; `spare` (s): an event of the grid so soon after another is passed over."""
 
     dynamics: Dynamics
     sensors: Integers
@@ -67,6 +67,19 @@ class Model(NamedTuple):
     invariant: bool
     covariance: bool
     held: bool
+    spare: float = 0.0
+
+
+class Task(NamedTuple):
+    """What the loop is given to go through."""
+
+    samples: Samples  # from some that are done with (for rates) to the newest
+    start: int  # the first that is not
+    events: Events  # in order of time
+    late: Events  # re-timed ones, in order of their stamps; all of one delay
+    sources: Sources
+    model: Model
+    horizon: int  # samples to be taken: those behind it are only there for rates
 
 
 class Kept(NamedTuple):

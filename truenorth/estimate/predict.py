@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from truenorth.core import earth
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.linalg import multiply, propagate_covariance
 from truenorth.errors.dynamics import ALONE, couple_pairs, noise_of_pairs
 from truenorth.errors.group import columns_at
@@ -28,22 +28,13 @@ from truenorth.state.now import (
     NOW_SPIN,
     NOW_TURN,
 )
-from truenorth.strapdown.wander import acceleration, advance, azimuth, earth_axis
+from truenorth.strapdown.wander import acceleration, advance, azimuth, earth_axis, set_matrix
 
 _PHI, _BG, _BA = 0, 9, 12
-FULL = 16  # columns that are summed whole: the dynamic states, up to a multiple of 8
+FULL = 16  # columns that are summed whole: the dynamic states, and more, as vector instructions take sixteen at a time
 
 
-@compiled
-def set_matrix(s: Any, C: Any) -> None:
-    """``C_wb`` of the state's quaternion."""
-    w, x, y, z = s[0], s[1], s[2], s[3]
-    C[0, 0], C[0, 1], C[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    C[1, 0], C[1, 1], C[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-    C[2, 0], C[2, 1], C[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-
-
-@compiled
+@borrowing
 def take_sample(
     s: Any,
     samples: Samples,
@@ -83,7 +74,7 @@ def take_sample(
     sums.T[0] += part * T
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def describe(m: Memory, model: Model, now: Any) -> None:
     """Fill in what rows and columns are given of this epoch, but for what is needed of it sample by sample."""
     s, C = m.s, m.sums.C_now
@@ -110,7 +101,7 @@ def describe(m: Memory, model: Model, now: Any) -> None:
     now[NOW_NORTH], now[NOW_NORTH + 1] = azimuth(s)
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: Any, now: Any) -> None:
     """Rate, its derivative and specific force at a part `done` of sample i: a line through the samples next to it."""
     middle = i
@@ -149,7 +140,7 @@ def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: A
         now[NOW_FORCE + j] = force + growth * since
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def predict_to_event(
     size: Any, m: Memory, model: Model, F: Any, rate: Any, now: Any, w: Any, Q: Any, link: Any
 ) -> None:
@@ -217,7 +208,7 @@ def predict_to_event(
     propagate_errors(size, d.pair, w.Phi, w.Phi_t, w.Q, w.P, w.temporary)
 
 
-@compiled
+@borrowing
 def propagate_errors(size: Any, pair: Any, Phi: Any, Phi_t: Any, Q: Any, P: Any, work: Any) -> None:
     """``P = Phi P Phi' + Q``, symmetric to the bit, in a third of the work.
 
@@ -259,7 +250,7 @@ def propagate_errors(size: Any, pair: Any, Phi: Any, Phi_t: Any, Q: Any, P: Any,
             P[i, j] = P[j, i]
 
 
-@compiled
+@borrowing
 def act(m: Memory, model: Model, F: Any, now: Any) -> None:
     """Columns of the groups that act on the INS."""
     d = model.dynamics

@@ -18,7 +18,7 @@ from truenorth.errors.deflection import at_rest
 from truenorth.errors.model import InsModel
 from truenorth.errors.whole_bias import taken_apart
 from truenorth.estimate import loop as kernel
-from truenorth.estimate.axes import convergence, turn
+from truenorth.estimate.axes import turn
 from truenorth.estimate.events import LoopState, Rows, Setting, planned, received
 from truenorth.estimate.memory import (
     ABSENT,
@@ -34,6 +34,7 @@ from truenorth.estimate.memory import (
     Model,
     Samples,
     Sources,
+    Task,
     memory,
 )
 from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
@@ -88,7 +89,7 @@ def begin(
             P0, aux = known_as_bias(P0, aux, group, model.layout.first_of(ACCEL_AXES), constant)
     place = np.array([[start.lat, start.lon, start.alt]])
     P0 = np.array(P0)[None]
-    turn(np.linalg.inv(convergence(np.eye(3)[None], s[None, wander.VELOCITY], place)), P0)
+    turn(np.eye(3)[None], s[None, wander.VELOCITY], place, -1.0, P0)
     width = max([3, *(source.measured.shape[1] for source in setting.sources)])
     nothing = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, width)), np.zeros((0, 3)))
     empty = Samples(np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
@@ -239,26 +240,19 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         m.s[wander.LAST_ANGLE] = 2.0 * dtheta[0] - dtheta[min(1, there - 1)]
         m.s[wander.LAST_VELOCITY] = 2.0 * dvel[0] - dvel[min(1, there - 1)]
     kept = _room(setting, plan, late, n)
-    code, taken, event, row_, outputs = kernel.run(
-        padded(n),
-        state.samples,
-        state.taken,
-        Events(*plan),
-        Events(*late),
-        kernel_sources(sources, model),
-        Model(
-            model.dynamics,
-            model.sensor_states,
-            model.fixed_altitude,
-            *model.turn_noise,
-            setting.invariant,
-            setting.covariance,
-            any(group.considered for group in model.groups),
-        ),
-        horizon,
-        m,
-        kept,
+    of_model = Model(
+        model.dynamics,
+        model.sensor_states,
+        model.fixed_altitude,
+        *model.turn_noise,
+        setting.invariant,
+        setting.covariance,
+        any(group.considered for group in model.groups),
+        setting.spare(state.interval),
     )
+    seen = kernel_sources(sources, model)
+    task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)
+    code, taken, event, row_, outputs = kernel.run(padded(n), task, m, kept)
     if code != SOUND:
         _raise(code, kept.when[event], sources[int(np.append(plan.source, late.source)[event])])
     residuals = _residuals(sources, plan, late.at(np.arange(row_)), kept, after.outside)
@@ -282,7 +276,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, model.dynamics.turns)
     C_nb, v_n, position, C_nw = wander.north(states)
     if setting.covariance:
-        turn(convergence(C_nw, v_n, position), P)
+        turn(C_nw, v_n, position, 1.0, P)
     return after, Track(kept.time[:outputs], C_nb, v_n, position, sensors, P, model.layout, residuals)
 
 

@@ -27,7 +27,7 @@ from typing import Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, mirror, propagate_covariance, transposed_times
 from truenorth.filters.drive import Running
@@ -56,7 +56,7 @@ class Factors(NamedTuple):
     no_noise: Array
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def remember(size: Size, w: Workspace, rho: float, V: Array) -> None:
     """``V = (rho V + e^2) / (1 + rho)`` of each row present; ``e^2`` the first time."""
     for row in range(w.z.shape[0]):
@@ -69,7 +69,7 @@ def remember(size: Size, w: Workspace, rho: float, V: Array) -> None:
             V[row] = (rho * V[row] + e * e) / (1.0 + rho)
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def factor(wanted: float, there: float, cap: float) -> float:
     """How much larger `there` must be; at least 1, at most `cap`; 1 where nothing is there."""
     if not (there > 0.0 and wanted > there):
@@ -77,7 +77,7 @@ def factor(wanted: float, there: float, cap: float) -> float:
     return min(wanted / there, cap)
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def fade(size: Size, w: Workspace, kind: int, softening: float, cap: float, V: Array, lam: Array, Lam: Array) -> None:
     """From ``P = Phi P Phi'`` to the predicted covariance; `lam` holds the factors, of rows or, in front, of all."""
     N, rows = len(size), w.z.shape[0]

@@ -17,7 +17,7 @@ from typing import NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, padded, take_off, transposed_times
 from truenorth.filters.drive import NoFilterError, Running
@@ -35,7 +35,7 @@ class HInfinity(NamedTuple):
     theta: float
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def distrust(size: Size, w: Workspace, L: Array, theta: float) -> float:
     """``P = (P^-1 - theta L' L)^-1``, row by row; the margin, ``min(1 - theta l P l')``."""
     margin = 1.0

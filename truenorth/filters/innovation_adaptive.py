@@ -19,7 +19,7 @@ from typing import Any, Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, transposed_times
 from truenorth.filters.drive import Running
@@ -40,7 +40,7 @@ class InnovationAdaptive(NamedTuple):
     largest: float
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def observe(size: Size, w: Workspace, window: Array, seen: Array, sign: float) -> None:
     """Put ``(z - h x)^2 + sign h P h'`` of each row present into its window, in the place of the oldest."""
     for row in range(w.z.shape[0]):
@@ -52,7 +52,7 @@ def observe(size: Size, w: Workspace, window: Array, seen: Array, sign: float) -
         seen[row] += 1.0
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def take_noise(w: Workspace, window: Array, seen: Array, smallest: float, largest: float) -> None:
     """R of each row from its window; the given one in the places not yet filled."""
     length = window.shape[1]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import (
     Array,
     Size,
@@ -91,7 +91,7 @@ def workspace(size: Size, rows: int) -> Workspace:
     )
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def begin(size: Size, system: Runs, run: int, w: Workspace) -> None:
     """Load the state before epoch 0."""
     b = run if system.x0.shape[0] > 1 else 0
@@ -103,7 +103,7 @@ def begin(size: Size, system: Runs, run: int, w: Workspace) -> None:
         w.largest[i] = w.P[i, i]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def load_process(size: Size, system: Runs, run: int, epoch: int, w: Workspace) -> None:
     """Load ``Phi, Q, u`` of an epoch; what is constant in time was loaded at epoch 0."""
     if epoch == 0 or system.Phi.shape[1] > 1:
@@ -119,7 +119,7 @@ def load_process(size: Size, system: Runs, run: int, epoch: int, w: Workspace) -
             w.u[i] = system.u[b, epoch, i]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def load_measurement(size: Size, system: Runs, run: int, epoch: int, w: Workspace) -> tuple[int, bool]:
     """Load ``z, H, R, S`` of an epoch.
 
@@ -157,7 +157,7 @@ def load_measurement(size: Size, system: Runs, run: int, epoch: int, w: Workspac
     return present, correlated
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def predict_state(size: Size, w: Workspace) -> None:
     """``x = Phi x + u``."""
     transposed_times(size, w.Phi_t, w.x, w.a)
@@ -165,14 +165,14 @@ def predict_state(size: Size, w: Workspace) -> None:
         w.x[i] = w.a[i] + w.u[i]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def predict(size: Size, w: Workspace) -> None:
     """``x = Phi x + u``, ``P = Phi P Phi' + Q``."""
     predict_state(size, w)
     propagate_covariance(size, w.Phi, w.Phi_t, w.Q, w.P, w.temporary)
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def innovate(size: Size, w: Workspace, innovation: Array, covariance: Array) -> None:
     """``nu = z - H x`` and ``H P H' + H S + S' H' + R`` of the predicted state."""
     for i in range(w.z.shape[0]):
@@ -185,7 +185,7 @@ def innovate(size: Size, w: Workspace, innovation: Array, covariance: Array) -> 
             covariance[j, i] = covariance[i, j]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def row_variance(size: Size, w: Workspace, row: int, correlated: bool) -> tuple[float, float, float]:
     """Innovation of one row, its variance, and ``h' s``; leaves its covariance with x, ``a = P h + s``, in ``w.a``."""
     transposed_times(size, w.P, w.H[row], w.a)
@@ -198,7 +198,7 @@ def row_variance(size: Size, w: Workspace, row: int, correlated: bool) -> tuple[
     return w.z[row] - dot(size, w.H[row], w.x) - w.v[row], variance, h_s
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def update_by_row(
     size: Size, w: Workspace, row: int, nu: float, variance: float, h_s: float, correlated: bool, joseph: bool
 ) -> None:
@@ -229,7 +229,7 @@ def update_by_row(
                 w.R[i, j] -= w.g[i] * w.g[j] / variance
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def settle(size: Size, w: Workspace) -> None:
     """After a row without noise: a variance that is zero but for rounding is zero, and so are its covariances."""
     for i in range(len(size)):
@@ -239,7 +239,7 @@ def settle(size: Size, w: Workspace) -> None:
                 w.P[j, i] = 0.0
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def holds(size: Size, w: Workspace, row: int, variance: float, noise: float) -> bool:
     """Whether P holds what a row showed: ``h P h'`` after it is ``noise (1 - noise / variance)``, to a half.
 
@@ -251,7 +251,7 @@ def holds(size: Size, w: Workspace, row: int, variance: float, noise: float) -> 
     return abs(dot(size, w.H[row], w.t) - expected) < 0.5 * expected
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def still_positive(size: Size, w: Workspace) -> bool:
     """Whether no variance is below zero by more than rounding of the largest it ever was; rounding becomes zero."""
     for i in range(len(size)):
@@ -262,7 +262,7 @@ def still_positive(size: Size, w: Workspace) -> bool:
     return True
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[int, float, float]:
     """Condition on all rows present; the failure if any, NIS and log-likelihood."""
     nis = 0.0
@@ -292,7 +292,7 @@ def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[in
     return SOUND, nis, log_likelihood
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def keep(out: Histories, run: int, epoch: int, last: int, w: Workspace) -> None:
     """Keep state, sigma and covariance of an epoch in those histories that have room; the last epoch in all."""
     n = out.x.shape[2]
@@ -308,7 +308,7 @@ def keep(out: Histories, run: int, epoch: int, last: int, w: Workspace) -> None:
                 out.P[run, k, i, j] = w.P[i, j]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def conclude(out: Histories, run: int, epoch: int, failure: int, nis: float, log_likelihood: float) -> bool:
     """Note what an update did; whether the run can go on."""
     out.log_likelihood[run] += log_likelihood

@@ -24,7 +24,7 @@ from typing import Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size
 from truenorth.filters.drive import Running
@@ -106,7 +106,7 @@ class Gate:
         return rule, k0, np.iinfo(np.int64).max if self.patience is None else self.patience, quantiles
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def weight_of(rule: int, e: float, k0: float, k1: float) -> float:
     """Weight of a row whose innovation is `e` sigma large."""
     if e <= k0:
@@ -118,7 +118,7 @@ def weight_of(rule: int, e: float, k0: float, k1: float) -> float:
     return 0.0
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def squared(nu: Array, W: Array) -> tuple[float, int]:
     """``nu' W^-1 nu`` of the rows present and their number; by elimination, destroys both."""
     total, present = 0.0, 0
@@ -135,7 +135,7 @@ def squared(nu: Array, W: Array) -> tuple[float, int]:
     return total, present
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def judge_and_update(
     size: Size,
     w: Workspace,

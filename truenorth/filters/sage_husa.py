@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, transposed_times
 from truenorth.filters.drive import Running
@@ -33,7 +33,7 @@ class SageHusa(NamedTuple):
     largest: float
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def estimate_noise(size: Size, w: Workspace, b: float, smallest: float, largest: float, r: Array, fade: Array) -> None:
     """Bring `r` of each row present up to date and put it into R; `fade` holds ``b^k``."""
     for row in range(w.z.shape[0]):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import Array, Size, load, padded, propagate_covariance, transposed_times
 from truenorth.filters.drive import in_parts, part
 from truenorth.filters.kalman import kalman
@@ -85,7 +85,7 @@ class Behind(NamedTuple):
     zero: Array
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def look_back(size: Size, w: Workspace, b: Behind, correlated: bool) -> None:
     """Carry ``lam, Lam`` from behind an epoch's rows to before them; conditions the predicted state as it goes.
 
@@ -126,7 +126,7 @@ def look_back(size: Size, w: Workspace, b: Behind, correlated: bool) -> None:
     propagate_covariance(size, b.M_t, b.M, b.G, b.Lam, w.temporary)
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def smooth(size: Size, w: Workspace, b: Behind, n: int, x: Array, P: Array) -> None:
     """``x = x + P lam``, ``P = P - P Lam P``, the filtered ones in `w`."""
     transposed_times(size, w.P, b.lam, w.a)
@@ -141,7 +141,7 @@ def smooth(size: Size, w: Workspace, b: Behind, n: int, x: Array, P: Array) -> N
         P[i, i] = max(P[i, i], ROUNDING * w.P[i, i])
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def filtered(size: Size, system: Runs, both: Passes, run: int, epoch: int, w: Workspace) -> None:
     """Load what the filter had after an epoch; the start for epoch -1."""
     if epoch < 0:

@@ -16,7 +16,7 @@ from typing import NamedTuple, Unpack
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 from truenorth.core.linalg import Array, Size, dot, load, transposed_times
 from truenorth.filters.drive import Running
@@ -42,14 +42,14 @@ class Predicted(NamedTuple):
     beta: Array
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def set_noise(w: Workspace, alpha: Array, beta: Array) -> None:
     """``R = beta / alpha``."""
     for row in range(w.z.shape[0]):
         w.R[row, row] = beta[row] / alpha[row]
 
 
-@compiled(forceinline=True)
+@borrowing(forceinline=True)
 def blame(size: Size, w: Workspace, before: Array, beta: Array) -> None:
     """``beta = before + (z - h x)^2 / 2 + h P h' / 2`` of each row present."""
     for row in range(w.z.shape[0]):

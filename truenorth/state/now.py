@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 
 # Places in the vector `now`: the state of strapdown.wander first (24 numbers, along the level frame w), then
 NOW_C = 24  # C_wb, 9, by rows
@@ -24,7 +24,7 @@ NOW_FORCE_B = 62  # the same along the body
 NOW_LENGTH = 65
 
 
-@compiled
+@borrowing
 def vector_of(values: Any, first: int) -> Any:
     """Three numbers of a vector as a tuple."""
     return values[first], values[first + 1], values[first + 2]

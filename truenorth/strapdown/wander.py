@@ -23,14 +23,13 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core import earth
 from truenorth.core.attitude import (
     cross,
-    dcm_from_quaternion,
     normalised,
     quaternion_from_dcm,
     quaternion_from_rotation_vector,
     quaternion_product,
     rotate,
 )
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.strapdown.coning import rotation_vector, velocity_increment
 
 Array = NDArray[np.float64]
@@ -53,7 +52,7 @@ _radii_at = compiled(earth.radii_at)
 _normal_gravity_at = compiled(earth.normal_gravity_at)
 
 
-@compiled
+@borrowing
 def curvature(axis: Any, alt: float) -> Any:
     """``K`` of ``w_ew = up x K v`` in a level frame: ``K_xx, K_xy, K_yy``, 1/m.
 
@@ -72,14 +71,23 @@ def curvature(axis: Any, alt: float) -> Any:
     return east + more * axis[0] * axis[0], more * axis[0] * axis[1], east + more * axis[1] * axis[1]
 
 
-@compiled
+@borrowing
 def earth_axis(s: Any) -> Any:
     """The earth's axis in w, a tuple: the third row of ``C_ew``."""
     w, x, y, z = s[7], s[8], s[9], s[10]
     return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@compiled
+@borrowing
+def set_matrix(s: Any, C: Any) -> None:
+    """``C_wb`` of the state's quaternion."""
+    w, x, y, z = s[0], s[1], s[2], s[3]
+    C[0, 0], C[0, 1], C[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    C[1, 0], C[1, 1], C[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+    C[2, 0], C[2, 1], C[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+@borrowing
 def azimuth(s: Any) -> Any:
     """Direction of north in w: its sine and cosine, x and y; at the pole itself y is called north."""
     axis = earth_axis(s)
@@ -89,7 +97,7 @@ def azimuth(s: Any) -> Any:
     return axis[0] / level, axis[1] / level
 
 
-@compiled
+@borrowing
 def acceleration(s: Any, force: Any, fixed_altitude: bool) -> Any:
     """``dv_w/dt`` of a mean specific force along w, m/s^2; of the last sample where there is none yet.
 
@@ -106,7 +114,7 @@ def acceleration(s: Any, force: Any, fixed_altitude: bool) -> Any:
     return force[0] - coriolis[0], force[1] - coriolis[1], up
 
 
-@compiled
+@borrowing
 def advance(s: Any, T: float, part: float, dtheta: Any, dvel: Any, ends: bool, fixed_altitude: bool) -> None:
     """Carry the state on through a sample, or through a part of it.
 
@@ -176,7 +184,7 @@ def advance(s: Any, T: float, part: float, dtheta: Any, dvel: Any, ends: bool, f
         s[18], s[19], s[20] = dvel
 
 
-@compiled
+@borrowing
 def displace(s: Any, dx: float, dy: float, dz: float) -> None:
     """Move the place by metres along w; attitude and velocity keep their components."""
     Kxx, Kxy, Kyy = curvature(earth_axis(s), s[11])
@@ -217,14 +225,35 @@ def north(states: Array) -> tuple[Array, Array, Array, Array]:
     C_nw : (K, 3, 3) array
         At the pole itself, where north has no meaning, w stays as it is.
     """
-    C_ew = dcm_from_quaternion(states[:, PLACE])
-    up, axis = C_ew[:, :, 2], C_ew[:, 2, :]
-    level = np.hypot(axis[:, 0], axis[:, 1])
-    lat, lon = np.arctan2(up[:, 2], np.hypot(up[:, 0], up[:, 1])), np.arctan2(up[:, 1], up[:, 0])
-    safe = np.where(level > 0.0, level, 1.0)
-    s, c = np.where(level > 0.0, axis[:, 0] / safe, 0.0), np.where(level > 0.0, axis[:, 1] / safe, 1.0)
-    C_nw = np.zeros((len(states), 3, 3))
-    C_nw[:, 0, 0], C_nw[:, 0, 1], C_nw[:, 1, 0], C_nw[:, 1, 1], C_nw[:, 2, 2] = c, -s, s, c, 1.0
-    C_nb = C_nw @ dcm_from_quaternion(states[:, ATTITUDE])
-    v_n = np.einsum("kij,kj->ki", C_nw, states[:, VELOCITY])
-    return C_nb, v_n, np.stack([lat, lon, states[:, ALT]], axis=1), C_nw
+    count = len(states)
+    C_nb, v_n, position, C_nw = (
+        np.empty((count, 3, 3)),
+        np.empty((count, 3)),
+        np.empty((count, 3)),
+        np.zeros((count, 3, 3)),
+    )
+    _north(np.ascontiguousarray(states, dtype=np.float64), C_nb, v_n, position, C_nw)
+    return C_nb, v_n, position, C_nw
+
+
+@compiled
+def _north(states: Any, C_nb: Any, v_n: Any, position: Any, C_nw: Any) -> None:
+    C = np.empty((3, 3))
+    for k in range(len(states)):
+        s = states[k]
+        sine, cosine = azimuth(s)
+        C_nw[k, 0, 0], C_nw[k, 0, 1] = cosine, -sine
+        C_nw[k, 1, 0], C_nw[k, 1, 1] = sine, cosine
+        C_nw[k, 2, 2] = 1.0
+        set_matrix(s, C)
+        for j in range(3):
+            C_nb[k, 0, j] = cosine * C[0, j] - sine * C[1, j]
+            C_nb[k, 1, j] = sine * C[0, j] + cosine * C[1, j]
+            C_nb[k, 2, j] = C[2, j]
+        v_n[k, 0] = cosine * s[4] - sine * s[5]
+        v_n[k, 1] = sine * s[4] + cosine * s[5]
+        v_n[k, 2] = s[6]
+        up = rotate((s[7], s[8], s[9], s[10]), (0.0, 0.0, 1.0))
+        position[k, 0] = math.atan2(up[2], math.sqrt(up[0] * up[0] + up[1] * up[1]))
+        position[k, 1] = math.atan2(up[1], up[0])
+        position[k, 2] = s[ALT]
