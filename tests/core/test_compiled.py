@@ -65,15 +65,18 @@ def alone(x):
 }
 SHOW = """
 import sys
-sys.path.insert(0, {folder!r})
 from numba import float64, typeof
 from truenorth.core.compiled import Kernel
 from truenorth.core.fingerprint import fingerprint
-import plugin_inner, plugin_outer
-for k in (plugin_inner.inner, plugin_outer.outer, plugin_outer.by_module, plugin_outer.alone):
-    print(fingerprint(k.py_func, k.options, (float64,)))
-pair = (typeof(plugin_outer.Pair(1.0, 2.0)),)
-print(fingerprint(plugin_outer.of_pair.py_func, {{}}, pair))
+for folder in {folders!r}:
+    sys.path[:1] = [folder]
+    for name in [name for name in sys.modules if name.startswith("plugin_")]:
+        del sys.modules[name]
+    import plugin_inner, plugin_outer
+    for k in (plugin_inner.inner, plugin_outer.outer, plugin_outer.by_module, plugin_outer.alone):
+        print(fingerprint(k.py_func, k.options, (float64,)))
+    pair = (typeof(plugin_outer.Pair(1.0, 2.0)),)
+    print(fingerprint(plugin_outer.of_pair.py_func, {{}}, pair))
 """
 KERNELS = ("inner", "outer", "by_module", "alone", "of_pair")
 CALL = """
@@ -103,39 +106,38 @@ def run(program, cache, **environment):
     return done.stdout.splitlines()
 
 
-def fingerprints(folder, cache):
-    return dict(zip(KERNELS, run(SHOW.format(folder=str(folder)), cache), strict=True))
-
-
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("plugin")
-    return fingerprints(write(folder / "original"), folder)
-
-
 def edited(module, old, new):
     assert old in MODULES[module]
     return {module: MODULES[module].replace(old, new)}
 
 
-@pytest.mark.parametrize(
-    ("edit", "changed"),
-    [
-        (edited("plugin_constants", "RATE = 2.0", "RATE = 3.0"), {"inner", "outer", "by_module"}),
-        (edited("plugin_constants", "UNUSED = 5.0", "UNUSED = 6.0"), set()),
-        (edited("plugin_inner", "RATE * x", "x * RATE * x"), {"inner", "outer"}),
-        (edited("plugin_inner", "@compiled", "@compiled(fastmath=True)"), {"inner", "outer"}),
-        (edited("plugin_inner", "'''Scaled.'''", "# and why\n\n    '''What it is.'''"), set()),
-        (edited("plugin_outer", "B = 1", "B = 2"), {"outer"}),
-        (edited("plugin_outer", "x + 1.0", "x + 1"), {"alone"}),
-        (edited("plugin_outer", "x + 1.0", "x - 1.0"), {"alone"}),
-        (edited("plugin_outer", "pair.left + pair.right", "pair.left"), {"of_pair"}),
-        (edited("plugin_outer", "    left: float\n    right: float", "    right: float\n    left: float"), {"of_pair"}),
-    ],
-)
-def test_an_edit_changes_its_dependents_only(tmp_path, original, edit, changed):
-    new = fingerprints(write(tmp_path / "edited", **edit), tmp_path)
-    assert {name for name in KERNELS if new[name] != original[name]} == changed
+EDITS = [
+    (edited("plugin_constants", "RATE = 2.0", "RATE = 3.0"), {"inner", "outer", "by_module"}),
+    (edited("plugin_constants", "UNUSED = 5.0", "UNUSED = 6.0"), set()),
+    (edited("plugin_inner", "RATE * x", "x * RATE * x"), {"inner", "outer"}),
+    (edited("plugin_inner", "@compiled", "@compiled(fastmath=True)"), {"inner", "outer"}),
+    (edited("plugin_inner", "'''Scaled.'''", "# and why\n\n    '''What it is.'''"), set()),
+    (edited("plugin_outer", "B = 1", "B = 2"), {"outer"}),
+    (edited("plugin_outer", "x + 1.0", "x + 1"), {"alone"}),
+    (edited("plugin_outer", "x + 1.0", "x - 1.0"), {"alone"}),
+    (edited("plugin_outer", "pair.left + pair.right", "pair.left"), {"of_pair"}),
+    (edited("plugin_outer", "    left: float\n    right: float", "    right: float\n    left: float"), {"of_pair"}),
+]
+
+
+@pytest.fixture(scope="module")
+def fingerprints(tmp_path_factory):
+    """Of the kernels of each edit, by name; the last are those of the original."""
+    home = tmp_path_factory.mktemp("plugin")
+    folders = [write(home / f"edit{number}", **edit) for number, (edit, _) in enumerate([*EDITS, ({}, None)])]
+    lines = iter(run(SHOW.format(folders=[str(folder) for folder in folders]), home))
+    return [{name: next(lines) for name in KERNELS} for _ in folders]
+
+
+@pytest.mark.parametrize("number", range(len(EDITS)))
+def test_an_edit_changes_its_dependents_only(fingerprints, number):
+    new, original = fingerprints[number], fingerprints[-1]
+    assert {name for name in KERNELS if new[name] != original[name]} == EDITS[number][1]
 
 
 def test_every_kernel_of_the_library_is_covered():
@@ -224,21 +226,21 @@ from truenorth.core.compiled import compiled
 def twice(x):
     return x + x
 
-x = {"int": 3, "float": 1.5, "complex": 1j}[sys.argv[1]]
-print(twice(x))
+for kind in sys.argv[1:]:
+    print(twice({"int": 3, "float": 1.5, "complex": 1j}[kind]))
 """
 
 
 def test_processes_that_compile_at_once_leave_each_signature_its_own_code(tmp_path):
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    for _ in range(2):
-        started = [
-            subprocess.Popen(
-                [sys.executable, "-c", TWO_TYPES, kind], stdout=subprocess.PIPE, text=True, env=environment
-            )
-            for kind in ("int", "float", "complex", "int")
-        ]
-        assert [process.communicate()[0].strip() for process in started] == ["6", "3.0", "2j", "6"]
+
+    def start(*kinds):
+        command = [sys.executable, "-c", TWO_TYPES, *kinds]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+
+    started = [start(kind) for kind in ("int", "float", "complex", "int")]
+    assert [process.communicate()[0].strip() for process in started] == ["6", "3.0", "2j", "6"]
+    assert start("int", "float", "complex").communicate()[0].split() == ["6", "3.0", "2j"]
     assert len(list((tmp_path / "truenorth" / "kernels").iterdir())) == 3
 
 
