@@ -11,7 +11,11 @@ from hypothesis import settings
 LONGEST = [
     "papers/test_static",
     "alignment/test_in_motion",
+    "live/test_moving",
+    "live/test_kinds",
+    "documents/test_long_commands",
     "damping/test_navigation",
+    "live/test_hostile",
     "core/test_compiled",
     "alignment/test_published",
     "campaign/test_faults",

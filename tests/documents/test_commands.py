@@ -55,7 +55,7 @@ def your_log() -> list[str]:
     return [line for line in block.splitlines() if line.startswith("truenorth ")]
 
 
-# Streams, turntables, indexers, days at sea, campaigns and studies take longer: `make test-all` runs them, in test_long_commands.
+# Streams, turntables, indexers, days at sea, campaigns and studies are run in test_long_commands.
 ELSEWHERE = ("live", "--indexer", "--positions", "--damping", "campaign", "reproduce")
 RUN = [line for line in your_log() if not any(word in shlex.split(line, comments=True) for word in ELSEWHERE)]
 

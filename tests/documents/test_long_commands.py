@@ -1,7 +1,12 @@
-"""Lines of README's block "Your log" that take longer: streams, turntables, indexers, days at sea, campaigns, studies."""
+"""Lines of README's block "Your log" that take longer: streams, turntables, indexers, days at sea, campaigns, studies.
+
+Each runs as it stands in every call, on a short log or with few runs, but for the drive that is aligned live; `test-all` has
+longer ones.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
 import signal
@@ -13,13 +18,15 @@ from pathlib import Path
 
 import pytest
 import yaml
+from typer.testing import CliRunner
 
 from tests.documents.test_commands import ELSEWHERE, ROOT, your_log
+from tests.runs import some
+from truenorth.cli import app
 from truenorth.simulation import scenario as scenarios
 
 LONG = [line for line in your_log() if any(word in shlex.split(line, comments=True) for word in ELSEWHERE)]
 SCENARIOS = Path(scenarios.__file__).parent / "scenarios"
-pytestmark = pytest.mark.slow
 
 
 def words_of(text: str) -> list[str]:
@@ -29,10 +36,9 @@ def words_of(text: str) -> list[str]:
 
 
 def run(folder: Path, *words: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "truenorth", *words], cwd=folder, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, f"{words}\n{done.stdout}{done.stderr}"
+    with contextlib.chdir(folder):
+        done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, f"{words}\n{done.output}{done.exception}"
 
 
 def simulate(folder: Path, name: str, **changes: object) -> Path:
@@ -43,8 +49,9 @@ def simulate(folder: Path, name: str, **changes: object) -> Path:
     return folder / name
 
 
-def test_an_indexer(tmp_path):
-    logs = simulate(tmp_path, "rotary_ship")
+@pytest.mark.parametrize("rate", some(["50 Hz"], ["100 Hz"]))
+def test_an_indexer(rate, tmp_path):
+    logs = simulate(tmp_path, "rotary_ship", rate=rate)
     (logs / "imu.csv").rename(tmp_path / "ship.csv")
     (logs / "encoder.csv").rename(tmp_path / "encoder.csv")
     run(tmp_path, *words_of("--indexer"))
@@ -55,37 +62,33 @@ def test_a_turntable(tmp_path):
     run(tmp_path, *words_of("--positions"))
 
 
-def test_a_voyage(tmp_path):
-    logs = simulate(tmp_path, "marine_damping", duration="6 h", imu="navigation", errors={})
+@pytest.mark.parametrize("duration", some(["2 h"], ["6 h"]))
+def test_a_voyage(duration, tmp_path):
+    logs = simulate(tmp_path, "marine_damping", duration=duration, imu="navigation", errors={})
     (logs / "imu.csv").rename(tmp_path / "voyage.csv")
     (logs / "velocity_log.csv").rename(tmp_path / "log.csv")
-    run(
-        tmp_path,
-        "align",
-        "voyage.csv",
-        "--lat",
-        "45.78",
-        "--lon",
-        "126.67",
-        "--imu",
-        "navigation",
-        "--to",
-        "900",
-        "-o",
-        "start",
-    )
+    place = ("--lat", "45.78", "--lon", "126.67")
+    run(tmp_path, "align", "voyage.csv", *place, "--imu", "navigation", "--to", "900", "-o", "start")
     run(tmp_path, *words_of("--damping"))
 
 
-def test_a_campaign(tmp_path):
+@pytest.mark.parametrize("points", some([1], [3]))
+def test_a_campaign(points, tmp_path):
+    """The plan of the page on campaigns, with some points of its grid and two runs of each."""
     text = (ROOT / "docs/campaigns.md").read_text(encoding="utf-8")
     plan = yaml.safe_load(re.search(r"```yaml\n(name: which_gyro\n.*?)```", text, re.DOTALL)[1]) | {"runs": 2}
+    plan["grid"] = {path: values[:points] for path, values in plan["grid"].items()}
     (tmp_path / "which_gyro.yaml").write_text(yaml.safe_dump(plan), encoding="utf-8")
     run(tmp_path, *words_of("campaign"))
 
 
 def test_a_study(tmp_path):
     run(tmp_path, *words_of("reproduce"), "--runs", "2")
+
+
+@pytest.mark.slow
+def test_another_study(tmp_path):
+    run(tmp_path, "reproduce", "rotary", "-o", "rotary", "--runs", "2")
 
 
 def free_port() -> int:
@@ -107,9 +110,9 @@ def stream(folder: Path, words: list[str], logs: dict[int, Path], pace: float) -
     for port, log in logs.items():
         header, *lines = log.read_bytes().splitlines(keepends=True)
         packets.append((-1e9, port, header))
-        some = 20 if port == 9000 else 1
-        for at in range(0, len(lines), some):
-            packets.append((float(lines[at].split(b",")[0]), port, b"".join(lines[at : at + some])))
+        rows = 20 if port == 9000 else 1
+        for at in range(0, len(lines), rows):
+            packets.append((float(lines[at].split(b",")[0]), port, b"".join(lines[at : at + rows])))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for _, port, packet in sorted(packets):
             if process.poll() is not None:
@@ -131,6 +134,7 @@ def test_live_until_heading_is_good_enough(tmp_path):
     assert "aligned" in out + err
 
 
+@pytest.mark.slow
 def test_live_on_the_move(tmp_path):
     """It navigates on until Ctrl-C."""
     logs = simulate(tmp_path, "van", imu="tactical")
