@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.runs import few_and_all
@@ -15,6 +16,7 @@ from truenorth.papers.study import STUDIES, Study, save_all
 from truenorth.papers.sweeps import Sweep, dependences, swept
 from truenorth.papers.table import OF_RUNS, STATISTICS, UNITS, Figure, Reference, Table
 from truenorth.papers.texts import read_texts
+from truenorth.report.study import across
 
 RULES = [(name, rule) for name, module in STUDIES.items() for rule in import_module(module).RULES]
 IDS = [f"{name}: {rule.claim[:40]}" for name, rule in RULES]
@@ -261,3 +263,23 @@ def test_a_number_of_its_own_is_not_that_of_the_runs_next_to_it():
     table.value("case", "method", "heading", "value", 0.5, "arcmin", runs=2)
     assert table.number_of("case method heading value") == 0.5
     assert table.number_of("case method heading") == pytest.approx(math.sqrt(12.5))
+
+
+def test_a_paper_s_table_of_many_quantities_keeps_its_columns():
+    """Ours with the paper's in each cell; a list of few quantities stays a list."""
+    row = {
+        "case": "a",
+        "method": "kf",
+        "statistic": "value",
+        "time_s": 72000.0,
+        "ours": 1.25,
+        "the paper's": -0.5,
+        "unit": "m",
+    }
+    many = pd.DataFrame([row | {"method": m, "quantity": q} for m in ("kf", "ukf") for q in ("x", "y", "z", "w")])
+    found = across(many)
+    assert list(found["method"]) == ["kf", "ukf"]
+    assert found.loc[0, "x, m: ours (the paper's)"] == "1.25 (-0.5)"
+    assert list(found["time_s"]) == ["72000", "72000"]
+    few = many[many["quantity"].isin(["x", "y"])]
+    assert across(few) is few

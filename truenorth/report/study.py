@@ -14,6 +14,7 @@ from truenorth.report.document import render
 if TYPE_CHECKING:
     import pandas as pd
 
+MANY_A_ROW = 4  # quantities of one case, method and time, from which each has a column
 BEST_FIRST = ("holds", "holds in part", "does not hold", "too few runs")
 
 
@@ -46,7 +47,7 @@ def study_page(
         study=study,
         of_a_paper=any(claim.by == "paper" for claim in study.claims),
         summary=_summary(study.claims),
-        beside="" if beside.empty else _html(beside),
+        beside="" if beside.empty else _html(across(beside)),
         of_paper=drawn(of_paper),
         more=drawn(more),
         table=_html(table),
@@ -62,6 +63,26 @@ def index_page(studies: Mapping[str, Any]) -> str:
     return render(
         "studies.html", interactive=False, studies=studies, contents=contents, summary=every, summaries=summaries
     )
+
+
+def across(beside: pd.DataFrame) -> pd.DataFrame:
+    """The paper's figures as its tables have them: a column for each quantity, ``ours (the paper's)``.
+
+    Of few quantities the list stays as it is: case by case and quantity by quantity.
+    """
+    keys = ["case", "method", "statistic", "time_s"]
+    rows = beside.drop_duplicates(keys)
+    if len(beside) < MANY_A_ROW * len(rows) or beside.duplicated([*keys, "quantity"]).any():
+        return beside
+    cells = beside.assign(
+        quantity=[
+            f"{name}, {unit}: ours (the paper's)" for name, unit in zip(beside["quantity"], beside["unit"], strict=True)
+        ],
+        time_s=beside["time_s"].map("{:g}".format),
+        cell=[f"{a:.4g} ({b:.4g})" for a, b in zip(beside["ours"], beside["the paper's"], strict=True)],
+    )
+    table = cells.pivot_table(index=keys, columns="quantity", values="cell", aggfunc="first", sort=False)
+    return table[list(dict.fromkeys(cells["quantity"]))].reset_index().rename_axis(None, axis=1)
 
 
 def _summary(claims: Sequence[Any]) -> str:
