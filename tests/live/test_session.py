@@ -92,6 +92,7 @@ def test_rows_of_aids_are_kept_and_a_resumed_run_needs_no_log_of_them(logs, tmp_
             (tmp_path / half / f"{name}.csv").write_text("\n".join([lines[0], *kept]) + "\n")
     folder = tmp_path / "out"
     session(tmp_path / "first", "max", folder=folder).run()
+    (folder / START).mkdir()  # as a run leaves it that is killed before the start of navigation is written
     found = session(tmp_path / "second", "max", folder=folder, resume=True).run()
     whole = session(logs, "max").run()
     assert np.array_equal(found.C_nb, whole.C_nb)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truenorth.alignment import Alignment
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.core.shown import load, save
+from truenorth.core.shown import ARCHIVE, load, save
 from truenorth.formats.layout import Layout
 from truenorth.live.aid_sources import AidSource, Replayed, open_aid
 from truenorth.live.aligner import SHARE, UNKNOWN, Aligner
@@ -140,7 +140,7 @@ class Session:
         """
         start = None if self.folder is None else self.folder / START
         run: Run
-        if earlier and start is not None and start.exists():
+        if earlier and start is not None and (start / ARCHIVE).exists():  # a run killed before has left the folder alone
             run = Navigator(load(start), feeds=self.feeds, mountings=UNKNOWN, kind=kind)
         else:
             aid = [*self.feeds, *([] if self.turner is None else [self.turner])]
