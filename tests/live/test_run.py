@@ -24,6 +24,7 @@ from truenorth.formats.layout import Layout
 from truenorth.live.decode import Decoder, binary_row
 from truenorth.live.journal import Journal
 from truenorth.live.outputs import nmea_lines
+from truenorth.live.remaining import seconds_to
 from truenorth.live.session import Session
 from truenorth.live.sources import open_source
 from truenorth.records.specs import imu_spec
@@ -227,6 +228,11 @@ def test_it_stops_when_the_heading_is_good(log):
     assert found.time < 60.0
     waits = [answer.remaining(goal) for answer in answers if answer is not None]
     assert waits[-1] == 0.0
+    # A time that has passed without the wish being met is not "now".
+    sigma = float(found.euler_sigma[0])
+    late = seconds_to(found, sigma, 0.9 * sigma, found.time + 1000.0)
+    assert 0.0 < seconds_to(found, sigma, 0.9 * sigma, found.time) < 60.0 < late
+    assert seconds_to(found, sigma, sigma, found.time) == 0.0
 
 
 def test_nmea_has_its_checksum_and_heading(log):

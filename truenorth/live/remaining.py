@@ -40,5 +40,10 @@ def seconds_to(solution: Alignment, sigma: float, goal: float, now: float) -> fl
     slope = math.log(random[-1] / random[half]) / math.log(elapsed[-1] / elapsed[half])
     if slope > SLOPE:
         return None
-    needed = float(elapsed[-1]) * (math.sqrt(random_goal) / float(random[-1])) ** (1.0 / slope)
-    return max(0.0, solution.time - solution.duration + needed - now)
+    start = solution.time - solution.duration
+    left = start + float(elapsed[-1]) * (math.sqrt(random_goal) / float(random[-1])) ** (1.0 / slope) - now
+    if left > 0.0:
+        return left
+    # That time has passed, and sigma is not there yet: the law goes on from the sigma of now.
+    random_now = math.sqrt(sigma**2 - float(solution.euler_sigma_floor[0]) ** 2)
+    return (now - start) * ((math.sqrt(random_goal) / random_now) ** (1.0 / slope) - 1.0)
