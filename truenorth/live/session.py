@@ -140,7 +140,8 @@ class Session:
         """
         start = None if self.folder is None else self.folder / START
         run: Run
-        if earlier and start is not None and (start / ARCHIVE).exists():  # a run killed before has left the folder alone
+        # A run that was killed while it wrote its start has left the folder alone.
+        if earlier and start is not None and (start / ARCHIVE).exists():
             run = Navigator(load(start), feeds=self.feeds, mountings=UNKNOWN, kind=kind)
         else:
             aid = [*self.feeds, *([] if self.turner is None else [self.turner])]
