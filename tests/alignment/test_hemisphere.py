@@ -2,11 +2,12 @@
 
 import pytest
 
+from tests.runs import some
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
 
 
-@pytest.mark.parametrize(("bench", "run"), [("swaying", 1), ("swaying", 2), ("rotary", 0), ("rotary", 4)])
+@pytest.mark.parametrize(("bench", "run"), some([("swaying", 1), ("rotary", 0)], [("swaying", 2), ("rotary", 4)]))
 def test_the_other_hemisphere_is_named_and_the_right_one_is_not(bench, run):
     """Of 10 draws of each the ratios were -20 to -180 at the right latitude, 22 to 160 at the wrong one."""
     inputs, _ = BENCHES[bench].draw(8301, run)

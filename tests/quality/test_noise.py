@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
+from tests.runs import some
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.units import parse
@@ -57,7 +58,7 @@ def test_the_curve_is_what_allantools_measures():
     assert_allclose(np.mean(measured, axis=0), gauss_markov_variance(taus, T), rtol=0.2)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", some([0], [1, 2]))
 def test_a_simulated_imu_is_found(seed):
     # 4 h, 72 correlation times. Scatter of a channel over 240: random walk .8 %, slope of the bias 10 %; the worst of three
     # axes lies 1 sigma higher. Bounds at 5 sigma.
