@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import truenorth
 from tests.campaign.test_plan import PLAN
-from tests.fuzz.test_readers import EXAMPLES, PHASES, SPICE, in_time
+from tests.fuzz.test_readers import EXAMPLES, SETTLED, SPICE, in_time
 from truenorth.campaign import read_plan
 from truenorth.core.errors import AlignmentError, DataError, TruenorthError
 from truenorth.core.position import Position
@@ -25,14 +25,6 @@ from truenorth.simulation import rest, simulate
 from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(45.0, 10.0)
-settled = settings(
-    max_examples=EXAMPLES,
-    derandomize="FUZZ" not in os.environ,
-    phases=PHASES,
-    deadline=None,
-    suppress_health_check=list(HealthCheck),
-    database=None,
-)
 
 SCENARIO = b"""name: quay
 duration: 60 s
@@ -60,7 +52,7 @@ def test_a_damaged_scenario_or_plan(kind, tmp_path_factory):
         path.write_text(json.dumps(PLAN))
     content = path.read_bytes()
 
-    @settled
+    @SETTLED
     @given(data=st.data())
     def attempt(data):
         path.write_bytes(spoilt(data, content))
@@ -85,7 +77,7 @@ def test_a_damaged_result_as_a_start(sound, tmp_path_factory):
     truenorth.save(sound[1], folder)
     files = {path: path.read_bytes() for path in folder.iterdir()}
 
-    @settled
+    @SETTLED
     @given(data=st.data())
     def attempt(data):
         hurt = data.draw(st.sampled_from(sorted(files)))
@@ -105,7 +97,7 @@ def test_a_damaged_result_as_a_start(sound, tmp_path_factory):
 VALUES = st.sampled_from([0.0, -1.0, 1e-300, 1e5, -1e5, 1e-3, 9.8, math.pi])
 
 
-@settings(settled, max_examples=max(10, EXAMPLES // 10))
+@settings(SETTLED, max_examples=max(10, EXAMPLES // 10))
 @given(data=st.data())
 def test_an_answer_holds_no_nan(sound, data):
     """Stretches, channels and clocks spoilt by any amount: an error of ours, or an answer of numbers that JSON can hold."""

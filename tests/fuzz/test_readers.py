@@ -27,6 +27,14 @@ from truenorth.records import ImuRecord
 LONGEST = 10.0  # s of one input
 PHASES = (Phase.explicit, Phase.generate, Phase.shrink)  # to explain a failure traces every line
 EXAMPLES = int(os.environ.get("FUZZ", "25"))
+SETTLED = settings(
+    max_examples=EXAMPLES,
+    derandomize="FUZZ" not in os.environ,
+    phases=PHASES,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    database=None,
+)
 SPICE = [
     b"\n", b",", b"-", b"e9", b"1e200", b"nan", b"\0", b'"', b";", b"$", b"\xff", "١".encode(), "٫".encode(), b"9" * 400,
     b"\r", b"#", b"[", b"{{", b"*", b":", b"&a", b"inf", b"  ", b"\t", b"T", b"Z", struct.pack("<d", 1e200),
@@ -95,14 +103,7 @@ def test_what_is_damaged_is_a_record_or_an_error_of_ours(name, whole, tmp_path_f
         request.addfinalizer(reader.close)
         monkeypatch.setattr(mat, "subprocess", reader)
 
-    @settings(
-        max_examples=EXAMPLES,
-        derandomize="FUZZ" not in os.environ,
-        phases=PHASES,
-        deadline=None,
-        suppress_health_check=list(HealthCheck),
-        database=None,
-    )
+    @SETTLED
     @given(data=st.data())
     def attempt(data):
         content = bytearray(whole[name])

@@ -14,7 +14,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.fine import fine_align
+from truenorth.alignment.fine import CoarseStart, fine_align
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import Means
@@ -71,10 +71,11 @@ def check_filter(
     P[:3, :3] = C_n_b @ np.diag([HELD_GYRO**2, LOOSE_GYRO**2, LOOSE_GYRO**2]) @ C_n_b.T
     P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
     noise = usual if known is None else known
-    fine = fine_align(task.record, C_n0_i, task.position, noise, P, task.interval, integrals=integrals)
+    start = CoarseStart(task.record, C_n0_i, task.position, noise, P, task.interval)
+    fine = fine_align(start, integrals)
     if known is None:
         noise = fit_task_noise(task, fine.integrals, fine.C_n0_i, fine.system.P0, usual)
-        fine = fine_align(task.record, fine.C_n0_i, task.position, noise, P, task.interval)
+        fine = fine_align(start._replace(C_n0_i=fine.C_n0_i, model=noise))
 
     lat = task.position.lat
     C = earth_rotation(fine.integrals.time[-1], lat).T @ fine.C_n0_i @ fine.integrals.C_ib[-1]

@@ -8,7 +8,7 @@ it is, is read from the log itself, axis by axis, by making the innovations as l
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,14 +158,20 @@ class FineAlignment:
         return np.asarray(np.clip((self.integrals.time[1:] - time) / self.integrals.intervals, 0.0, 1.0))
 
 
+class CoarseStart(NamedTuple):
+    """What a fine alignment begins from: a log, its coarse attitude, and what is known of its IMU."""
+
+    record: ImuRecord
+    C_n0_i: Array  # (3, 3): coarse attitude
+    position: Position
+    model: StaticModel
+    P_bias: Array  # (6, 6): prior covariance of the biases about zero
+    interval: float  # s; of the filter
+    rows_at: Array | None = None  # (M,) int: rows after which the integrated attitude is wanted
+
+
 def fine_align(
-    record: ImuRecord,
-    C_n0_i: Array,
-    position: Position,
-    model: StaticModel,
-    P_bias: Array,
-    interval: float,
-    rows_at: Array | None = None,
+    start: CoarseStart,
     integrals: InertialIntegrals | None = None,
     form: Form = "velocity",
     turned: ImuSpec | None = None,
@@ -174,14 +180,7 @@ def fine_align(
 
     Parameters
     ----------
-    C_n0_i : (3, 3) array
-        Coarse attitude.
-    P_bias : (6, 6) array
-        Prior covariance of the biases about zero.
-    interval : float, s
-        Filter interval.
-    rows_at : (M,) int array, optional
-        Rows after which the integrated attitude is wanted.
+    start : CoarseStart
     integrals : InertialIntegrals, optional
         Of the log as it is, with `interval` and `rows_at`, where they are known already.
     form : {"velocity", "force"}
@@ -190,6 +189,7 @@ def fine_align(
         Of an IMU that is turned about on its base: scale factors, misalignments and the arm from the axis of the turns are states
         then, and `P_bias` is of the biases proper.
     """
+    record, C_n0_i, position, model, P_bias, interval, rows_at = start
     prior = prior_of(P_bias) if turned is None else prior_of(P_bias, spec=turned, arm=np.zeros(3), arm_sigma=TURN_ARM)
     log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)
     if form == "velocity":

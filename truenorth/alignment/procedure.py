@@ -19,7 +19,7 @@ from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import bias_step_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, sharper
 from truenorth.alignment.drift import Drift, detect_drift
-from truenorth.alignment.fine import FineAlignment, fine_align
+from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.hemisphere import hemisphere_evidence
@@ -262,17 +262,17 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     if turns and method not in FADING:
         turned = used = with_usual(used) if spec is None else used
         P = np.diag(used.bias_variance)
-    start = (task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
+    start = CoarseStart(task.record, coarse.C_n0_i, task.position, StaticModel.of(used), P, task.interval, rows)
     if method in FADING:
-        fine = faded_align(*start, method)
+        fine = faded_align(start, method)
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     if sways:
-        fine = sway_align(*start, turned=turned)
+        fine = sway_align(start, turned=turned)
     elif turned is not None:
-        fine = fine_align(*start, turned=turned)
+        fine = fine_align(start, turned=turned)
     else:
-        fine = fine_align(*start, integrals, picked)
+        fine = fine_align(start, integrals, picked)
     del integrals, filtered, coarse  # of the first pass; what follows takes memory
     answer = replace(answer_of(task, fine, used, where, P, sways), ongoing=go_on(task, fine, StaticModel.of(used)))
     if turned is not None:  # the check knows no scale factors

@@ -32,11 +32,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.errors import AlignmentError
-from truenorth.core.position import Position
 from truenorth.errors import stationary
 from truenorth.errors.stationary import StationaryModel
 from truenorth.errors.staying import PHI, StaticModel, gained_velocity, sampled_system, sampled_velocity
@@ -80,18 +79,9 @@ def _plain(system: LinearSystem) -> Filtered:
     return Filtered(system, kalman(system, history="full"))
 
 
-def faded_align(
-    record: ImuRecord,
-    C_n0_i: Array,
-    position: Position,
-    model: StaticModel,
-    P_bias: Array,
-    interval: float,
-    rows_at: Array,
-    method: str,
-    arm_velocity: Array | None = None,
-) -> FineAlignment:
-    """Align by kf, sakf, makf or imakf; arguments as :func:`truenorth.alignment.fine.fine_align` and of `SampledLog`."""
+def faded_align(start: CoarseStart, method: str, arm_velocity: Array | None = None) -> FineAlignment:
+    """Align by kf, sakf, makf or imakf; `arm_velocity` is that of `SampledLog`."""
+    record, C_n0_i, position, model, P_bias, interval, rows_at = start
     kind, prior = FADING[method], prior_of(P_bias)
     log = SampledLog(record, C_n0_i, position, model, prior, interval, rows_at)
     log.arm_velocity = arm_velocity

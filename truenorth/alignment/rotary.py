@@ -23,7 +23,7 @@ from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
-from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
@@ -127,12 +127,12 @@ def align_rotary(
         angles = angles_at(encoder, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb)
-    start = (record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
+    start = CoarseStart(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
     if own in FADING:
         arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)
-        fine: FineAlignment = faded_align(*start, own, arm)
+        fine: FineAlignment = faded_align(start, own, arm)
     else:
-        fine = sway_align(*start, mount, _turned(spec))
+        fine = sway_align(start, mount, _turned(spec))
     source = f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 

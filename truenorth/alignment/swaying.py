@@ -14,18 +14,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.core.earth import normal_gravity
-from truenorth.core.position import Position
-from truenorth.errors.staying import PHI, QUIETEST_BASE, StaticModel
+from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
-from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import InertialIntegrals
 
@@ -84,28 +82,20 @@ class _MotionFilter:
         return Filtered(full, kalman(full, history="full"))
 
 
-def sway_align(
-    record: ImuRecord,
-    C_n0_i: Array,
-    position: Position,
-    model: StaticModel,
-    P_bias: Array,
-    interval: float,
-    rows_at: Array | None = None,
-    mount: Mount = UNKNOWN_ARM,
-    turned: ImuSpec | None = None,
-) -> SwayAlignment:
+def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
     """Estimate attitude, biases, lever arm and the base's motion from a whole log.
 
     Parameters
     ----------
-    record, C_n0_i, position, model, P_bias, interval, rows_at
-        As in :func:`truenorth.alignment.fine.fine_align`.
+    start : CoarseStart
+    mount : Mount
+        Where the IMU sits.
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
     """
-    log, residual = _settled(record, C_n0_i, position, model, P_bias, interval, rows_at, mount, turned)
+    log, residual = _settled(start, mount, turned)
     step = float(np.mean(log.integrals.intervals))
+    model, position = start.model, start.position
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
     estimator = _MotionFilter(residual, step, walks)
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
@@ -121,15 +111,7 @@ def sway_align(
     )
 
 
-def windowed_align(
-    record: ImuRecord,
-    C_n0_i: Array,
-    position: Position,
-    model: StaticModel,
-    P_bias: Array,
-    interval: float,
-    mount: Mount = UNKNOWN_ARM,
-) -> tuple[Array, InertialIntegrals]:
+def windowed_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM) -> tuple[Array, InertialIntegrals]:
     """Attitude by windowed least squares alone, re-linearised; parameters as in :func:`sway_align`.
 
     Returns
@@ -139,26 +121,17 @@ def windowed_align(
     integrals : InertialIntegrals
         With the estimated biases taken off: ``C_n0_i @ integrals.C_ib`` is the attitude at their times.
     """
-    log, _ = _settled(record, C_n0_i, position, model, P_bias, interval, None, mount)
+    log, _ = _settled(start, mount)
     return log.C_n0_i, log.integrals
 
 
-def _settled(
-    record: ImuRecord,
-    C_n0_i: Array,
-    position: Position,
-    model: StaticModel,
-    P_bias: Array,
-    interval: float,
-    rows_at: Array | None,
-    mount: Mount,
-    turned: ImuSpec | None = None,
-) -> tuple[StayingLog, Array]:
+def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) -> tuple[StayingLog, Array]:
     """A log about windowed fits until the attitude stands still, and what the last fit leaves of its measurements.
 
     The fit knows no random walk. Of gyros that make a large one it takes the wander for signal, and its passes may run away:
     then the log is fitted with as little weight as the walk leaves it.
     """
+    record, C_n0_i, position, model, P_bias, interval, rows_at = start
     prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma)
     g = float(normal_gravity(position.lat, position.alt))
     walked = math.sqrt(record.duration / 3.0) * math.hypot(

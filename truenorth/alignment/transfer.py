@@ -16,7 +16,7 @@ from truenorth.aiding.matching import FIRST_NOISE, Matched, Translation, What, f
 from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
-from truenorth.alignment.transfer_answer import assemble_transfer, final_attitudes
+from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
 from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, delay_found, transfer_filter
 from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.core.attitude import dcm_from_euler
@@ -157,9 +157,8 @@ def align_transfer(
     again = partial(transfer_filter, part, master, start=start, matching=rows, linear=linear)
     seen = _seen(slave, master, model, C_mb) + noise_evidence(again, track, model, slave)
     seen += wandering_evidence(again, track, model, spec, part.duration)
-    answer = assemble_transfer(
-        part, master, model, spec, where, assumed, start, track, noise, what, notes, heading_limit, seen
-    )
+    last = LastPass(part, master, model, assumed, start, what, noise, track)
+    answer = assemble_transfer(last, spec, where, notes, heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,27 +74,34 @@ WORDS = {
 }
 
 
+class LastPass(NamedTuple):
+    """The pass over two records that the answer comes from, and what it was given."""
+
+    slave: ImuRecord  # the part that the master covers
+    master: MasterRecord
+    model: TransferModel
+    assumed: Assumed
+    start: SlaveStart
+    what: Matched
+    noise: tuple[float, float]  # of translation and attitude of the master's rows
+    track: TransferTrack
+
+
 def assemble_transfer(
-    slave: ImuRecord,
-    master: MasterRecord,
-    model: TransferModel,
+    last: LastPass,
     spec: ImuSpec,
     where: str,
-    assumed: Assumed,
-    start: SlaveStart,
-    track: TransferTrack,
-    noise: tuple[float, float],
-    what: Matched,
     notes: tuple[str, ...],
     heading_limit: float,
     of_master: list[Evidence],
 ) -> Alignment:
     """The answer at the last row of the master, judged; `of_master` is what was found of the master before, its clock included."""
+    slave, master, model, _, start, what, _, track = last
     P = track.last_P
     phi_covariance, floor = misalignment_covariance(P)
     gyro_prior, accel_prior = bias_sigmas(spec)
     lat, lon, alt = (float(x) for x in track.position[-1])
-    transfer = _transfer(slave, master, model, assumed, start, track, noise, what, notes)
+    transfer = _transfer(last, notes)
     sigma = track.sigma[-1]
     answer = Alignment(
         status="not_converged",
@@ -122,17 +130,8 @@ def assemble_transfer(
     return judge_transfer(answer, transfer, track, start, heading_limit, of_master)
 
 
-def _transfer(
-    slave: ImuRecord,
-    master: MasterRecord,
-    model: TransferModel,
-    assumed: Assumed,
-    start: SlaveStart,
-    track: TransferTrack,
-    noise: tuple[float, float],
-    what: Matched,
-    notes: tuple[str, ...],
-) -> Transfer:
+def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
+    _, master, model, assumed, _, what, noise, track = last
     sigma, aux = track.sigma[-1], track.aux[-1]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
@@ -162,7 +161,7 @@ def _transfer(
         relative_sigma=_relative(track, model),
         considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
         jumps=_jumps(track, what),
-        open=_open(slave, model, assumed, start, track, noise, what),
+        open=_open(last),
         notes=(*notes, *silences),
         position_noise=fitted["position"],
         acceleration_noise=fitted["acceleration"],
@@ -224,16 +223,9 @@ def _jumps(track: TransferTrack, matched: Matched) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _open(
-    slave: ImuRecord,
-    model: TransferModel,
-    assumed: Assumed,
-    start: SlaveStart,
-    track: TransferTrack,
-    noise: tuple[float, float],
-    what: Matched,
-) -> tuple[str, ...]:
+def _open(last: LastPass) -> tuple[str, ...]:
     """What the motion as it was could not separate, from the model along the track."""
+    slave, _, model, assumed, start, what, noise, track = last
     every = max(1, len(track.time) // MOST_EPOCHS)
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:

@@ -23,6 +23,7 @@ PARTS = ("scale", "mounting", "lever_arm", "latency", "scale_factors")
 SIGMAS = {"scale": 0.05, "mounting": math.radians(5.0), "lever_arm": 2.0, "latency": 0.3}
 
 
+IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first.")]
 Baseline = Annotated[
     str | None,
     option(
@@ -115,7 +116,7 @@ class OnIndexer:
         str | None,
         option("Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns."),
     ] = None
-    indexer_axes: Annotated[str, option("Axes of the indexer, the outermost first.")] = "z,x"
+    indexer_axes: IndexerAxes = "z,x"
     indexer_sigma: Annotated[
         str,
         option(

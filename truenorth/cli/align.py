@@ -16,7 +16,7 @@ from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import make_console, stages
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.print_alignment import print_alignment
-from truenorth.cli.reading import Log, Place, ReadingWindow
+from truenorth.cli.reading import Calibrated, Log, Place, ReadingWindow
 from truenorth.cli.remedies import reasons_of
 from truenorth.cli.wording import in_options
 from truenorth.core.language import retold, translated
@@ -66,9 +66,7 @@ def align(
     ] = "auto",
     at: Annotated[float | None, option("Epoch of the attitude, s; the last sample without it.")] = None,
     heading_limit: Annotated[float, option("Largest usable one-sigma heading error, deg.")] = 5.0,
-    calibration: Annotated[
-        Path | None, option("YAML file of known bias, scale factor and misalignment, taken off first.")
-    ] = None,
+    calibration: Calibrated = None,
     any_attitude: Annotated[
         bool, option("The IMU really lies on its head: do not refuse z pointing down.", "--any-attitude")
     ] = False,

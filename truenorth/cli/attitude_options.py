@@ -16,6 +16,19 @@ if TYPE_CHECKING:
     from truenorth.records import ImuRecord
     from truenorth.state.mounting import Mounting
 
+AttitudeSigma = Annotated[
+    str | None,
+    option("Its one-sigma noise; and its slow error, and the time of that: '0.1' or '0.1,0.3,300', deg and s."),
+]
+AttitudeMounting = Annotated[
+    str | None, option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg.")
+]
+MagnetometerAxes = Annotated[str | None, option("Where its x, y and z point, such as FRD; RFU without it.")]
+MagnetometerIron = Annotated[
+    str | None,
+    option("One sigma of hard and soft iron, % of the earth's field; '10,3' (not calibrated) without it."),
+]
+
 FIRST_DATE = 1e9  # s since 1970: a clock beyond it holds dates
 
 
@@ -27,21 +40,13 @@ class OfAttitude:
     attitude: Annotated[
         Path | None, option("Log of heading, pitch and roll of another system; needs --attitude-sigma.")
     ] = None
-    attitude_sigma: Annotated[
-        str | None,
-        option("Its one-sigma noise; and its slow error, and the time of that: '0.1' or '0.1,0.3,300', deg and s."),
-    ] = None
-    attitude_mounting: Annotated[
-        str | None, option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg.")
-    ] = None
+    attitude_sigma: AttitudeSigma = None
+    attitude_mounting: AttitudeMounting = None
     magnetometer: Annotated[
         Path | None, option("Log of a magnetometer; north by the World Magnetic Model of place and --date.")
     ] = None
-    magnetometer_axes: Annotated[str | None, option("Where its x, y and z point, such as FRD; RFU without it.")] = None
-    magnetometer_iron: Annotated[
-        str | None,
-        option("One sigma of hard and soft iron, % of the earth's field; '10,3' (not calibrated) without it."),
-    ] = None
+    magnetometer_axes: MagnetometerAxes = None
+    magnetometer_iron: MagnetometerIron = None
     date: Annotated[str | None, option("Of the log, YYYY-MM-DD; its clock's own where that counts from 1970.")] = None
 
     @property

@@ -6,7 +6,17 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.aiding_options import GYROS, Baseline
+from truenorth.cli.aiding_options import GYROS, Baseline, IndexerAxes
+from truenorth.cli.attitude_options import (
+    AttitudeMounting,
+    AttitudeSigma,
+    MagnetometerAxes,
+    MagnetometerIron,
+    attitude_mounting,
+    attitude_sigmas,
+    date_of,
+    iron_of,
+)
 from truenorth.cli.options import option
 
 if TYPE_CHECKING:
@@ -24,7 +34,7 @@ class Turned:
         str | None,
         option("Source of an indexer's angles: CSV; or 'gyros': the body is still, the gyros show how the IMU turns."),
     ] = None
-    indexer_axes: Annotated[str, option("Axes of the indexer, the outermost first.")] = "z,x"
+    indexer_axes: IndexerAxes = "z,x"
     indexer_sigma: Annotated[str, option("One-sigma error of its own angles and axes: '10 arcsec'.")] = "0 arcsec"
     positions: Annotated[str | None, option("auto: a turntable takes the IMU from position to position.")] = None
 
@@ -70,20 +80,14 @@ class Aids:
     magnetometer: Annotated[
         str | None, option("Source of a magnetometer's rows: CSV or a device; on the move and in navigation.")
     ] = None
-    magnetometer_axes: Annotated[str | None, option("Where its x, y and z point, such as FRD.")] = None
-    magnetometer_iron: Annotated[
-        str | None, option("One sigma of hard and soft iron, % of the earth's field; '10,3' without it.")
-    ] = None
+    magnetometer_axes: MagnetometerAxes = None
+    magnetometer_iron: MagnetometerIron = None
     date: Annotated[str | None, option("Of the rows, YYYY-MM-DD, for the earth's field; today without it.")] = None
     attitude: Annotated[
         str | None, option("Source of another system's heading, pitch and roll: CSV; needs --attitude-sigma.")
     ] = None
-    attitude_sigma: Annotated[
-        str | None, option("Its one-sigma noise; and its slow error and its time: '0.1' or '0.1,0.3,300', deg and s.")
-    ] = None
-    attitude_mounting: Annotated[
-        str | None, option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg.")
-    ] = None
+    attitude_sigma: AttitudeSigma = None
+    attitude_mounting: AttitudeMounting = None
     lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up.")] = None
     latency: Annotated[
         float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
@@ -131,7 +135,6 @@ class Aids:
 
     def _magnetometer(self, place: Position | None, imu_source: str) -> Feed:
         from truenorth.aiding.magnetometer import earth_field
-        from truenorth.cli.attitude_options import date_of, iron_of
         from truenorth.core.errors import UsageError
         from truenorth.live.attitude_feeds import MagnetometerFeed
 
@@ -145,7 +148,6 @@ class Aids:
         )
 
     def _attitude(self) -> Feed:
-        from truenorth.cli.attitude_options import attitude_mounting, attitude_sigmas
         from truenorth.live.attitude_feeds import AttitudeFeed
 
         sigmas = attitude_sigmas(self.attitude_sigma)

@@ -15,7 +15,7 @@ from truenorth.cli.aiding_options import Sensors, shifted
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import in_reader_s_words, make_console, print_written, stages
 from truenorth.cli.options import AsJson, command, option
-from truenorth.cli.reading import Log, Reading, numbers_of
+from truenorth.cli.reading import Calibrated, Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
 from truenorth.core.language import translated as _
 
@@ -199,7 +199,7 @@ def navigate(
         str, option("Of the vertical along the way: one sigma and over which distance, or none.")
     ] = "6 arcsec, 20 km",
     every: Annotated[float | None, option("Seconds between rows of the track.", panel="The track")] = None,
-    calibration: Annotated[Path | None, option("YAML file of known errors of the IMU, taken off first.")] = None,
+    calibration: Calibrated = None,
     output: Annotated[
         Path | None, option("Folder for summary.json, track.parquet, .geojson, report.html.", "-o", "--output")
     ] = None,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Log = Annotated[
     Path, argument("IMU log: text, .parquet, .feather, .npz, .mat, PSINS .imu, KF-GINS .txt/.bin, ROS bag.")
 ]
+Calibrated = Annotated[Path | None, option("YAML file of known bias, scale factor and misalignment, taken off first.")]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,15 +64,22 @@ def add_velocity(x: Array, p: Array, felt: tuple[float, float, float], at: int, 
     out[at + 1] = x[at + 1] + p[GRAVITY + 1] - felt[1] + T * (p[4] * x[a] + p[5] * x[a + 1])
 
 
+@compiled(forceinline=True)
+def half_turned(x: Array, p: Array) -> Any:
+    """``C eps``; the tilt, and gravity turned by the azimuth, half an interval on; tuples."""
+    half, rate = 0.5 * p[INTERVAL], turned_by(p, x[5:8])
+    azimuth = x[2] - half * rate[2]
+    s, c = math.sin(azimuth), math.cos(azimuth)
+    g = (c * p[GRAVITY] + s * p[GRAVITY + 1], c * p[GRAVITY + 1] - s * p[GRAVITY], p[GRAVITY + 2])  # Rz(-phi_U) g
+    return rate, (x[0] - half * rate[0], x[1] - half * rate[1], 0.0), g
+
+
 @vector_function
 def tilt_azimuth_transition(x: Array, p: Array, out: Array) -> None:
     """Of ``[phi_E, phi_N, phi_U, dv (2), eps (3), nabla (2)]``, a tilt after an azimuth."""
     T = p[INTERVAL]
-    rate = turned_by(p, x[5:8])
-    tilt_E, tilt_N, azimuth = x[0] - T / 2 * rate[0], x[1] - T / 2 * rate[1], x[2] - T / 2 * rate[2]
-    s, c = math.sin(azimuth), math.cos(azimuth)
-    g = (c * p[GRAVITY] + s * p[GRAVITY + 1], c * p[GRAVITY + 1] - s * p[GRAVITY], p[GRAVITY + 2])  # Rz(-phi_U) g
-    turn = cross((tilt_E, tilt_N, 0.0), g)
+    rate, tilt, g = half_turned(x, p)
+    turn = cross(tilt, g)
     add_velocity(x, p, (g[0] - turn[0], g[1] - turn[1], g[2] - turn[2]), 3, out)
     for i in range(3):
         out[i] = x[i] - T * rate[i]
@@ -82,15 +89,12 @@ def tilt_azimuth_transition(x: Array, p: Array, out: Array) -> None:
 def tilt_azimuth_jacobian(x: Array, p: Array, out: Array) -> None:
     """Of `tilt_azimuth_transition`."""
     T = p[INTERVAL]
-    rate = turned_by(p, x[5:8])
-    tilt_E, tilt_N, azimuth = x[0] - T / 2 * rate[0], x[1] - T / 2 * rate[1], x[2] - T / 2 * rate[2]
-    s, c = math.sin(azimuth), math.cos(azimuth)
-    g = (c * p[GRAVITY] + s * p[GRAVITY + 1], c * p[GRAVITY + 1] - s * p[GRAVITY], p[GRAVITY + 2])
+    _, tilt, g = half_turned(x, p)
     for i in range(10):
         out[i, i] = 1.0
     out[3, 1], out[4, 0] = g[2], -g[2]
     turned = (g[1], -g[0], 0.0)  # d g / d phi_U
-    turn = cross((tilt_E, tilt_N, 0.0), turned)
+    turn = cross(tilt, turned)
     out[3, 2], out[4, 2] = turn[0] - turned[0], turn[1] - turned[1]
     for j in range(3):
         for i in range(3):

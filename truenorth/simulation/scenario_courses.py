@@ -70,15 +70,12 @@ class Turn(_Manoeuvre):
     onset: Time = 2.0
 
 
-class STurn(_Manoeuvre):
+class STurn(Turn):
     """Out to one side and back, to the other and back."""
 
-    kind: Literal["s_turn"]
-    angle: Angle
-    rate: AngularRate
+    kind: Literal["s_turn"]  # type: ignore[assignment]  # the discriminator
     times: int = Field(1, ge=1)
     bank: Literal["flat", "coordinated"] = "coordinated"
-    onset: Time = 2.0
 
 
 class Accelerate(_Manoeuvre):

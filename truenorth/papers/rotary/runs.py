@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.fine import CoarseStart
 from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
 from truenorth.analysis.consistency import nees
@@ -198,13 +199,14 @@ def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> No
         truth = data.C_ns(np.array([integrals.start + at]))[0]
         C_n_n0 = earth_rotation(at, place.lat).T
         C_n0_i = oba(integrals, place.lat, place.alt).C_n0_i
+        start = CoarseStart(record, C_n0_i, place, walks, P_bias, 1.0)
         begun = time.perf_counter()
-        C_start, inside = windowed_align(record, C_n0_i, place, walks, P_bias, 1.0, mount)
+        C_start, inside = windowed_align(start, mount)
         seconds = time.perf_counter() - begun
         phi = misalignment(C_n_n0 @ C_start @ inside.C_ib[-1], truth)
         results.found[case, "windowed_ls", at] = Found(phi, np.full(3, np.nan), seconds=seconds)
         begun = time.perf_counter()
-        fine = sway_align(record, C_n0_i, place, walks, P_bias, 1.0, mount=mount)
+        fine = sway_align(start, mount)
         seconds = time.perf_counter() - begun
         C_hat, P, _ = fine.misalignment_at(fine.integrals.C_ib[-1], at)
         answer = _found(misalignment(C_n_n0 @ C_hat, truth), C_n_n0 @ P @ C_n_n0.T)
