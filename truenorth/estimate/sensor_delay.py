@@ -33,11 +33,8 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record:
 
     Parameters
     ----------
-    run : callable
-        The same measurements with another record.
-    first : track
-        Of the record as it is.
-    record : ImuRecord
+    run, first, record
+        As of :func:`truenorth.estimate.rivals.jump_evidence`.
 
     Returns
     -------

@@ -70,17 +70,10 @@ class Spin:
 
 @dataclass(frozen=True)
 class Swing:
-    """To and fro about a mean angle, as a sinusoid.
+    """To and fro about a mean angle, as a sinusoid."""
 
-    Attributes
-    ----------
-    tone : Tone
-        Amplitude in rad.
-    mean : float, rad
-    """
-
-    tone: Tone
-    mean: float = 0.0
+    tone: Tone  # amplitude in rad
+    mean: float = 0.0  # rad
     breaks: Array = field(default_factory=lambda: np.empty(0), init=False, repr=False, compare=False)
 
     def __call__(self, t: Array) -> Triple:

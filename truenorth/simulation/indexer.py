@@ -84,16 +84,9 @@ class Indexer:
 
 @dataclass(frozen=True)
 class Indexed:
-    """An indexer on a motion: the motion of its innermost frame, s.
+    """An indexer on a motion: the motion of its innermost frame, s."""
 
-    Attributes
-    ----------
-    motion : Motion
-        Of the body.
-    indexer : Indexer
-    """
-
-    motion: Moving
+    motion: Moving  # of the body
     indexer: Indexer
 
     @cached_property
