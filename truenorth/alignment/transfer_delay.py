@@ -61,7 +61,6 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Found:
     # Shift k puts row j of the master on row j + k of the slave: delay = (start of master) - (start of slave) - k step.
     offset = float(master.time[0] - slave.time[0])
     shifts, score, common = _correlations(a, b)
-    offset - step * shifts
     possible = common >= least
     if not possible.any():
         return Found(math.nan, 0.0, 0.0, False)
