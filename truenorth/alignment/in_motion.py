@@ -23,9 +23,10 @@ from truenorth.alignment.in_motion_learnt import (
 )
 from truenorth.alignment.in_motion_start import (
     Guess,
-    backtracked,
     departures,
     guesses_all_round,
+    led_back,
+    used_twice,
 )
 from truenorth.alignment.in_motion_task import (
     NO_LOG_ERRORS,
@@ -65,7 +66,8 @@ Method = Literal["auto", "gyrocompass", "motion"]
 HEADING_LIMIT = math.radians(5.0)
 GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros are asked for north first
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
-PASSES, MORE_PASSES = 2, 2  # over the log, and where what was learnt of the sensors still changes
+# Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
+PASSES, MORE_PASSES, SETTLED = 2, 6, 0.3
 
 
 def align_in_motion(
@@ -194,24 +196,28 @@ def _aligned(
         guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
         best, track, spread = _best_of_bank(task, guesses, tell)
         guess = guesses[best]
-    number, much = 1, False
-    while number < passes or (much and passes > 1 and number < passes + MORE_PASSES):
+    first, number, much, moved = guess, 1, False, math.inf
+    while number < passes or ((much or moved > SETTLED) and passes > 1 and number < passes + MORE_PASSES):
         task, much = task.learnt(track)
-        if number < passes or much:
+        if number < passes or much or moved > SETTLED:
             tell(f"pass {number + 1}")
-            guess = replace(guess, C_nb=backtracked(task.record, track))
+            guess, before = led_back(task.record, track, task.spec, first), track
             track = task.run(guess, gated=True)
+            moved = abs(_turn_between(track.C_nb[-1], before.C_nb[-1])) / float(track.sigma[-1, PHI][2])
         number += 1
+    if number > 1:
+        left = moved * float(track.sigma[-1, PHI][2]) if moved > SETTLED else 0.0  # what has not settled
+        spread = math.hypot(spread, used_twice(track, guess, first), left)
     answer = _answer(task, track, method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
     more += learnt_evidence(task.factors, answer.moving.delays) if answer.moving is not None else []
-    more += _seen(task, track, guess, gated=passes > 1)
+    more += _seen(task, track, guess, first, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)
 
 
-def _seen(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[Evidence]:
+def _seen(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
     """What the receiver, the log itself and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
@@ -220,7 +226,7 @@ def _seen(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[
         return replace(task, record=record).run(guess, gated=gated)
 
     found += jump_evidence(other, track, task.record)
-    found += clock_evidence(task, track, guess, gated=gated)
+    found += clock_evidence(task, track, guess, first, gated=gated)
 
     def again(model: InsModel) -> Track:
         return replace(task, model=model).run(guess, gated=gated)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from truenorth.alignment.in_motion_learnt import SHOWN_DELAY, delay_of
-from truenorth.alignment.in_motion_start import Guess
+from truenorth.alignment.in_motion_start import Guess, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio, moved
@@ -17,10 +17,11 @@ from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 
-def clock_evidence(task: MovingTask, track: Track, guess: Guess, *, gated: bool) -> list[Evidence]:
+def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
     """What measurements say against the clock of a receiver whose latency is given, and against gyros of the same moment.
 
-    A receiver that is later than it is said to be looks like gyros that are early: its lag is left open first.
+    A receiver that is later than it is said to be looks like gyros that are early: its lag is left open first. Rivals of the gyros
+    have two passes: the guess is that of the log as it is, and `first` that of its first pass.
     """
     found: list[Evidence] = []
     if task.gnss is not None and task.antenna.latency_sigma == 0.0:
@@ -38,6 +39,7 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, *, gated: bool)
         task, track = open_, late
 
     def other(record: ImuRecord) -> Track:
-        return replace(task, record=record).run(guess, gated=gated)
+        rival = replace(task, record=record)
+        return rival.run(led_back(record, rival.run(guess, gated=gated), task.spec, first), gated=gated)
 
     return found + gyro_delay_evidence(other, track, task.record)

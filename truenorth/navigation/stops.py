@@ -22,7 +22,7 @@ STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motio
 FEWEST_FIXES = 5  # through which a line is laid
 REACHES = (2.0, 5.0, 10.0, 20.0)  # s before and after a fix
 SHARP = 0.4  # of the speed of standing: one sigma of a slope that is sharp enough
-STANDING_PULSES = 1.5  # pulses in a row of an odometer: no more is standing
+STANDING_PULSES = 1.5  # pulses of an odometer in a second: no more is standing
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
 STILL_RATE = 1e-6  # rad/s, of its rotation, besides what the gyros show of themselves
 
@@ -78,8 +78,13 @@ def _near(at: Array, times: Array) -> NDArray[np.intp]:
 def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array, NDArray[np.bool_]]:
     """When a sensor gave a speed, and whether it was motion."""
     if isinstance(log, OdometerRecord):
-        pulse = 0.0 if log.pulse_size is None else STANDING_PULSES * log.pulse_size / log.interval
-        return log.time - 0.5 * log.steps, np.abs(log.speed) > max(STANDING, pulse)
+        time = log.time - 0.5 * log.steps
+        if log.pulse_size is None:
+            return time, np.abs(log.speed) > STANDING
+        # One pulse in a row of .1 s would be a speed, and none may be a creeping vehicle: pulses count over a second.
+        way = np.concatenate([[0.0], np.cumsum(log.values)]) * log.pulse_size
+        first, last = (np.searchsorted(log.time, time + half, "right") for half in (-0.5, 0.5))
+        return time, np.abs(way[last] - way[first]) > max(STANDING, STANDING_PULSES * log.pulse_size)
     velocity = log.v_n if isinstance(log, GnssRecord) else log.velocity
     if velocity is None or not np.isfinite(velocity[:, :2]).any():
         return _speed_of_places(log) if isinstance(log, GnssRecord) else (np.empty(0), np.empty(0, dtype=bool))

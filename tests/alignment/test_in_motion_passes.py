@@ -1,0 +1,100 @@
+"""Passes that begin where the one before ended: heading of poor gyros on wheels is what its sigma says."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from truenorth.aiding.aids import Odometer
+from truenorth.alignment import align
+from truenorth.alignment.in_motion_start import LEAST_HEADING, Guess, led_back, used_twice
+from truenorth.core.position import Position
+from truenorth.navigation.stops import seconds_at_rest
+from truenorth.records import ImuRecord, OdometerRecord
+from truenorth.simulation import scenario as scenario_module
+from truenorth.simulation.scenario import read_scenario
+
+POOR = {
+    "name": "constant biases",
+    "gyro": {"bias": "100 deg/h", "random_walk": "0.3 deg/sqrt(h)"},
+    "accel": {"bias": "8 mg", "random_walk": "100 ug/sqrt(Hz)"},
+}
+
+
+def van(seed):
+    """The shipped van with gyros of constant biases: record, odometer, heading at the end (rad), place at the start."""
+    text = yaml.safe_load((Path(scenario_module.__file__).parent / "scenarios" / "van.yaml").read_text())
+    scenario = read_scenario(text | {"imu": POOR})
+    record = scenario.simulate(seed=seed).record
+    motion = scenario.build_motion(seed, 0)
+    C = motion.states(np.array(float(record.time[-1]))).C_nb
+    at = motion.states(np.array(0.0))
+    odometer = scenario.simulate_aiding(seed=seed)["odometer"].record
+    return record, odometer, np.arctan2(C[0, 1], C[1, 1]), Position(float(at.lat), float(at.lon), float(at.alt))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_a_van_with_poor_gyros_and_a_wheel_of_pulses(seed):
+    """Gyros of 100 deg/h; as every pass began from zero biases and 4 deg of level: 23, 11 and -7 deg off, sigma 2.3 to 3.6."""
+    record, odometer, heading, place = van(seed)
+    answer = align(record, place, POOR, aid=Odometer(odometer))
+    sigma = float(answer.euler_sigma[0])
+    off = (answer.heading - heading + np.pi) % (2.0 * np.pi) - np.pi
+    assert answer.status == "aligned", answer.reasons
+    assert sigma < np.radians(5.0)
+    assert abs(off) < 3.0 * sigma
+
+
+def test_what_is_used_twice_is_taken_off():
+    """Variances of two independent sources: with the prior taken off again what the log alone gives."""
+    first = Guess(np.eye(3), 0.07, 0.5)
+    log, prior = 0.05, 0.15
+
+    class Passed:
+        sigma = np.full((1, 15), 1.0 / np.sqrt(1.0 / log**2 + 1.0 / prior**2))
+
+    more = used_twice(Passed, replace(first, heading_sigma=prior), first)
+    assert np.hypot(Passed.sigma[-1, 2], more) == pytest.approx(log, rel=1e-9)
+    assert used_twice(Passed, first, first) == 0.0
+
+
+def test_a_pass_hands_on_what_it_has_found(monkeypatch):
+    """Biases that it has narrowed; level and heading no wider than at first."""
+    from truenorth.alignment import in_motion_start
+    from truenorth.records.specs import imu_spec
+
+    monkeypatch.setattr(in_motion_start, "backtracked", lambda record, track: np.eye(3))
+    spec = imu_spec(POOR)
+    sigma = np.concatenate([np.full(9, 1e-3), 0.01 * np.sqrt(spec.bias_variance)])
+    sigma[11] = np.sqrt(spec.bias_variance[2])
+
+    class Track:
+        gyro_bias, accel_bias = np.array([[1e-4, 2e-4, 3e-4]]), np.array([[0.01, 0.02, 0.03]])
+
+    Track.sigma = sigma[None]
+    first = Guess(np.eye(3), 0.07, 0.5)
+    found = led_back(None, Track, spec, first)
+    assert np.array_equal(found.gyro_bias, [1e-4, 2e-4, 0.0])
+    assert np.array_equal(found.accel_bias, [0.01, 0.02, 0.03])
+    assert found.heading_sigma == LEAST_HEADING
+    assert found.level_sigma == pytest.approx(1e-2)
+    assert led_back(None, Track, spec, Guess(np.eye(3), 0.001, 0.01)).heading_sigma == 0.01
+
+
+def test_a_creeping_vehicle_does_not_stand():
+    """One pulse of 4 cm in each row of .1 s is .4 m/s; a pulse now and then of a wheel at rest is none."""
+    time = 0.01 * np.arange(1, 3001)
+    rng = np.random.default_rng(1)
+    record = ImuRecord(
+        time, 1e-5 * rng.standard_normal((3000, 3)), [0.0, 0.0, 9.8] + 1e-3 * rng.standard_normal((3000, 3))
+    )
+    rows = 0.1 * np.arange(1, 301)
+    creeping = np.where(rows > 15.0, 1.0, 0.0)
+    still, _ = seconds_at_rest(record, OdometerRecord(rows, creeping, "pulses", 0.04))
+    assert len(still) > 10
+    assert still.max() < 15.5
+    now_and_then = np.where(np.arange(300) % 50 == 0, 1.0, 0.0)
+    still, _ = seconds_at_rest(record, OdometerRecord(rows, now_and_then, "pulses", 0.04))
+    assert len(still) > 25
