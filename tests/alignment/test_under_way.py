@@ -1,13 +1,18 @@
 """A log of a vehicle at steady speed, given as one of a base that stays: what shows it, and what nothing shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.alignment import align
+from truenorth.core.attitude import misalignment
 from truenorth.core.position import Position
 from truenorth.simulation import simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight
+from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(40.0, 10.0)
 
@@ -59,3 +64,56 @@ def test_a_base_that_stays_is_not_doubted():
         assert answer.status == "aligned"
         doubted += "rate.doubtful" in keys(answer)
     assert doubted <= 2
+
+
+def at_sea(run):
+    """A ship in a high sea, its IMU some metres from the centre: roll, pitch and yaw of four periods each, and a metre of way."""
+    rng = np.random.default_rng([91, run])
+
+    def tones(largest, unit):
+        sizes = rng.uniform(0.1 * largest, largest, 4)
+        return [
+            {"amplitude": f"{a:.3f} {unit}", "period": f"{T:.2f} s"}
+            for a, T in zip(sizes, rng.uniform(4.0, 14.0, 4), strict=True)
+        ]
+
+    motion = {"pitch": 2.0, "roll": 4.0, "heading": 1.0}, {"east": 0.6, "north": 0.6, "up": 0.4}
+    return read_scenario(
+        {
+            "name": "high sea",
+            "duration": "300 s",
+            "position": {"lat": f"{rng.uniform(-60.0, 60.0):.3f} deg", "lon": "10 deg"},
+            "motion": {
+                "kind": "sway",
+                "heading": f"{rng.uniform(0.0, 360.0):.1f} deg",
+                "tones": {n: tones(a, "deg") for n, a in motion[0].items()}
+                | {n: tones(a, "m") for n, a in motion[1].items()},
+            },
+            "lever_arm": [f"{x:.2f} m" for x in rng.uniform(-12.0, 12.0, 3)],
+            "imu": "navigation",
+        }
+    )
+
+
+@few_and_all(16, few=4)
+def test_a_high_sea_takes_a_ship_nowhere(runs):
+    """Its velocity is more than .5 m/s, and it stays within metres: aligned, none more than four sigmas off."""
+    for run in range(runs):
+        scenario = at_sea(run)
+        made = scenario.simulate(seed=run)
+        answer = align(made.record, Position(scenario.position.lat, scenario.position.lon), "navigation")
+        assert answer.status == "aligned", answer.reasons
+        phi = misalignment(answer.C_nb, made.motion.states(np.array([answer.time])).C_nb[0])
+        assert np.all(np.abs(phi) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
+
+
+def test_a_ship_that_manoeuvres_in_the_same_sea_does_not_stay():
+    """It gathers way and stops again: tens of metres are no sway."""
+    made = at_sea(0).simulate(seed=0)
+    record, t = made.record, made.record.time
+    speeding = 0.25 * np.sin(2.0 * np.pi * (t - t[0]) / 60.0)  # m/s^2: 2.4 m/s and 23 m, to and fro
+    C_bn = np.swapaxes(made.motion.states(t).C_nb, 1, 2)
+    scale = record.interval if record.kind == "increments" else 1.0
+    driven = replace(record, accel=record.accel + scale * C_bn[:, :, 1] * speeding[:, None])
+    answer = align(driven, Position(at_sea(0).position.lat, at_sea(0).position.lon), "navigation")
+    assert answer.status == "inconsistent", answer.reasons

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from truenorth.campaign.fault_benches import BENCHES
-from truenorth.quality.tilt import _changes, check_tilt
+from truenorth.quality.tilt import IDENTITY, Tilt, _changes, check_tilt
 from truenorth.simulation.scenario import read_scenario
 
 
@@ -52,3 +52,14 @@ def test_a_base_that_moves_along_with_its_sway_is_no_scale_factor():
     """A sound log drawn so: the line through its scales stands ten sigmas from zero, and gyros without such errors turn worse."""
     record = BENCHES["swaying"].draw(8202, 51)[0]["record"]
     assert check_tilt(record).evidence() == []
+
+
+def test_a_turn_that_leaks_in_by_a_misalignment_is_no_scale_factor():
+    """30 % of a turn of .1 deg, by one of 60 deg about another axis, is a misalignment; 30 % of turns of one size is a scale."""
+    found = {"scale": np.array([0.0, 0.297, 0.0]), "scale_sigma": np.full(3, 0.009), "pieces": 8}
+    leaks, scaled = (
+        Tilt(0.1, 1.0, 0.1, IDENTITY, 0.0, 0.01, 0.0, turned=np.radians(turned), **found)
+        for turned in ([0.2, 0.1, 60.0], [5.0, 5.0, 5.0])
+    )
+    assert leaks.evidence() == []
+    assert [item.key for item in scaled.evidence()] == ["tilt.scale"]

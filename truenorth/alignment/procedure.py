@@ -26,7 +26,7 @@ from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.swaying import sway_align
+from truenorth.alignment.swaying import farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
 from truenorth.alignment.turning import infer_turning, turning_align, turning_noise, turns_blindly, with_usual
 from truenorth.alignment.verdict import base_evidence, judged, leaves
@@ -53,6 +53,7 @@ HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
 MOSTLY = 0.95  # of the seconds
+GOES = 10.0  # m: of the way from where a base was in the mean, that still passes for sway
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
@@ -159,6 +160,7 @@ class _Found:
     drift: Drift | None = None
     form: str = ""
     steps: Sequence[Evidence] = ()
+    way: float = math.inf  # m, that a swaying base is from its mean place at most
     acted: float | None = None  # share of the epochs in which factors of a published filter acted
 
 
@@ -283,7 +285,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
     others = matrix_signatures(fine, used) if sways else None
     steps = [*bias_step_evidence(fine, others), *bad_stretches(fine, task.record)]
     steps += hemisphere_evidence(fine, task.position, others)
-    return _Found(answer, check, fine.settled, detect_drift(fine, others), "" if sways else form, steps)
+    way = farthest(fine, task.position) if sways else math.inf
+    return _Found(answer, check, fine.settled, detect_drift(fine, others), "" if sways else form, steps, way)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
@@ -334,9 +337,12 @@ def _rocks_all_along(motion: MotionSummary) -> bool:
 
 
 def _explained(motion: MotionSummary, found: _Found) -> bool:
-    """Whether a lever arm and bounded motion explain all that the base does: what moves by its arm goes nowhere."""
+    """Whether a lever arm and bounded motion explain all that the base does: what moves by its arm goes nowhere.
+
+    A high sea moves a ship by more than a metre a second, and takes it nowhere either.
+    """
     leaves = found.drift is not None and found.drift.sure
-    small = float(np.max(found.answer.disturbance[:2])) < STAYS
+    small = float(np.max(found.answer.disturbance[:2])) < STAYS or found.way < GOES
     return _rocks_all_along(motion) and found.settled and small and not leaves
 
 

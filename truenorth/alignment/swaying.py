@@ -18,14 +18,16 @@ from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
+from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import normal_gravity
+from truenorth.core.position import Position
 from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.records.specs import ImuSpec
-from truenorth.strapdown.inertial import InertialIntegrals
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_position
 
 Array = NDArray[np.float64]
 
@@ -100,15 +102,27 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     estimator = _MotionFilter(residual, step, walks)
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
     arm = log.prior.groups["arm"]
+    # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
+    seen = np.sqrt(np.mean(base_velocity(log.integrals, log.C_n0_i, position.lat, position.alt) ** 2, axis=0))
     return SwayAlignment.of(
         log,
         last,
         log.prior.sensors,
-        np.array([item.sigma for item in estimator.motion]),
+        np.minimum([item.sigma for item in estimator.motion], seen),
         motion=estimator.motion,
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
     )
+
+
+def farthest(fine: FineAlignment, position: Position) -> float:
+    """How far the IMU is from its mean place at most, level, by the last integration of its log, m.
+
+    A slow course of the place is that of errors that are left: a cubic in time is taken off.
+    """
+    t = fine.integrals.time
+    place = fine.integrals.position @ fine.C_n0_i.T + gravity_position(t, position.lat, position.alt)
+    return float(np.max(np.linalg.norm(detrended(t, place)[:, :2], axis=1)))
 
 
 def windowed_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM) -> tuple[Array, InertialIntegrals]:
@@ -141,9 +155,9 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     def turn(found: _Fitted) -> float:
         return float(np.max(np.abs(found.end[PHI])))
 
-    for base_velocity in (BASE_VELOCITY, max(BASE_VELOCITY, walked)):
+    for speed in (BASE_VELOCITY, max(BASE_VELOCITY, walked)):
         log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, sways=True, C_sb=mount.C_sb)
-        last = settle(log, partial(_fitted, base_velocity), turn, enough=SMALL_TURN, most=WINDOWED_PASSES)
+        last = settle(log, partial(_fitted, speed), turn, enough=SMALL_TURN, most=WINDOWED_PASSES)
         if last.moved < DIVERGED:
             break
     return log, last.found.residual

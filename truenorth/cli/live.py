@@ -97,6 +97,7 @@ def live(
 ) -> None:
     """Find heading while the log is still running: watch it converge, stop when it is good."""
     from truenorth.core.errors import UsageError
+    from truenorth.core.language import retold
     from truenorth.core.units import parse
     from truenorth.formats.layout import layout_for
     from truenorth.live.sending import open_sink
@@ -142,6 +143,8 @@ def live(
     with _listeners(session, lines, page, goal) as listeners, _ended_by_sigterm():
         alignment = session.run(listeners)
     result: Alignment | Navigation = session.navigation or alignment
+    if session.without:
+        print(f"truenorth: {retold(session.without)}", file=sys.stderr)
     if as_json:
         say(json.dumps({"final": True} | result.summary(), allow_nan=False))
     paths = [] if output is None else result.save(output)

@@ -170,14 +170,23 @@ class Navigator:
             motion=Motion(track.v_n[-1], track.position[-1], sigma[3:6].copy(), sigma[6:9].copy()),
         )
 
+    @property
+    def missing(self) -> DataError | None:
+        """What is raised where nothing can be navigated yet: the rows end with the alignment; None from the second row on."""
+        if len(self.log) > 1:
+            return None
+        return DataError(f"navigation: fewer than two rows came after the alignment at {self.start.time:.3f} s")
+
     def finish(self) -> Navigation:
         """Navigate all rows, as :func:`truenorth.navigate` would; where they are kept one by one no longer, the loop's own track.
 
         Raises
         ------
         DataError
-            As :func:`truenorth.navigate`.
+            As :func:`truenorth.navigate`; fewer than two rows; lost before the first epoch.
         """
+        if (missing := self.missing) is not None:
+            raise missing
         if self.log.merged == 1 and not self.failure:
             aids = [feed.until(self.log.end, self._mountings.get(key)) for key, feed in self.feeds.items()]
             return navigate(
@@ -192,7 +201,7 @@ class Navigator:
         with self._lock:
             found = self._now()
         if found is None:
-            raise DataError(f"navigation: no rows came after the start at {self.start.time:.3f} s")
+            raise DataError(self.failure)
         return self._judged(self.past.with_end(found))
 
     def save(self, path: str | PathLike[str]) -> Path:

@@ -62,6 +62,7 @@ class Session:
     opened: Callable[[str], None] = lambda source: None  # called with the source's text when rows can come
     go: threading.Event = field(default_factory=threading.Event)
     navigation: Navigation | None = None  # of the rows after the alignment, when there were some
+    without: str = ""  # why there is no navigation, though it was begun
 
     def run(self, listeners: Sequence[Listener] = ()) -> Alignment:
         """Align until the source ends, the heading is good enough, or an interrupt; then navigate, if that is wished.
@@ -85,6 +86,7 @@ class Session:
         aids = self._open_aids(source, journal)
         self.opened(self.source)
         run: Run | None = None
+        aligned: Answer | None = None  # stands until navigation has one of its own
         due = 0.0
         try:
             for rows in source:
@@ -97,11 +99,12 @@ class Session:
                 if clock.monotonic() >= due:
                     due = clock.monotonic() + self.every
                     answer = run.answer
-                    self._publish(listeners, run, answer, _notes(source, aids))
+                    self._publish(listeners, run, answer or aligned, _notes(source, aids, run))
                     if isinstance(run, Aligner) and self._good(answer):
                         if not self.navigate:
                             break
-                        run = self._go_on(run, journal)
+                        navigator = self._go_on(run, journal)
+                        aligned, run = run.answer, navigator
         except KeyboardInterrupt:
             pass
         if run is None and earlier:
@@ -111,7 +114,7 @@ class Session:
         if journal is not None:
             journal.flush(source.kind)
         found = self._finish(run)
-        self._publish(listeners, run, run.answer, _notes(source, aids))
+        self._publish(listeners, run, run.answer or aligned, _notes(source, aids, run))
         return found
 
     def _open_aids(self, source: Source, journal: Journal | None) -> list[AidSource]:
@@ -161,8 +164,11 @@ class Session:
     def _finish(self, run: Run) -> Alignment:
         if isinstance(run, Aligner):
             return run.finish()
-        self.navigation = run.finish()
         assert run.solution is not None
+        if run.missing is None:
+            self.navigation = run.finish()
+        else:
+            self.without = str(run.missing)
         return run.solution
 
     def _publish(self, listeners: Sequence[Listener], run: Run, answer: Answer | None, note: str) -> None:
@@ -184,6 +190,7 @@ def _give(run: Run, rows: Array, aids: Sequence[AidSource]) -> None:
     run.push(rows[:, 0], rows[:, 1:4], rows[:, 4:])
 
 
-def _notes(source: Source, aids: Sequence[AidSource]) -> str:
+def _notes(source: Source, aids: Sequence[AidSource], run: Run) -> str:
     broken = f"{source.broken} lines could not be read" if source.broken else ""
-    return "; ".join(filter(None, (source.note, broken, *(aid.note for aid in aids))))
+    missing = "" if isinstance(run, Aligner) or run.missing is None else str(run.missing)
+    return "; ".join(filter(None, (source.note, broken, *(aid.note for aid in aids), missing)))

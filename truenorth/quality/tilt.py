@@ -40,7 +40,7 @@ EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may l
 # Of a small delay and of a scale factor of sound gyros: sigma is estimated from few pieces, and the base's own motion is alike in
 # them. Of eight pieces 10 and 7 sigmas.
 SURE, CLEAR = 2e-5, 2e-4
-LEAST_SCALE = 0.005  # no gyro of a specification has a larger error
+LEAST_SCALE = 0.005  # no gyro of a specification has a larger error of scale, or misalignment in rad
 LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
 IDENTITY = "+x +y +z"
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
@@ -104,7 +104,7 @@ class Tilt:
         if abs(self.delay) >= max(LEAST_DELAY, sure * self.delay_sigma):
             found.append(Evidence(late, figures, "bounded", Effect(level=self.tilt), ("common_clock",)))
         off = np.abs(self.scale)
-        for i in np.flatnonzero(off >= np.maximum(LEAST_SCALE, clear * self.scale_sigma)):
+        for i in np.flatnonzero(off >= np.maximum(least_scale(self.turned), clear * self.scale_sigma)):
             size = float(off[i] * self.turned[i])
             figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
             found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
@@ -156,12 +156,17 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     # Scale factors are fitted on a straight line, and the base's motion along the sway may pass for them. With half of what was
     # found taken off, and with all, the gyros must turn better and better.
     clear = student_limit(CLEAR, len(theta) - 1)
-    wrong = np.where(np.abs(little[1:]) >= np.maximum(LEAST_SCALE, clear * sigma[1:]), little[1:], 0.0)
+    wrong = np.where(np.abs(little[1:]) >= np.maximum(least_scale(turns), clear * sigma[1:]), little[1:], 0.0)
     if wrong.any():
         half, whole = (bench.left(theta / np.maximum(1.0 + part * wrong, 0.1)) for part in (0.5, 1.0))
         if not whole < half < given:
             sigma[1:] = np.inf
     return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, little[1:], sigma[1:], turns, len(theta))
+
+
+def least_scale(turned: Array) -> Array:
+    """(3,) the smallest scale error that is more than a sound gyro's: turns about the other axes leak in by its misalignment."""
+    return np.asarray(LEAST_SCALE * np.linalg.norm(turned) / np.maximum(turned, 1e-12))
 
 
 READINGS = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))
