@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.filters.dense import Dense, one_run, random_system
 from tests.runs import said_by_a_second_process
 from truenorth.core.errors import DataError, UsageError
-from truenorth.filters import LinearSystem, kalman
+from truenorth.core.linalg import padded
+from truenorth.filters import LinearSystem, drive, kalman
 
 TIGHT = {"rtol": 1e-9, "atol": 1e-9}
 
@@ -53,6 +54,15 @@ def test_filter_is_the_joint_gaussian(kind, joseph):
 def test_covariance_is_symmetric_to_the_bit():
     P = kalman(random_system(n=9, epochs=30), history="full").P
     assert_array_equal(P, np.swapaxes(P, -1, -2))
+
+
+def test_wider_padding_changes_no_bit(monkeypatch):
+    system = random_system(n=9, epochs=30)
+    narrow = kalman(system, history="full")
+    monkeypatch.setattr(drive, "padded", lambda n: padded(17))
+    wide = kalman(system, history="full")
+    for name in ("x", "P", "innovation", "nis", "log_likelihood"):
+        assert_array_equal(getattr(wide, name), getattr(narrow, name))
 
 
 @pytest.mark.parametrize("constant", [False, True])

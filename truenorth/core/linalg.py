@@ -1,9 +1,10 @@
 """Matrix work of the recursions: small symmetric and square matrices, padded, without BLAS and without allocation.
 
-A matrix of n rows lives in the corner of an N x N array with N the next multiple of 4 and zeros beyond n. Each
-function takes `size`, a tuple of N nothings, first: its length is part of its *type*, so that Numba compiles every
-function once for each N with loops of constant length, and one source serves all. With the innermost loop of constant
-length summing into a scalar, LLVM unrolls it and turns the loop around it into vector instructions.
+A matrix of n rows lives in the corner of an N x N array with zeros beyond n; N is the next multiple of 4, beyond 16 of 8.
+The zeros change no bit of a result. Each function takes `size`, a tuple of N nothings, first: its length is part of its
+*type*, so that Numba compiles every function once for each N with loops of constant length, and one source serves all.
+With the innermost loop of constant length summing into a scalar, LLVM unrolls it and turns the loop around it into
+vector instructions.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from truenorth.core.compiled import borrowing
 Array = NDArray[np.float64]
 Size = tuple[Any, ...]
 
-MULTIPLE = 4
+SMALL = 16  # rows up to which sizes go in steps of 4; beyond, of 8: each size of the closed loop takes 50 s to compile
 
 
 def padded(n: int) -> Size:
-    """Give the `size` of matrices with `n` rows: a tuple as long as the next multiple of 4."""
-    return (None,) * (MULTIPLE * -(-n // MULTIPLE))
+    """Give the `size` of matrices with `n` rows: a tuple as long as the next multiple of 4, beyond 16 rows of 8."""
+    step = 4 if n <= SMALL else 8
+    return (None,) * (step * -(-n // step))
 
 
 @borrowing(forceinline=True)
