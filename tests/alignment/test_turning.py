@@ -71,13 +71,13 @@ def test_a_turntable_that_turns_while_the_log_runs(start, imu):
     assert np.sqrt(answer.phi_covariance[0, 0]) > answer.imu.gyro_misalignment * 0.5
 
 
-def turned(positions, duration, imu="tactical"):
+def turned(positions, duration, imu="tactical", rate="10 deg/s"):
     return read_scenario(
         {
             "name": "turned",
             "duration": f"{duration} s",
             "position": {"lat": "40 deg", "lon": "116 deg"},
-            "motion": {"kind": "turntable", "rate": "10 deg/s", "positions": positions},
+            "motion": {"kind": "turntable", "rate": rate, "positions": positions},
             "imu": imu,
         }
     )
@@ -135,3 +135,11 @@ def test_a_gyro_that_steps_on_a_table_that_was_turned():
     stepped = record.gyro + np.outer(record.time > 220.0, [0.0, 0.0, np.radians(20.0 / 3600.0) * record.interval])
     answer = align(replace(record, gyro=stepped), PLACE, scenario.imu)
     assert any(item.key == "bias.vertical_steps" for item in answer.evidence), answer.reasons
+
+
+def test_a_base_that_is_nudged_has_no_gyro_that_steps():
+    """Half a degree within a few seconds, and still again."""
+    scenario = turned([{"duration": "90 s"}, {"duration": "110 s", "heading": "0.5 deg"}], 200, rate="0.2 deg/s")
+    record = scenario.simulate(seed=3, run=0).record
+    answer = align(record, PLACE, scenario.imu)
+    assert all(item.key != "bias.vertical_steps" for item in answer.evidence), answer.reasons

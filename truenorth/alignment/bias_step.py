@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.inference import usual
 from truenorth.alignment.task import Task
-from truenorth.alignment.touched import find_touch
+from truenorth.alignment.touched import Touch, find_touch
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
 from truenorth.errors.staying import BA, BG, PHI
@@ -29,6 +30,8 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
+AWAY = 5  # seconds from a turn: it begins and ends slowly
+WANDERS = 3.0  # times its instability, that an accelerometer's bias is off by at some time
 FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
 SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
@@ -36,14 +39,18 @@ AT_ONCE = 2  # courses that are matched together: they take memory
 SENSORS = slice(BG.start, BA.stop)
 
 
-def bias_step_evidence(fine: FineAlignment, others: Array | None = None) -> list[Evidence]:
+def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, others: Array | None = None) -> list[Evidence]:
     """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves.
 
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
-    that beats slowly. They explain what they can (:func:`matrix_signatures`, `others`).
+    that beats slowly. They explain what they can (:func:`matrix_signatures`, `others`). An accelerometer's bias wanders by its
+    instability, which stands on the vertical for all to see: so small a step is none.
     """
     ends: list[Array] = []
     ratio, size, x = matched(fine, _signatures(fine, ends), others)
+    instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
+    accel = np.arange(len(ratio)) % 6 >= 3
+    ratio = np.where(accel & (np.abs(size) < WANDERS * instability), 0.0, ratio)
     d = np.hstack(ends)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
@@ -126,7 +133,7 @@ def turn_evidence(task: Task) -> list[Evidence]:
     motion = task.motion
     if motion.overall not in ("still", "disturbed"):
         return []
-    turns = np.convolve(motion.kind == KINDS.index("rotating"), np.ones(3), "same") > 0.0
+    turns = np.convolve(motion.kind == KINDS.index("rotating"), np.ones(2 * AWAY + 1), "same") > 0.0
     found = []
     for part in np.split(np.arange(len(turns)), np.flatnonzero(np.diff(turns)) + 1):
         if len(part) < FEWEST or turns[part[0]]:
@@ -134,10 +141,16 @@ def turn_evidence(task: Task) -> list[Evidence]:
         up = motion.specific_force[part].mean(axis=0)
         rate = motion.rate[part] @ (up / np.linalg.norm(up))
         step = find_touch(motion.time[part], np.stack([rate, 0.0 * rate], axis=1), 0.0)
-        found += [] if step is None else [step]
+        found += [step] if step is not None and _stays(step, motion.time[part], rate) else []
     if not found:
         return []
     last = float(motion.time[-1])
     turned, step = max(((item.size * max(0.0, last - item.time), item) for item in found), key=lambda pair: pair[0])
     figures: dict[str, Figure] = {"onset": step.time, "size": step.size, "heading": turned}
     return [Evidence("bias.vertical_steps", figures, "bounded", Effect(heading=turned), ("still_part",))]
+
+
+def _stays(step: Touch, time: Array, rate: Array) -> bool:
+    """Whether the rate is another one from then on: a base that is nudged turns for a moment."""
+    before, after = rate[time < step.time - AWAY], rate[time > step.time + AWAY]
+    return bool(len(before) and len(after) and abs(np.median(after) - np.median(before)) > 0.5 * step.size)

@@ -283,7 +283,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
     others = matrix_signatures(fine, used) if sways else None
-    steps = [*bias_step_evidence(fine, others), *bad_stretches(fine, task.record)]
+    steps = [*bias_step_evidence(fine, used, others), *bad_stretches(fine, task.record)]
     steps += hemisphere_evidence(fine, task.position, others)
     way = farthest(fine, task.position) if sways else math.inf
     return _Found(answer, check, fine.settled, detect_drift(fine, others), "" if sways else form, steps, way)

@@ -156,7 +156,7 @@ def align_rotary(
     )
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
     evidence = model_evidence(detect_drift(fine), settled=fine.settled)
-    evidence += base_speed(answer) + bias_step_evidence(fine) + bad_stretches(fine, record)
+    evidence += base_speed(answer) + bias_step_evidence(fine, spec) + bad_stretches(fine, record)
     evidence += hemisphere_evidence(fine, task.position)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
