@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -17,6 +18,7 @@ import truenorth as tn
 from truenorth.formats import write_imu
 from truenorth.live.journal import Journal
 from truenorth.live.known_feeds import FEEDS
+from truenorth.live.navigator import Navigator
 from truenorth.live.session import START, Session
 from truenorth.simulation.scenario import read_scenario
 
@@ -62,21 +64,6 @@ def test_a_replayed_run_on_the_move_is_the_batch_to_the_bit(logs):
     assert found.status == whole.status == "aligned"
     assert np.array_equal(found.C_nb, whole.C_nb)
     assert np.array_equal(found.phi_covariance, whole.phi_covariance)
-
-
-def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
-    statuses = []
-    run = session(logs, "25x", until=np.radians(0.5), navigate=True, every=0.05, share=1.0, folder=tmp_path)
-    alignment = run.run([lambda run, answer, note: statuses.append(None if answer is None else answer.status)])
-    assert alignment.euler_sigma[0] <= 1.1 * np.radians(0.5)
-    assert run.navigation.status == "navigated"
-    assert run.navigation.time[0] == pytest.approx(alignment.time, abs=0.03)
-    assert run.navigation.time[-1] == pytest.approx(90.0, abs=0.03)
-    assert statuses[-1] == "navigated"
-    assert tn.load(tmp_path / START).time == alignment.time
-    # The rows of both parts are kept.
-    kept = sum(len(rows) for _, rows in Journal(tmp_path, resume=True).earlier())
-    assert kept == len(tn.read_imu(logs / "log.csv"))
 
 
 def test_rows_of_aids_are_kept_and_a_resumed_run_needs_no_log_of_them(logs, tmp_path):
@@ -139,24 +126,117 @@ def test_navigation_killed_and_resumed_goes_on_from_the_same_alignment(logs, tmp
     assert final["heading_deg"] == np.degrees(whole.euler[-1, 0])
 
 
+class ByHand:
+    """A session in a thread, whose rows come over TCP when the test sends them: nothing depends on how fast it runs."""
+
+    def __init__(self, logs, **options):
+        self.server = socket.create_server(("127.0.0.1", 0))
+        self.session = session(logs, "max", every=0.05, share=1.0, **options)
+        self.session.source = f"tcp://127.0.0.1:{self.server.getsockname()[1]}"
+        self.header, *self.lines = (logs / "log.csv").read_bytes().splitlines(keepends=True)
+        self.now, self.found = (None, None, ""), []
+        self.thread = threading.Thread(target=lambda: self.found.append(self.session.run([self.see])))
+
+    def see(self, run, answer, note):
+        self.now = (run, answer, note)
+
+    def __enter__(self):
+        self.thread.start()
+        self.line, _ = self.server.accept()
+        self.line.sendall(self.header)
+        return self
+
+    def send(self, count):
+        """The next rows."""
+        self.line.sendall(b"".join(self.lines[:count]))
+        del self.lines[:count]
+
+    def wait_for(self, happened):
+        """Until this holds of what was last published."""
+        while not happened(*self.now):
+            assert self.thread.is_alive()
+            time.sleep(0.02)
+
+    def drive(self, happened):
+        """Rows until this holds of what was published; the next ones only when the last ones have been solved for."""
+        sent, solutions = 0, 0
+        for count in np.diff([0, 1250, 1500, 1800, 2200, 2700, 3300, 4000]):
+            self.send(count)
+            sent += count
+            self.wait_for(
+                lambda run, answer, note, n=sent, m=solutions: (
+                    happened(run, answer, note)
+                    or (run is not None and run.intake.counts.taken == n and (run.solutions > m or run.failure))
+                )
+            )
+            if happened(*self.now):
+                return
+            solutions = self.now[0].solutions
+        self.wait_for(happened)
+
+    def __exit__(self, *error):
+        self.line.close()
+        self.thread.join()
+        self.server.close()
+
+
+def heading_known(run, answer, note):
+    return answer is not None and answer.heading_known
+
+
+def navigates(run, answer, note):
+    return isinstance(run, Navigator)
+
+
+def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
+    with ByHand(logs, until=np.radians(0.5), navigate=True, folder=tmp_path) as run:
+        run.drive(navigates)
+        run.send(len(run.lines))
+    (alignment,), found = run.found, run.session.navigation
+    assert alignment.euler_sigma[0] <= 1.1 * np.radians(0.5)
+    assert found.status == run.now[1].status == "navigated"
+    assert found.time[0] == pytest.approx(alignment.time, abs=0.03)
+    assert found.time[-1] == pytest.approx(90.0, abs=0.03)
+    assert tn.load(tmp_path / START).time == alignment.time
+    # The rows of both parts are kept.
+    kept = sum(len(rows) for _, rows in Journal(tmp_path, resume=True).earlier())
+    assert kept == len(tn.read_imu(logs / "log.csv"))
+
+
+def test_navigation_that_begins_with_the_last_row_leaves_the_alignment(logs):
+    """Rows end, heading is good, and an interrupt or the end of the stream comes without another row."""
+    with ByHand(logs, navigate=True) as run:
+        run.drive(heading_known)
+        run.session.go.set()
+        run.wait_for(navigates)
+        _, answer, note = run.now
+    (found,) = run.found
+    assert found.status == answer.status == "aligned"
+    assert answer.time == found.time
+    assert run.session.navigation is None
+    assert run.session.without == note
+    assert "fewer than two rows came after the alignment at" in note
+
+
 def test_the_page_asks_for_navigation_by_its_token_alone(logs):
     pytest.importorskip("uvicorn")
     from truenorth.live.page import serve
 
-    run = session(logs, "20x", navigate=True, every=0.1, share=1.0)
-    page = serve(":0", 0.01, run.go)
+    run = ByHand(logs, navigate=True)
+    page = serve(":0", 0.01, run.session.go)
     try:
-        thread = threading.Thread(target=lambda: run.run([page.publish]))
-        thread.start()
-        text = urllib.request.urlopen(page.address, timeout=10).read().decode()
-        token = text.split('"X-Token": "')[1].split('"')[0]
-        for headers in ({}, {"X-Token": "guessed"}, {"X-Token": token, "Origin": "http://elsewhere.example"}):
-            with pytest.raises(urllib.error.HTTPError, match="403"):
-                urllib.request.urlopen(urllib.request.Request(page.address + "go", b"", headers), timeout=10)
-        assert not run.go.is_set()
-        urllib.request.urlopen(urllib.request.Request(page.address + "go", b"", {"X-Token": token}), timeout=10)
-        assert run.go.is_set()
-        thread.join(timeout=60)
-        assert run.navigation.status == "navigated"
+        with run:
+            text = urllib.request.urlopen(page.address, timeout=60).read().decode()
+            token = text.split('"X-Token": "')[1].split('"')[0]
+            for headers in ({}, {"X-Token": "guessed"}, {"X-Token": token, "Origin": "http://elsewhere.example"}):
+                with pytest.raises(urllib.error.HTTPError, match="403"):
+                    urllib.request.urlopen(urllib.request.Request(page.address + "go", b"", headers), timeout=60)
+            run.drive(heading_known)
+            assert not run.session.go.is_set()
+            urllib.request.urlopen(urllib.request.Request(page.address + "go", b"", {"X-Token": token}), timeout=60)
+            assert run.session.go.is_set()
+            run.wait_for(navigates)
+            run.send(len(run.lines))
+        assert run.session.navigation.status == "navigated"
     finally:
         page.close()
