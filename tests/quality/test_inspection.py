@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import time as clock
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -169,6 +170,20 @@ def test_direction_of_gravity(angles, code):
     """Yaw, pitch, roll of the mounting; 45 deg of tilt is a real attitude, not a mistake."""
     C = Rotation.from_euler("ZXY", angles, degrees=True).as_matrix()
     assert codes(inspect(base().rotated(C)), "error", "warning") == ({code} if code else set())
+
+
+def test_a_log_turned_through_many_tilts_points_nowhere():
+    """Half of the log upside down and half on its side: no direction is the IMU's."""
+    still = base()
+    halves = [
+        still.rotated(Rotation.from_euler("ZXY", angles, degrees=True).as_matrix())
+        for angles in ((0, 180, 0), (0, 90, 0), (0, 0, 90))
+    ]
+    third = len(still.time) // 3
+    parts = [slice(0, third), slice(third, 2 * third), slice(2 * third, None)]
+    gyro, accel = (np.vstack([getattr(r, key)[p] for r, p in zip(halves, parts)]) for key in ("gyro", "accel"))
+    turned = replace(still, gyro=gyro, accel=accel)
+    assert not codes(inspect(turned)) & {"axes_down", "axes_up", "axes_tilted"}
 
 
 def test_missing_gravity():

@@ -306,7 +306,15 @@ def _turn_between(C: Array, D: Array) -> float:
 def _answer(task: MovingTask, track: Track, method: str, why: str, spread: float) -> Alignment:
     place = track.position[-1]
     sigma = track.sigma[-1]
-    position = Position(float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8]))
+    try:
+        position = Position(
+            float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8])
+        )
+    except UsageError:
+        raise AlignmentError(
+            f"the solution runs away: a height of {place[2]:.3g} m at the end; the measurements do not hold it: check their clock, "
+            "axes and units, and the specification `imu`"
+        ) from None
     history = _history(track, task)
     covariance = history.phi_covariance[-1].copy()
     covariance[2, 2] = min(covariance[2, 2] + spread**2, UNIFORM_SIGMA**2)

@@ -348,9 +348,8 @@ def open_log(
         if device:
             columns = devices.columns(path, chosen, part or "gnss", values.get("topic"))
         else:
-            columns = (columns_of_positions(path) if part == "gnss" and chosen == "csv" else None) or columns_of(
-                path, chosen
-            )
+            own = columns_of_positions(path) if part == "gnss" and chosen == "csv" else None
+            columns = own or columns_of(path, chosen, named=bool(options.columns))
         if not columns.named:
             example = ",".join(q.name for q in quantities[:4])
             raise DataError(

@@ -1,4 +1,4 @@
-"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; ``imu`` of PSINS without being asked.
+"""MATLAB .mat up to version 7: arrays by name, fields of structs as ``trj.imu``; those of toolboxes without being asked.
 
 SciPy's reader follows pointers of the file without a check, and ends the interpreter on some damaged ones: it runs in a
 process of its own.
@@ -21,17 +21,17 @@ from truenorth.formats.columns import columns_of_arrays
 from truenorth.formats.content import LARGEST
 from truenorth.formats.layout import Layout
 from truenorth.formats.table import record_of
+from truenorth.formats.toolboxes import imu_layout
 from truenorth.records import ImuRecord
 
-PSINS = {"dtheta": "imu[0:3]", "dvel": "imu[3:6]", "time": "imu[6]"}
 LONGEST = 300.0  # s, of reading
 
 
 def read(path: Path, layout: Layout) -> ImuRecord:
     """Read a MATLAB file.
 
-    An array ``imu`` of seven columns is what the PSINS toolbox keeps under this name (three angle and three velocity
-    increments, rad and m/s, time; right-forward-up), unless the layout names columns.
+    An array ``imu`` of seven columns is what the PSINS toolbox keeps under this name, a struct of ``t, fb, wb`` and a
+    specification is NaveGo's (:mod:`truenorth.formats.toolboxes`), unless the layout names columns.
 
     Raises
     ------
@@ -39,10 +39,9 @@ def read(path: Path, layout: Layout) -> ImuRecord:
         A damaged file, one of version 7.3, or variables that are missing or have other shapes.
     """
     variables = variables_of(path)
-    if not layout.columns and np.shape(variables.get("imu", 0))[1:] == (7,):
-        units = {"gyro": "rad", "accel": "m/s", "time": "s", **layout.units}
-        layout = replace(layout, columns=PSINS, units=units)
-    return record_of(columns_of_arrays(path, variables), layout)
+    found, whose = imu_layout(variables, layout)
+    record = record_of(columns_of_arrays(path, variables), found)
+    return record if whose is None else replace(record, taken_for=(whose,))
 
 
 def variables_of(path: Path) -> dict[str, Any]:

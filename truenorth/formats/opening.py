@@ -7,8 +7,15 @@ from pathlib import Path
 from truenorth.formats.columns import Columns, columns_of_arrays
 
 
-def columns_of(path: Path, format: str) -> Columns:
+def columns_of(path: Path, format: str, named: bool = True) -> Columns:
     """A log of any format as columns; of two-dimensional arrays each column is ``name[i]``, counted from 0.
+
+    Parameters
+    ----------
+    path : Path
+    format : str
+    named : bool
+        Whether the caller names columns; else those of toolboxes get our names.
 
     Raises
     ------
@@ -25,6 +32,9 @@ def columns_of(path: Path, format: str) -> Columns:
         from truenorth.formats import parquet
 
         return parquet.columns(path, format)
-    from truenorth.formats import mat, npz
+    from truenorth.formats import mat, npz, toolboxes
 
-    return columns_of_arrays(path, (npz if format == "npz" else mat).variables_of(path))
+    if format == "npz":
+        return columns_of_arrays(path, npz.variables_of(path))
+    variables = mat.variables_of(path)
+    return columns_of_arrays(path, variables if named else toolboxes.aiding(variables))

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 DEG = np.pi / 180.0
 LEVEL_TOLERANCE = 0.12  # of g: local gravity, biases of cheap sensors, motion
 UP_LIMIT = np.radians(60.0)  # tilt of z from up beyond which the axes are doubtful
+ONE_DIRECTION = 0.8  # of the median specific force: the median vector's length where the base keeps its tilt
 CONTRADICTS = 4.0  # times as much left unexplained as by another reading: the axes as given are wrong
 # A lever arm r accelerates in step with the sway and tilts apparent gravity by w^2 r/g: .3 for 3 m at 1 rad/s.
 SCALE_TOLERANCE = 0.35
@@ -100,8 +101,10 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
 
 
 def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
-    """Specific force at rest points up; with RFU axes that is +z."""
+    """Specific force at rest points up; with RFU axes that is +z. A log turned through many tilts has no such direction."""
     mean = np.median(record.accel, axis=0)
+    if np.linalg.norm(mean) < ONE_DIRECTION * np.median(np.linalg.norm(record.accel, axis=1)):
+        return
     up = mean / np.linalg.norm(mean)
     axis = int(np.argmax(np.abs(up)))
     if up[2] > np.cos(UP_LIMIT):
