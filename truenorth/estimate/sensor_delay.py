@@ -4,7 +4,9 @@ On a base that stays gravity says it (:mod:`truenorth.quality.tilt`). On the mov
 ``d`` leave the attitude behind by ``w d`` while the vehicle turns, and the specific force is resolved along axes of another moment.
 Twice the logarithm of a likelihood ratio is a parabola of the delay as long as that is short beside a turn; from the ends of a
 ladder of delays it leads to the likeliest one. Each rival is one fixed shift: by chance it exceeds c in less than exp(-c / 2) of
-sound logs (Markov's inequality).
+sound logs (Markov's inequality). That holds of measurements that are the same for all rivals. The mean rates of the gyros
+themselves while nothing turns are not: each shift averages other rows of their noise. A delay does nothing to them, and they do
+not count.
 """
 
 from __future__ import annotations
@@ -18,9 +20,11 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved
+from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence, Figure
 from truenorth.state.limits import limit
+from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 
@@ -76,7 +80,7 @@ def _likelier(
         if rows not in ratios:
             try:
                 tracks[rows] = run(gyros_later(record, -rows))
-                ratios[rows] = likelihood_ratio(base.residuals, tracks[rows].residuals)
+                ratios[rows] = likelihood_ratio(_not_of_gyros(base), tracks[rows].residuals)
             except DataError:  # the filter broke down: no explanation
                 ratios[rows] = -math.inf
         return ratios[rows]
@@ -92,6 +96,10 @@ def _likelier(
     tried(_peak(ratios, best))
     best = max(ratios, key=ratios.__getitem__)
     return best, tracks[best], ratios[best]
+
+
+def _not_of_gyros(track: Along) -> list[Residuals]:
+    return [r for r in track.residuals if r.name != NO_ROTATION]
 
 
 def gyros_later(record: ImuRecord, rows: int) -> ImuRecord:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.source import Aiding
 from truenorth.core.earth import radii
 from truenorth.core.errors import UsageError
+from truenorth.quality.innovations import NO_ROTATION
 from truenorth.quality.regimes import DISTURBED, STILL, motion_summary
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.strapdown.increments import increments
@@ -178,5 +179,5 @@ def updates_at(record: ImuRecord, still: Array, disturbed: Array, interval: floa
     found = [Aiding("zero velocity", "velocity", time, zero, np.tile(sigma[:, None], 3))]
     if still.size:
         scatter = np.full((still.size, 3), np.hypot(STILL_RATE, rate_scatter(record, interval, still)))
-        found.append(Aiding("zero rotation", "rotation", still, np.zeros((still.size, 3)), scatter))
+        found.append(Aiding(NO_ROTATION, "rotation", still, np.zeros((still.size, 3)), scatter))
     return found

@@ -32,7 +32,8 @@ SCHULER = 5064.0  # s
 MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 CHANCE = math.erfc(limit("chance") / math.sqrt(2.0))
 LEAST_CORRELATION = 0.05  # mean over the first lags
-REST = ("zero velocity", "zero rotation")
+NO_ROTATION = "zero rotation"  # that the gyros show themselves
+REST = ("zero velocity", NO_ROTATION)
 BODY = ("odometer", "velocity log", *REST)
 
 
