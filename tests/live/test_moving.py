@@ -12,6 +12,7 @@ from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
 from truenorth.simulation.scenario import read_scenario
+from truenorth.state.state import Start
 
 DURATION = 120.0
 
@@ -223,3 +224,14 @@ def test_without_a_place_the_first_solution_waits_for_a_fix(van):
     whole = tn.align(record, imu="tactical", aid=[Gnss(kept(gnss, record.time[-1] - 0.4).between(first, None))])
     assert np.array_equal(found.C_nb, whole.C_nb)
     assert found.status == whole.status
+
+
+def test_a_receiver_that_never_brought_a_fix_leaves_navigation_by_the_imu_alone(van):
+    record = van[0].record[:200]
+    begun = float(record.time[0])
+    start = Start(begun, np.eye(3), np.zeros(3), 0.8, 0.2, 100.0, np.zeros(3), np.zeros(3), 1e-6 * np.eye(15))
+    with Navigator(start, "tactical", feeds=[GnssFeed()], kind=record.kind) as run:
+        run.push(record.time, record.gyro, record.accel)
+        found = run.finish()
+    assert (run.altitude, found.altitude) == ("gnss", "fixed")
+    assert any("gnss: fewer than two rows came" in reason for reason in found.reasons)

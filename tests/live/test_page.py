@@ -124,7 +124,9 @@ def test_the_page_is_watched_to_convergence(log, tmp_path):
                 look(browser, name)
             assert all(url.startswith((page.address, "about:")) for url in browser.requests), browser.requests
             assert [text for text in browser.complaints if "net::ERR" not in text] == []
-        thread.join(timeout=120)
+            thread.join(timeout=120)
+            page.close()
+            browser.wait("$('ended').textContent === 'the run has ended' && $('status').className !== 'pill lost'", 30)
     finally:
         page.close()
 

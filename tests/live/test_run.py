@@ -347,3 +347,35 @@ def test_before_the_first_answer_the_page_says_what_it_waits_for_and_what_failed
     assert event["waiting"] == "the first answer comes after 20 s of log"
     assert event["note"] == "2 lines could not be read; the log cannot be aligned"
     assert "status" not in event
+
+
+def test_a_page_says_that_its_run_has_ended():
+    pytest.importorskip("uvicorn")
+    from truenorth.live.page import serve
+
+    page = serve(":0", 0.01)
+    stream = urllib.request.urlopen(page.address + "events", timeout=30)
+    page.close()
+    events = [json.loads(line[6:]) for line in stream.read().decode().splitlines() if line.startswith("data: ")]
+    assert events[-1]["ended"] is True
+
+
+@pytest.mark.parametrize(
+    ("status", "sigma", "floor", "words"),
+    [
+        ("navigated", 0.05, 0.0, "heading good to 0.1 deg"),
+        ("inconsistent", 0.05, 0.01, "heading may not be used; the findings say why"),
+        ("aligned", 0.3, 0.12, "0.1 deg is out of reach: the floor of these gyros is 0.12 deg"),
+    ],
+)
+def test_a_wish_is_spoken_of_in_degrees(status, sigma, floor, words):
+    from truenorth.live.answer import Answer
+    from truenorth.live.intake import Counts
+    from truenorth.live.outputs import waiting
+
+    class Solution:
+        history, euler_sigma_floor = None, np.radians([floor, 0.0, 0.0])
+
+    sigmas, floors = np.radians([sigma, 0.01, 0.01]), np.radians([floor, 0.0, 0.0])
+    answer = Answer(100.0, np.eye(3), sigmas, floors, status, (), Solution(), Counts())
+    assert waiting(answer, np.radians(0.1)) == words

@@ -122,7 +122,7 @@ class Aligner:
         self._mover: Navigator | None = None  # on the move
         self._newest = Recent()  # of the last `RECENT`, and what a running solution lacks
         self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
-        self._due = -np.inf
+        self._due = self._then_due = -np.inf  # s: of the next solution, and of the one after the one that runs
         self._lock = threading.Lock()
 
     def push(self, time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
@@ -328,8 +328,10 @@ class Aligner:
     def _leave(self, time: float, solution: Alignment) -> None:
         """The base has left its place."""
         self.left, self._gap_before = time, self.log.last_gap
-        known = angle_text(float(solution.euler_sigma[0])) if solution.heading_known else "not at all"
-        self.until_then = f"heading was known to {known} (one sigma)"
+        sigma = angle_text(float(solution.euler_sigma[0]))
+        self.until_then = (
+            f"heading was known to {sigma} (one sigma)" if solution.heading_known else "heading was not known"
+        )
 
     def _lost(self, found: Alignment | None) -> bool:
         """Whether a solution of a base that stays lies before a gap in the rows: what the base did in it, nobody knows."""
@@ -345,6 +347,7 @@ class Aligner:
             return
         record = self._record(aids, reach(aids))
         self._newest_in = float(record.time[-1])
+        self._then_due = self.log.end + (GROWTH - 1.0) * max(self.duration, FIRST)
         self._solving.start(lambda: self._solve(record, aids))
         self._collect()
 
@@ -380,8 +383,7 @@ class Aligner:
         ended = self._solving.ready(first=not self.solutions)
         if ended is None:
             return
-        self._newest_in = np.inf
-        self._due = self.log.end + (GROWTH - 1.0) * max(self.duration, FIRST)
+        self._newest_in, self._due = np.inf, self._then_due
         found, self.failure = ended
         if found is None:
             return

@@ -68,6 +68,13 @@ class Log:
         """(N, 7) view of the rows that are kept."""
         return self._rows[: self._size]
 
+    @property
+    def rate(self) -> float:
+        """Rows of the source a second, of the newest ones; 0 before there are two."""
+        if self._size < 2:
+            return 0.0
+        return self.merged / float(np.median(np.diff(self.rows[-500:, 0])))
+
     def add(self, block: Array) -> bool:
         """Take a block of ascending rows in; False where it lies before rows that are merged already, and was left out."""
         if self.merged > 1:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.aiding.aids import Aid
 from truenorth.aiding.source import Aiding
 from truenorth.alignment import Alignment
-from truenorth.core.errors import DataError
+from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.axes import standing
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
@@ -37,6 +37,7 @@ from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
 from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import note
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
@@ -188,21 +189,31 @@ class Navigator:
         if (missing := self.missing) is not None:
             raise missing
         if self.log.merged == 1 and not self.failure:
-            aids = [feed.until(self.log.end, self._mountings.get(key)) for key, feed in self.feeds.items()]
-            return navigate(
+            came = {key: feed.until(self.log.end, self._mountings.get(key)) for key, feed in self.feeds.items()}
+            aids = {key: aid for key, aid in came.items() if aid is not None}
+            found = navigate(
                 self.log.record(),
                 self._given,
-                aid=[aid for aid in aids if aid is not None],
-                altitude=self.altitude,
+                aid=list(aids.values()),
+                altitude=self._kept_with(aids),
                 imu=self._imu,
                 interval=FINE,
                 output=self.output,
             )
+            silent = [note("feed.silent", name=key) for key, aid in came.items() if aid is None]
+            return replace(found, evidence=(*found.evidence, *silent))
         with self._lock:
-            found = self._now()
-        if found is None:
+            last = self._now()
+        if last is None:
             raise DataError(self.failure)
-        return self._judged(self.past.with_end(found))
+        return self._judged(self.past.with_end(last))
+
+    def _kept_with(self, aids: Mapping[str, Aid]) -> Altitude | None:
+        """How height is kept: as in the loop; where its sensor brought no height, as the aids allow."""
+        try:
+            return kept_altitude(self.altitude, aids)[0]
+        except UsageError:
+            return None
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write all that the run goes on from, whole or not at all; see :meth:`load`."""

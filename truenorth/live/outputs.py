@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from truenorth.live.aligner import Aligner
     from truenorth.live.navigator import Navigator
 
+NOT_USED = ("inconsistent", "not_observable", "lost")
 COLOURS = {"aligned": "green", "navigated": "green", "level_only": "yellow"}
 
 
@@ -55,17 +56,20 @@ def angle(radians: float) -> str:
 
 
 def waiting(answer: Answer, goal: float) -> str:
-    """How long until heading is as good as wished, in words."""
+    """How long until heading is as good as wished, in words; both in degrees, as wishes are written."""
+    wish, floor = (f"{significant(float(np.degrees(value)))} deg" for value in (goal, answer.floor[0]))
+    if answer.status in NOT_USED:
+        return "heading may not be used; the findings say why"
     if answer.status == "navigated":
-        return f"heading {'good' if answer.sigma[0] <= goal else 'not good'} to {angle(goal)}"
+        return f"heading {'good' if answer.sigma[0] <= goal else 'not good'} to {wish}"
     left = answer.remaining(goal)
     if left is None:
         if answer.floor[0] >= goal:
-            return f"{angle(goal)} is out of reach: the floor of these gyros is {angle(answer.floor[0])}"
-        return f"{angle(goal)} is not in sight yet"
+            return f"{wish} is out of reach: the floor of these gyros is {floor}"
+        return f"{wish} is not in sight yet"
     if left == 0.0:
-        return f"good to {angle(goal)}"
-    return f"about {significant(left, 2)} s more to {angle(goal)}"
+        return f"good to {wish}"
+    return f"about {significant(left, 2)} s more to {wish}"
 
 
 def view(aligner: Aligner | Navigator, answer: Answer | None, goal: float, note: str = "") -> Table:
@@ -73,10 +77,7 @@ def view(aligner: Aligner | Navigator, answer: Answer | None, goal: float, note:
     from rich.table import Table
 
     table = Table.grid(padding=(0, 2))
-    rate = 0.0
-    if len(aligner.log) > 1:
-        rate = aligner.log.merged / float(np.median(np.diff(aligner.log.rows[-500:, 0])))
-    rows = f"{aligner.intake.counts.taken} rows, {significant(rate)} Hz, {significant(aligner.duration)} s"
+    rows = f"{aligner.intake.counts.taken} rows, {significant(aligner.log.rate)} Hz, {significant(aligner.duration)} s"
     if answer is None:
         table.add_row("heading", f"the first answer comes after {aligner.first_answer:g} s of log")
     else:

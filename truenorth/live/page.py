@@ -29,6 +29,7 @@ from truenorth.live.spectrum import motion_spectrum
 
 HISTORY = 3600  # answers that a page which is opened late still sees
 BEAT = 15.0  # s between two signs of life to a silent page
+LONG_SINCE = 1e6  # s: a clock that has run for longer was not started for this log
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'",
     "X-Content-Type-Options": "nosniff",
@@ -52,6 +53,7 @@ class Page:
         self._events: deque[tuple[int, str]] = deque(maxlen=HISTORY)
         self._number = 0
         self._closing = False
+        self._zero: float | None = None
         self._socket = socket.create_server((host, port))
         port = self._socket.getsockname()[1]
         self._hosts = {f"{host}:{port}", f"localhost:{port}", f"127.0.0.1:{port}"}
@@ -65,7 +67,7 @@ class Page:
         self._number += 1
         event: dict[str, Any] = {"run": self._run, "number": self._number, "note": note}
         event["rows"] = aligner.intake.counts.taken
-        event["log_s"] = aligner.duration
+        event["log_s"], event["rate_hz"] = aligner.duration, aligner.log.rate
         event["left_out"] = aligner.intake.counts.words()
         event["may_go"] = self._go is not None and not self._go.is_set() and isinstance(aligner, Aligner)
         if answer is None:
@@ -75,14 +77,24 @@ class Page:
             event |= answer.summary() | {
                 "waiting": waiting(answer, self._goal),
                 "goal_deg": float(np.degrees(self._goal)),
+                "zero_s": self._zero_of(answer.time - aligner.duration),
             }
             if self._number % 5 == 1:
                 event["spectrum"] = motion_spectrum(aligner.log)
-                event["innovations"] = newest_innovations(answer.solution, aligner.residuals)
+                solution = answer.solution if isinstance(aligner, Aligner) else None
+                event["innovations"] = newest_innovations(solution, aligner.residuals)
         self._events.append((self._number, json.dumps(event, allow_nan=False)))
 
+    def _zero_of(self, start: float) -> float:
+        """Time that the charts count from, s: the clock's own zero, but for stamps that count from 1970 or 1980."""
+        if self._zero is None:
+            self._zero = start if abs(start) > LONG_SINCE else 0.0
+        return self._zero
+
     def close(self) -> None:
-        """End the server."""
+        """Say that the run has ended, and end the server."""
+        self._number += 1
+        self._events.append((self._number, json.dumps({"run": self._run, "number": self._number, "ended": True})))
         self._closing = True
         self._server.should_exit = True
         self._thread.join(timeout=5.0)
@@ -129,7 +141,9 @@ class Page:
         """Server-sent events: those of the past that the page has not seen, then each as it comes."""
         spoken = clock.monotonic()
         yield "retry: 1000\n\n"
-        while not (self._closing or await gone()):
+        closing = False
+        while not (closing or await gone()):
+            closing = self._closing  # what was said before that is sent
             new = [(number, text) for number, text in list(self._events) if number > seen]
             for number, text in new:
                 yield f"id: {self._run}-{number}\ndata: {text}\n\n"
@@ -139,7 +153,8 @@ class Page:
             elif clock.monotonic() - spoken > BEAT:
                 yield ": still here\n\n"
                 spoken = clock.monotonic()
-            await asyncio.sleep(0.2)
+            if not closing:
+                await asyncio.sleep(0.2)
 
 
 def serve(address: str, goal: float, go: threading.Event | None = None) -> Page:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,16 +14,16 @@ RATE = 4.0  # Hz, of the means whose spectrum is taken: sway lies below 1 Hz
 POINTS = 120
 
 
-def motion_spectrum(log: Log) -> dict[str, list[float]]:
+def motion_spectrum(log: Log) -> dict[str, Any]:
     """Amplitude spectral density of the turning rate, all axes together.
 
     Returns
     -------
     dict
-        ``frequency_hz`` and ``rate_deg_s_sqrt_hz``; empty lists for a log below 16 s.
+        ``frequency_hz`` and ``rate_deg_s_sqrt_hz``; empty lists for a log below 16 s. ``span_s``: of the rows.
     """
     rows = log.rows[np.searchsorted(log.rows[:, 0], log.end - SPAN) :]
-    empty: dict[str, list[float]] = {"frequency_hz": [], "rate_deg_s_sqrt_hz": []}
+    empty: dict[str, Any] = {"frequency_hz": [], "rate_deg_s_sqrt_hz": [], "span_s": 0.0}
     if len(rows) < 3 or rows[-1, 0] - rows[0, 0] < 16.0:
         return empty
     interval = float(np.median(np.diff(rows[:, 0])))
@@ -37,6 +39,7 @@ def motion_spectrum(log: Log) -> dict[str, list[float]]:
     return {
         "frequency_hz": frequency[keep].tolist(),
         "rate_deg_s_sqrt_hz": np.degrees(np.sqrt(density[keep])).tolist(),
+        "span_s": float(rows[-1, 0] - rows[0, 0]),
     }
 
 

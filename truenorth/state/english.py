@@ -306,6 +306,7 @@ SENTENCES = {
         "{leak:.2f} m/s into the loop, {allowed:.2f} m/s is allowed"
     ),
     "heading.given": "heading {heading:.3f} deg ± {sigma:angle} is given",
+    "feed.silent": "{name}: fewer than two rows came; it aids nothing",
     # ---- height
     "height.free": "height is carried on by velocity alone: no sensor of height is given",
     "height.fixed": "height is held fixed, as at sea",
