@@ -269,7 +269,7 @@ class _Scheme:
         C = rest(self.position).states(np.array(0.0)).C_nb
         log = StayingLog(self.record, C, self.position, model, self.prior, self.interval, integrals=self.integrals)
         system = log.linearise()
-        return replace(system, R=system.R + self.base - QUIETEST_BASE**2 * np.eye(3))
+        return system.with_arrays(R=system.R + self.base - QUIETEST_BASE**2 * np.eye(3))
 
     def heading_variance(self) -> float:
         """At the end, deflection of the vertical included, rad^2."""

@@ -14,7 +14,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.fine import CoarseStart, fine_align
+from truenorth.alignment.fine import CoarseStart, settle_fine
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import Means
@@ -72,15 +72,16 @@ def check_filter(
     P[3:, 3:] = C_n_b @ np.diag([HELD_ACCEL**2, HELD_ACCEL**2, LOOSE_ACCEL**2]) @ C_n_b.T
     noise = usual if known is None else known
     start = CoarseStart(task.record, C_n0_i, task.position, noise, P, task.interval)
-    fine = fine_align(start, integrals)
+    log, last, _ = settle_fine(start, integrals)
     if known is None:
-        noise = fit_task_noise(task, fine.integrals, fine.C_n0_i, fine.system.P0, usual)
-        fine = fine_align(start._replace(C_n0_i=fine.C_n0_i, model=noise))
+        noise = fit_task_noise(task, log.integrals, log.C_n0_i, log.prior.P, usual)
+        log, last, _ = settle_fine(start._replace(C_n0_i=log.C_n0_i, model=noise))
 
     lat = task.position.lat
-    C = earth_rotation(fine.integrals.time[-1], lat).T @ fine.C_n0_i @ fine.integrals.C_ib[-1]
-    rate, rate_P = C @ fine.bias[:3], C @ fine.P[6:9, 6:9] @ C.T
-    force, force_P = C @ fine.bias[3:], C @ fine.P[9:, 9:] @ C.T
+    C = earth_rotation(log.integrals.time[-1], lat).T @ log.C_n0_i @ log.integrals.C_ib[-1]
+    bias, P_last = log.bias + last.found.end[6:], last.found.P
+    rate, rate_P = C @ bias[:3], C @ P_last[6:9, 6:9] @ C.T
+    force, force_P = C @ bias[3:], C @ P_last[9:, 9:] @ C.T
     slope = float(normal_gravity(lat, task.position.alt + 1.0)) - task.gravity
     check = LogCheck(
         rate_residual=rate[1:],

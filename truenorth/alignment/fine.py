@@ -7,7 +7,7 @@ it is, is read from the log itself, axis by axis, by making the innovations as l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -71,7 +71,7 @@ class FineAlignment:
         P0[kept, kept] = log.prior.P[kept, kept]
         floors, floor = initial_part(gains.step, P0, PHI)
         # What follows needs the noise of the first interval alone; that of all takes memory.
-        system = replace(system, Q=system.Q[:1].copy(), S=None if system.S is None else system.S[:1].copy())
+        system = system.with_arrays(Q=system.Q[:1].copy(), S=None if system.S is None else system.S[:1].copy())
         return cls(
             integrals=log.integrals,
             C_n0_i=log.C_n0_i,
@@ -189,6 +189,17 @@ def fine_align(
         Of an IMU that is turned about on its base: scale factors, misalignments and the arm from the axis of the turns are states
         then, and `P_bias` is of the biases proper.
     """
+    log, last, disturbance = settle_fine(start, integrals, form, turned)
+    return FineAlignment.of(log, last, log.prior.sensors, disturbance)
+
+
+def settle_fine(
+    start: CoarseStart,
+    integrals: InertialIntegrals | None = None,
+    form: Form = "velocity",
+    turned: ImuSpec | None = None,
+) -> tuple[StayingLog, Settled[Filtered], Array]:
+    """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains are not wanted."""
     record, C_n0_i, position, model, P_bias, interval, rows_at = start
     prior = prior_of(P_bias) if turned is None else prior_of(P_bias, spec=turned, arm=np.zeros(3), arm_sigma=TURN_ARM)
     log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)
@@ -201,7 +212,7 @@ def fine_align(
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
     noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
     last = settle(log, noise, in_sigmas(PHI), most=MAX_PASSES)
-    return FineAlignment.of(log, last, prior.sensors, np.sqrt(noise.R[0]))
+    return log, last, np.sqrt(noise.R[0])
 
 
 def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:

@@ -71,6 +71,7 @@ def align_base(
     calibration: Calibration | None = None,
     heading_limit: float = HEADING_LIMIT,
     progress: Callable[[str], None] | None = None,
+    sound: bool = False,
 ) -> Alignment:
     """Find pitch, roll and true heading of an IMU on a base that stays where it is: still, shaken or swaying.
 
@@ -89,6 +90,9 @@ def align_base(
         ``kf``, ``sakf``, ``makf``, ``imakf``; ``states10``, ``states8``.
     at, calibration, heading_limit, progress
         As of :func:`truenorth.align`.
+    sound : bool
+        Whether the log is known to be without faults of clock, logging and range, and its noise to be one all along, as a
+        simulated one is: then it is not looked at for them.
 
     Raises
     ------
@@ -136,15 +140,15 @@ def align_base(
     elif chosen == "analytic":
         found = _align_analytic(task, spec)
     else:
-        found = _align_inertial(task, spec, chosen)
+        found = _align_inertial(task, spec, chosen, sound)
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     moves = None if chosen == "swaying" and _explained(task.motion, found) else _moves_from(task.motion)
-    evidence = record_evidence(task.record, task.motion) + leaves(moves)
+    evidence = record_evidence(task.record, task.motion, sound=sound) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task)
     if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
-        own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress)
+        own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     return judged(answer, evidence, heading_limit)
@@ -239,7 +243,7 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     return _Found(answer, unchecked, fine.settled)
 
 
-def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
+def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) -> _Found:
     lat, alt = task.position.lat, task.position.alt
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
@@ -283,7 +287,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str) -> _Found:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
     others = matrix_signatures(fine, used) if sways else None
-    steps = [*bias_step_evidence(fine, used, others), *bad_stretches(fine, task.record)]
+    steps = bias_step_evidence(fine, used, others) + ([] if sound else bad_stretches(fine, task.record))
     steps += hemisphere_evidence(fine, task.position, others)
     way = farthest(fine, task.position) if sways else math.inf
     return _Found(answer, check, fine.settled, detect_drift(fine, others), "" if sways else form, steps, way)

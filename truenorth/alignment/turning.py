@@ -113,4 +113,4 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
 
 def _by_level(noise: VelocityNoise, system: LinearSystem) -> Filtered:
     """Filtered without the vertical: it carries no attitude, and what tilts of degrees do to it is of second order."""
-    return noise(replace(system, R=system.R + np.diag([0.0, 0.0, VERTICAL**2])))
+    return noise(system.with_arrays(R=system.R + np.diag([0.0, 0.0, VERTICAL**2])))

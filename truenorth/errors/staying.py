@@ -21,7 +21,7 @@ shakes the samples; the mean's tie to the states and to the process noise inside
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -164,7 +164,7 @@ def sampled_system(core: LinearSystem, z: Array, variance: float) -> LinearSyste
     """A system observed by the velocity (K, 3) at the ends of the intervals: one state a row, as multiple factors need it."""
     H = np.zeros((1, 3, STATES))
     H[0, :, DV] = np.eye(3)
-    return replace(core, H=H, R=variance * np.eye(3)[None], S=None, z=z)
+    return core.with_arrays(H=H, R=variance * np.eye(3)[None], S=None, z=z)
 
 
 def force_system(
@@ -200,8 +200,7 @@ def force_system(
     C_t = np.swapaxes(C, 1, 2)
     noise = C @ own @ core.Q @ np.swapaxes(own, 1, 2) @ C_t
     z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-    return replace(
-        core,
+    return core.with_arrays(
         H=C @ back,
         R=0.5 * (noise + np.swapaxes(noise, 1, 2)) + QUIETEST_BASE**2 * np.eye(3),
         S=core.Q @ np.swapaxes(own, 1, 2) @ C_t,

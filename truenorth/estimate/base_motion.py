@@ -96,4 +96,4 @@ class VelocityNoise:
         return Filtered(system, estimates)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
-        return replace(quiet, R=quiet.R + (self.R - QUIETEST_BASE**2)[:, None] * np.eye(3))
+        return quiet.with_arrays(R=quiet.R + (self.R - QUIETEST_BASE**2)[:, None] * np.eye(3))

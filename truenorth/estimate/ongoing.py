@@ -162,7 +162,7 @@ class Ongoing:
         )
         system = self._linearise(whole)
         if not measured:
-            system = replace(system, z=np.full_like(system.z, np.nan))
+            system = system.with_arrays(z=np.full_like(system.z, np.nan))
         state = FilterState(self.x, self.P, np.zeros(()), np.zeros(0))
         estimates = kalman(system, state, innovations=True)
         sizes = _sizes(estimates, min(BLOCK, len(system.z)))
@@ -171,7 +171,7 @@ class Ongoing:
             return self._blocks(record, max(1, int(large[0])), context, measured)
         disturbed = bool(large.size)
         if disturbed:
-            estimates = kalman(replace(system, R=system.R + _disturbance(estimates)), state)
+            estimates = kalman(system.with_arrays(R=system.R + _disturbance(estimates)), state)
         return replace(
             self,
             epochs=self.epochs + len(found.intervals),
@@ -197,7 +197,7 @@ class Ongoing:
             system = with_arm(system, arm_rows(integrals, self.C_n0_i, place.lat), self.arm)
         if self.motion:
             return with_motion(system, float(np.mean(integrals.intervals)), self.motion)
-        return replace(system, R=system.R + np.diag(self.R - QUIETEST_BASE**2))
+        return system.with_arrays(R=system.R + np.diag(self.R - QUIETEST_BASE**2))
 
 
 def _rows(record: ImuRecord, rows: slice) -> ImuRecord:

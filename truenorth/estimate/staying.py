@@ -8,7 +8,7 @@ an INS that is levelled to some heading.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -178,7 +178,7 @@ class StayingLog:
             system = with_arm(system, rows, self.taken[groups["arm"]])
         if "rate" in groups:
             system = with_level_rate(system, self.integrals, lat, alt)
-        return replace(system, x0=self.prior.mean - self.taken, P0=P0)
+        return system.with_arrays(x0=self.prior.mean - self.taken, P0=P0)
 
     def correct(self, x: Array) -> None:
         """Take the errors at the last epoch off: of attitude back at the start, of sensors and arm as they are."""

@@ -19,7 +19,6 @@ system is made.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -141,14 +140,6 @@ class NonlinearSystem(System):
             _try("measurement_jacobian", self.measurement_jacobian, MATRIX, x, p, (m, n))
         if self.retract is not None:
             _try("retract", self.retract, VECTOR, x, np.zeros(n), x.shape)
-
-    def with_arrays(self, **arrays: Array) -> NonlinearSystem:
-        """The same with other arrays, which are checked; the functions, which were tried, are not tried again."""
-        other = copy.copy(self)
-        for name, array in arrays.items():
-            object.__setattr__(other, name, array)
-        super(NonlinearSystem, other).__post_init__()
-        return other
 
 
 class Functions(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -39,10 +40,15 @@ class System(ABC):
 
     def __post_init__(self) -> None:
         """Convert and check all arrays."""
-        for name, axes in self.axes.items():
-            value = getattr(self, name)
+        self._take({name: getattr(self, name) for name in self.axes})
+
+    def _take(self, arrays: Mapping[str, Array | None]) -> None:
+        """Convert these arrays, take them, and check them."""
+        for name, value in arrays.items():
             if value is None:
+                object.__setattr__(self, name, None)
                 continue
+            axes = self.axes[name]
             array = _floats(self._owner, name, value)
             if array.ndim < len(axes):
                 shape = _shape_text(axes)
@@ -51,9 +57,11 @@ class System(ABC):
             object.__setattr__(self, name, array)
         self._check_shapes()
         for name, a in self._arrays():
-            _check_finite(self._owner, name, self.axes[name], a)
+            if name in arrays:
+                _check_finite(self._owner, name, self.axes[name], a)
         for name in ("Q", "R", "P0"):
-            _check_covariance(self._owner, name, self.axes[name], getattr(self, name))
+            if name in arrays:
+                _check_covariance(self._owner, name, self.axes[name], getattr(self, name))
 
     @property
     def states(self) -> int:
@@ -75,9 +83,11 @@ class System(ABC):
         """Shape of the run axes; ``()`` for a single run."""
         return np.broadcast_shapes(*(a.shape[: a.ndim - len(self.axes[name])] for name, a in self._arrays()))
 
-    def with_arrays(self: S, **arrays: Array) -> S:
-        """The same system with other arrays of some names."""
-        return replace(self, **arrays)  # type: ignore[type-var]
+    def with_arrays(self: S, **arrays: Array | None) -> S:
+        """The same system with other arrays of some names; these alone are checked."""
+        other = copy(self)
+        other._take(arrays)
+        return other
 
     def between(self: S, start: int, stop: int) -> S:
         """Epochs ``start <= k < stop``; go on from the state that a filter left behind epoch ``start - 1``."""

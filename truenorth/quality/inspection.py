@@ -221,7 +221,7 @@ def inspect(record: ImuRecord, lat: float | None = None) -> Inspection:
     motion = motion_summary(record)
     sampling, findings = check_sampling(record)
     turning, doubts = check_plausibility(record, motion, lat)
-    findings += doubts
+    findings = [*findings, *doubts]
     gyro_noise, accel_noise, rest = _noise_at_rest(record, motion, findings)
     findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
     return Inspection(

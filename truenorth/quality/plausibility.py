@@ -52,13 +52,24 @@ def check_plausibility(
     findings : list of Finding
     """
     findings: list[Finding] = []
-    unit_is_right = _force_level(record, findings)
-    if unit_is_right:
+    if _force_level(record, findings):
         _up_axis(record, findings)
+    return _gyros(record, motion, lat, findings), findings
+
+
+def unit_findings(record: ImuRecord, motion: MotionSummary) -> list[Finding]:
+    """What :func:`check_plausibility` finds of units and of the gyros; which axis points up is left to it."""
+    findings: list[Finding] = []
+    _force_level(record, findings)
+    _gyros(record, motion, None, findings)
+    return findings
+
+
+def _gyros(record: ImuRecord, motion: MotionSummary, lat: float | None, findings: list[Finding]) -> Turning:
     turning = fit_turning(*even_rates(record))
     if not _gyro_against_gravity(turning, findings):
         _gyro_against_earth(record, motion, lat, findings)
-    return turning, findings
+    return turning
 
 
 # ----------------------------------------------------------------------------------------- accelerometers
@@ -67,8 +78,12 @@ def check_plausibility(
 def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     """Judge the accelerometers' unit by the size of the median specific force."""
     dt = record.interval
-    size = np.linalg.norm(record.accel, axis=1)
-    level = float(np.median(size)) / (dt if record.kind == "increments" else 1.0)
+    unit = dt if record.kind == "increments" else 1.0
+    size = np.sqrt(np.einsum("ki,ki->k", record.accel, record.accel))
+    # Where all of them are near gravity the median is.
+    if abs(size.min() / unit / G - 1.0) < LEVEL_TOLERANCE and abs(size.max() / unit / G - 1.0) < LEVEL_TOLERANCE:
+        return True
+    level = float(np.median(size)) / unit
     if abs(level / G - 1.0) < LEVEL_TOLERANCE:
         return True
     readings = [

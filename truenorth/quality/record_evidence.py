@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.quality.plausibility import check_plausibility
+from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
 from truenorth.quality.tilt import check_tilt
@@ -24,7 +24,11 @@ QUIET = ("still", "disturbed")
 
 
 def record_evidence(
-    record: ImuRecord, motion: MotionSummary, C_sb: Callable[[Array], Array] | None = None
+    record: ImuRecord,
+    motion: MotionSummary,
+    C_sb: Callable[[Array], Array] | None = None,
+    *,
+    sound: bool = False,
 ) -> list[Evidence]:
     """Evidence of a record on a base that stays where it is.
 
@@ -34,9 +38,11 @@ def record_evidence(
         Of the same record.
     C_sb : callable, optional
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
+    sound : bool
+        Whether clock, logging and range are known to be without fault.
     """
-    found = sampling_evidence(record, turns=motion.overall not in QUIET)
-    _, doubts = check_plausibility(record, motion)
+    found = [] if sound else sampling_evidence(record, turns=motion.overall not in QUIET)
+    doubts = unit_findings(record, motion)
     quiet = motion.overall in QUIET  # elsewhere an arm makes gravity swing as if the gyros counted in another unit
     codes = {*ALWAYS} - (set() if quiet else {"gyro_unit"})
     found += [_error(doubt) for doubt in doubts if doubt.code in codes and doubt.severity == "error"]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from truenorth.core.remembered import remembered
 from truenorth.quality.signals import (
     LEVEL_WINDOW,
     STILL_ANGLE,
@@ -175,6 +176,7 @@ class MotionSummary:
         return best
 
 
+@remembered
 def motion_summary(record: ImuRecord) -> MotionSummary:
     """Tell the kinds of motion of a record apart.
 

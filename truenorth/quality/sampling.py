@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.remembered import remembered
 from truenorth.quality.packets import exchanged_packets
 from truenorth.records import COLUMNS, ImuRecord
 
@@ -61,6 +62,7 @@ class Sampling:
     saturated_rows: NDArray[np.intp]  # (6,): rows at a clipped extreme of each channel; 0 where nothing is clipped
 
 
+@remembered
 def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
     """Look for faults of clock, logging and range.
 

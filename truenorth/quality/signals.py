@@ -12,6 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from truenorth.core.compiled import compiled
+from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -29,6 +30,7 @@ MISALIGNED = 0.1  # rad: of the gyros and of a turntable's axis, at the most
 LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, whatever the sensor
 
 
+@remembered
 def even_rates(record: ImuRecord) -> tuple[float, Array]:
     """Cell length (about 0.1 s) and (6, cells) mean rates and specific forces on an even grid."""
     rows_a_cell = max(1, round(CELL / record.interval))
@@ -60,6 +62,7 @@ def second_means(signal: Array, per_second: int) -> Array:
     return signal.reshape(3, -1, per_second).mean(axis=2)
 
 
+@remembered
 def white_noise(record: ImuRecord) -> Array:
     """(6,) random walk of the quiet quarter of the record: the least ``sigma(tau) sqrt(tau)`` of several tau.
 

@@ -138,7 +138,7 @@ class Record(_Ordered):
         return np.flatnonzero(self.steps > GAP_FACTOR * self.interval)
 
     def between(self, start: float | None = None, stop: float | None = None) -> Self:
-        """Rows with ``start <= time <= stop``, as a record of its own.
+        """Rows with ``start <= time <= stop``, as a record of its own; the record itself where that is all.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class Record(_Ordered):
                 f"{self.source}: no samples between {start} s and {stop} s; the record runs from "
                 f"{self.time[0]:g} s to {self.time[-1]:g} s, choose a window inside it"
             )
-        return self[first:last]
+        return self if last - first == len(self) else self[first:last]
 
     def __getitem__(self, rows: slice) -> Self:
         names = ("time", *(name for name in self.groups() if self._holds(name)))

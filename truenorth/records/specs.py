@@ -17,6 +17,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cache
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -308,7 +309,7 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
     if isinstance(source, Mapping):
         return _from_mapping(source, "IMU specification", "custom")
     if isinstance(source, str) and source in PRESETS:
-        return _from_mapping(PRESETS[source], source, source)
+        return _preset(source)
     path = as_path(source, "IMU specification")
     if not path.is_file():
         near = get_close_matches(str(source), PRESETS, n=1)
@@ -318,6 +319,11 @@ def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSp
             f"IMU specification {str(source)!r} is neither a preset ({presets}) nor a file that can be read{hint}"
         )
     return _from_mapping(read_mapping(path), str(path), path.stem)
+
+
+@cache
+def _preset(name: str) -> ImuSpec:
+    return _from_mapping(PRESETS[name], name, name)
 
 
 # Kalibr's imu.yaml: continuous-time densities in SI, as bare numbers.
