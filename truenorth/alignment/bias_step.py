@@ -7,16 +7,15 @@ is the error of the answer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.inference import usual
+from truenorth.alignment.matched import Innovations, Signatures, matched
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -35,27 +34,24 @@ WANDERS = 3.0  # times its instability, that an accelerometer's bias is off by a
 FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
 SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
-AT_ONCE = 2  # courses that are matched together: they take memory
 SENSORS = slice(BG.start, BA.stop)
 
 
-def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, others: Array | None = None) -> list[Evidence]:
+def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, seen: Innovations) -> list[Evidence]:
     """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves.
 
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
-    that beats slowly. They explain what they can (:func:`matrix_signatures`, `others`). An accelerometer's bias wanders by its
-    instability, which stands on the vertical for all to see: so small a step is none.
+    that beats slowly. They explain what they can (:func:`matrix_signatures`, the others of `seen`). An accelerometer's bias
+    wanders by its instability, which stands on the vertical for all to see: so small a step is none.
     """
-    ends: list[Array] = []
-    ratio, size, x = matched(fine, _signatures(fine, ends), others)
+    ratio, size, ends = matched(seen, *_signatures(fine))
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
     accel = np.arange(len(ratio)) % 6 >= 3
     ratio = np.where(accel & (np.abs(size) < WANDERS * instability), 0.0, ratio)
-    d = np.hstack(ends)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []
-    left = np.where(ratio > limit("hint"), np.abs((d[PHI] - x[PHI]) * size), 0.0)
+    left = np.where(ratio > limit("hint"), np.abs(ends[PHI] * size), 0.0)
     heading, level = float(left[2].max()), float(np.hypot(left[0], left[1]).max())
     axis, sensor = best % 3, "gyro" if best % 6 < 3 else "accel"
     figures: dict[str, Figure] = {
@@ -71,18 +67,17 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, others: Array | None 
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 
-def _signatures(fine: FineAlignment, ends: list[Array]) -> Iterator[Array]:
-    """Signatures (K, 3, 6 AT_ONCE) of some courses at a time, in all six biases; their last states (n, 6 AT_ONCE) go to `ends`."""
-    count = len(fine.estimates.innovation)
-    for first in range(0, len(SIGNATURES), AT_ONCE):
-        courses = SIGNATURES[first : first + AT_ONCE]
-        shapes = np.zeros((count, len(courses)))
-        for i, (course, onset) in enumerate(courses):
-            since = np.arange(count) - round(onset * count)
-            shapes[:, i] = since >= 0 if course == "step" else np.maximum(since, 0.0) / (count - round(onset * count))
-        end, signature = _seen(fine, np.einsum("ki,jl->kjil", shapes, np.eye(6)).reshape(count, 6, -1))
-        ends.append(end)
-        yield signature
+def _signatures(fine: FineAlignment) -> tuple[Signatures, Array, Array]:
+    """Of each course, in each of the six biases."""
+    count, n, rows = len(fine.estimates.innovation), fine.system.states, fine.system.rows
+    begin = np.repeat([round(onset * count) for _, onset in SIGNATURES], 6)
+    steps = np.repeat([course == "step" for course, _ in SIGNATURES], 6)
+    every = np.tile(np.eye(6), len(SIGNATURES))
+    state, course = np.zeros((n, len(begin))), np.zeros((n, 6))
+    state[SENSORS] = every * steps
+    course[SENSORS] = np.eye(6)
+    after = every * np.where(steps, 0.0, 1.0 / (count - begin))
+    return Signatures(begin, state, np.zeros((rows, len(begin))), after), course, np.zeros((count, rows, 6))
 
 
 def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:
@@ -99,16 +94,16 @@ def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:
     for i, j in product(range(3), range(3)):
         bias[:, i, 3 * i + j] = gyro[i, j] * (rate[:, j] - rate[:, j].mean())
         bias[:, 3 + i, 9 + 3 * i + j] = accel[i, j] * (force[:, j] - force[:, j].mean())
-    return _seen(fine, bias)[1]
+    return _seen(fine, bias)
 
 
-def _seen(fine: FineAlignment, bias: Array) -> tuple[Array, Array]:
-    """Last states (n, S) and measurements (K, 3, S) of errors of the six sensors (K, 6, S)."""
+def _seen(fine: FineAlignment, bias: Array) -> Array:
+    """Measurements (K, 3, S) of errors of the six sensors (K, 6, S)."""
     Phi, H = (np.ascontiguousarray(x) for x in (fine.system.Phi, fine.system.H))
     d = np.zeros((fine.system.states, bias.shape[2]))
     signature = np.empty((len(bias), H.shape[-2], bias.shape[2]))
     _follow(Phi, H, np.ascontiguousarray(bias), SENSORS.start, d, signature)
-    return d, signature
+    return signature
 
 
 @compiled

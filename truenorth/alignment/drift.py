@@ -5,16 +5,11 @@ A bank of signatures (a step of velocity, a velocity that grows; east or north; 
 through the filter, and its innovations are matched with the real ones. A constant velocity from the very beginning cannot
 be seen by anyone: north velocity v equals a heading error of v/(R w_ie cos L).
 
-Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in
-linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
-
-What a signature of the size found does to attitude follows from the same recursion: the state that the filter estimates from
-the signature alone.
+What a signature of the size found does to attitude follows from the same recursion (:mod:`truenorth.alignment.matched`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -22,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.matched import Innovations, Signatures, matched
 from truenorth.errors.staying import PHI
-from truenorth.filters.gains import through
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
 
@@ -32,7 +27,6 @@ Array = NDArray[np.float64]
 # Of fewer, a departure lies between two: one at .59 of a log matched with a ratio of 14 at quarters of it, of 22 close by.
 ONSETS = tuple(k / 16 for k in range(1, 16))
 KINDS, AXES = ("step", "ramp"), ("east", "north")
-AT_ONCE = 3  # onsets that are matched together: they take memory
 
 
 @dataclass(frozen=True)
@@ -74,69 +68,36 @@ class Drift:
         return Evidence(f"drift.{self.kind}", figures, kind, Effect(self.heading, self.level), remedies=("still_part",))
 
 
-def detect_drift(fine: FineAlignment, others: Array | None = None) -> Drift:
-    """Match the innovations of a fine alignment with the bank of drift signatures; `others` as of :func:`matched`."""
-    ratio, size, x = matched(fine, _signatures(fine), others)
+def detect_drift(fine: FineAlignment, seen: Innovations) -> Drift:
+    """Match the innovations of a fine alignment with the bank of drift signatures."""
+    courses = list(product(ONSETS, KINDS, AXES))
+    ratio, size, left = matched(seen, *_signatures(fine))
     best = int(np.argmax(ratio))
-    onset, kind, axis_name = list(product(ONSETS, KINDS, AXES))[best]
+    onset, kind, axis_name = courses[best]
     start = onset * fine.integrals.time[-1]
-    turned = np.where(ratio > limit("hint"), np.abs(x[PHI] * size), 0.0)  # (3, S): E, N, U
+    turned = np.where(ratio > limit("hint"), np.abs(left[PHI] * size), 0.0)  # (3, S): E, N, U
     heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
     return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 
 
-def _signatures(fine: FineAlignment) -> Iterator[Array]:
-    """Signatures (K, 3, 4 AT_ONCE) of some onsets at a time: of each kind, along each axis."""
-    t = fine.integrals.time
-    middle = (t[1:] + t[:-1]) / 2
-    for first in range(0, len(ONSETS), AT_ONCE):
-        courses = list(product(ONSETS[first : first + AT_ONCE], KINDS, (0, 1)))
-        signature = np.zeros((len(middle), 3, len(courses)))
-        for i, (onset, kind, axis) in enumerate(courses):
-            start = onset * t[-1]
-            since = np.maximum((middle if fine.form == "velocity" else t) - start, 0.0)
-            velocity = (since > 0).astype(float) if kind == "step" else since / (t[-1] - start)
-            signature[:, axis, i] = velocity if fine.form == "velocity" else np.diff(velocity)
-        yield signature
-
-
-def matched(
-    fine: FineAlignment, signatures: Iterable[Array], others: Array | None = None
-) -> tuple[Array, Array, Array]:
-    """Match innovations with those that signatures in the measurements make.
-
-    Parameters
-    ----------
-    signatures : iterable of (K, 3, s) arrays
-        Some of them at a time: they take memory.
-    others : (K, 3, M) array, optional
-        Signatures, of one sigma each, of errors that the filter leaves out and any log may have: they explain what they can.
-
-    Returns
-    -------
-    ratio : (S,) array
-        Twice the logarithm of each likelihood ratio.
-    size : (S,) array
-        Of each signature, the most likely.
-    x : (n, S) array
-        What the filter estimates in the end of a signature of size one.
-    """
-    L = np.linalg.cholesky(fine.estimates.innovation_covariance)
-    e = np.linalg.solve(L, fine.estimates.innovation[..., None]).ravel()
-
-    def white(some: Array) -> tuple[Array, Array]:
-        expected, x = through(fine.system, fine.gains, some)
-        return np.linalg.solve(L, expected).reshape(-1, some.shape[-1]), x
-
-    other = np.zeros((len(e), 0)) if others is None else white(others)[0]
-    information = np.eye(other.shape[1]) + other.T @ other
-    found: list[tuple[Array, Array, Array]] = []
-    for signature in signatures:
-        shape, x = white(signature)
-        shared = np.linalg.solve(information, other.T @ np.column_stack([e, shape]))
-        match = shape.T @ e - shape.T @ other @ shared[:, 0]
-        energy = np.sum(shape**2, axis=0) - np.einsum("ks,ks->s", shape, other @ shared[:, 1:])
-        energy = np.maximum(energy, 1e-300)
-        found.append((match**2 / energy, match / energy, x))
-    ratio, size, end = (np.concatenate(values, axis=-1) for values in zip(*found, strict=True))
-    return ratio, size, end
+def _signatures(fine: FineAlignment) -> tuple[Signatures, Array, Array]:
+    """Of each onset, each kind, along each axis; the courses are those of the mean velocity, or of the velocity gained."""
+    t, n, by_velocity = fine.integrals.time, fine.system.states, fine.form == "velocity"
+    at = (t[1:] + t[:-1]) / 2 if by_velocity else t[1:]
+    onsets, kinds, axes = (np.array(x) for x in zip(*product(ONSETS, (0, 1), (0, 1)), strict=True))
+    start = onsets * t[-1]
+    steps, span = kinds == 0, t[-1] - start
+    epoch = np.minimum(np.searchsorted(at, start, side="right"), len(at) - 1)
+    since = np.maximum(at[epoch] - start, 0.0)
+    measured, after = np.zeros((3, len(start))), np.zeros((4, len(start)))
+    each = np.arange(len(start))
+    measured[axes, each] = np.where(steps, since > 0.0, since / span)
+    course = np.zeros((len(at), 3, 4))
+    for axis in (0, 1):
+        # Of the mean velocity 1 and the time, of the velocity gained the interval.
+        course[:, axis, axis] = 1.0 if by_velocity else 0.0
+        course[:, axis, 2 + axis] = at if by_velocity else np.diff(t)
+    after[2 + axes, each] = np.where(steps, 0.0, 1.0 / span)
+    if by_velocity:
+        after[axes, each] = np.where(steps, 1.0, -start / span)
+    return Signatures(epoch, np.zeros((n, len(start))), measured, after), np.zeros((n, 4)), course

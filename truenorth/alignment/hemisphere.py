@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.drift import matched
 from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.matched import Innovations, Signatures, matched
 from truenorth.core.position import Position
 from truenorth.errors.staying import gravity_position, gravity_velocity
 from truenorth.state.evidence import Evidence, contradiction
@@ -19,18 +19,17 @@ from truenorth.state.limits import limit
 Array = NDArray[np.float64]
 
 
-def hemisphere_evidence(fine: FineAlignment, position: Position, others: Array | None = None) -> list[Evidence]:
-    """Whether the log fits the other hemisphere better: twice the logarithm of the likelihood ratio of the two.
-
-    `others` are signatures of errors that any log may have, as of :func:`truenorth.alignment.drift.matched`.
-    """
+def hemisphere_evidence(fine: FineAlignment, position: Position, seen: Innovations) -> list[Evidence]:
+    """Whether the log fits the other hemisphere better: twice the logarithm of the likelihood ratio of the two."""
     time, lat, alt = fine.integrals.time, position.lat, position.alt
     if fine.form == "velocity":
         off = np.diff(gravity_position(time, lat, alt) - gravity_position(time, -lat, alt), axis=0)
         off /= fine.integrals.intervals[:, None]
     else:
         off = np.diff(gravity_velocity(time, lat, alt) - gravity_velocity(time, -lat, alt), axis=0)
-    ratio, size, _ = matched(fine, [off[..., None]], others)
+    n = fine.system.states
+    all_along = Signatures(np.zeros(1, dtype=np.int64), np.zeros((n, 1)), off[:1].T, np.ones((1, 1)))
+    ratio, size, _ = matched(seen, all_along, np.zeros((n, 1)), off[..., None])
     if size[0] <= 0.0:
         return []
     # Of a signature of size one: 2 match - energy.

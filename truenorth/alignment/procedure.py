@@ -24,6 +24,7 @@ from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
+from truenorth.alignment.matched import innovations_of
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import farthest, sway_align
@@ -286,11 +287,11 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    others = matrix_signatures(fine, used) if sways else None
-    steps = bias_step_evidence(fine, used, others) + ([] if sound else bad_stretches(fine, task.record))
-    steps += hemisphere_evidence(fine, task.position, others)
+    seen = innovations_of(fine, matrix_signatures(fine, used) if sways else None)
+    steps = bias_step_evidence(fine, used, seen) + ([] if sound else bad_stretches(fine, task.record))
+    steps += hemisphere_evidence(fine, task.position, seen)
     way = farthest(fine, task.position) if sways else math.inf
-    return _Found(answer, check, fine.settled, detect_drift(fine, others), "" if sways else form, steps, way)
+    return _Found(answer, check, fine.settled, detect_drift(fine, seen), "" if sways else form, steps, way)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:

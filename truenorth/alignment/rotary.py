@@ -25,6 +25,7 @@ from truenorth.alignment.bias_step import bias_step_evidence
 from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence
+from truenorth.alignment.matched import innovations_of
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
@@ -155,9 +156,10 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
-    evidence = model_evidence(detect_drift(fine), settled=fine.settled)
-    evidence += base_speed(answer) + bias_step_evidence(fine, spec) + bad_stretches(fine, record)
-    evidence += hemisphere_evidence(fine, task.position)
+    seen = innovations_of(fine)
+    evidence = model_evidence(detect_drift(fine, seen), settled=fine.settled)
+    evidence += base_speed(answer) + bias_step_evidence(fine, spec, seen) + bad_stretches(fine, record)
+    evidence += hemisphere_evidence(fine, task.position, seen)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}

@@ -94,7 +94,8 @@ def _aligned(
             aid: list[Indexer] = []
             if isinstance(motion, Indexed) and method.method in INDEXER_METHODS:
                 aid, motion = [_indexer(plan, case, run, motion)], motion.motion  # the answer is the body's
-            known: dict[str, Any] = {"sound": True} if _is_sound(case.built) else {}  # where no faults can be, none are looked for
+            # Where no faults can be, none are looked for.
+            known: dict[str, Any] = {"sound": True} if _is_sound(case.built) else {}
             limit = plan.heading_limit
             answer = align(record, place, spec, aid=aid, method=method.method, heading_limit=limit, **known)
         errors = [

@@ -1,0 +1,62 @@
+"""Signatures matched from the last epoch back: against each one sent through the filter by itself."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from truenorth.alignment.matched import Signatures, innovations_of, matched
+from truenorth.filters import LinearSystem, filter_gains, kalman
+
+K, N, M, W = 12, 12, 3, 5
+
+
+def forward(system, gains, signatures, U, A, s):
+    """Innovations (K, m) that a signature makes, and the error (n,) that it leaves."""
+    e, seen = np.zeros(N), np.zeros((K, M))
+    for k in range(signatures.epoch[s], K):
+        begins = k == signatures.epoch[s]
+        u = signatures.state[:, s] if begins else U @ signatures.after[:, s]
+        a = signatures.measured[:, s] if begins else A[k] @ signatures.after[:, s]
+        seen[k] = system.H[k] @ system.Phi[k] @ (e + u) + a
+        e = gains.step[k] @ (e + u) - gains.gain[k] @ a
+    return seen, e
+
+
+@pytest.mark.parametrize("other", [0, 2])
+def test_as_forward(other):
+    rng = np.random.default_rng(4)
+    Phi = np.eye(N) + 0.1 * rng.standard_normal((K, N, N))
+    H, S = rng.standard_normal((K, M, N)), 0.01 * rng.standard_normal((K, N, M))
+    Q, R = np.tile(0.1 * np.eye(N), (K, 1, 1)), np.tile(np.eye(M), (K, 1, 1))
+    system = LinearSystem(Phi, Q, H, R, rng.standard_normal((K, M)), np.zeros(N), np.eye(N), S=S)
+    estimates = kalman(system, history="full")
+    fine = SimpleNamespace(system=system, estimates=estimates, gains=filter_gains(system, estimates))
+    epochs = np.array([0, 3, 3, 7, K - 1])
+    count = len(epochs)
+    shapes = ((N, count), (M, count), (W, count))
+    signatures = Signatures(epochs, *(rng.standard_normal(shape) for shape in shapes))
+    U, A = rng.standard_normal((N, W)), rng.standard_normal((K, M, W))
+    others = rng.standard_normal((K, M, other)) if other else None
+    ratio, size, left = matched(innovations_of(fine, others), signatures, U, A)
+
+    L = np.linalg.cholesky(estimates.innovation_covariance)
+    white = np.linalg.solve(L, estimates.innovation[..., None]).ravel()
+    known = np.zeros((K * M, 0))
+    if other:  # errors of the measurement at every epoch: what the filter makes of them
+        columns = []
+        for j in range(other):
+            e, seen = np.zeros(N), np.zeros((K, M))
+            for k in range(K):
+                seen[k] = H[k] @ Phi[k] @ e + others[k, :, j]
+                e = fine.gains.step[k] @ e - fine.gains.gain[k] @ others[k, :, j]
+            columns.append(np.linalg.solve(L, seen[..., None]).ravel())
+        known = np.stack(columns, axis=1)
+    # With others of one sigma in it the covariance of the white innovations is I + known known'.
+    information = np.linalg.inv(np.eye(K * M) + known @ known.T)
+    for s in range(count):
+        seen, e = forward(system, fine.gains, signatures, U, A, s)
+        y = np.linalg.solve(L, seen[..., None]).ravel()
+        energy, match = y @ information @ y, y @ information @ white
+        np.testing.assert_allclose([ratio[s], size[s]], [match**2 / energy, match / energy], rtol=1e-10)
+        np.testing.assert_allclose(left[:, s], e, rtol=1e-10, atol=1e-12)

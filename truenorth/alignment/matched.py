@@ -1,0 +1,235 @@
+"""Signatures of what the model leaves out, matched with the innovations of a filter: a generalised likelihood ratio test.
+
+Something begins at epoch k: errors ``u`` enter the state, ``a`` the measurement, and go on in courses of size ``w``,
+``u_i = U w``, ``a_i = A_i w`` (a bias that grows, a velocity that stays). What is left between truth and estimate is
+
+    e_i = (I - K_i H_i) Phi_i (e_(i-1) + u_i) - K_i a_i,    seen in the innovation as    y_i = H_i Phi_i (e_(i-1) + u_i) + a_i
+
+Match ``sum y' W^-1 nu`` and energy ``sum y' W^-1 y`` of all epochs behind k are a linear and a quadratic form of ``(e_k, w)``:
+both are summed up once, from the last epoch back, for whatever begins when. The likelihood ratio is ``match^2 / energy``.
+
+Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in
+linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.fine import FineAlignment
+from truenorth.core.compiled import compiled
+from truenorth.filters.gains import Gains, through
+
+Array = NDArray[np.float64]
+
+
+class Signatures(NamedTuple):
+    """What may begin, S of them.
+
+    Attributes
+    ----------
+    epoch : (S,) int array
+        At which it begins.
+    state : (n, S) array
+        Errors that enter the state before that epoch.
+    measured : (m, S) array
+        Errors of the measurement at that epoch.
+    after : (w, S) array
+        Sizes of the courses behind it.
+    """
+
+    epoch: NDArray[np.int64]
+    state: Array
+    measured: Array
+    after: Array
+
+
+class Innovations(NamedTuple):
+    """Innovations of a filter, made white, and how it comes to them.
+
+    Attributes
+    ----------
+    L : (K, m, m) array
+        Of each innovation's covariance ``L L'``.
+    H_Phi : (K, m, n) array
+    gains : Gains
+    white : (K, m, 1 + M) array
+        ``L^-1`` of the innovations, and of what M other errors of one sigma make of them.
+    """
+
+    L: Array
+    H_Phi: Array
+    gains: Gains
+    white: Array
+
+
+def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovations:
+    """Innovations of a fine alignment.
+
+    Parameters
+    ----------
+    others : (K, m, M) array, optional
+        Signatures, of one sigma each, of errors in the measurements that the filter leaves out and any log may have: they
+        explain what they can.
+    """
+    system, seen = fine.system, fine.estimates.innovation[..., None]
+    L: Array = np.linalg.cholesky(fine.estimates.innovation_covariance)
+    if others is not None:
+        seen = np.concatenate([seen, through(system, fine.gains, others)[0]], axis=2)
+    H_Phi = np.broadcast_to(system.H @ system.Phi, (len(seen), system.rows, system.states))
+    white: Array = np.linalg.solve(L, seen)
+    return Innovations(L, np.ascontiguousarray(H_Phi), fine.gains, white)
+
+
+def matched(
+    seen: Innovations, signatures: Signatures, state_course: Array, measured_course: Array
+) -> tuple[Array, Array, Array]:
+    """Match innovations with those that signatures make.
+
+    Parameters
+    ----------
+    seen : Innovations
+    signatures : Signatures
+        What may begin.
+    state_course, measured_course : (n, w) and (K, m, w) arrays
+        ``U`` and ``A`` of the courses that it takes.
+
+    Returns
+    -------
+    ratio : (S,) array
+        Twice the logarithm of each likelihood ratio.
+    size : (S,) array
+        Of each signature, the most likely.
+    left : (n, S) array
+        Errors of the last estimate that a signature of size one leaves.
+    """
+    (n, courses), right, gains = state_course.shape, seen.white.shape[2], seen.gains
+    behind, place = np.unique(signatures.epoch, return_inverse=True)
+    energies = np.empty((len(behind), n + courses, n + courses))
+    matches, ends = np.empty((len(behind), n + courses, right)), np.empty((len(behind), n, n + courses))
+    arrays = (gains.step, seen.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
+    _sum_back(*(np.ascontiguousarray(a) for a in arrays), behind.astype(np.int64), energies, matches, ends)
+
+    k = signatures.epoch  # their first epoch by itself
+    first = np.einsum("smi,is->sm", seen.H_Phi[k], signatures.state) + signatures.measured.T
+    first = np.linalg.solve(seen.L[k], first[..., None])[..., 0]
+    e = np.einsum("sij,js->si", gains.step[k], signatures.state)
+    e = e - np.einsum("sim,ms->si", gains.gain[k], signatures.measured)
+    begun = np.concatenate([e, signatures.after.T], axis=1)
+    energy = np.sum(first**2, axis=1) + np.einsum("si,sij,sj->s", begun, energies[place], begun)
+    match = np.einsum("sm,smr->sr", first, seen.white[k]) + np.einsum("si,sir->sr", begun, matches[place])
+    others = seen.white[:, :, 1:].reshape(seen.white[..., 0].size, right - 1)
+    known = np.column_stack([others.T @ seen.white[:, :, 0].ravel(), match[:, 1:].T])
+    explained = np.linalg.solve(np.eye(right - 1) + others.T @ others, known)
+    energy = np.maximum(energy - np.einsum("sr,rs->s", match[:, 1:], explained[:, 1:]), 1e-300)
+    of_innovations = match[:, 0] - match[:, 1:] @ explained[:, 0]
+    return of_innovations**2 / energy, of_innovations / energy, np.einsum("sij,sj->is", ends[place], begun)
+
+
+@compiled
+def _sum_back(
+    step: Any,
+    H_Phi: Any,
+    gain: Any,
+    L: Any,
+    A: Any,
+    U: Any,
+    seen: Any,
+    behind: Any,
+    energies: Any,
+    matches: Any,
+    ends: Any,
+) -> None:
+    """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last error of it."""
+    n, m, size, right = step.shape[1], gain.shape[2], energies.shape[1], matches.shape[2]
+    energy, match, end = np.zeros((size, size)), np.zeros((size, right)), np.zeros((n, size))
+    for i in range(n):
+        end[i, i] = 1.0
+    # e goes on as F (e, w), and is seen, made white, as G (e, w).
+    F, G, T = np.zeros((n, size)), np.zeros((m, size)), np.zeros((size, size))
+    before, match_before, end_before = np.zeros_like(energy), np.zeros_like(match), np.zeros_like(end)
+    row = len(behind) - 1
+    for k in range(step.shape[0] - 1, -1, -1):
+        while row >= 0 and behind[row] == k:
+            energies[row], matches[row], ends[row] = energy, match, end
+            row -= 1
+        if row < 0:
+            break
+        _go_on(step[k], H_Phi[k], gain[k], A[k], U, F, G)
+        _whiten(L[k], G)
+        _times_course(energy, F, T)
+        _course_times(F, T, before)
+        _add_product(G, G, before)
+        energy, before = before, energy
+        _course_times(F, match, match_before)
+        _add_product(G, seen[k], match_before)
+        match, match_before = match_before, match
+        _times_course(end, F, end_before)
+        end, end_before = end_before, end
+
+
+@compiled
+def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any) -> None:
+    """``F = [step, step U - gain A]`` and ``G = [H Phi, H Phi U + A]``."""
+    n, m = F.shape[0], G.shape[0]
+    for i in range(n):
+        for j in range(n):
+            F[i, j] = step[i, j]
+        for j in range(U.shape[1]):
+            F[i, n + j] = 0.0
+            for r in range(n):
+                F[i, n + j] += step[i, r] * U[r, j]
+            for r in range(m):
+                F[i, n + j] -= gain[i, r] * A[r, j]
+    for i in range(m):
+        for j in range(n):
+            G[i, j] = H_Phi[i, j]
+        for j in range(U.shape[1]):
+            G[i, n + j] = A[i, j]
+            for r in range(n):
+                G[i, n + j] += H_Phi[i, r] * U[r, j]
+
+
+@compiled
+def _whiten(L: Any, G: Any) -> None:
+    """``G = L^-1 G``, L lower triangular."""
+    for i in range(G.shape[0]):
+        for r in range(i):
+            for j in range(G.shape[1]):
+                G[i, j] -= L[i, r] * G[r, j]
+        for j in range(G.shape[1]):
+            G[i, j] /= L[i, i]
+
+
+@compiled
+def _times_course(X: Any, F: Any, Y: Any) -> None:
+    """``Y = X M`` with ``M = [F; 0 I]``."""
+    n = F.shape[0]
+    for i in range(X.shape[0]):
+        for j in range(X.shape[1]):
+            Y[i, j] = X[i, j] if j >= n else 0.0
+        for r in range(n):
+            for j in range(X.shape[1]):
+                Y[i, j] += X[i, r] * F[r, j]
+
+
+@compiled
+def _course_times(F: Any, X: Any, Y: Any) -> None:
+    """``Y = M' X`` with ``M = [F; 0 I]``."""
+    n = F.shape[0]
+    for i in range(X.shape[0]):
+        for j in range(X.shape[1]):
+            Y[i, j] = X[i, j] if i >= n else 0.0
+    _add_product(F, X, Y)
+
+
+@compiled
+def _add_product(A: Any, B: Any, C: Any) -> None:
+    """``C += A' B``, of the rows that A has."""
+    for k in range(A.shape[0]):
+        for i in range(A.shape[1]):
+            for j in range(B.shape[1]):
+                C[i, j] += A[k, i] * B[k, j]
