@@ -76,11 +76,11 @@ def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovati
         explain what they can.
     """
     system, seen = fine.system, fine.estimates.innovation[..., None]
-    L: Array = np.linalg.cholesky(fine.estimates.innovation_covariance)
+    L = np.asarray(np.linalg.cholesky(fine.estimates.innovation_covariance), dtype=np.float64)
     if others is not None:
         seen = np.concatenate([seen, through(system, fine.gains, others)[0]], axis=2)
     H_Phi = np.broadcast_to(system.H @ system.Phi, (len(seen), system.rows, system.states))
-    white: Array = np.linalg.solve(L, seen)
+    white = np.asarray(np.linalg.solve(L, seen), dtype=np.float64)
     return Innovations(L, np.ascontiguousarray(H_Phi), fine.gains, white)
 
 
