@@ -166,6 +166,9 @@ def test_another_process_and_another_checkout_compile_nothing(tmp_path):
     assert run(CALL.format(folder=str(first)), tmp_path) == ["4.0 3.0", "1 0", "1 0"]
     assert run(CALL.format(folder=str(first)), tmp_path) == ["4.0 3.0", "0 1", "0 1"]
     assert run(CALL.format(folder=str(second)), tmp_path) == ["4.0 3.0", "0 1", "0 1"]
+    write(second, **edited("plugin_outer", "inner(x) + OFF", "inner(x) - OFF"))
+    assert run(CALL.format(folder=str(second)), tmp_path) == ["2.0 3.0", "1 0", "0 1"]
+    assert len(list((tmp_path / "truenorth" / "kernels").glob("plugin_inner.inner-*"))) == 1
     write(second, **edited("plugin_inner", "RATE * x", "x + RATE"))
     assert run(CALL.format(folder=str(second)), tmp_path) == ["4.5 3.0", "1 0", "0 1"]
     assert run(CALL.format(folder=str(first)), tmp_path) == ["4.0 3.0", "0 1", "0 1"]

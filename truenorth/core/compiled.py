@@ -29,26 +29,29 @@ class Kernel(KernelSource):
     @cached_property
     def dispatcher(self) -> Any:
         """Numba's own, for calls from Python."""
-        return self._dispatcher({})
+        from truenorth.core.inner_library import SteadyCompiler
+
+        return self._dispatcher(self.options, SteadyCompiler)
 
     @cached_property
     def inner(self) -> Any:
         """Numba's own, for calls from other kernels."""
-        return self._dispatcher(INNER)
+        from truenorth.core.inner_library import InnerCompiler
+
+        return self._dispatcher(self.options | INNER, InnerCompiler)
 
     @property
     def _numba_type_(self) -> Any:
         """What Numba takes a kernel for that another one names."""
         return self.inner._numba_type_
 
-    def _dispatcher(self, more: dict[str, Any]) -> Any:
+    def _dispatcher(self, options: dict[str, Any], compiler: Any) -> Any:
         import numba
 
         from truenorth.core.kernel_store import KernelStore
 
-        options = self.options | more
-        dispatcher: Any = numba.jit(**options)(self.py_func)
-        dispatcher._cache = KernelStore(self.py_func, options)
+        dispatcher: Any = numba.jit(pipeline_class=compiler, **options)(self.py_func)
+        dispatcher._cache = KernelStore(self.py_func, options | compiler.kept_as)
         return dispatcher
 
     @property

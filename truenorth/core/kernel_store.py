@@ -27,6 +27,7 @@ from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
+from truenorth.core.inner_library import KIND, InnerLibrary
 
 PACKAGE = Path(__file__).parents[1]
 BOUND = 512 * 2**20  # bytes that the kernels of all versions may take, before the longest unused go
@@ -64,7 +65,7 @@ class KernelStore:
         for folder in folders() if name else ():
             payload = _read(folder / str(name))
             if payload is not None:
-                return CompileResult._rebuild(target, *payload)
+                return _rebuilt(target, *payload)
         if name and "<locals>" in self.function.__code__.co_qualname:
             # The linker takes what has one name for one function, and a function made anew has the name of the last.
             self.function.__qualname__ = f"{self.function.__code__.co_qualname}.{Path(name).stem[-16:]}"
@@ -73,6 +74,10 @@ class KernelStore:
 
     def save_overload(self, signature: Any, kernel: Any) -> None:
         """Keep a kernel; one that holds an address of this process is not kept."""
+        kernel.library._ensure_finalized()
+        if not isinstance(kernel.library, InnerLibrary):
+            for environment in kernel._find_referenced_environments():  # of the kernels that it took up
+                kernel.codegen.set_env(environment.env_name, environment)
         folder = write_folder()
         name = self._file(signature, kernel.codegen)
         if folder is None or name is None or kernel.library.has_dynamic_globals or kernel.lifted:
@@ -132,6 +137,34 @@ def write_folder() -> Path | None:
         except OSError:
             continue
     return None
+
+
+def _rebuilt(target: Any, code: Any, fndesc: Any, environment: Any, *rest: Any) -> Any:
+    """A kernel from what it was reduced to; Numba's own rebuilds none that has no machine code."""
+    if code[1] != KIND:
+        return CompileResult._rebuild(target, code, fndesc, environment, *rest)
+    signature, objectmode, lifted, annotation, initial, environments = rest
+    for begin in initial:
+        begin()
+    library = InnerLibrary._unserialize(target.codegen(), code)
+    result: Any = CompileResult
+    return result(
+        typing_context=target.typing_context,
+        target_context=target,
+        library=library,
+        environment=environment,
+        entry_point=target.get_executable(library, fndesc, environment),
+        fndesc=fndesc,
+        type_annotation=annotation,
+        signature=signature,
+        objectmode=objectmode,
+        lifted=lifted,
+        typing_error=None,
+        call_helper=None,
+        metadata=None,
+        reload_init=initial,
+        referenced_envs=environments,
+    )
 
 
 def _read(path: Path) -> Any:
