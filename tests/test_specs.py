@@ -6,7 +6,9 @@ from dataclasses import fields
 import pytest
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.records.specs import KEYS, PRESETS, ImuSpec, imu_spec
+from truenorth.records.presets import PRESETS
+from truenorth.records.spec_keys import KEYS
+from truenorth.records.specs import ImuSpec, imu_spec
 
 DEG = math.pi / 180
 G = 9.80665

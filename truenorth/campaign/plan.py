@@ -32,7 +32,7 @@ from truenorth.core.paths import as_path
 from truenorth.core.plugins import plugins
 from truenorth.core.schema import Angle, Strict, Time, validated
 from truenorth.core.yaml_file import read_mapping
-from truenorth.records.specs import PRESETS
+from truenorth.records.presets import PRESETS
 from truenorth.simulation.scenario import Scenario, read_scenario
 
 # A path into a scenario, motion.legs[2].rate: entries of a list count from one, as in our messages.

@@ -33,7 +33,8 @@ from truenorth.core.shown import Shown
 from truenorth.core.units import format as format_quantity
 from truenorth.core.units import parse
 from truenorth.core.yaml_file import read_mapping, unknown_key
-from truenorth.records.specs import KEYS, ImuSpec, imu_spec
+from truenorth.records.spec_keys import KEYS
+from truenorth.records.specs import ImuSpec, imu_spec
 
 if TYPE_CHECKING:
     import pandas as pd

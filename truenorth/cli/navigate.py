@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
-from truenorth.cli.aiding_options import Sensors, shifted
+from truenorth.cli.aiding_options import shifted
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import in_reader_s_words, make_console, print_written, stages
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Calibrated, Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
+from truenorth.cli.sensor_options import Sensors
 from truenorth.core.language import translated as _
 
 if TYPE_CHECKING:

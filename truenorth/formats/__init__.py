@@ -16,9 +16,7 @@ from truenorth.formats import devices
 from truenorth.formats.aiding import (
     read_encoder,
     read_height,
-    read_master,
     read_odometer,
-    read_trajectory,
     read_velocity,
 )
 from truenorth.formats.detect import FORMATS, SUFFIXES, format_of
@@ -26,6 +24,7 @@ from truenorth.formats.gnss import read_gnss
 from truenorth.formats.guesses import UnsureError, write_layout
 from truenorth.formats.layout import layout_for
 from truenorth.formats.opening import columns_of
+from truenorth.formats.poses import read_master, read_trajectory
 from truenorth.formats.table import record_of
 from truenorth.formats.writing import write_imu, write_record
 from truenorth.records import ImuRecord

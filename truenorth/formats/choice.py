@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level
-from truenorth.formats.columns import Columns
+from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import BLOCKS, Layout
 from truenorth.formats.names import Heading, clock_of, families, heading_of
@@ -23,8 +23,6 @@ from truenorth.records.imu import Kind
 Array = NDArray[np.float64]
 
 REFERENCE = re.compile(r"([^\[\]]+?)\s*\[\s*(\d+)\s*:\s*(\d+)\s*\]")
-INTERVALS = ("ts", "Ts", "dt", "interval")
-RATE_LINE = re.compile(r"(?:rate|frequency|freq)\b[^\d\n]{0,20}(\d+(?:\.\d+)?)\s*(?:hz\b|$)", re.IGNORECASE)
 STEADY = 0.5  # of the median step: the RMS scatter of a clock's steps, gaps left out
 MOST_COLUMNS = 200  # that are looked at where no name decides
 
@@ -71,7 +69,7 @@ def choose(columns: Columns, layout: Layout) -> Choice:
     near = [name for name in columns.names if name in {c for names in COLUMNS.values() for c in names}]
     if near:
         wanted = next(c for k in COLUMNS for c in COLUMNS[k] if near[0] in COLUMNS[k] and c not in columns.names)
-        raise _missing(columns, wanted, wanted)
+        raise missing_column(columns, wanted, wanted)
     return _by_behaviour(columns, layout)
 
 
@@ -86,13 +84,6 @@ def _once(columns: Columns, names: Sequence[str]) -> None:
             raise DataError(
                 f"{columns.path.name}: column {name!r} is there {columns.names.count(name)} times; rename one"
             )
-
-
-def _missing(columns: Columns, ours: str, wanted: str) -> DataError:
-    near = {name.lower(): name for name in columns.names}
-    match = get_close_matches(wanted.lower(), near, n=1)
-    hint = f"; is it {near[match[0]]!r}? Then columns: {{{ours}: {near[match[0]]}}}" if match else ""
-    return DataError(f"{columns.path.name}: column {wanted!r} is missing; found {', '.join(columns.names)}{hint}")
 
 
 # ---------------------------------------------------------------------------------------------- by caller
@@ -167,7 +158,7 @@ def _by_caller(columns: Columns, layout: Layout, named: dict[str, tuple[str, flo
             named[ours] = (sets[0][ours[-1]].name, 1.0)
     for ours in COLUMNS[kind]:
         if ours not in named or named[ours][0] not in columns.names:
-            raise _missing(columns, ours, named.get(ours, (ours, 1.0))[0])
+            raise missing_column(columns, ours, named.get(ours, (ours, 1.0))[0])
     _once(columns, [name for name, _ in named.values()])
     choice = Choice(kind, (), [named[ours] for ours in COLUMNS[kind]])
     choice.documented = all(name == ours for ours, (name, _) in named.items())
@@ -247,7 +238,7 @@ def _with_time(columns: Columns, layout: Layout, choice: Choice) -> Choice:
         if wanted in columns.names or f"{wanted}[0]" in columns.names:
             choice.time = (wanted if wanted in columns.names else f"{wanted}[0]",)
         elif layout.rate is None:
-            raise _missing(columns, "time", wanted)
+            raise missing_column(columns, "time", wanted)
         _note_unit(choice, *(clock_of(choice.time[0]) if choice.time else (False, None)))
         return choice
     if "interval" in layout.columns:
@@ -392,30 +383,3 @@ def _constant(values: Array) -> bool:
     norm = np.linalg.norm(values, axis=1)
     low, middle, high = np.quantile(norm, [0.25, 0.5, 0.75])
     return bool(middle > 0.0 and (high - low) < 0.3 * middle)
-
-
-def rate_above(columns: Columns) -> tuple[float, str] | None:
-    """The sampling rate that a line above the table names, and the line."""
-    for line in columns.above:
-        match = RATE_LINE.search(line.strip())
-        if match is not None and float(match[1]) > 0.0:
-            return float(match[1]), line.strip()
-    return None
-
-
-def interval_of(columns: Columns, layout: Layout) -> tuple[float, str] | None:
-    """The sampling interval that a variable of one value holds, and its name."""
-    names: Mapping[str, str] = layout.columns
-    candidates = (names["interval"],) if "interval" in names else INTERVALS
-    for name in candidates:
-        if name in columns.names:
-            values = columns.read([name], False)
-            if values.size == 1 and 0.0 < values.item() < np.inf:
-                return float(values.item()), name
-            if "interval" in names:
-                raise DataError(
-                    f"{columns.path.name}: interval {name!r} is {values[:3, 0]}; expected one positive time"
-                )
-    if "interval" in names:
-        raise _missing(columns, "interval", names["interval"])
-    return None

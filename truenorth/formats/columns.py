@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -148,3 +149,11 @@ def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
         return pa.chunked_array([pa.array(part if part.dtype.kind in "mM" else part.astype(np.float64))])
 
     return Columns(path, list(parts), read, column)
+
+
+def missing_column(columns: Columns, ours: str, wanted: str) -> DataError:
+    """The error for a column of ours that is not there under the name that is `wanted`, with the nearest name."""
+    near = {name.lower(): name for name in columns.names}
+    match = get_close_matches(wanted.lower(), near, n=1)
+    hint = f"; is it {near[match[0]]!r}? Then columns: {{{ours}: {near[match[0]]}}}" if match else ""
+    return DataError(f"{columns.path.name}: column {wanted!r} is missing; found {', '.join(columns.names)}{hint}")

@@ -9,12 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import read_mapping, unknown_key
 from truenorth.records import COLUMNS
 from truenorth.records.imu import Kind
 
 BLOCKS: dict[str, tuple[str, str]] = {"rates": ("gyro", "accel"), "increments": ("dtheta", "dvel")}
 ARRAY_ONLY = (*BLOCKS["rates"], *BLOCKS["increments"], "scale", "interval")
+DIMENSION_OF: dict[Kind, dict[str, str]] = {
+    "rates": {"gyro": "angular_rate", "accel": "acceleration", "time": "time"},
+    "increments": {"gyro": "angle", "accel": "speed", "time": "time"},
+}
 KNOWN_COLUMNS = ("time", *COLUMNS["rates"], *COLUMNS["increments"], *ARRAY_ONLY)
 
 
@@ -148,3 +153,20 @@ def _rate(value: Any) -> float:
     if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < math.inf:
         raise UsageError(f"rate is {value!r}; expected samples a second, such as 100")
     return float(rate)
+
+
+def unit_factor(sensor: str, kind: Kind, layout: Layout) -> float:
+    """What a column is multiplied with: SI for one of its units, or for one count where a number stands before the unit."""
+    text = layout.units.get(sensor)
+    if text is None:
+        return 1.0
+    factor, found = parse_quantity(text) if text[:1].isdigit() or text[:1] == "." else parse_unit(text)
+    dimension = DIMENSION_OF[kind][sensor]
+    wanted, example = DIMENSIONS[dimension]
+    if found != wanted:
+        unit = example.partition(" ")[2]
+        raise UsageError(
+            f"units: {sensor} {kind if sensor != 'time' else ''} cannot be in {text!r}; expected a unit of "
+            f"{dimension.replace('_', ' ')}, such as {unit}"
+        )
+    return factor

@@ -14,30 +14,21 @@ from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.formats.behaviour import (
     SURE_GYRO,
     accel_readings,
-    clock_readings,
     gravity_level,
     gyro_facts,
     gyro_readings,
-    size,
 )
 from truenorth.formats.checks import check_finite, check_order
-from truenorth.formats.choice import Choice, choose, interval_of, rate_above
+from truenorth.formats.choice import Choice, choose
+from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
 from truenorth.formats.guesses import UnsureError, in_words, take
-from truenorth.formats.layout import Layout
+from truenorth.formats.layout import Layout, unit_factor
 from truenorth.records import COLUMNS, Guess, ImuRecord
 from truenorth.records.imu import Kind
 
 Array = NDArray[np.float64]
 
-FEWEST = 50  # rows, from which a log shows by itself what its numbers are
-BUNCHED = 1.2  # mean over median step, from which stamps are of a computer that read several rows at once
-BUNCH_SHARE = 0.05  # of the steps that are longer than 1.5 median ones, or zero; gaps are fewer
-SPAN = 0.02  # by which the stamps' span and that of a given rate may differ
-DIMENSION_OF: dict[Kind, dict[str, str]] = {
-    "rates": {"gyro": "angular_rate", "accel": "acceleration", "time": "time"},
-    "increments": {"gyro": "angle", "accel": "speed", "time": "time"},
-}
 FULL_UP = 0.9  # of the specific force along an axis that points up
 
 
@@ -67,7 +58,7 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     values = columns.read(names, False) * np.array([sign for _, sign in choice.sensors])
     values = _scaled(columns, layout, names, values)
     check_finite(values, choice.labels[1:], source, columns.place)
-    time, layout = _clock(columns, layout, choice, len(values), guesses)
+    time, layout = clock_of_log(columns, layout, choice, len(values), guesses)
     gyro, accel = values[:, :3], values[:, 3:]
     kind, units = _units(time, gyro, accel, layout, choice, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
@@ -106,121 +97,6 @@ def _array_of(name: str) -> str:
 
 def _place_in_array(name: str) -> int:
     return int(name.partition("[")[2].rstrip("]")) if "[" in name else "xyz".index(name[-1])
-
-
-# ------------------------------------------------------------------------------------------------- clock
-
-
-def _clock(columns: Columns, layout: Layout, choice: Choice, rows: int, guesses: list[Guess]) -> tuple[Array, Layout]:
-    """Time in seconds: from the stamps, or made from the rate."""
-    source = columns.path.name
-    if not choice.time:
-        return _made(columns, layout, rows, guesses), layout
-    raw, said = columns.clock(choice.time[0])
-    if len(choice.time) == 2:
-        raw = raw + 1e-9 * columns.read([choice.time[1]], False)[:, 0]
-    if len(raw) != rows:
-        raise DataError(f"{source}: gyro and accelerometer have {rows} rows, time {len(raw)}; expected as many of each")
-    check_finite(raw[:, None], choice.labels[:1], source, columns.place)
-    stated = layout.units.get("time", choice.units.get("time"))
-    if layout.rate is None:
-        _check_bunches(raw, said, stated, source, guesses)
-    elif np.all(np.diff(raw) >= 0.0) and raw[-1] > raw[0]:
-        return _evenly(raw, said, stated, layout.rate, source, guesses), layout
-    check_order(raw, choice.labels[0], source, columns.place)
-    if said is not None:
-        guesses.append(Guess("time", said, "the cells are no bare numbers"))
-        return raw, layout
-    if "time" in layout.units:
-        guesses.append(Guess("unit of time", layout.units["time"], "as the caller says", 1.0, {"units": layout.units}))
-        return raw * unit_factor("time", "rates", layout), layout
-    if stated is not None:
-        guesses.append(Guess("unit of time", stated, "the heading", 1.0, {"units": {"time": stated}}))
-        return raw * size(stated), layout
-    return raw * size(_unit_of_time(raw, source, guesses)), layout
-
-
-def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:
-    if len(raw) < 3:
-        return "s"
-    steps = np.diff(raw)
-    step = float(np.median(steps))
-    readings = clock_readings(step, float(raw[0]))
-    if step == 1.0 and np.all(steps == 1.0):
-        options: list[dict[str, Any]] = [{"units": {"time": "ms"}}, {"rate": "(rows a second)"}]
-        raise UnsureError(
-            f"{source}: time goes up by 1 in each row: it may be in ms (1000 rows a second) or count the rows",
-            options,
-            guesses,
-        )
-    if not readings:
-        return "s"
-    options = [{"units": {"time": reading.unit}} for reading in readings]
-    return take("unit of time", readings, options, source, guesses).unit
-
-
-def _made(columns: Columns, layout: Layout, rows: int, guesses: list[Guess]) -> Array:
-    """Time of a log without any: the first row's interval ends at ``1 / rate``."""
-    rate = layout.rate
-    if rate is None:
-        interval = interval_of(columns, layout)
-        if interval is not None:
-            value, name = interval
-            rate = 1.0 / (value * unit_factor("time", "rates", layout))
-            guesses.append(Guess("rate", f"{rate:g} Hz", f"the interval {name!r}", 1.0, {"rate": rate}))
-    if rate is None:
-        above = rate_above(columns)
-        if above is None:
-            raise UsageError(
-                f"{columns.path.name}: no time in the log; name its column (columns: {{time: ...}}) or give the rate"
-            )
-        rate, line = above
-        guesses.append(Guess("rate", f"{rate:g} Hz", f"the line {line!r} above the table", 1.0, {"rate": rate}))
-    elif layout.rate is not None:
-        guesses.append(Guess("rate", f"{rate:g} Hz", "as the caller says", 1.0, {"rate": rate}))
-    return np.arange(1, rows + 1) / rate
-
-
-def _check_bunches(raw: Array, said: str | None, stated: str | None, source: str, guesses: list[Guess]) -> None:
-    """Refuse stamps of a computer that read several rows at once: their steps say nothing of the sampling."""
-    steps = np.diff(raw)
-    if len(steps) < FEWEST or steps.min() < 0.0 or raw[-1] <= raw[0]:
-        return
-    median, mean = float(np.median(steps)), float(np.mean(steps))
-    uneven = float(np.mean((steps > 1.5 * median) | (steps == 0.0)))
-    if mean < BUNCHED * median or uneven < BUNCH_SHARE:
-        return
-    unit = 1.0 if said is not None else size(stated) if stated is not None else None
-    if unit is None:
-        readings = clock_readings(mean, float(raw[0]))
-        unit = size(readings[0].unit) if readings else 1.0
-    rate = 1.0 / (mean * unit)
-    whole = round(rate)
-    rate = float(whole) if whole and abs(rate / whole - 1.0) < 0.003 else rate
-    by_median = "many are equal" if median == 0.0 else f"the median step is one of {1.0 / (median * unit):.0f} Hz"
-    raise UnsureError(
-        f"{source}: the rows are stamped in bunches: {by_median}, but {rate:.4g} rows a second come in all; if the sensor "
-        "samples evenly, give its rate", [{"rate": f"{rate:.4g}"}], guesses,
-    )  # fmt: skip
-
-
-def _evenly(raw: Array, said: str | None, stated: str | None, rate: float, source: str, guesses: list[Guess]) -> Array:
-    """Rows at a given rate, from where the stamps begin: no row is stamped before it was taken."""
-    steps = float(raw[-1] - raw[0]) / (len(raw) - 1)
-    if said is None and stated is None:
-        stated = min(("s", "ms", "us", "ns"), key=lambda unit: abs(np.log(steps * size(unit) * rate)))
-    stamps = raw * (1.0 if said is not None or stated is None else size(stated))
-    even = np.arange(len(raw)) / rate
-    span = float(stamps[-1] - stamps[0])
-    if abs(span / even[-1] - 1.0) > SPAN:
-        raise DataError(
-            f"{source}: {len(raw)} rows at {rate:g} Hz last {even[-1]:.6g} s, their stamps span {span:.6g} s; expected the same: "
-            f"rows are missing, or the rate is {(len(raw) - 1) / span:.6g} Hz"
-        )
-    guesses.append(
-        Guess("time", f"even, {rate:g} Hz", "the rate is given: stamps give only the start", 1.0, {"rate": rate})
-    )
-    return even + float(np.min(stamps - even))
 
 
 # ------------------------------------------------------------------------------------------------- units
@@ -389,20 +265,3 @@ def finish(
     from truenorth.core.attitude import body_axes  # compiled code: not for a log that needs no turning
 
     return record.rotated(body_axes(axes))
-
-
-def unit_factor(sensor: str, kind: Kind, layout: Layout) -> float:
-    """What a column is multiplied with: SI for one of its units, or for one count where a number stands before the unit."""
-    text = layout.units.get(sensor)
-    if text is None:
-        return 1.0
-    factor, found = parse_quantity(text) if text[:1].isdigit() or text[:1] == "." else parse_unit(text)
-    dimension = DIMENSION_OF[kind][sensor]
-    wanted, example = DIMENSIONS[dimension]
-    if found != wanted:
-        unit = example.partition(" ")[2]
-        raise UsageError(
-            f"units: {sensor} {kind if sensor != 'time' else ''} cannot be in {text!r}; expected a unit of "
-            f"{dimension.replace('_', ' ')}, such as {unit}"
-        )
-    return factor

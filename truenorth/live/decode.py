@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import body_axes
 from truenorth.core.errors import DataError
-from truenorth.formats.layout import Layout
+from truenorth.formats.layout import Layout, unit_factor
 from truenorth.formats.names import clock_of, heading_of
-from truenorth.formats.table import unit_factor
 from truenorth.live.log import Kind
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 from truenorth.records import COLUMNS

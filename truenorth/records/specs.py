@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from truenorth.core.paths import as_path
 from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 from truenorth.records.presets import PRESETS
+from truenorth.records.spec_keys import CORRELATION_TIME, ENTRIES, KEYS, PLAIN, WANTED, Entry, field_of
 
 if TYPE_CHECKING:
     from truenorth.records.imu import ImuRecord
@@ -127,7 +128,7 @@ class ImuSpec:
     def __post_init__(self) -> None:
         where = f"IMU specification {self.name!r}"
         for (group, key), entry in ENTRIES.items():
-            name = _field(group, key)
+            name = field_of(group, key)
             value = getattr(self, name)
             if not entry.allows(value):
                 raise UsageError(f"{where}: {name} is {value}; expected {WANTED[entry.least]}")
@@ -192,7 +193,7 @@ class ImuSpec:
         """The specification as it stands in a file; only what differs from a perfect IMU."""
         result: dict[str, Any] = {"name": self.name}
         for (group, key), entry in ENTRIES.items():
-            value = getattr(self, _field(group, key))
+            value = getattr(self, field_of(group, key))
             if value in (0.0, math.inf):
                 continue
             text = format_quantity(value, entry.unit, digits=None)
@@ -222,76 +223,6 @@ class ImuSpec:
 
         with atomic_path(path) as temporary:
             temporary.write_text(yaml.safe_dump(self.to_mapping(), sort_keys=False, allow_unicode=True), "utf-8")
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A key of a file: its dimension, the unit it is written in, and the least it may be."""
-
-    dimension: str
-    unit: str
-    least: Literal["zero", "above zero", "finite"] = "zero"
-
-    def allows(self, value: float) -> bool:
-        """Whether a value in SI makes sense."""
-        if self.least == "above zero":
-            return value > 0.0
-        return math.isfinite(value) and (value >= 0.0 or self.least == "finite")
-
-
-WANTED = {"zero": "zero or more, and finite", "above zero": "a positive value", "finite": "a finite number"}
-
-# Keys of a file by group.
-KEYS: dict[str, dict[str, Entry]] = {
-    "gyro": {
-        "bias": Entry("angular_rate", "deg/h"),
-        "turn_on_bias": Entry("angular_rate", "deg/h"),
-        "random_walk": Entry("angle_random_walk", "deg/sqrt(h)"),
-        "sample_noise": Entry("angular_rate", "deg/h"),
-        "bias_instability": Entry("angular_rate", "deg/h"),
-        "rate_random_walk": Entry("rate_random_walk", "deg/h/sqrt(h)"),
-        "scale_factor": Entry("ratio", "ppm"),
-        "scale_factor_asymmetry": Entry("ratio", "ppm"),
-        "misalignment": Entry("angle", "arcsec"),
-        "g_sensitivity": Entry("rate_per_acceleration", "deg/h/g"),
-        "bias_temperature": Entry("rate_per_temperature", "deg/h/K"),
-        "scale_factor_temperature": Entry("ratio_per_temperature", "ppm/K"),
-        "bandwidth": Entry("frequency", "Hz", "above zero"),
-        "latency": Entry("time", "ms"),
-        "quantisation": Entry("angle", "arcsec"),
-        "range": Entry("angular_rate", "deg/s", "above zero"),
-    },
-    "accel": {
-        "bias": Entry("acceleration", "ug"),
-        "turn_on_bias": Entry("acceleration", "ug"),
-        "random_walk": Entry("velocity_random_walk", "ug/sqrt(Hz)"),
-        "sample_noise": Entry("acceleration", "ug"),
-        "bias_instability": Entry("acceleration", "ug"),
-        "rate_random_walk": Entry("acceleration_random_walk", "ug/sqrt(h)"),
-        "scale_factor": Entry("ratio", "ppm"),
-        "scale_factor_asymmetry": Entry("ratio", "ppm"),
-        "misalignment": Entry("angle", "arcsec"),
-        "bias_temperature": Entry("acceleration_per_temperature", "ug/K"),
-        "scale_factor_temperature": Entry("ratio_per_temperature", "ppm/K"),
-        "bandwidth": Entry("frequency", "Hz", "above zero"),
-        "latency": Entry("time", "ms"),
-        "quantisation": Entry("speed", "m/s"),
-        "range": Entry("acceleration", "g", "above zero"),
-    },
-    "temperature": {
-        "start": Entry("temperature", "K", "finite"),
-        "rate": Entry("temperature_rate", "K/min", "finite"),
-        "time_constant": Entry("time", "min", "above zero"),
-    },
-}
-PLAIN = {"gyro": ("filter_order",), "accel": ("filter_order", "positions"), "temperature": ()}  # keys of other kinds
-CORRELATION_TIME = Entry("time", "s", "above zero")
-ENTRIES = {(group, key): entry for group, keys in KEYS.items() for key, entry in keys.items()}
-ENTRIES["", "correlation_time"] = CORRELATION_TIME
-
-
-def _field(group: str, key: str) -> str:
-    return f"{group}_{key}" if group else key
 
 
 def imu_spec(source: ImuSpec | str | PathLike[str] | Mapping[str, Any]) -> ImuSpec:

@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.yaml_file import quantity, unknown_key
-from truenorth.records.specs import KEYS, ImuSpec
+from truenorth.records.spec_keys import KEYS
+from truenorth.records.specs import ImuSpec
 from truenorth.simulation.streams import STREAMS, stream
 
 Array = NDArray[np.float64]
