@@ -9,11 +9,12 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 
 from tests.runs import some
+from truenorth.analysis.allan import NoiseCoefficients
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.core.units import parse
 from truenorth.errors.staying import StaticModel
-from truenorth.quality.noise import gauss_markov_variance, noise_from_log
+from truenorth.quality.noise import gauss_markov_variance, noise_from_log, with_terms_seen
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import rest, simulate
@@ -114,3 +115,20 @@ def test_bad_records_are_refused():
     time = np.delete(np.arange(101) * 0.1, 50)
     with pytest.raises(UsageError, match=r"a gap of 0\.2 s before row 51"):
         noise_from_log(ImuRecord(time, np.ones((100, 3)), np.ones((100, 3))))
+
+
+def coefficients(bias_instability: float, rate_random_walk: float) -> NoiseCoefficients:
+    none, sigma = np.zeros(3), np.full(3, np.nan)
+    one = np.array([0.0, 1.0, 0.0])
+    return NoiseCoefficients(
+        none, one, bias_instability * one, rate_random_walk * one, sigma, sigma, sigma, sigma, None
+    )  # type: ignore[arg-type]  # no curve
+
+
+def test_a_file_holds_the_slow_terms_that_the_table_shows():
+    """A bias that goes on wandering is a rate random walk; one that nothing shows is none; one that is seen stays as fitted."""
+    spec = replace(KNOWN, correlation_time=800.0)
+    found = with_terms_seen(spec, coefficients(0.0, 0.0), coefficients(0.0, 1e-6))
+    assert (found.gyro_bias_instability, found.gyro_rate_random_walk, found.accel_bias_instability) == (0.0, 0.0, 0.0)
+    assert found.accel_rate_random_walk == pytest.approx(KNOWN.accel_bias_instability / 20.0)
+    assert with_terms_seen(spec, coefficients(1e-6, 0.0), coefficients(1e-6, 1e-6)) == spec

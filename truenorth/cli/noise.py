@@ -26,6 +26,7 @@ Examples:
 Writes imu.yaml (the specification), kalibr.yaml (Kalibr's form of it), noise.svg (Allan deviation and fit).
 Exit codes: 0 done; 2 wrong usage; 3 bad data; 4 the base moved, so that the log does not show the sensors' noise.
 """
+WIDTH = 96  # columns, also where the output is no terminal
 TERMS = (
     ("random walk", "random_walk", ("deg/sqrt(h)", "ug/sqrt(Hz)")),
     ("bias instability", "bias_instability", ("deg/h", "ug")),
@@ -92,13 +93,13 @@ def _figures(gyro: NoiseCoefficients, accel: NoiseCoefficients) -> list[dict[str
 
 def _write(output: Path, found: Inspection, like: str | None) -> list[Path]:
     from truenorth.core.atomic import atomic_files, writable_folder
-    from truenorth.quality.noise import noise_from_log
+    from truenorth.quality.noise import noise_from_log, with_terms_seen
     from truenorth.records.kalibr import write_kalibr
 
     folder = writable_folder(output)
-    record, rest = found.record, found.noise_from
-    assert record is not None and rest is not None  # noqa: PT018  # checked before
-    spec = noise_from_log(record.between(rest.start, rest.stop), like, record.source).spec
+    record, rest, gyro, accel = found.record, found.noise_from, found.gyro_noise, found.accel_noise
+    assert record is not None and rest is not None and gyro is not None and accel is not None  # noqa: PT018  # checked before
+    spec = with_terms_seen(noise_from_log(record.between(rest.start, rest.stop), like, record.source).spec, gyro, accel)
     paths = [folder / name for name in ("imu.yaml", "kalibr.yaml", "noise.svg")[: 3 if drawing() else 2]]
     with atomic_files() as file:
         spec.to_yaml(file(paths[0]))
@@ -123,14 +124,25 @@ def _print(source: str, start: float, stop: float, figures: list[dict[str, Any]]
 
     console = make_console()
     console.print(f"{source}, at rest from {start:.0f} s to {stop:.0f} s; one sigma after each figure", soft_wrap=True)
-    table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for title in ("", "x", "y", "z", "unit"):
-        table.add_column(title)
-    for row in figures:
-        cells = [
-            "not seen" if value is None else f"{value:.3g} ± {'?' if sigma is None else f'{sigma:.2g}'}"
-            for value, sigma in zip(row["value"], row["sigma"])
-        ]
-        table.add_row(f"{row['sensor']} {row['term']}", *cells, row["unit"])
+        table.add_column(title, no_wrap=True)
+    for sensor in dict.fromkeys(row["sensor"] for row in figures):
+        table.add_row(sensor)
+        for row in figures:
+            if row["sensor"] == sensor:
+                table.add_row(f"  {row['term']}", *map(_cell, row["value"], row["sigma"]), row["unit"])
+    console.width = max(console.width, WIDTH)
     console.print(table)
     print_written(paths)
+
+
+def _cell(value: float | None, sigma: float | None) -> str:
+    """With as many digits as its sigma has, which has one; two where that is a 1."""
+    if value is None:
+        return "not seen"
+    if sigma is None:
+        return f"{value:.3g} ± ?"
+    first = math.floor(math.log10(sigma))
+    decimals = max(0, -first + (sigma < 2.0 * 10.0**first))
+    return f"{value:.{decimals}f} ± {sigma:.{decimals}f}"

@@ -154,6 +154,23 @@ def noise_from_log(
     )
 
 
+def with_terms_seen(spec: ImuSpec, gyro: NoiseCoefficients, accel: NoiseCoefficients) -> ImuSpec:
+    """A specification of :func:`noise_from_log` without terms that the coefficients of the same record do not show.
+
+    A Gauss-Markov bias stands for bias instability and for rate random walk. Where only the latter is seen, it is written as such,
+    with the slope ``b sqrt(2 / T)``: the sigma b of a bias that wanders for longer than the record is an extrapolation.
+    """
+    drive = np.sqrt(2.0 / spec.correlation_time)
+    terms: dict[str, Any] = {}
+    for group, seen in (("gyro", gyro), ("accel", accel)):
+        if seen.bias_instability.any():
+            continue
+        if seen.rate_random_walk.any():
+            terms[f"{group}_rate_random_walk"] = float(drive * getattr(spec, f"{group}_bias_instability"))
+        terms[f"{group}_bias_instability"] = 0.0
+    return replace(spec, **terms)
+
+
 def _correlation_times(record: ImuRecord) -> list[float]:
     shortest, longest = SHORTEST * record.interval, LONGEST * record.duration
     count = 1 + int(np.ceil(PER_OCTAVE * np.log2(longest / shortest)))
