@@ -9,7 +9,7 @@ cannot be checked by anyone.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import CoarseStart, settle_fine
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
-from truenorth.coarse.analytic import Means
+from truenorth.analysis.consistency import as_normal
+from truenorth.coarse.analytic import BLOCKS, Means
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.errors.staying import StaticModel, mean_velocity
 from truenorth.estimate.base_motion import white_variance
@@ -34,12 +35,34 @@ HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
 
 @dataclass(frozen=True)
 class LogCheck:
-    """Components of rate and specific force that the log lets us check, measured minus expected, with their noise."""
+    """Components of rate and specific force that the log lets us check, measured minus expected, with their noise.
+
+    The scatter of a few block means is itself not well known: `dof` of them show it.
+    """
 
     rate_residual: Array  # (2,) rad/s: along north and up
     rate_noise: Array  # (2,) rad/s
     force_residual: float  # m/s^2; along up
     force_noise: float  # m/s^2
+    rate_dof: Array = field(default_factory=lambda: np.full(2, math.inf))
+    force_dof: float = math.inf
+
+    def rate_misses(self, bias: float) -> Array:
+        """(2,) by how many sigmas the rates miss the earth's, where a bias has this sigma."""
+        pairs = zip(self.rate_residual, self.rate_noise, self.rate_dof, strict=True)
+        return np.array([_sigmas(*pair, bias) for pair in pairs])
+
+    def force_misses(self, bias: float) -> float:
+        """By how many sigmas the force misses gravity, where a bias has this sigma."""
+        return _sigmas(self.force_residual, self.force_noise, self.force_dof, bias)
+
+
+def _sigmas(residual: float, noise: float, dof: float, bias: float) -> float:
+    """Of a known and an estimated sigma together, with the degrees of freedom of the sum (Welch, Satterthwaite)."""
+    both = math.hypot(bias, noise)
+    if both == 0.0:
+        return math.inf if residual else 0.0
+    return as_normal(residual / both, dof * (both / noise) ** 4 if 0.0 < noise < math.inf else math.inf)
 
 
 def check_means(m: Means, lat: float, g: float) -> LogCheck:
@@ -55,6 +78,8 @@ def check_means(m: Means, lat: float, g: float) -> LogCheck:
         rate_noise=np.sqrt([north @ m.w_covariance @ north, up @ m.w_covariance @ up]),
         force_residual=f - g,
         force_noise=float(np.sqrt(up @ m.f_covariance @ up)),
+        rate_dof=np.full(2, BLOCKS - 1.0),
+        force_dof=BLOCKS - 1.0,
     )
 
 
@@ -129,6 +154,7 @@ def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogChe
         filtered,
         rate_residual=np.where(better, mean.rate_residual, filtered.rate_residual),
         rate_noise=np.where(better, mean.rate_noise, filtered.rate_noise),
+        rate_dof=np.where(better, mean.rate_dof, filtered.rate_dof),
     )
 
 
@@ -155,6 +181,7 @@ def implied(check: LogCheck, bias: Array, P: Array, P0: Array) -> LogCheck:
         check,
         rate_residual=np.where(better, bias[1:] * before / seen, check.rate_residual),
         rate_noise=np.where(better, noise, check.rate_noise),
+        rate_dof=np.where(better, math.inf, check.rate_dof),
     )
 
 

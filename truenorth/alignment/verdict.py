@@ -130,7 +130,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     place = answer.position
     bias = float(np.max(answer.gyro_bias_prior))
     horizontal = EARTH_RATE * math.cos(place.lat)
-    for axis, residual, noise in zip(("north", "up"), check.rate_residual, check.rate_noise, strict=True):
+    for axis, residual, misses in zip(("north", "up"), check.rate_residual, check.rate_misses(bias), strict=True):
         turned = min(abs(residual) / max(horizontal, 1e-12), UNIFORM_SIGMA)
         figures: dict[str, Figure] = {
             "axis": axis,
@@ -138,7 +138,6 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
             "allowed": bias,
             "imu": answer.imu_source,
         }
-        misses = abs(residual) / math.hypot(bias, noise)
         if misses > limit("specification"):
             remedies = ("latitude", "imu_axes", "units", "specification", "base_stays")
             found.append(Evidence("rate.misses", figures, "bounded", Effect(heading=turned), remedies))
@@ -147,7 +146,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
     g = float(normal_gravity(place.lat, place.alt))
     accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)
-    if abs(check.force_residual) > limit("specification") * math.hypot(accel, check.force_noise):
+    if check.force_misses(accel) > limit("specification"):
         found.append(
             Evidence(
                 "force.misses",
