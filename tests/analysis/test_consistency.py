@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.special import stdtrit
 
 from truenorth.analysis.consistency import (
     chi_square_band,
@@ -17,6 +18,7 @@ from truenorth.analysis.consistency import (
     nis,
     sigma_ratio,
     standardised,
+    student_limit,
     whiteness,
 )
 from truenorth.core.errors import DataError, UsageError
@@ -154,3 +156,10 @@ def test_bad_input_is_said():
         chi_square_band(2, level=95)
     with pytest.raises(UsageError, match="10 epochs are too few for 20 lags"):
         whiteness(np.ones((10, 1)), np.ones((10, 1, 1)))
+
+
+@pytest.mark.parametrize("dof", [1, 2, 3, 4, 7, 30, 431])
+def test_the_limit_of_students_t_is_that_of_scipy(dof):
+    chances = np.array([2e-5, 1e-3, 0.05, 0.5])
+    limits = [student_limit(chance, dof) for chance in chances]
+    np.testing.assert_allclose(limits, stdtrit(dof, 1.0 - 0.5 * chances), rtol=1e-9)

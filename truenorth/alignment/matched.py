@@ -154,7 +154,9 @@ def _sum_back(
     row = len(behind) - 1
     for k in range(step.shape[0] - 1, -1, -1):
         while row >= 0 and behind[row] == k:
-            energies[row], matches[row], ends[row] = energy, match, end
+            _keep(energy, energies[row])
+            _keep(match, matches[row])
+            _keep(end, ends[row])
             row -= 1
         if row < 0:
             break
@@ -169,6 +171,14 @@ def _sum_back(
         match, match_before = match_before, match
         _times_course(end, F, end_before)
         end, end_before = end_before, end
+
+
+@compiled
+def _keep(values: Any, place: Any) -> None:
+    """``place = values``: one by one, since Numba takes a second to compile what checks the shapes of whole arrays."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            place[i, j] = values[i, j]
 
 
 @compiled

@@ -180,6 +180,8 @@ class ByMaster:
 
     def aids(self, arm: Any, mounting: str | None, mounting_sigma: float) -> list[Any]:
         """The master, where one is named; `arm` from the IMU to it."""
+        if self.master is None:
+            return []
         import numpy as np
 
         from truenorth.aiding.aids import Master
@@ -187,8 +189,6 @@ class ByMaster:
         from truenorth.formats import read_master
         from truenorth.state.mounting import Mounting
 
-        if self.master is None:
-            return []
         late, late_sigma = _delay(self.delay, DELAY_SIGMA)
         mounted = Mounting(
             lever_arm=np.zeros(3) if arm is None else arm,
@@ -245,6 +245,8 @@ class OnTheMove:
 
     def aids(self) -> list[Any]:
         """Odometer, velocity log and GNSS, where they are named."""
+        if not self.given:
+            return []
         from dataclasses import replace
 
         from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
@@ -252,7 +254,7 @@ class OnTheMove:
         from truenorth.core.errors import UsageError
         from truenorth.formats import read_gnss, read_odometer, read_velocity
 
-        if self.given and not self.mounting_sigma > 0.0:
+        if not self.mounting_sigma > 0.0:
             raise UsageError(f"--mounting-sigma {self.mounting_sigma:g}: expected degrees above zero")
         found: list[Any] = []
         wheel = replace(WHEEL, angle_sigma=math.radians(self.mounting_sigma))

@@ -154,10 +154,12 @@ def align(
 
 def _first_place(record: ImuRecord, aids: list[Any]) -> Position | None:
     """Where GNSS says that a log begins."""
+    fixes = next((aid.record for aid in aids if aid.key == "gnss" and aid.record.has_position.any()), None)
+    if fixes is None:
+        return None
     from truenorth.alignment.in_motion_task import first_fix
 
-    fixes = next((aid.record for aid in aids if aid.key == "gnss" and aid.record.has_position.any()), None)
-    return None if fixes is None else first_fix(record, fixes)
+    return first_fix(record, fixes)
 
 
 def _latitude(place: Position | None, aids: list[Any]) -> float | None:

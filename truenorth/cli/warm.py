@@ -8,12 +8,14 @@ import os
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from truenorth.cli.console import make_console
 from truenorth.cli.options import command, option
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
 
 PACKAGE = Path(__file__).parents[1]
 EXAMPLES = """
@@ -57,6 +59,7 @@ def warm(
     workers: Annotated[int | None, option("Processes at once; one a core without it.", min=1)] = None,
 ) -> None:
     """Compile what the other commands need and keep it for all that follow; a second call finds it done."""
+    from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     from truenorth.core.kernel_store import write_folder
@@ -91,6 +94,8 @@ def _digest() -> str:
 
 def _show(pool: ProcessPoolExecutor, tasks: list[str]) -> None:
     """Run the tasks with a bar on standard error."""
+    from concurrent.futures import as_completed
+
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("compiling"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
