@@ -24,7 +24,7 @@ REQUIRED = (
     "truenorth/report/templates/alignment.html",
     "truenorth/simulation/scenarios/quay.yaml",
 )
-FORBIDDEN = ("tests/", "docs/", "examples/", "benchmarks/")  # as roots: they would land beside other packages
+FORBIDDEN = ("tests/", "docs/", "examples/", "benchmarks/")  # as roots: they would land among other packages
 
 STILL = """\
 name: still
@@ -61,10 +61,10 @@ def interpreter(minor: int) -> str | None:
     versions = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     found = [shutil.which(f"python3.{minor}"), *map(str, sorted(versions.glob(f"3.{minor}.*/bin/python")))]
     for path in filter(None, found):
-        told = subprocess.run(
+        said = subprocess.run(
             [path, "-c", "import sys, venv; print(sys.version_info[1])"], capture_output=True, text=True, check=False
         )
-        if told.stdout.strip() == str(minor):
+        if said.stdout.strip() == str(minor):
             return path
     return None
 

@@ -1,1 +1,1 @@
-"""Our speed beside the peers' in one run: ``python -m benchmarks``."""
+"""Our speed compared with the peers' in one run: ``python -m benchmarks``."""

@@ -1,4 +1,4 @@
-"""The real recordings beside the repository, as records; a test that needs one skips by name where it is missing."""
+"""The real recordings next to the repository, as records; a test that needs one skips by name where it is missing."""
 
 from pathlib import Path
 

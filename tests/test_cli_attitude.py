@@ -67,8 +67,8 @@ def call(*arguments):
 def off(result, true, code=0):
     """How many of its sigmas the heading is off, and the sigma in degrees."""
     assert result.exit_code == code, (result.output, result.exception)
-    told = json.loads(result.stdout)
-    return abs(math.remainder(told["heading_deg"] - true, 360.0)) / told["heading_sigma_deg"], told["heading_sigma_deg"]
+    said = json.loads(result.stdout)
+    return abs(math.remainder(said["heading_deg"] - true, 360.0)) / said["heading_sigma_deg"], said["heading_sigma_deg"]
 
 
 BASELINE = ("--baseline", "90,0.5")
@@ -112,8 +112,8 @@ def test_align_by_a_velocity_log(files):
     result = call(
         "align", folder / "imu.parquet", "--velocity", folder / "dvl.csv", "--lat", 50, "--lon", 10, *IMU, "--json"
     )
-    told = json.loads(result.stdout)
-    assert told["status"] == "not_converged"  # 80 s of tactical gyros tell no heading, and a log knows no north
+    said = json.loads(result.stdout)
+    assert said["status"] == "not_converged"  # 80 s of tactical gyros tell no heading, and a log knows no north
     result = call("align", folder / "imu.parquet", "--velocity", folder / "dvl.csv", "--lat", 50, "--lon", 10, *IMU,
                   "--magnetometer", folder / "mag.csv", *MAGNETOMETER, "--json")  # fmt: skip
     ratio, sigma = off(result, true)

@@ -25,7 +25,7 @@ FLOORS = [
 ]
 FLOOR = {folder: number for number, folders in enumerate(FLOORS) for folder in folders}
 FLOOR["simulation"] = FLOOR["state"] + 0.5  # it stands aside: on floors up to the strapdown algorithms
-FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, beside the package itself
+FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, next to the package itself
 SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
 LONGEST = 120
 TYPES_COMMANDS = {"truenorth.formats.samples"}  # it shows commands to type

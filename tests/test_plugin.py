@@ -39,7 +39,7 @@ print(float(np.sqrt(ends[1] ** 2 - ends[0] ** 2)[2]))
 def installed(tmp_path_factory):
     """Folder into which the example is installed, without the network."""
     if UV is None:
-        pytest.skip("uv is not installed beside this Python")
+        pytest.skip("uv is not installed with this Python")
     folder = tmp_path_factory.mktemp("plugin")
     source = folder / "source"
     shutil.copytree(EXAMPLE, source)

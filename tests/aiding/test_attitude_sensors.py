@@ -83,8 +83,8 @@ def fixes(at, t, rng, heading):
     if heading:
         off = np.radians(1.0) * rng.standard_normal() - np.pi / 2
         noise = np.radians(0.3)
-        told = _heading_of(at.C_nb @ [np.sin(off), np.cos(off), 0.0]) + noise * rng.standard_normal(len(t))
-        more = {"heading": told, "heading_sigma": np.full(len(t), noise)}
+        said = _heading_of(at.C_nb @ [np.sin(off), np.cos(off), 0.0]) + noise * rng.standard_normal(len(t))
+        more = {"heading": said, "heading_sigma": np.full(len(t), noise)}
     return GnssRecord(t, at.lat, at.lon, at.alt, v_n=v, velocity_sigma=sigma, **more)
 
 

@@ -123,10 +123,10 @@ def test_the_command_for_manoeuvres(capsys, monkeypatch, tmp_path):
     code, out = run_command(
         capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--speed", 200, "--json", "-o", tmp_path
     )
-    told = json.loads(out.out)["manoeuvres"]
+    said = json.loads(out.out)["manoeuvres"]
     assert code == 0
-    assert told["straight"]["reached_s"] is None  # heading is not observed without an acceleration
-    assert 20.0 < told["flat turn"]["reached_s"] < 40.0  # the turn begins at 20 s
+    assert said["straight"]["reached_s"] is None  # heading is not observed without an acceleration
+    assert 20.0 < said["flat turn"]["reached_s"] < 40.0  # the turn begins at 20 s
     assert {path.name for path in tmp_path.iterdir()} == {"advice.json", "advice.png"}
     code, out = run_command(capsys, monkeypatch, "advise", *where, "--heading", 0.2, "--attitude-noise", 3)
     assert code == 2

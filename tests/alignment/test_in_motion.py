@@ -183,7 +183,7 @@ def test_under_way_at_the_first_sample(ring):
 
 
 def test_driving_backwards():
-    """The wheel counts negative; one that counts magnitudes is told by a contradiction, not by a wrong heading."""
+    """The wheel counts negative; one that counts magnitudes is shown by a contradiction, not by a wrong heading."""
     legs = [{"kind": "straight", "duration": "5 s"}]
     for speed in ("6 m/s", "0 m/s", "9 m/s", "4 m/s"):
         legs += [

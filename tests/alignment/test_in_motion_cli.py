@@ -31,11 +31,11 @@ def test_align_and_go_on(files, tmp_path):
     common = ["--odometer", odometer, "--lat", 39.9, "--alt", 50, "--imu", "navigation"]
     result = call("align", log, *common, "--to", 200, "-o", tmp_path / "start", "--json")
     assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
-    assert told["status"] == "aligned"
-    assert told["heading_from"] == "the earth's rate"
-    assert told["odometer_scale_sigma"] < 1e-3
-    assert told["heading_sigma_deg"] < 1.0
+    said = json.loads(result.stdout)
+    assert said["status"] == "aligned"
+    assert said["heading_from"] == "the earth's rate"
+    assert said["odometer_scale_sigma"] < 1e-3
+    assert said["heading_sigma_deg"] < 1.0
     track = call(
         "navigate", log, "--start", tmp_path / "start", "--odometer", odometer, "--estimate", "scale", "--json"
     )
@@ -49,7 +49,7 @@ def test_align_and_go_on(files, tmp_path):
 
 
 def test_navigation_takes_the_wheel_over(files, tmp_path):
-    """Pulses are 2 % shorter than told: the alignment finds it, and navigation does not have to be told of it."""
+    """Pulses are 2 % shorter than given: the alignment finds it, and navigation takes it from there."""
     log, odometer = files / "imu.csv", tmp_path / "odo.csv"
     head, *rows = (files / "odo.csv").read_text().splitlines()
     size = head.split(",").index("pulse_size")
@@ -63,15 +63,15 @@ def test_navigation_takes_the_wheel_over(files, tmp_path):
     def speed_off(*options, code=0):
         track = call("navigate", log, "--start", tmp_path / "start", "--odometer", odometer, "--json", *options)
         assert track.exit_code == code, track.output
-        told = json.loads(track.stdout)
-        return np.hypot(*told["v_n_m_s"][:2]) / np.hypot(*truth.v_n[0, :2]) - 1.0, told["reasons"]
+        said = json.loads(track.stdout)
+        return np.hypot(*said["v_n_m_s"][:2]) / np.hypot(*truth.v_n[0, :2]) - 1.0, said["reasons"]
 
     for options in ([], ["--odometer-noise", "0.1"]):
         off, reasons = speed_off(*options)
         assert abs(off) < 0.004
         assert any("are the alignment's" in reason for reason in reasons)
         assert not any("warning" in reason for reason in reasons)
-    # Told how it sits, and with that how it counts: velocity is wrong by far more than its sigma.
+    # Given how it sits, and with that how it counts: velocity is wrong by far more than its sigma.
     _, reasons = speed_off("--mounting", "0,0,0", code=4)
     assert any("seems to count" in reason for reason in reasons)
 

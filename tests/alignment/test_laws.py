@@ -232,7 +232,7 @@ def test_at_the_pole_there_is_no_north():
 
 
 def test_convergence_ends_at_the_answer_without_the_bases_motion():
-    """What earlier epochs would have told of the final attitude: no trace of 10 deg of sway, and within the sigmas."""
+    """What earlier epochs would have said of the final attitude: no trace of 10 deg of sway, and within the sigmas."""
     log = simulate(SHIP, imu=imu_spec("navigation"), rate=50.0, duration=300.0, seed=4).record
     answer = align(log, XIAN, "navigation")
     angles, sigmas = answer.convergence

@@ -78,7 +78,7 @@ def simulate_errors(ship):
 
 
 def test_a_known_arm_gives_the_same(ship, answer):
-    """The arm is told by the sway itself; to know it changes nothing beyond a sigma."""
+    """The arm is shown by the sway itself; to know it changes nothing beyond a sigma."""
     aid = IndexerAid(ship.encoder, lever_arm=-ship.arm)  # from the IMU to the centre
     known = align(ship.record, ship.place, ship.imu, aid=aid)
     apart = rotation_vector_from_dcm(known.C_nb @ answer.C_nb.T) / ARCMIN

@@ -58,7 +58,7 @@ def test_mems_on_a_table_that_was_touched():
     assert answer.table.touch.time == pytest.approx(90.0, abs=6.0)
     assert 8.0 < answer.table.touch.size / MG < 18.0
     assert align_positions(record.between(95.0, None), position, MEMS).table.touch is None
-    assert "Positions()" in align(record, position, MEMS).method_reason  # who forgets it is told
+    assert "Positions()" in align(record, position, MEMS).method_reason  # who forgets it reads of it
 
 
 def test_xsens_two_directions_tell_offset_from_tilt():

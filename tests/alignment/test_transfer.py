@@ -167,9 +167,9 @@ def test_a_master_that_is_late_or_on_another_clock_is_recognised(real, found, of
 
 def test_a_known_delay_is_compensated_without_a_word(real, found):
     slave, master = real
-    told = align_transfer(slave, master.shifted(0.2), delay=0.2)
-    assert told.transfer.notes == ()
-    assert told.transfer.delay == pytest.approx(0.2 + found.transfer.delay, abs=1e-4)
+    said = align_transfer(slave, master.shifted(0.2), delay=0.2)
+    assert said.transfer.notes == ()
+    assert said.transfer.delay == pytest.approx(0.2 + found.transfer.delay, abs=1e-4)
 
 
 def _without(master, gone):
@@ -195,8 +195,8 @@ def test_a_jump_is_told_and_taken_up(real, found, size):
     result = align_transfer(slave, replace(master, v_n=v))
     assert result.status == "aligned"  # the rows until it is taken up are no drift of the slave's
     assert len(result.transfer.jumps) == 1
-    told = re.search(r"velocity jumped by (\S+) m/s", result.transfer.jumps[0])
-    assert float(told[1]) == pytest.approx(size, rel=0.05)
+    said = re.search(r"velocity jumped by (\S+) m/s", result.transfer.jumps[0])
+    assert float(said[1]) == pytest.approx(size, rel=0.05)
     np.testing.assert_allclose(rotation_vector_from_dcm(result.C_nb @ found.C_nb.T), 0, atol=2 * ARCMIN)
 
 
@@ -304,7 +304,7 @@ def test_the_answer_can_be_drawn_saved_and_told(found, tmp_path):
 
 
 def test_the_history_converges_on_the_answer(found):
-    """What each epoch told of the final attitude is within its sigmas: no epoch beyond five."""
+    """What each epoch said of the final attitude is within its sigmas: no epoch beyond five."""
     value, sigma = found.convergence
     late = found.history.time > 20
     assert np.all(np.abs(value - found.euler)[late] < 5 * sigma[late])

@@ -58,12 +58,12 @@ def test_static_alignment_has_the_published_rank(states, rank, scale):
     result = piecewise_observability([model.segment], size, model.names[:states], model.units[:states])
     assert result.rank.tolist() == result.stripped_rank.tolist() == [rank]
     assert {name for group in result.entangled for name in group.free} == {"eps_E", "nabla_E", "nabla_N"}
-    told = [str(c) for group in result.entangled for c in group.observable]
+    said = [str(c) for group in result.entangled for c in group.observable]
     # phi_E = -nabla_N/g, phi_N = nabla_E/g, phi_U = -eps_E/(w cos L) + phi_N tan L: what alignment is limited by.
-    assert "nabla_N + 9.81 m/s^2 * phi_E" in told
-    assert "nabla_E - 9.81 m/s^2 * phi_N" in told
+    assert "nabla_N + 9.81 m/s^2 * phi_E" in said
+    assert "nabla_E - 9.81 m/s^2 * phi_N" in said
     slope = 1.0 / (W_IE * np.cos(np.pi / 4))
-    assert f"phi_U + {slope:.3g} s * eps_E - 0.102 s^2/m * nabla_E" in told
+    assert f"phi_U + {slope:.3g} s * eps_E - 0.102 s^2/m * nabla_E" in said
     assert not {"dv_E", "dv_N"} & {name for group in result.entangled for name in group.states}
 
 

@@ -97,7 +97,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path):
     assert ends["status"][1] == "aligned"
 
 
-@pytest.mark.parametrize("others", [[], [REST]], ids=["alone", "beside a good one"])
+@pytest.mark.parametrize("others", [[], [REST]], ids=["alone", "with a good one"])
 def test_a_scenario_that_cannot_be_is_rows_and_does_not_spoil_the_report(tmp_path, others):
     """What is wrong with the motion shows when it is built, after the plan has been read."""
     impossible = REST | {"motion": {"kind": "legs", "legs": [{"kind": "turn", "angle": "9 deg", "rate": "-1 deg/s"}]}}
@@ -278,7 +278,7 @@ def test_a_base_that_sways_has_no_bound():
 
 @few_and_all(100)
 def test_the_bound_is_not_beaten_and_nearly_reached(tmp_path, runs):
-    """Still runs, a filter that is told the truth: RMS over the Cramer-Rao bound within its 99.9 % band of 1."""
+    """Still runs, a filter that is given the truth: RMS over the Cramer-Rao bound within its 99.9 % band of 1."""
     plan = PLAN | {"runs": runs, "block": 50, "methods": ["kalman"]}
     table = run_campaign(plan, tmp_path, workers=min(2, runs // 50 + 1)).summary.set_index("quantity")
     assert 0.5 < table.loc["nis", "mean"] < table.loc["nis", "ratio_high"]  # below 1: it allows for a base that sways

@@ -132,7 +132,7 @@ def test_the_prior_is_that_of_the_navigation():
 
 
 def test_the_augmented_filter_is_honest():
-    """30 runs with errors, biases and log error drawn from what it is told; NEES of 450 numbers in its 99.9 % band.
+    """30 runs with errors, biases and log error drawn from what it is given; NEES of 450 numbers in its 99.9 % band.
 
     Full strapdown at 10 s over 24 h, its course re-linearised midway; ARW .001 deg/sqrt(h), VRW 10 ug/sqrt(Hz).
     """

@@ -160,7 +160,7 @@ def test_both_hemispheres_east_and_west(lat, heading):
 
 @pytest.mark.parametrize("method", some(["double"], ["external", "kalman", "augmented"]))
 def test_a_sick_log(ship, method):
-    """Outliers, a jump of 1.1 m/s and two hours of silence: told, and what is left is near to a healthy log's."""
+    """Outliers, a jump of 1.1 m/s and two hours of silence: named, and what is left is near to a healthy log's."""
     healthy = ship.log()
     v = healthy.velocity.copy()
     hit = ship.rng.random(len(v)) < 0.01
@@ -211,7 +211,7 @@ def test_a_switch_later_than_the_start(ship):
 def test_a_real_recording():
     """A parked vehicle with people and engine: 300 s of alignment, 600 s of navigation, a zero log that is .1 m/s wrong.
 
-    The free INS has 6.1 m after ten minutes and .009 m/s RMS; the 15-state filter 2.7 m and .005, the log's error told to 1 cm/s.
+    The free INS has 6.1 m after ten minutes and .009 m/s RMS; the 15-state filter 2.7 m and .005, the log's error found to 1 cm/s.
     """
     record, place = rlg_vehicle_xian()
     start = align(record.between(None, 300.0), place, "navigation")
@@ -310,7 +310,7 @@ def test_from_the_shell(tmp_path):
     assert "Spectrum of the velocity" in page
     assert "Errors of the log" in page
     assert "Modes of" not in page  # a filter has none of its own here
-    told = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert told["damping"]["reference_error_m_s"] == pytest.approx([0.1, 0.1], abs=0.03)
+    said = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert said["damping"]["reference_error_m_s"] == pytest.approx([0.1, 0.1], abs=0.03)
     wrong = CliRunner().invoke(app, [*base, "strong"])
     assert isinstance(wrong.exception, UsageError)

@@ -1,4 +1,4 @@
-"""What a log does wrong is found, sized and told; a healthy one is left as it is."""
+"""What a log does wrong is found, sized and named; a healthy one is left as it is."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Lines that are put in are found; what a record cannot tell is not told. Modes under a filter's gain."""
+"""Lines that are put in are found; what a record cannot show is not named. Modes under a filter's gain."""
 
 import numpy as np
 import pytest

@@ -45,7 +45,7 @@ def flight():
 
 
 def measured(motion, dx, C_mb):
-    """z and H of a slave with errors `dx` beside a simulated master with the delay, arm, mounting and errors of `dx`."""
+    """z and H of a slave with errors `dx` against a simulated master with the delay, arm, mounting and errors of `dx`."""
     at = motion.states(np.array([T]))
     part = {name: dx[ALL.slice_of(name)] for name in ALL.groups}
     bent = dcm_from_rotation_vector(part[FLEXURE])

@@ -58,7 +58,7 @@ def test_what_a_sensors_error_does_to_the_velocity(ideal, state):
 
 
 def test_an_arm_is_seen_in_the_turns(ideal):
-    """An IMU beside the axes moves by C r: its mean velocity is what H says of the arm."""
+    """An IMU off the axes moves by C r: its mean velocity is what H says of the arm."""
     record, C = ideal
     system = _velocity(record, C)
     r = np.array([0.02, -0.01, 0.03])

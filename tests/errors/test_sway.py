@@ -48,7 +48,7 @@ def test_autocovariance_is_that_of_the_states(item):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_base_does_not_leave(order):
-    """What a velocity integrates to stays bounded: its spectrum at frequency zero is nothing beside that at the peak."""
+    """What a velocity integrates to stays bounded: its spectrum at frequency zero is nothing against that at the peak."""
     item = Oscillator(order, 0.03, 1.0, 0.05)
     A, h = dynamics(item), AxisMotion(1.0, (item,)).blocks(1.0)[3]
 

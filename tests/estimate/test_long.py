@@ -1,4 +1,4 @@
-"""Days of free inertial navigation: the periods of its errors, the error model beside it, steps halved."""
+"""Days of free inertial navigation: the periods of its errors, the error model against it, steps halved."""
 
 import numpy as np
 import pytest

@@ -240,7 +240,7 @@ def test_smoother_is_better_than_the_filter_and_as_honest(runs):
 
 
 def test_measurements_in_any_order_at_any_time():
-    """Rows in disorder give the bits of rows in order; late ones, told how late, those of the same rows in time."""
+    """Rows in disorder give the bits of rows in order; late ones, given how late, those of the same rows in time."""
     seconds = 60.0
     motion = flight(45.0, seconds)
     record = simulate(motion, rate=50.0, duration=seconds, imu=SPEC, seed=7).record

@@ -47,9 +47,9 @@ def test_near_the_vertical_the_combination_is_drawn(sign):
     assert found[0].value[-1] == pytest.approx(answer.azimuth[1], abs=1e-9)
     # The base is still, so that the attitude of each epoch tells the combination by itself.
     heading, _, roll = answer.history.euler.T
-    told = heading - sign * roll
-    late = slice(len(told) // 4, None)
-    difference = (found[0].value - told + np.pi) % (2 * np.pi) - np.pi
+    said = heading - sign * roll
+    late = slice(len(said) // 4, None)
+    difference = (found[0].value - said + np.pi) % (2 * np.pi) - np.pi
     scatter = np.ptp(found[0].value[late])
     assert np.max(np.abs(difference[late])) < 0.05 * scatter
 

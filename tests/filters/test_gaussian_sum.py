@@ -162,7 +162,7 @@ def test_an_unknown_azimuth_is_found(azimuth):
     x = found.hypotheses.x.copy()
     x[:, 0] = exact + (x[:, 0] - exact + np.pi) % (2.0 * np.pi) - np.pi
     laid = replace(found.hypotheses, x=x)
-    # Beside 10 deg of one hypothesis the tangent bends the velocity by 1.5 %: a tenth of a sigma after 20 epochs.
+    # At 10 deg of one hypothesis the tangent bends the velocity by 1.5 %: a tenth of a sigma after 20 epochs.
     assert abs(laid.mean[0] - exact) < 0.1 * sigma
     assert_allclose(np.sqrt(laid.covariance[0, 0]), sigma, rtol=0.05)
 

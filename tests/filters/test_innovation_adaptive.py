@@ -40,7 +40,7 @@ def test_limits_and_absent_rows():
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("factor", [0.1, 25.0])
 def test_a_wrong_noise_is_found(kind, factor):
-    # A random walk with R = 1, told `factor`; 20 runs of 2000 epochs with a window of 200. The estimate of a run scatters by
+    # A random walk with R = 1, given as `factor`; 20 runs of 2000 epochs with a window of 200. The estimate of a run scatters by
     # about sqrt(2/200) = 10 %, its mean over runs and ten windows by 1 %: bounds at 15 %.
     rng = np.random.default_rng(0)
     truth = np.cumsum(0.2 * rng.standard_normal((20, 2000)), axis=1)

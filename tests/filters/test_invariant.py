@@ -1,4 +1,4 @@
-"""Errors of the motion's own group: the invariant extended Kalman filter on SE(2), beside the ordinary one.
+"""Errors of the motion's own group: the invariant extended Kalman filter on SE(2), against the ordinary one.
 
 A vehicle in the plane knows its turns and body increments and sees its position: x = (azimuth, east, north). The left-
 invariant error is ``chi = chi_hat Exp(dx)``, with which the motion's Jacobian is ``Ad(U^-1)``, whatever the estimate

@@ -77,7 +77,7 @@ def test_variational_step_by_step():
 
 
 def drifting(noise: np.ndarray, seed: int = 0) -> tuple[LinearSystem, np.ndarray]:
-    """A random walk seen through noise whose variance over time is given; the filter is told 1."""
+    """A random walk seen through noise whose variance over time is given; the filter is given 1."""
     rng = np.random.default_rng(seed)
     truth = np.cumsum(0.3 * rng.standard_normal((200, len(noise))), axis=1)
     z = truth + np.sqrt(noise) * rng.standard_normal(truth.shape)
@@ -100,8 +100,8 @@ def test_a_change_of_noise_is_followed_and_pays(filter_):
     noise = np.where(np.arange(800) < 400, 1.0, 25.0)
     system, truth = drifting(noise, seed=1)
     estimates = filter_(system, history="sigma")
-    plain, told = kalman(system, history="sigma"), kalman(replace(system, R=noise[:, None, None]), history="sigma")
-    rms = [float(np.sqrt(np.mean((e.x[..., 0] - truth)[:, 550:] ** 2))) for e in (told, estimates, plain)]
+    plain, said = kalman(system, history="sigma"), kalman(replace(system, R=noise[:, None, None]), history="sigma")
+    rms = [float(np.sqrt(np.mean((e.x[..., 0] - truth)[:, 550:] ** 2))) for e in (said, estimates, plain)]
     assert rms[0] < rms[1] < 1.1 * rms[0] < rms[2]
     ratio = np.sqrt(np.mean(((estimates.x[..., 0] - truth) / estimates.sigma[..., 0])[:, 550:] ** 2))
     assert 0.85 < ratio < 1.2  # and its sigma is honest, where the plain filter's is twice too small

@@ -94,7 +94,7 @@ def test_chunks_give_the_bits_of_the_batch(by):
 
 
 def test_outliers_do_less_harm():
-    # One in ten measurements is 50 sigma off; errors of the last 300 of 400 epochs, beside those of the Kalman filter
+    # One in ten measurements is 50 sigma off; errors of the last 300 of 400 epochs, against those of the Kalman filter
     # that never met an outlier.
     rng = np.random.default_rng(0)
     truth = np.cumsum(0.1 * rng.standard_normal((100, 400)), axis=1)

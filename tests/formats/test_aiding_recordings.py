@@ -1,4 +1,4 @@
-"""Real aiding logs agree with themselves and with the IMU beside them."""
+"""Real aiding logs agree with themselves and with the IMU of the same vehicle."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Options and the YAML file beside a log: names, units, axes, rate, kind."""
+"""Options and the YAML file next to a log: names, units, axes, rate, kind."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def log(tmp_path):
     return path
 
 
-def beside(log, text):
+def nearby(log, text):
     log.with_suffix(".yaml").write_text(text, encoding="utf-8")
 
 
@@ -61,7 +61,7 @@ def test_kind_where_the_names_mislead(log):
 
 
 def test_the_file_beside_and_the_options_that_win(log):
-    beside(log, "units: {gyro: deg/s}\naxes: FRD\nkind: increments\nrate: 10 Hz\n")
+    nearby(log, "units: {gyro: deg/s}\naxes: FRD\nkind: increments\nrate: 10 Hz\n")
     with pytest.raises(UsageError, match="gyro increments cannot be in 'deg/s'"):
         read_imu(log)
     record = read_imu(log, kind="rates", axes="RFU")
@@ -70,7 +70,7 @@ def test_the_file_beside_and_the_options_that_win(log):
 
 
 def test_a_rate_makes_the_time_that_is_missing(log):
-    beside(log, "columns: {time: none_here}\nrate: 50 Hz\n")
+    nearby(log, "columns: {time: none_here}\nrate: 50 Hz\n")
     np.testing.assert_allclose(read_imu(log).time, np.arange(1, 6) / 50, rtol=1e-15)
     np.testing.assert_allclose(read_imu(log, rate=100).time, np.arange(1, 6) / 100, rtol=1e-15)
 
@@ -93,7 +93,7 @@ def test_a_rate_makes_the_time_that_is_missing(log):
     ],
 )
 def test_mistakes_in_the_file_beside(log, text, words):
-    beside(log, text)
+    nearby(log, text)
     with pytest.raises(DataError) as error:
         read_imu(log)
     for word in ("log.yaml", *words):

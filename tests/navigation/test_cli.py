@@ -62,9 +62,9 @@ def test_a_folder_with_all_results(capsys, monkeypatch, folder):
 def test_json_alone(folder):
     done = run("navigate", folder / "log.parquet", "--start", folder / "start", "--json", "--zupt", "200-260")
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["stops_s"] == 60
-    assert abs(told["lat_deg"] - 48.0) * 111e3 < 1.0
+    shown = json.loads(done.stdout)
+    assert shown["stops_s"] == 60
+    assert abs(shown["lat_deg"] - 48.0) * 111e3 < 1.0
 
 
 @pytest.mark.parametrize(

@@ -81,9 +81,9 @@ def test_odometer_bounds_what_free_inertial_does_not(drive):
     for result in (free, aided):
         assert np.all(np.abs(metres_off(result, motion)[:2]) < 4 * result.position_sigma[-1, :2])
     assert np.hypot(*aided.position_sigma[-1, :2]) < 0.2 * np.hypot(*free.position_sigma[-1, :2])
-    told = aided.estimated()
+    said = aided.estimated()
     for name, true in (("odometer scale", [0.02]), ("odometer mounting", None)):
-        value, sigma = (np.array(told[name][key]) for key in ("value", "sigma"))
+        value, sigma = (np.array(said[name][key]) for key in ("value", "sigma"))
         if true is not None:
             assert np.all(np.abs(value - true) < 4 * sigma)
         assert np.all(sigma < 0.01)
@@ -93,7 +93,7 @@ def test_odometer_bounds_what_free_inertial_does_not(drive):
 
 
 def test_gnss_with_a_latency_and_a_clock_offset(drive):
-    """An offset of 300 ms is told with its sign; given, or as latency, it is gone."""
+    """An offset of 300 ms is found with its sign; given, or as latency, it is gone."""
     motion, record, start = drive
     time = np.arange(1.0, 179.0)
     late = fixes(motion, time, sigma=0.3).shifted(0.3)

@@ -1,4 +1,4 @@
-"""Our mechanisation beside python-ins on that project's own sine-velocity motion, an hour at 100 Hz."""
+"""Our mechanisation against python-ins on that project's own sine-velocity motion, an hour at 100 Hz."""
 
 from dataclasses import replace
 

@@ -14,7 +14,7 @@ from truenorth.records import GnssRecord
 def test_ring_laser_on_a_parked_vehicle():
     """Aligned on 300 s, then free inertial for 600 s: it drifts 7 m and .03 m/s, and its sigma says so (15 m, .06 m/s).
 
-    With its stops told it stays where it is: the sigma of velocity is that of the updates.
+    With its stops given it stays where it is: the sigma of velocity is that of the updates.
     """
     record, position = recordings.rlg_vehicle_xian()
     start = align(record.between(None, 300.0), position, "navigation")
@@ -89,18 +89,18 @@ def _without(gnss, start, stop):
 
 def test_car_with_gnss_and_odometer(car):
     """Innovations no larger than expected, smaller where the receiver's dilutions say more than it errs by; the car looks where it
-    drives; the record's gap is bridged and told."""
+    drives; the record's gap is bridged and named."""
     imu, odometer, gnss, start, wheel = car
     result = navigate(
         imu, start, aid=[Gnss(gnss, RECEIVER), Odometer(odometer, wheel)], imu="consumer", zupt=[(1.0, 20.0)]
     )
     assert result.status == "navigated", result.reasons
     assert len(result.gaps) == 1
-    told = result.summary()["aiding"]
-    assert told["GNSS position"]["rejected"] == 0
-    assert told["odometer"]["rejected"] < 30
+    said = result.summary()["aiding"]
+    assert said["GNSS position"]["rejected"] == 0
+    assert said["odometer"]["rejected"] < 30
     for name in ("GNSS position", "odometer"):
-        assert 0.2 < told[name]["nis_over_rows"] < 1.5
+        assert 0.2 < said[name]["nis_over_rows"] < 1.5
     forward = np.einsum("kij,j->ki", result.C_nb, wheel.C_mb[1])
     fast = np.hypot(result.v_n[:, 0], result.v_n[:, 1]) > 4.0
     course = np.arctan2(result.v_n[fast, 0], result.v_n[fast, 1])

@@ -1,4 +1,4 @@
-"""What the data say of clocks, arms, scales and mountings that were taken for known: told with figures and the option."""
+"""What the data say of clocks, arms, scales and mountings that were taken for known: named with figures and the option."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -53,16 +53,16 @@ def test_a_wheel_given_in_centimetres_and_a_clock_are_told_apart(drive):
     motion, record, start = drive
     odometer = wheel_log(motion, (-0.5, 0.0, 0.0))
 
-    def told(log, arm):
+    def said(log, arm):
         return warnings(
             navigate(record, start, aid=Odometer(log, Mounting(lever_arm=np.array(arm))), imu=SPEC, altitude="fixed")
         )
 
-    assert told(odometer, (-0.5, 0.0, 0.0)) == []
-    (words,) = told(odometer, (-50.0, 0.0, 0.0))
+    assert said(odometer, (-0.5, 0.0, 0.0)) == []
+    (words,) = said(odometer, (-50.0, 0.0, 0.0))
     assert "lever arm of the odometer" in words
     assert "was it given in centimetres?" in words
-    (words,) = told(odometer.shifted(0.25), (-0.5, 0.0, 0.0))
+    (words,) = said(odometer.shifted(0.25), (-0.5, 0.0, 0.0))
     assert words.startswith("the clock of the odometer seems 0.25")
     assert "late: shift the times of that log by -0.25" in words
 
@@ -111,9 +111,9 @@ def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
         "velocity": Mounting(),
         "baro": Mounting(),
     }
-    told = sentences(second_look(lambda loose: found, found, mounting))
-    assert len(told) == bool(words)
-    assert all(word in told[0] for word in words)
+    said = sentences(second_look(lambda loose: found, found, mounting))
+    assert len(said) == bool(words)
+    assert all(word in said[0] for word in words)
     known = mounting | {"gnss": replace(mounting["gnss"], lever_arm_sigma=1.0)}
     assert second_look(lambda loose: found, found, known) == []
 
@@ -130,7 +130,7 @@ def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
 
 
 def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
-    """A drift of 1.5 m over 60 s: the sigma is too small, until it is said; by chance it is told of white fixes once in 3e4."""
+    """A drift of 1.5 m over 60 s: the sigma is too small, until it is said; by chance it is said of white fixes once in 3e4."""
     motion, record, start = drive
     time = np.arange(1.0, 179.0)
     white = fixes(motion, time, 1.0)
@@ -144,11 +144,11 @@ def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
         alt=white.alt + drift[:, 2],
     )
     assert not any("are correlated" in words for words in warnings(navigate(record, start, aid=Gnss(white), imu=SPEC)))
-    told = [
+    said = [
         words for words in warnings(navigate(record, start, aid=Gnss(wandering), imu=SPEC)) if "are correlated" in words
     ]
-    assert len(told) == 1
-    assert "give the size and the time of that wander" in told[0]
+    assert len(said) == 1
+    assert "give the size and the time of that wander" in said[0]
     antenna = Mounting(bias_sigma=1.5, bias_time=60.0)
     assert not any(
         "are correlated" in w for w in warnings(navigate(record, start, aid=Gnss(wandering, antenna), imu=SPEC))

@@ -84,7 +84,7 @@ def test_height_does_not_wander_while_the_vehicle_stands(standing):
 
 
 def test_an_ins_that_falls_for_minutes_is_no_fault_of_the_aiding(standing):
-    """A start of poor biases, with an odometer: what the log's axes are is told by the first seconds or not at all."""
+    """A start of poor biases, with an odometer: what the log's axes are is shown by the first seconds or not at all."""
     sigma = np.repeat([5e-3, 0.1, 1.0, 5e-3, 0.5], 3)
     C = rest(PLACE, 0.6).states(0.0).C_nb
     start = Start(

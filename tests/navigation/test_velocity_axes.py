@@ -1,4 +1,4 @@
-"""Velocities in other axes are told by the IMU's own changes of velocity; those that are right never are."""
+"""Velocities in other axes are shown by the IMU's own changes of velocity; those that are right never are."""
 
 import numpy as np
 import pytest

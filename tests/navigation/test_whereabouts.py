@@ -18,7 +18,7 @@ R = 6.38e6
 
 
 def journey(noise=0.3, v=(9.0, 5.0, 0.6), seed=0):
-    """Fixes and velocities on a road that goes up and down, from 40 m beside the place."""
+    """Fixes and velocities on a road that goes up and down, from 40 m away from the place."""
     rng = np.random.default_rng(seed)
     v_n = np.array(v) * [1.0, 1.0, 0.0] + np.outer(np.cos(T / 5.0), [0.0, 2.0, v[2]])
     way = np.vstack([np.full(3, 40.0), 40.0 + np.cumsum(0.5 * (v_n[1:] + v_n[:-1]), axis=0)])

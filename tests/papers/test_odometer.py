@@ -1,4 +1,4 @@
-"""System 5: the paper's model in its loop, the invariant filter beside it, and the study as a whole."""
+"""System 5: the paper's model in its loop, the invariant filter in the same, and the study as a whole."""
 
 import numpy as np
 import pandas as pd
@@ -78,8 +78,8 @@ def test_study(tmp_path):
     assert cases <= set(table["case"])
     key = ["case", "method", "noise", "time_s", "quantity", "statistic"]
     assert not table.duplicated(key).any()
-    told = table[(table["quantity"] == "heading") & (table["statistic"] == "value") & (table["case"] == "paper_table")]
-    assert set(told["paper"].dropna()) == {5.5541, 5.7304}
+    said = table[(table["quantity"] == "heading") & (table["statistic"] == "value") & (table["case"] == "paper_table")]
+    assert set(said["paper"].dropna()) == {5.5541, 5.7304}
     assert {claim.verdict for claim in study.claims if claim.runs >= 6} <= {"holds", "does not hold", "holds in part"}
     names = {path.name for path in study.save(tmp_path)}
     drawings = {"figures_1_to_4.png", "starts.png", "open_choices.png"}

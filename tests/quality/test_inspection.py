@@ -235,7 +235,7 @@ def test_the_summary_is_cheap():
 
 @few_and_all(3, few=1)
 def test_waves_do_not_carry_a_moored_ship_away(runs):
-    """A swell that shakes the mast by .1 m/s^2 and turns the hull by a fifth of a degree; a start of a van, beside it."""
+    """A swell that shakes the mast by .1 m/s^2 and turns the hull by a fifth of a degree; a start of a van, for comparison."""
     from truenorth.quality.regimes import motion_summary
 
     for run in range(runs):

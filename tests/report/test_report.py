@@ -111,7 +111,7 @@ def test_figures_have_no_exponent(value, shown):
 
 
 def test_a_result_without_history_leaves_none_of_an_earlier_one(aligned, levelled, tmp_path):
-    """Else the folder would hold the summary of one log beside the history of another."""
+    """Else the folder would hold the summary of one log with the history of another."""
     save(aligned, tmp_path)
     assert (tmp_path / "history.parquet").exists()
     assert [p.name for p in save(levelled, tmp_path)] == ["summary.json", "report.html", "result.npz"]

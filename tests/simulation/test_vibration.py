@@ -15,7 +15,7 @@ BASE = {"name": "engine", "duration": "60 s", "position": {"lat": "45 deg"}, "mo
 
 
 def felt(vibration, rate, duration):
-    """Specific force beside that of a base at rest, m/s^2, at sample times."""
+    """Specific force minus that of a base at rest, m/s^2, at sample times."""
     t = np.arange(round(rate * duration)) / rate
     still = read_scenario(BASE).build_motion().states(t)
     shaken = read_scenario(BASE | {"disturbances": [{"kind": "vibration", **vibration}]}).build_motion().states(t)

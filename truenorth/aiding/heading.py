@@ -35,8 +35,8 @@ def _heading(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: An
     rate = (u[1] * v[0] - u[0] * v[1]) / level
     s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
     lag = lag_now(now, assumed, at[AT_LAG])
-    told = atan2(c * u[0] - s * u[1], s * u[0] + c * u[1]) - lag * rate
-    off = told + state_of(assumed, at[AT_BIAS]) - measured[0]
+    said = atan2(c * u[0] - s * u[1], s * u[0] + c * u[1]) - lag * rate
+    off = said + state_of(assumed, at[AT_BIAS]) - measured[0]
     z[0] = (off + pi) % (2.0 * pi) - pi
     H[0, _PHI] = -u[2] * u[0] / level
     H[0, _PHI + 1] = -u[2] * u[1] / level

@@ -99,8 +99,8 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         states = states_of(mounting, "GNSS", "lag")
         if mounting.angle_sigma > 0.0:
             states["bias"] = Group("GNSS heading bias", np.array([mounting.angle_sigma]), unit="rad")
-        told = None if record.heading_sigma is None else record.heading_sigma[:, None]
-        sigma = np.tile(_or_default(told, np.array([HEADING_SIGMA]), len(record)), 3)
+        said = None if record.heading_sigma is None else record.heading_sigma[:, None]
+        sigma = np.tile(_or_default(said, np.array([HEADING_SIGMA]), len(record)), 3)
         found.append(
             Aiding(
                 "GNSS heading",
@@ -262,8 +262,8 @@ def _position_sigma(record: GnssRecord, default: Array) -> Array:
     if record.position_sigma is None and record.dop is not None:
         # A horizontal dilution is that of both axes together.
         h, v = record.dop[:, :1] / np.sqrt(2.0), record.dop[:, 1:]
-        told = USER_RANGE * np.hstack([h, h, v])
-        sigma = np.where(np.isfinite(told), told, sigma)
+        said = USER_RANGE * np.hstack([h, h, v])
+        sigma = np.where(np.isfinite(said), said, sigma)
     return sigma
 
 

@@ -1,6 +1,6 @@
 """What a pass over the log teaches of its sensors before the next one: how noisy they are, and how late a receiver is.
 
-Innovations of a right model are white. Errors of the model are slow beside the rows of a sensor, noise of the sensor is not: half
+Innovations of a right model are white. Errors of the model are slow against the rows of a sensor, noise of the sensor is not: half
 the mean square of the *difference* of innovations that follow each other is the part that is white. Where it is ``q`` times as
 large as the variances ``S = H P H' + R`` say, R is ``1 + (q - 1) S / R`` times too small, and the next pass takes it as large. What
 is slow is left to the verdict (:mod:`truenorth.quality.innovations`).

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 BLOCKS = 40  # into which a position is cut
 SHORTEST = 12  # blocks that say what is usual
-BESIDE = 3  # blocks on either side whose means are compared, ...
+ASIDE = 3  # blocks on either side whose means are compared, ...
 GAP = 2  # ... and between them, for what takes its time
 SETTLED = 5.0  # s after a touch from which the table is at rest again
 FACTOR = 10.0  # of the usual scatter of such differences: a false alarm in less than 1e-5 of logs with Gaussian noise
@@ -68,15 +68,15 @@ def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
         return None
     blocks = force[: count * length].reshape(count, length, 2).mean(axis=1)
     sums = np.concatenate([np.zeros((1, 2)), np.cumsum(blocks, axis=0)])
-    before = (sums[BESIDE:] - sums[:-BESIDE])[: -BESIDE - GAP] / BESIDE
-    after = (sums[BESIDE:] - sums[:-BESIDE])[BESIDE + GAP :] / BESIDE
+    before = (sums[ASIDE:] - sums[:-ASIDE])[: -ASIDE - GAP] / ASIDE
+    after = (sums[ASIDE:] - sums[:-ASIDE])[ASIDE + GAP :] / ASIDE
     steps = after - before
     size = np.linalg.norm(steps, axis=1)
     # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
-    usual = np.median(np.abs(np.diff(blocks, axis=0)), axis=0) / 0.6745 / math.sqrt(BESIDE)
+    usual = np.median(np.abs(np.diff(blocks, axis=0)), axis=0) / 0.6745 / math.sqrt(ASIDE)
     scatter = float(np.linalg.norm(usual))
     best = int(np.argmax(size))
     if size[best] < max(FACTOR * scatter, STILL_ANGLE * gravity):
         return None
-    middle = (best + BESIDE) * length + GAP * length // 2
+    middle = (best + ASIDE) * length + GAP * length // 2
     return Touch(float(time[middle]), steps[best], scatter)

@@ -247,14 +247,14 @@ def _open(last: LastPass) -> tuple[str, ...]:
     system = system_along(middle, at, T, model, P0, R, assumed.lever_arm, assumed.C_mb, what.kind)
     seen = seen_states(model, what.kind)
     names = [WORDS[model.names[i]] for i in seen]
-    told = observability(system, names, [model.units[i] for i in seen])
+    said = observability(system, names, [model.units[i] for i in seen])
     quiet = set()  # what nothing is expected of
     if what.translation in (None, "acceleration"):
         quiet |= {WORDS[f"dv_{axis}"] for axis in "ENU"}
     if what.translation is None:
         quiet |= {WORDS[f"nabla_{axis}"] for axis in "xyz"}
-    unseen = [group.states[0] for group in told.hardly if len(group.states) == 1 and group.states[0] not in quiet]
-    words = [str(group) for group in told.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
+    unseen = [group.states[0] for group in said.hardly if len(group.states) == 1 and group.states[0] not in quiet]
+    words = [str(group) for group in said.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
     if unseen:
         words.append(f"not seen at all: {', '.join(unseen)}")
     return (*words, *_tied(names, track.last_P[np.ix_(seen, seen)], quiet | set(unseen)))
@@ -271,9 +271,9 @@ def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
         while group != grown:
             grown, group = group, {int(j) for i in group for j in np.flatnonzero(tied[i])}
         left -= group
-        told = [names[i] for i in sorted(group) if names[i] not in quiet]
-        if len(told) > 1:
-            listed = f"{', '.join(told[:-1])} and {told[-1]}"
+        said = [names[i] for i in sorted(group) if names[i] not in quiet]
+        if len(said) > 1:
+            listed = f"{', '.join(said[:-1])} and {said[-1]}"
             found.append(f"{listed} are known together far better than each alone (correlation above {TIED})")
     return tuple(found)
 

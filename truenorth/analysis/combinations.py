@@ -61,9 +61,9 @@ class Entangled:
     def __str__(self) -> str:
         if not self.observable:
             return f"{_listed(self.states)} {'is' if len(self.states) == 1 else 'are'} not seen at all"
-        told = _listed([str(c) for c in self.observable])
+        said = _listed([str(c) for c in self.observable])
         be = "is" if len(self.observable) == 1 else "are"
-        return f"of {_listed(self.states)} only {told} {be} observable"
+        return f"of {_listed(self.states)} only {said} {be} observable"
 
 
 def entangled_states(

@@ -70,17 +70,17 @@ def cramer_rao(system: LinearSystem) -> CramerRao:
     out = np.empty((epochs, n, n))
     for k in range(epochs):
         Phi, Q_k = _epoch(system.Phi, k, 2), Q[k if len(Q) > 1 else 0]
-        told = np.mean(_told(system, k), axis=0)
+        said = np.mean(_said(system, k), axis=0)
         mean = Phi.mean(axis=0)
         if np.all(np.abs(Phi - mean) <= SAME * np.abs(mean).max()):
-            J = _inverse(mean @ _inverse(J, _LOST) @ mean.T + Q_k, f"Phi P Phi' + Q is singular at epoch {k}") + told
+            J = _inverse(mean @ _inverse(J, _LOST) @ mean.T + Q_k, f"Phi P Phi' + Q is singular at epoch {k}") + said
         else:
             noise = _inverse(
                 Q_k, f"Q is singular at epoch {k} while Phi differs from run to run: the bound degenerates"
             )
             D11 = np.mean(np.swapaxes(Phi, -1, -2) @ noise @ Phi, axis=0)
             D12 = -mean.T @ noise
-            J = noise - D12.T @ np.linalg.solve(J + D11, D12) + told
+            J = noise - D12.T @ np.linalg.solve(J + D11, D12) + said
         J = symmetric(J)
         out[k] = _inverse(J, _LOST)
     return CramerRao(out, np.sqrt(np.diagonal(out, axis1=-2, axis2=-1)))
@@ -149,7 +149,7 @@ def _epoch(a: Array, k: int, core: int) -> Array:
     return flat[:, k if flat.shape[1] > 1 else 0]
 
 
-def _told(system: LinearSystem, k: int) -> Array:
+def _said(system: LinearSystem, k: int) -> Array:
     """(runs or 1, n, n) ``H' R^-1 H`` of the rows present."""
     absent = np.isnan(_epoch(system.z, k, 1))
     R = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), _epoch(system.R, k, 2))

@@ -189,9 +189,9 @@ class Plan(Strict):
         return tuple(result)
 
     def _scenario(self, source: str | dict[str, Any]) -> dict[str, Any]:
-        beside = self._folder / source if isinstance(source, str) else None
+        nearby = self._folder / source if isinstance(source, str) else None
         try:
-            scenario = read_scenario(beside if beside is not None and beside.is_file() else source)
+            scenario = read_scenario(nearby if nearby is not None and nearby.is_file() else source)
         except TruenorthError as error:
             raise DataError(f"{self._source}: scenarios: {error}") from None
         resolved = scenario.to_mapping()

@@ -43,7 +43,7 @@ class Campaign(Shown):
     def summary(self) -> pd.DataFrame:
         """Statistics over runs of each quantity; see :func:`truenorth.campaign.summarise`.
 
-        Beside the attitude errors on a base at rest stands the Cramer-Rao ``bound`` of the case, see
+        Next to the attitude errors on a base at rest stands the Cramer-Rao ``bound`` of the case, see
         :mod:`truenorth.campaign.bound`, and how many times as large the RMS is, ``rms_over_bound``.
         """
         from truenorth.campaign.bound import bounds

@@ -320,11 +320,11 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     for name in ("heading", "pitch", "roll"):
         table.add_row(_(name), f"{s[f'{name}_deg']:.4f} deg", f"{s[f'{name}_sigma_deg']:.4f} deg")
     console.print(table)
-    for name, told in s["aiding"].items():
-        used = told["nis_over_rows"] is not None
-        nis = _("NIS over rows {nis:.2f}").format(nis=told["nis_over_rows"]) if used else _("none used")
+    for name, noted in s["aiding"].items():
+        used = noted["nis_over_rows"] is not None
+        nis = _("NIS over rows {nis:.2f}").format(nis=noted["nis_over_rows"]) if used else _("none used")
         counts = _("{name}: {count} measurements, {rejected} rejected, {nis}")
-        said = counts.format(name=_(name), count=told["measurements"], rejected=told["rejected"], nis=nis)
+        said = counts.format(name=_(name), count=noted["measurements"], rejected=noted["rejected"], nis=nis)
         console.print(said, soft_wrap=True)
     for name, value, sigma in estimated_rows(result):
         console.print(

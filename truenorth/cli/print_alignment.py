@@ -86,9 +86,9 @@ def print_moving(console: Console, result: Alignment) -> None:
         "{sensor}: scale {scale:+.3f} ± {scale_sigma:.2g} %; IMU on the vehicle: heading {yaw:.3f} ± {sigma_yaw:.2g} deg, pitch "
         "{pitch:.3f} ± {sigma_pitch:.2g} deg"
     )
-    told = {"yaw": yaw, "sigma_yaw": sigma_yaw, "pitch": pitch, "sigma_pitch": sigma_pitch}
+    said = {"yaw": yaw, "sigma_yaw": sigma_yaw, "pitch": pitch, "sigma_pitch": sigma_pitch}
     scale = {"scale": 100 * wheel.scale, "scale_sigma": 100 * wheel.scale_sigma}
-    console.print(sits.format(sensor=_(wheel.sensor), **scale, **told), soft_wrap=True)
+    console.print(sits.format(sensor=_(wheel.sensor), **scale, **said), soft_wrap=True)
 
 
 def print_table(console: Console, result: Alignment) -> None:
@@ -130,7 +130,7 @@ def print_table(console: Console, result: Alignment) -> None:
 def print_transfer(console: Console, transfer: Transfer) -> None:
     """Delay, lever arm and mounting, each with its sigma, or that it was not estimated or not matched."""
 
-    def told(name: str, value: float, sigma: float, estimated: bool) -> str:
+    def said(name: str, value: float, sigma: float, estimated: bool) -> str:
         if sigma == 0.0:
             return _("{name} {value:.4g} (as given)").format(name=name, value=value)
         # A delay of hours is known to a millisecond: as many digits as the sigma has.
@@ -140,7 +140,7 @@ def print_transfer(console: Console, transfer: Transfer) -> None:
         return _("{name} not estimated (± {sigma:.3g})").format(name=name, sigma=sigma)
 
     s = transfer.summary()
-    delay = told("", s["delay_ms"], s["delay_sigma_ms"], s["delay_estimated"]).strip()
+    delay = said("", s["delay_ms"], s["delay_sigma_ms"], s["delay_estimated"]).strip()
     console.print(f"{_('delay, ms')}: {delay}", soft_wrap=True)
     for title, key, unit, names, blind in (
         (_("lever arm, m"), "lever_arm", "m", (_("right"), _("forward"), _("up")), ("attitude",)),
@@ -157,5 +157,5 @@ def print_transfer(console: Console, transfer: Transfer) -> None:
             console.print(unseen, soft_wrap=True)
             continue
         columns = (s[f"{key}_{unit}"], s[f"{key}_sigma_{unit}"], s[f"{key}_estimated"])
-        parts = [told(*row) for row in zip(names, *columns, strict=True)]
+        parts = [said(*row) for row in zip(names, *columns, strict=True)]
         console.print(f"{title}: {', '.join(parts)}", soft_wrap=True)

@@ -136,10 +136,10 @@ class Sensors:
         from truenorth.formats import read_gnss, read_height, read_odometer, read_velocity
 
         antenna, wheel = self.antenna(), self.wheel()
-        told = self.wheel_arm is not None or self.mounting is not None
-        told = told or bool(self.parts & {"scale", "mounting", "lever_arm"})
-        known = told or found is None or self.odometer_noise is not None
-        sits = replace(wheel if told or found is None else found, noise=self.odometer_noise) if known else None
+        said = self.wheel_arm is not None or self.mounting is not None
+        said = said or bool(self.parts & {"scale", "mounting", "lever_arm"})
+        known = said or found is None or self.odometer_noise is not None
+        sits = replace(wheel if said or found is None else found, noise=self.odometer_noise) if known else None
         aids: list[Any] = []
         if self.gnss is not None:
             aids.append(Gnss(read_gnss(self.gnss), antenna))

@@ -80,9 +80,9 @@ def retold(message: str) -> str:
 
 def _fitting(message: str) -> tuple[int, str, tuple[str, ...]] | None:
     """The most telling template that a message was made from: its fixed characters, its translation, the figures."""
-    for pieces, pattern, told in _templates(_chosen.get()):
+    for pieces, pattern, said in _templates(_chosen.get()):
         if all(piece in message for piece in pieces) and (match := re.fullmatch(pattern, message, re.DOTALL)):
-            return sum(map(len, pieces)), told, match.groups()
+            return sum(map(len, pieces)), said, match.groups()
     return None
 
 
@@ -90,10 +90,10 @@ def _fitting(message: str) -> tuple[int, str, tuple[str, ...]] | None:
 def _templates(code: str) -> list[tuple[list[str], str, str]]:
     """Of each template the fixed pieces, a pattern that gives its figures, and its translation; the most telling first."""
     found = []
-    for text, told in _catalogue(code)._catalog.items():  # type: ignore[attr-defined]
+    for text, said in _catalogue(code)._catalog.items():  # type: ignore[attr-defined]
         if isinstance(text, str) and "{0}" in text:
             pieces = [piece.replace("{{", "{").replace("}}", "}") for piece in re.split(r"\{\d+\}", text)]
-            found.append((pieces, "(.*?)".join(map(re.escape, pieces)), told))
+            found.append((pieces, "(.*?)".join(map(re.escape, pieces)), said))
     return sorted(found, key=lambda entry: -sum(map(len, entry[0])))
 
 

@@ -74,11 +74,11 @@ def validated(model: type[M], content: Any, where: str) -> M:
 
 
 def _message(model: type[BaseModel], content: Any, problem: Any, where: str) -> str:
-    path, beside, field = _locate(model, content, problem["loc"])
+    path, siblings, field = _locate(model, content, problem["loc"])
     kind = problem["type"]
     if kind == "extra_forbidden":
         parent = path[: path.rfind(".") + 1]
-        return unknown_key(where, path, [parent + key for key in beside])
+        return unknown_key(where, path, [parent + key for key in siblings])
     if kind == "missing":
         example = next((str(x) for x in getattr(field, "metadata", ()) if isinstance(x, _Unit)), None)
         such = f", such as {path.rpartition('.')[2]}: {example}" if example else ""
@@ -103,7 +103,7 @@ def _locate(model: type[BaseModel], content: Any, loc: tuple[int | str, ...]) ->
 
     The library's location holds the tag of each union that it went through; the path of a person does not.
     """
-    path, beside, field = "", list(model.model_fields), None
+    path, siblings, field = "", list(model.model_fields), None
     at: list[type[BaseModel]] = [model]
     for step in loc:
         if len(at) > 1 and isinstance(content, Mapping) and step == content.get("kind"):
@@ -111,14 +111,14 @@ def _locate(model: type[BaseModel], content: Any, loc: tuple[int | str, ...]) ->
             continue
         path += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if path else step
         if isinstance(step, str):
-            beside = list(dict.fromkeys(name for m in at for name in m.model_fields))
+            siblings = list(dict.fromkeys(name for m in at for name in m.model_fields))
             field = next((m.model_fields[step] for m in at if step in m.model_fields), None)
             at = [] if field is None else list(models_in(field.annotation))
         try:
             content = content[step]
         except (KeyError, IndexError, TypeError):
             content = None
-    return path, beside, field
+    return path, siblings, field
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:

@@ -104,7 +104,7 @@ class Damping:
 
     def summary(self) -> dict[str, Any]:
         """One dictionary, ready for JSON."""
-        told: dict[str, Any] = {
+        said: dict[str, Any] = {
             "method": self.damper.method,
             "switch_s": self.switch,
             "schuler_periods_min": [None if np.isnan(x) else x / 60.0 for x in self.lines],
@@ -119,7 +119,7 @@ class Damping:
             ],
         }
         if self.reference is not None:
-            told["reference"] = {
+            said["reference"] = {
                 "noise_m_s": self.reference.noise,
                 "outliers": self.reference.outliers,
                 "jumps": [list(jump) for jump in self.reference.jumps],
@@ -127,11 +127,11 @@ class Damping:
                 "rejected": self.rejected,
             }
         if self.reference_error is not None and self.reference_error_sigma is not None:
-            told["reference_error_m_s"] = self.reference_error.tolist()
-            told["reference_error_sigma_m_s"] = self.reference_error_sigma.tolist()
+            said["reference_error_m_s"] = self.reference_error.tolist()
+            said["reference_error_sigma_m_s"] = self.reference_error_sigma.tolist()
         if self.log is not None:
             ends = {name: self.log.last(name) for name in self.log.names}
-            told["log"] = {name: {"value": x.tolist(), "sigma": e.tolist()} for name, (x, e) in ends.items()}
+            said["log"] = {name: {"value": x.tolist(), "sigma": e.tolist()} for name, (x, e) in ends.items()}
         if self.switching is not None:
-            told["switches"] = [s._asdict() for s in self.switching.switches]
-        return told
+            said["switches"] = [s._asdict() for s in self.switching.switches]
+        return said

@@ -92,7 +92,7 @@ def axis_groups(spec: ImuSpec, force: ArrayLike, *, always: bool = False) -> tup
     force : (3,) array, m/s^2
         Specific force at rest as the vehicle stands at the start, body axes.
     always : bool
-        Those whose effect is small beside the sensor's own noise, too.
+        Those whose effect is small against the sensor's own noise, too.
     """
     gyro, accel = axis_sigma(spec)
     found = []

@@ -58,8 +58,8 @@ def taken_apart(model: InsModel, P15: Array, bias: Array, whole: WholeBiases) ->
         s = np.diag(P)[slow].copy()
         process = model.groups[model.layout.names.index(name)]
         mean, late = time_average(whole.averaged / process.correlation_time)
-        told = c + mean * s  # variance a priori of what the data see
-        a, b = c / told, late * s / told
+        said = c + mean * s  # variance a priori of what the data see
+        a, b = c / said, late * s / said
         M[group, group], M[slow, group] = np.diag(a), np.diag(b)
         P[group, group] = np.diag(c * (1.0 - a))
         P[slow, slow] = np.diag(s * (1.0 - late * b))

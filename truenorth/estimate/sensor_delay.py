@@ -2,7 +2,7 @@
 
 On a base that stays gravity says it (:mod:`truenorth.quality.tilt`). On the move the aiding measurements do: gyros that are late by
 ``d`` leave the attitude behind by ``w d`` while the vehicle turns, and the specific force is resolved along axes of another moment.
-Twice the logarithm of a likelihood ratio is a parabola of the delay as long as that is short beside a turn; from the ends of a
+Twice the logarithm of a likelihood ratio is a parabola of the delay as long as that is short against a turn; from the ends of a
 ladder of delays it leads to the likeliest one. Each rival is one fixed shift: by chance it exceeds c in less than exp(-c / 2) of
 sound logs (Markov's inequality). That holds of measurements that are the same for all rivals. The mean rates of the gyros
 themselves while nothing turns are not: each shift averages other rows of their noise. A delay does nothing to them, and they do

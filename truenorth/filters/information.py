@@ -118,7 +118,7 @@ def information(
         if system.u is not None:
             y = y + times(M, _at(system.u, k, 1))
         Y, y = _spread(M, y, _root(_at(system.Q, k, 2)))
-        dY, dy = _told(system, k)
+        dY, dy = _said(system, k)
         Y, y = Y + dY, y + dy
         ys[..., k if kept > 1 else 0, :], Ys[..., k if kept > 1 else 0, :, :] = y, Y
     x, sigma, P = determined(ys, Ys)
@@ -148,7 +148,7 @@ def information_behind(system: LinearSystem) -> InformationState:
     n, shape, epochs = system.states, system.runs, system.epochs
     ys, Ys = np.zeros((*shape, epochs + 1, n)), np.zeros((*shape, epochs + 1, n, n))
     for k in range(epochs - 1, -1, -1):
-        dY, dy = _told(system, k)
+        dY, dy = _said(system, k)
         Y, y = _spread(Ys[..., k + 1, :, :] + dY, ys[..., k + 1, :] + dy, _root(_at(system.Q, k, 2)))
         Phi = _at(system.Phi, k, 2)
         Phi_t = np.swapaxes(Phi, -1, -2)
@@ -250,7 +250,7 @@ def _spread(M: Array, y: Array, B: Array) -> tuple[Array, Array]:
     return symmetric(Y), times(L, y)
 
 
-def _told(system: LinearSystem, k: int) -> tuple[Array, Array]:
+def _said(system: LinearSystem, k: int) -> tuple[Array, Array]:
     """``H' R^-1 H`` and ``H' R^-1 z`` of the rows present at an epoch."""
     z, H, R = _at(system.z, k, 1), _at(system.H, k, 2), _at(system.R, k, 2)
     absent: NDArray[np.bool_] = np.isnan(z)

@@ -216,8 +216,10 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
             kind = "increments"
         ours = COLUMNS[kind]
         guess = Guess("columns", ", ".join(names), "their names", 1.0, {"columns": dict(zip(ours, names))})
-        told = kind if kind == "increments" or said is not None else None
-        return Choice(told, (), [(name, 1.0) for name in names], _units(headings, layout.kind or kind), guesses=[guess])
+        shown = kind if kind == "increments" or said is not None else None
+        return Choice(
+            shown, (), [(name, 1.0) for name in names], _units(headings, layout.kind or kind), guesses=[guess]
+        )
     return None
 
 

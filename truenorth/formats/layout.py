@@ -71,12 +71,12 @@ def options_for(
         The same in the options of the call.
     """
     values: dict[str, Any] = {}
-    beside = path.with_suffix(".yaml")
-    if beside.is_file():
+    nearby = path.with_suffix(".yaml")
+    if nearby.is_file():
         try:
-            values = checked(read_mapping(beside))
+            values = checked(read_mapping(nearby))
         except UsageError as error:
-            raise DataError(f"{beside} (the layout of {path.name}): {error}") from None
+            raise DataError(f"{nearby} (the layout of {path.name}): {error}") from None
     return values | checked({key: value for key, value in given.items() if value is not None})
 
 

@@ -57,12 +57,12 @@ def _ask_near_zero(found: Found) -> None:
     seen = f"lat {np.degrees(lat[0]):.3f}, lon {np.degrees(lon[0]):.3f} deg"
     raise UnsureError(
         f"{found.source}: columns {labels}: {lat[0]:.6g}, {lon[0]:.6g} are degrees south of Ghana, or radians of {seen}; say "
-        f"which, in a file {_beside(found)} next to the log, or to the reader",
+        f"which, in a file {_next_to(found)} next to the log, or to the reader",
         [{"units": {"position": "rad"}}, {"units": {"position": "deg"}}],
     )
 
 
-def _beside(found: Found) -> str:
+def _next_to(found: Found) -> str:
     return found.source.rpartition(".")[0] + ".yaml"
 
 
@@ -81,7 +81,7 @@ def _advice(found: Found, name: str) -> str:
     labels = {key: found.labels[key] for key in LIMIT}
 
     def options(text: str) -> str:
-        return f"put {text} into a file {_beside(found)} next to the log, or give it to the reader"
+        return f"put {text} into a file {_next_to(found)} next to the log, or give it to the reader"
 
     if _in_radians(found, name):
         if farthest <= LIMIT["lat"] and other <= LIMIT["lon"]:

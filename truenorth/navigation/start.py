@@ -130,8 +130,8 @@ def _by_static_limits(
     nabla += C_nb.T @ np.diag([1.0, 1.0, 0.0]) @ C_nb * (DEFLECTION * g) ** 2
     J = static_jacobian(position.lat, g)
     X = np.hstack([J[:, 3:] @ C_nb @ eps, J[:, :3] @ C_nb @ nabla])
-    told = np.diag(J[:, 3:] @ C_nb @ eps @ C_nb.T @ J[:, 3:].T + J[:, :3] @ C_nb @ nabla @ C_nb.T @ J[:, :3].T)
-    X *= np.sqrt(np.minimum(1.0, np.diag(phi_floor) / np.maximum(told, 1e-30)))[:, None]
+    said = np.diag(J[:, 3:] @ C_nb @ eps @ C_nb.T @ J[:, 3:].T + J[:, :3] @ C_nb @ nabla @ C_nb.T @ J[:, :3].T)
+    X *= np.sqrt(np.minimum(1.0, np.diag(phi_floor) / np.maximum(said, 1e-30)))[:, None]
     P = np.block([[phi_covariance, X], [X.T, np.block([[eps, np.zeros((3, 3))], [np.zeros((3, 3)), nabla]])]])
     return Handover(C_nb, accel_bias, P, prior)
 

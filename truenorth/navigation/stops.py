@@ -90,8 +90,8 @@ def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array,
     if velocity is None or not np.isfinite(velocity[:, :2]).any():
         return _speed_of_places(log) if isinstance(log, GnssRecord) else (np.empty(0), np.empty(0, dtype=bool))
     level = velocity[:, :2]
-    told = np.isfinite(level).any(axis=1)
-    return log.time[told], np.linalg.norm(np.nan_to_num(level[told]), axis=1) > STANDING
+    said = np.isfinite(level).any(axis=1)
+    return log.time[said], np.linalg.norm(np.nan_to_num(level[said]), axis=1) > STANDING
 
 
 def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
@@ -108,7 +108,7 @@ def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
     place = np.stack([(lon - lon[0]) * R_N * np.cos(lat[0]), (lat - lat[0]) * R_M], axis=1)
     # Second differences of white noise have six times its variance; a steady course has none.
     noise = float(np.median(np.abs(np.diff(place, n=2, axis=0)))) / 0.6745 / np.sqrt(6.0)
-    speed, told = np.full(time.size, np.nan), np.zeros(time.size, dtype=bool)
+    speed, said = np.full(time.size, np.nan), np.zeros(time.size, dtype=bool)
     t = time - time[0]
     sums = np.concatenate(
         [np.zeros((1, 7)), np.cumsum(np.column_stack([t**0, t, t**2, place, t[:, None] * place]), axis=0)]
@@ -118,9 +118,9 @@ def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
         n, st, stt, *rest = (sums[last] - sums[first]).T
         spread = np.maximum(stt - st**2 / n, 1e-12)
         slope = np.stack([(rest[2 + i] - st * rest[i] / n) / spread for i in range(2)])
-        sharp = ~told & (n >= FEWEST_FIXES) & (noise / np.sqrt(spread) < SHARP * STANDING)
-        speed[sharp], told[sharp] = np.linalg.norm(slope[:, sharp], axis=0), True
-    return time[told], speed[told] > STANDING
+        sharp = ~said & (n >= FEWEST_FIXES) & (noise / np.sqrt(spread) < SHARP * STANDING)
+        speed[sharp], said[sharp] = np.linalg.norm(slope[:, sharp], axis=0), True
+    return time[said], speed[said] > STANDING
 
 
 def rate_scatter(record: ImuRecord, interval: float, seconds: Array) -> float:

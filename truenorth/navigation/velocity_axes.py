@@ -78,10 +78,10 @@ def check_axes(
     # A vehicle that hardly slides or climbs does not tell left from right: all that fit are named.
     name = " or ".join(name for name, left in tried if _squares(left) <= ALIKE * _squares(other))
     expected = "forward" if kind == "odometer" else EXPECTED[frame]
-    told = f"{record.source}: velocities change otherwise than the IMU says, by"
+    said = f"{record.source}: velocities change otherwise than the IMU says, by"
     if _better(other[:, :2], given[:, :2], dv[:, :2]):
         raise DataError(
-            f"{told} {_rms(given[:, :2]):.2g} m/s in {STEP:g} s; taken for {name} by {_rms(other[:, :2]):.2g} m/s: "
+            f"{said} {_rms(given[:, :2]):.2g} m/s in {STEP:g} s; taken for {name} by {_rms(other[:, :2]):.2g} m/s: "
             f"expected {expected}; name the columns as what they are, or turn them"
         )
     if not np.isfinite(velocity[rows, 2]).all():
@@ -91,7 +91,7 @@ def check_axes(
     if _better(other[:, 2:], given[:, 2:], dv[:, 2:]):
         column = "VD" if frame == "navigation" else "v_down"
         raise DataError(
-            f"{told} {_rms(given[:, 2:]):.2g} m/s vertically in {VERTICAL_STEP:g} s; counted downwards by "
+            f"{said} {_rms(given[:, 2:]):.2g} m/s vertically in {VERTICAL_STEP:g} s; counted downwards by "
             f"{_rms(other[:, 2:]):.2g} m/s: expected {expected}; name the column {column}, or turn its sign"
         )
 

@@ -94,9 +94,9 @@ class Study:
         def shown(own: bool) -> list[str]:
             return [name for name in self.drawings if name.startswith(("figure", "table")) == own]
 
-        return study_page(self, self._beside(), shown(True), shown(False), self.table.to_frame())
+        return study_page(self, self._compared(), shown(True), shown(False), self.table.to_frame())
 
-    def _beside(self) -> pd.DataFrame:
+    def _compared(self) -> pd.DataFrame:
         """Every figure that the paper gives, ours next to it."""
         frame = self.table.to_frame()
         columns = ["case", "method", "quantity", "statistic", "time_s", "value", "paper", "unit", "runs"]

@@ -19,7 +19,7 @@ BEST_FIRST = ("holds", "holds in part", "does not hold", "too few runs")
 
 
 def study_page(
-    study: Any, beside: pd.DataFrame, of_paper: Sequence[str], more: Sequence[str], table: pd.DataFrame
+    study: Any, compared: pd.DataFrame, of_paper: Sequence[str], more: Sequence[str], table: pd.DataFrame
 ) -> str:
     """HTML text of the page; drawings are inside, so that it works offline.
 
@@ -27,7 +27,7 @@ def study_page(
     ----------
     study : Study
         Title, claims, drawings, captions, remarks.
-    beside : DataFrame
+    compared : DataFrame
         The paper's figures, ours next to them.
     of_paper, more : sequences of str
         Names of the drawings that are the paper's own, and of the others.
@@ -38,7 +38,7 @@ def study_page(
     def drawn(names: Sequence[str]) -> list[tuple[str, str, str]]:
         return [(n.replace("_", " "), study.captions.get(n, ""), _inline(study.drawings[n])) for n in names]
 
-    contents = [_("Verdict")] if beside.empty else [_("Verdict"), _("The paper's figures, ours next to them")]
+    contents = [_("Verdict")] if compared.empty else [_("Verdict"), _("The paper's figures, ours next to them")]
     contents += [_spelt(name) for name in of_paper]
     contents += [_("Claims"), *(_spelt(name) for name in more)] + ([_("Remarks")] if study.remarks else [])
     return render(
@@ -47,7 +47,7 @@ def study_page(
         study=study,
         of_a_paper=any(claim.by == "paper" for claim in study.claims),
         summary=_summary(study.claims),
-        beside="" if beside.empty else _html(across(beside)),
+        compared="" if compared.empty else _html(across(compared)),
         of_paper=drawn(of_paper),
         more=drawn(more),
         table=_html(table),
@@ -65,21 +65,22 @@ def index_page(studies: Mapping[str, Any]) -> str:
     )
 
 
-def across(beside: pd.DataFrame) -> pd.DataFrame:
+def across(compared: pd.DataFrame) -> pd.DataFrame:
     """The paper's figures as its tables have them: a column for each quantity, ``ours (the paper's)``.
 
     Of few quantities the list stays as it is: case by case and quantity by quantity.
     """
     keys = ["case", "method", "statistic", "time_s"]
-    rows = beside.drop_duplicates(keys)
-    if len(beside) < MANY_A_ROW * len(rows) or beside.duplicated([*keys, "quantity"]).any():
-        return beside
-    cells = beside.assign(
+    rows = compared.drop_duplicates(keys)
+    if len(compared) < MANY_A_ROW * len(rows) or compared.duplicated([*keys, "quantity"]).any():
+        return compared
+    cells = compared.assign(
         quantity=[
-            f"{name}, {unit}: ours (the paper's)" for name, unit in zip(beside["quantity"], beside["unit"], strict=True)
+            f"{name}, {unit}: ours (the paper's)"
+            for name, unit in zip(compared["quantity"], compared["unit"], strict=True)
         ],
-        time_s=beside["time_s"].map("{:g}".format),
-        cell=[f"{a:.4g} ({b:.4g})" for a, b in zip(beside["ours"], beside["the paper's"], strict=True)],
+        time_s=compared["time_s"].map("{:g}".format),
+        cell=[f"{a:.4g} ({b:.4g})" for a, b in zip(compared["ours"], compared["the paper's"], strict=True)],
     )
     table = cells.pivot_table(index=keys, columns="quantity", values="cell", aggfunc="first", sort=False)
     return table[list(dict.fromkeys(cells["quantity"]))].reset_index().rename_axis(None, axis=1)

@@ -39,7 +39,7 @@ def increments(
 
     Increment rows are given back as they are. Rates are instantaneous, and are integrated by the causal rule of third
     order ``T (5 w_k + 8 w_{k-1} - w_{k-2})/12`` (Adams-Moulton: exact for a rate that is quadratic in time; a sinusoid
-    that turns by x rad an interval comes out late by x^3/24 rad, and smaller by 11 x^4/720). Beside a gap, and at the
+    that turns by x rad an interval comes out late by x^3/24 rad, and smaller by 11 x^4/720). Next to a gap, and at the
     second row, the trapezoid; the first row's interval by its own rate.
 
     Parameters
