@@ -1,12 +1,14 @@
 """Faults of drawn sizes: those that passed in silence once are flagged, or harmless; sound logs are left alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from tests.runs import few_and_all, some
 from truenorth.campaign.fault_benches import BENCHES
-from truenorth.campaign.fault_limits import UNSEEN
+from truenorth.campaign.fault_limits import LEAST_RATIO, UNSEEN, ratio_on_sway
 from truenorth.campaign.fault_pages import keeper, page, read_trials
 from truenorth.campaign.faults import FAULTS, SOUND, Trial, faults_of, run_faults, table
 from truenorth.cli import app
@@ -56,6 +58,22 @@ def test_a_sound_log_is_left_alone(procedure):
 def test_the_whole_campaign(procedure):
     """Ten draws of every fault: silent are those alone that a log cannot show."""
     assert silent(run_faults([procedure], runs=10, seed=SEED + 1)) == []
+
+
+@pytest.mark.slow
+def test_what_a_swaying_base_can_show_of_a_ramp():
+    """Seed 8301: 90 ug from a fifth of the log on, heading 6 sigmas off, and not beyond chance; twice as much would be."""
+    inputs, _ = BENCHES["swaying"].draw(8301, 0)
+    record, answer = inputs["record"], BENCHES["swaying"].align(inputs)
+    assert record.kind == "increments"
+    course = record.interval * np.maximum(np.arange(len(record)) / len(record) - 0.2, 0.0) / 0.8
+    ratio, twice = (
+        ratio_on_sway(replace(record, accel=record.accel + np.outer(size * course, np.eye(3)[0])), record, answer)
+        for size in (8.85e-4, 2 * 8.85e-4)
+    )
+    assert 0.0 < ratio < LEAST_RATIO < twice
+    (trial,) = run_faults(["swaying"], ["accel bias ramp"], runs=1, seed=8301)
+    assert trial.outcome == "unseen", trial
 
 
 @pytest.mark.parametrize("procedure", ["swaying", "rotary"])

@@ -11,8 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from truenorth.alignment.check import check_means
+from truenorth.alignment.fine import CoarseStart
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.swaying import sway_align
 from truenorth.alignment.task import make_task
+from truenorth.coarse.inertial import oba
+from truenorth.errors.staying import StaticModel, mean_velocity
+from truenorth.filters.gains import through
+from truenorth.records import ImuRecord
+from truenorth.strapdown.inertial import integrate
 
 LEVEL = (
     "on a level base at rest gyros see two things, the earth's rate along the vertical and the length of that along north: both "
@@ -35,6 +42,10 @@ BY_LIKELIHOOD = (
     "than 25 (twice the logarithm of the likelihood ratio, the fault known exactly). By Neyman and Pearson no test does better, "
     "and one that has to look for sensor, axis, shape, moment and size in some hundred ways would raise more than one false alarm "
     "in a thousand sound logs"
+)
+BY_STAYING = (
+    "measured, trial by trial, through the filter of the answer: a base that stays prefers the sound log by less than 25 (the same "
+    "ratio, the fault known exactly)"
 )
 BY_MEANS = (
     "measured, trial by trial: what gyros at rest see, the earth's rate along the vertical and the length of that along north, "
@@ -98,3 +109,23 @@ def misfit_at_rest(inputs: dict[str, Any], answer: Alignment) -> float:
     check = check_means(task.means, inputs["place"].lat, task.gravity)
     variance = float(np.max(answer.gyro_bias_prior)) ** 2 + check.rate_noise**2
     return float(np.sum(check.rate_residual**2 / variance))
+
+
+def ratio_on_sway(spoilt: ImuRecord, sound: ImuRecord, answer: Alignment) -> float:
+    """Twice the logarithm of the likelihood ratio by which a base that sways and stays prefers the sound log.
+
+    Both logs go through the filter of the spoilt one: by how much less the squares of the innovations are without the fault.
+    """
+    task = make_task(spoilt, answer.position, None)
+    lat, alt = task.position.lat, task.position.alt
+    C_n0_i = oba(integrate(task.record, task.interval), lat, alt).C_n0_i
+    P = task.bias_prior(answer.imu, C_n0_i.T)
+    fine = sway_align(
+        CoarseStart(task.record, C_n0_i, task.position, StaticModel.of(answer.imu), P, task.interval, np.empty(0, int))
+    )
+    made, true = (mean_velocity(integrate(log, task.interval), fine.C_n0_i, lat, alt) for log in (task.record, sound))
+    seen = through(fine.system, fine.gains, (made - true)[..., None])[0]
+    L = np.linalg.cholesky(fine.estimates.innovation_covariance)
+    fault = np.linalg.solve(L, seen)
+    white = np.linalg.solve(L, fine.estimates.innovation[..., None])
+    return float(np.sum(fault * (2.0 * white - fault)))

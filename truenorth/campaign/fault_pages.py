@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from truenorth.campaign.fault_limits import BY_LIKELIHOOD, BY_MEANS, LIKE_HEADING, LIKE_MOTION, REST, UNSEEN
+from truenorth.campaign.fault_limits import BY_LIKELIHOOD, BY_MEANS, BY_STAYING, LIKE_HEADING, LIKE_MOTION, REST, UNSEEN
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError, UsageError
@@ -113,6 +113,8 @@ def _unseen() -> list[str]:
     lines = ["| cannot be seen | by | why |", "| --- | --- | --- |"]
     lines += [f"| {u.fault}{_sizes(u.size)} | {', '.join(u.procedures)} | {u.why} |" for u in UNSEEN]
     lines.append(f"| {', '.join(LIKE_HEADING)} | {', '.join(REST)} | {BY_MEANS} |")
+    biases = [name for name in LIKE_MOTION if name.startswith(("gyro", "accel"))]
+    lines.append(f"| {', '.join(biases)} | swaying | {BY_STAYING} |")
     return [*lines, f"| {', '.join(LIKE_MOTION)} | odometer, gnss, transfer, attitude, navigate | {BY_LIKELIHOOD} |"]
 
 

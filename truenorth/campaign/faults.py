@@ -16,7 +16,7 @@ from truenorth.campaign.fault import Fault
 from truenorth.campaign.fault_aids import AID_FAULTS
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
 from truenorth.campaign.fault_imu import IMU_FAULTS
-from truenorth.campaign.fault_limits import REST, misfit_at_rest, unseen
+from truenorth.campaign.fault_limits import REST, misfit_at_rest, ratio_on_sway, unseen
 from truenorth.core.errors import TruenorthError, UsageError
 from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.navigation.result import Navigation
@@ -167,6 +167,12 @@ class _Draw:
         """By how much the same measurements prefer the sound log; None where they are not the same, or there are none."""
         if self.bench.name in REST and isinstance(answer, Alignment):
             return misfit_at_rest(inputs, answer) - misfit_at_rest(self.inputs, answer)
+        if (
+            isinstance(answer, Alignment)
+            and answer.method == "swaying"
+            and inputs["record"] is not self.inputs["record"]
+        ):
+            return ratio_on_sway(inputs["record"], self.inputs["record"], answer)
         if self.sound is None or not answer.residuals or not self.sound.residuals:
             return None
         both = zip(answer.residuals, self.sound.residuals, strict=False)
