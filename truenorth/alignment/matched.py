@@ -79,9 +79,9 @@ def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovati
     L = np.asarray(np.linalg.cholesky(fine.estimates.innovation_covariance), dtype=np.float64)
     if others is not None:
         seen = np.concatenate([seen, through(system, fine.gains, others)[0]], axis=2)
-    H_Phi = np.broadcast_to(system.H @ system.Phi, (len(seen), system.rows, system.states))
+    H_Phi = np.broadcast_to(system.H @ system.Phi, (len(seen), system.rows, system.states)).copy()
     white = np.asarray(np.linalg.solve(L, seen), dtype=np.float64)
-    return Innovations(L, np.ascontiguousarray(H_Phi), fine.gains, white)
+    return Innovations(L, H_Phi, fine.gains, white)
 
 
 def matched(

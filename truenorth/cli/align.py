@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from truenorth.cli.ahead import compile_ahead
 from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable, shifted
 from truenorth.cli.align_options import check_options
 from truenorth.cli.attitude_options import OfAttitude
@@ -116,6 +117,8 @@ def align(
             *table.aids(),
             *indexer.aids(),
         ]
+        if not aids:
+            compile_ahead()
         if indexer.indexer is None:  # which turns its IMU on its head, and fast
             free = any_attitude or table.positions is not None
             _refuse_implausible(record, _latitude(place, aids), free, units_given=reading.units is not None)

@@ -21,5 +21,5 @@ __all__ = ["Mounting", "Navigation", "Start", "navigate"]
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(name)
     return getattr(import_module(_HOMES[name]), name)
