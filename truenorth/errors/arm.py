@@ -30,7 +30,7 @@ def arm_rows(integrals: InertialIntegrals, C_n0_i: Array, lat: float, C_sb: Arra
         Attitude of the base in the IMU at the integrals' times; the two are one when left out.
     """
     C_ib = integrals.C_ib if C_sb is None else integrals.C_ib @ C_sb
-    rows: Array = local_axes(integrals, lat) @ C_n0_i @ np.diff(C_ib, axis=0) / integrals.intervals[:, None, None]
+    rows: Array = local_axes(integrals.time, lat) @ C_n0_i @ np.diff(C_ib, axis=0) / integrals.intervals[:, None, None]
     return rows
 
 

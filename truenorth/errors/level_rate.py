@@ -30,9 +30,9 @@ def with_level_rate(system: LinearSystem, integrals: InertialIntegrals, lat: flo
     n = system.states
     bigger = grown(system, n + LEVEL_RATE)
     rate, level = slice(n, n + LEVEL_RATE), np.eye(3)[:, :LEVEL_RATE]
-    f, f_late = gravity_force(integrals, lat, alt)
+    f, f_late = gravity_force(integrals.time, lat, alt)
     bigger["Phi"][:, rate, rate] = np.eye(LEVEL_RATE)
     bigger["Phi"][:, PHI, rate] = -T * level
     bigger["Phi"][:, DV, rate] = -T * (f_late @ level)
-    bigger["H"][:, :, rate] = -(T**2) / 6 * (local_axes(integrals, lat) @ f @ level)
+    bigger["H"][:, :, rate] = -(T**2) / 6 * (local_axes(integrals.time, lat) @ f @ level)
     return replace(system, **bigger)

@@ -42,7 +42,7 @@ def with_matrices(
     """
     T = integrals.intervals[:, None, None]
     gyro, accel = _moments(record, integrals)
-    C_n_n0 = local_axes(integrals, lat)
+    C_n_n0 = local_axes(integrals.time, lat)
     force = system.Phi[:, DV, PHI] / T  # [f x], f the reaction to gravity
     n, K = system.states, len(T)
     bigger = grown(system, n + MATRICES)

@@ -22,7 +22,8 @@ shakes the samples; the mean's tie to the states and to the process noise inside
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from functools import lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,10 +81,8 @@ class StaticModel(Walks):
         T = integrals.intervals[:, None, None]
         C_mean = C_n0_i @ integrals.C_mean  # (1/T) int C_n0_b
         C_late = C_n0_i @ integrals.C_late  # (1/T^2) int s C_n0_b
-        f, f_late = gravity_force(integrals, lat, alt)
-        ff = f @ np.swapaxes(f, 1, 2)
-        eye = np.eye(3)
-        q_g, q_a = self.gyro_random_walk**2, self.accel_random_walk**2
+        known = _known_of(self, integrals.time.tobytes(), lat, alt)
+        f, f_late, C_n_n0 = known.f, known.f_late, known.C_n_n0
         count = len(T)
 
         Phi = np.zeros((count, STATES, STATES))
@@ -93,42 +92,62 @@ class StaticModel(Walks):
         Phi[:, DV, BG] = -2 * T * (f_late @ (C_mean - C_late))
         Phi[:, DV, BA] = T * C_mean
 
-        # White gyro noise reaches phi at once and dv as a ramp.
-        Q = np.zeros((count, STATES, STATES))
-        Q[:, PHI, PHI] = q_g * T * eye
-        Q[:, DV, PHI] = q_g * T**2 / 2 * f
-        Q[:, PHI, DV] = np.swapaxes(Q[:, DV, PHI], 1, 2)
-        Q[:, DV, DV] = q_a * T * eye + q_g * T**3 / 3 * ff
-        Q[:, BG, BG] = self.gyro_rate_walk**2 * T * eye
-        Q[:, BA, BA] = self.accel_rate_walk**2 * T * eye
-
         # Mean velocity error by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
         # phi(t) = phi_k + int_t^k C eps; averaged, the force counts with its elapsed part s/T of the interval.
         H = np.zeros((count, 3, STATES))
-        H[:, :, DV] = eye
+        H[:, :, DV] = np.eye(3)
         H[:, :, PHI] = -f_late
         H[:, :, BG] = -(T**2) / 6 * (f @ C_mean)
         H[:, :, BA] = -T * C_late
-        # Noise inside the interval acts on its mean with the weight (T-s)/T (accelerometers) and (T-s)^2/(2T)
-        # (gyros); less what H x_k already holds, -s/T and s^2/(2T) are left: their covariance, and that with Q's.
-        R_inside = q_a * T / 3 * eye + q_g * T**3 / 20 * ff
-        S = np.zeros((count, STATES, 3))
-        S[:, PHI] = q_g * T**2 / 6 * np.swapaxes(f, 1, 2)
-        S[:, DV] = -q_a * T / 2 * eye + q_g * T**3 / 24 * ff
-
-        C_n_n0 = local_axes(integrals, lat)
-        C_n0_n = np.swapaxes(C_n_n0, 1, 2)
         z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
         return LinearSystem(
             Phi=Phi,
-            Q=Q,
+            Q=known.Q,
             H=C_n_n0 @ H,
-            R=C_n_n0 @ R_inside @ C_n0_n + np.diag(R),
-            S=S @ C_n0_n,
+            R=known.R + np.diag(R),
+            S=known.S,
             z=z,
             x0=np.zeros(STATES) if x0 is None else x0,
             P0=P0,
         )
+
+
+class _Known(NamedTuple):
+    """What time and place alone decide: alike in all passes over a log, and in all runs of a campaign."""
+
+    f: Array  # [f x] and
+    f_late: Array  # [f_late x], (K, 3, 3), as of :func:`gravity_force`
+    C_n_n0: Array  # (K, 3, 3)
+    Q: Array
+    R: Array  # of the noise inside the intervals
+    S: Array
+
+
+@lru_cache(maxsize=1)
+def _known_of(model: StaticModel, times: bytes, lat: float, alt: float) -> _Known:
+    """Noise of a model over intervals between times (of doubles); nobody writes to it."""
+    time = np.frombuffer(times)
+    T, eye = np.diff(time)[:, None, None], np.eye(3)
+    f, f_late = gravity_force(time, lat, alt)
+    ff = f @ np.swapaxes(f, 1, 2)
+    q_g, q_a = model.gyro_random_walk**2, model.accel_random_walk**2
+    # White gyro noise reaches phi at once and dv as a ramp.
+    Q = np.zeros((len(T), STATES, STATES))
+    Q[:, PHI, PHI] = q_g * T * eye
+    Q[:, DV, PHI] = q_g * T**2 / 2 * f
+    Q[:, PHI, DV] = np.swapaxes(Q[:, DV, PHI], 1, 2)
+    Q[:, DV, DV] = q_a * T * eye + q_g * T**3 / 3 * ff
+    Q[:, BG, BG] = model.gyro_rate_walk**2 * T * eye
+    Q[:, BA, BA] = model.accel_rate_walk**2 * T * eye
+    # Noise inside the interval acts on its mean with the weight (T-s)/T (accelerometers) and (T-s)^2/(2T)
+    # (gyros); less what H x_k already holds, -s/T and s^2/(2T) are left: their covariance, and that with Q's.
+    R_inside = q_a * T / 3 * eye + q_g * T**3 / 20 * ff
+    S = np.zeros((len(T), STATES, 3))
+    S[:, PHI] = q_g * T**2 / 6 * np.swapaxes(f, 1, 2)
+    S[:, DV] = -q_a * T / 2 * eye + q_g * T**3 / 24 * ff
+    C_n_n0 = local_axes(time, lat)
+    C_n0_n = np.swapaxes(C_n_n0, 1, 2)
+    return _Known(f, f_late, C_n_n0, Q, C_n_n0 @ R_inside @ C_n0_n, S @ C_n0_n)
 
 
 def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
@@ -137,11 +156,10 @@ def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: 
     return np.diff(p, axis=0) / integrals.intervals[:, None]
 
 
-def gravity_force(integrals: InertialIntegrals, lat: float, alt: float) -> tuple[Array, Array]:
-    """``[f x]`` (K, 3, 3) of the mean of ``f = -g_n0`` over each interval, m/s^2, and of ``(1/T) int s f ds``, m/s."""
-    v, p = -gravity_velocity(integrals.time, lat, alt), -gravity_position(integrals.time, lat, alt)
-    v_mean = np.diff(p, axis=0) / integrals.intervals[:, None]
-    return skew(np.diff(v, axis=0) / integrals.intervals[:, None]), skew(v[1:] - v_mean)
+def gravity_force(time: Array, lat: float, alt: float) -> tuple[Array, Array]:
+    """``[f x]`` (K, 3, 3) of the mean of ``f = -g_n0`` over intervals between times, m/s^2, and of ``(1/T) int s f ds``, m/s."""
+    v, p, T = -gravity_velocity(time, lat, alt), -gravity_position(time, lat, alt), np.diff(time)[:, None]
+    return skew(np.diff(v, axis=0) / T), skew(v[1:] - np.diff(p, axis=0) / T)
 
 
 def sampled_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
@@ -154,9 +172,9 @@ def gained_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt
     return np.diff(sampled_velocity(integrals, C_n0_i, lat, alt), axis=0)
 
 
-def local_axes(integrals: InertialIntegrals, lat: float) -> Array:
-    """(K, 3, 3) ``C_n_n0`` at the middle of each interval."""
-    middle = (integrals.time[1:] + integrals.time[:-1]) / 2
+def local_axes(time: Array, lat: float) -> Array:
+    """(K, 3, 3) ``C_n_n0`` at the middle of each interval between times."""
+    middle = (time[1:] + time[:-1]) / 2
     return np.asarray(np.swapaxes(earth_rotation(middle, lat), 1, 2))
 
 
@@ -196,7 +214,7 @@ def force_system(
     J[:, :, DV] -= np.eye(3)
     back = J @ np.linalg.inv(core.Phi)
     own = np.eye(STATES)[DV] - back
-    C = local_axes(integrals, lat)
+    C = local_axes(integrals.time, lat)
     C_t = np.swapaxes(C, 1, 2)
     noise = C @ own @ core.Q @ np.swapaxes(own, 1, 2) @ C_t
     z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]

@@ -211,7 +211,7 @@ def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
     """
     level, slope = _running_level(steady)
     drifting = steady - slope
-    deviations = np.stack([steady - level, drifting, body - _running_level(body)[0]])
+    deviations = np.stack([steady - level, drifting, body - _running_median(body)])
     size = np.linalg.norm(deviations, axis=1)
     gain = np.linalg.norm(box_mean(np.where(size[0] < size[1], deviations[0], drifting), WINDOW), axis=0)
     return size.min(axis=0), gain
@@ -231,7 +231,13 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
     early = np.median(windows[..., :half], axis=2)[:, first]
     late = np.median(windows[..., width - half :], axis=2)[:, first]
     line = early + (late - early) * (within - (half - 1) / 2.0) / (width - half)
-    return np.median(windows, axis=2)[:, first], line
+    return _running_median(signal), line
+
+
+def _running_median(signal: Array) -> Array:
+    """(3, m) median of the 31 s around each second."""
+    width = min(LEVEL_WINDOW, signal.shape[1])
+    return np.asarray(np.median(sliding_window_view(signal, width, axis=1), axis=2)[:, offset(signal.shape[1], width)])
 
 
 def offset(seconds: int, width: int) -> NDArray[np.intp]:
