@@ -28,7 +28,7 @@ from truenorth.alignment.matched import innovations_of
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.swaying import farthest, sway_align
-from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task
+from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
 from truenorth.alignment.turning import infer_turning, turning_align, turning_noise, turns_blindly, with_usual
 from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
@@ -109,7 +109,7 @@ def align_base(
         refuse(method, get_args(Method))
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
-    spec = None if imu is None else imu_spec(imu).seen_in(record)
+    spec = None if imu is None else noise_in(record, imu_spec(imu))
     if calibration is not None:
         record = calibration.apply(record)
     record = bridged(record)

@@ -122,6 +122,41 @@ def bridged(record: ImuRecord) -> ImuRecord:
     return across_gaps(record)
 
 
+def noise_in(record: ImuRecord, imu: ImuSpec) -> ImuSpec:
+    """What a filter sees in a record, lost samples as random walks as well.
+
+    Parameters
+    ----------
+    record : ImuRecord
+        Not bridged yet.
+    imu : ImuSpec
+        The specification.
+    """
+    spec = imu.seen_in(record)
+    gyro, accel = (lost_walk(record, x) for x in (record.gyro, record.accel))
+    return replace(
+        spec,
+        gyro_random_walk=math.hypot(spec.gyro_random_walk, gyro),
+        accel_random_walk=math.hypot(spec.accel_random_walk, accel),
+    )
+
+
+def lost_walk(record: ImuRecord, x: Array) -> float:
+    """Random walk that bridged samples leave in an integral of the worst axis, unit of its rate times sqrt(s).
+
+    A bridge over ``m`` samples misses ``sum x - m (x_before + x_after) / 2``: as much as it would miss of the samples that are there.
+    """
+    gaps = record.gaps[record.gaps > 0]
+    lost = np.rint(record.steps[gaps] / record.interval).astype(int) - 1
+    total, sums = np.zeros(3), np.vstack([np.zeros(3), np.cumsum(x, axis=0)])
+    for m, count in zip(*np.unique(lost, return_counts=True), strict=True):
+        if 0 < m < len(x) - 1:
+            missed = sums[m + 1 : -1] - sums[1 : -m - 1] - 0.5 * m * (x[: -m - 1] + x[m + 1 :])
+            total += count * np.mean(missed**2, axis=0)
+    scale = record.interval if record.kind == "rates" else 1.0
+    return scale * math.sqrt(float(total.max()) / record.duration)
+
+
 def deflection_covariance(lat: float, g: float) -> Array:
     """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would."""
     J = static_jacobian(lat, g)[:, :2] * (DEFLECTION * g)
