@@ -437,3 +437,13 @@ def test_interrupted_writing_leaves_nothing(tmp_path, monkeypatch):
     done = subprocess.run([sys.executable, "-c", code], check=False, env=dict(os.environ))
     assert done.returncode == -9
     assert not target.exists()
+
+
+def test_a_folder_named_as_the_command_or_as_what_is_shipped_is_no_input(tmp_path, monkeypatch):
+    from truenorth.cli.files import inputs
+
+    monkeypatch.chdir(tmp_path)
+    for name in ("align", "static", "rows"):
+        (tmp_path / name).mkdir()
+    assert list(inputs(["align", "rows", "--lat", "1", "-o", "align"])) == ["rows", "--lat", "1"]
+    assert list(inputs(["reproduce", "static", "-o", "static"])) == []

@@ -144,7 +144,7 @@ def noise_in(record: ImuRecord, imu: ImuSpec) -> ImuSpec:
 def lost_walk(record: ImuRecord, x: Array) -> float:
     """Random walk that bridged samples leave in an integral of the worst axis, unit of its rate times sqrt(s).
 
-    A bridge over ``m`` samples misses ``sum x - m (x_before + x_after) / 2``: as much as it would miss of the samples that are there.
+    A bridge over ``m`` samples misses ``sum x - m (x_before + x_after) / 2``: as much as it would miss of those that are there.
     """
     gaps = record.gaps[record.gaps > 0]
     lost = np.rint(record.steps[gaps] / record.interval).astype(int) - 1

@@ -18,6 +18,14 @@ KINDS = {  # by command: the kind of result that it writes into its output folde
     "tune": "Tuned",
     "faults": "Faults",
 }
+READ_NO_FOLDER = (
+    "simulate",
+    "campaign",
+    "reproduce",
+    "tune",
+    "faults",
+    "advise",
+)  # but files, and names of what is shipped
 MARKERS = {  # names of files, of results that keep no result.npz
     "manifest.json": "Campaign",
     "claims.md": "Study",
@@ -26,12 +34,18 @@ MARKERS = {  # names of files, of results that keep no result.npz
 
 
 def inputs(words: Sequence[str]) -> Iterator[str]:
-    """What on the command line may name an input: every word but those that name an output."""
-    before = ""
-    for word in words:
+    """What on the command line may name an input: every word but those that name the command or an output.
+
+    A command that reads no folder takes no word for one: ``reproduce static -o static`` may be run again.
+    """
+    before, command = "", next((word for word in words if word in (*KINDS, "noise", "example")), "")
+    first = words.index(command) if command else -1
+    for at, word in enumerate(words):
         option, _, value = word.partition("=")
-        if before not in OUTPUTS and option not in OUTPUTS:
-            yield value or word
+        name = value or word
+        folder = command in READ_NO_FOLDER and Path(name).is_dir()
+        if at != first and before not in OUTPUTS and option not in OUTPUTS and not folder:
+            yield name
         before = word
 
 

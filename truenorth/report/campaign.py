@@ -78,14 +78,12 @@ def campaign_page(campaign: Campaign, tables: dict[str, pd.DataFrame]) -> str:
 def _tables(campaign: Campaign, tables: dict[str, pd.DataFrame]) -> list[Table]:
     summary, comparison, outcomes = (tables[f"{name}.csv"] for name in ("summary", "comparison", "outcomes"))
     comparison = _at_the_end(comparison[comparison["quantity"] == "phi_u"])
-    headings = [_(words) for words in COLUMNS.values()]
     text = frozenset({0, 1})
     found = [
-        Table(_("Heading error at the end of the log, arcmin"), headings, _accuracy(summary, "phi_u"), words=text),
+        Table(_("Heading error at the end of the log, arcmin"), *_accuracy(summary, "phi_u"), words=text),
         Table(
             _("Level error (both tilts together) at the end of the log, arcmin"),
-            headings,
-            _accuracy(summary, "level"),
+            *_accuracy(summary, "level"),
             words=text,
         ),
         Table(
@@ -147,8 +145,8 @@ def _at_the_end(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[rows["time_s"] == rows.groupby("case")["time_s"].transform("max")]
 
 
-def _accuracy(summary: pd.DataFrame, quantity: str) -> list[list[str]]:
-    """Rows of the table at the end of the log; the earlier times stand in summary.csv."""
+def _accuracy(summary: pd.DataFrame, quantity: str) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows at the end of the log, without columns that no row fills; the earlier times stand in summary.csv."""
     chosen = summary[summary["quantity"] == quantity]
     last = _at_the_end(chosen)
     rows = []
@@ -157,7 +155,9 @@ def _accuracy(summary: pd.DataFrame, quantity: str) -> list[list[str]]:
         ratio = row.get("rms_over_sigma")
         row["band"] = f"{row['ratio_low']:.2f} - {row['ratio_high']:.2f}" if ratio == ratio else ""
         rows.append([_text(row.get(column)) for column in COLUMNS])
-    return rows
+    filled = [i for i, cells in enumerate(zip(*rows, strict=True)) if any(cells)]
+    headings = [_(words) for words in COLUMNS.values()]
+    return [headings[i] for i in filled], [[row[i] for i in filled] for row in rows]
 
 
 def _consistency(summary: pd.DataFrame) -> list[list[str]]:

@@ -40,17 +40,18 @@
     return Object.fromEntries(Object.entries(x).map(([k, v]) =>
       [k, /color$/i.test(k) && typeof v === "string" ? colour(v) : resolve(v)]));
   };
-  const dressed = (layout, paper) => {
+  const dressed = (layout, data, paper) => {
+    const named = data.some(trace => trace.name && trace.showlegend !== false);
     const ink = read("--ink"), grid = read("--line");
     const axis = { gridcolor: grid, zerolinecolor: grid, linecolor: grid, exponentformat: "power", automargin: true };
     const size = paper ? 8 : 13, rows = Object.keys(layout).filter(key => key.startsWith("yaxis")).length;
     const found = { ...layout, paper_bgcolor: read("--paper"), plot_bgcolor: read("--paper"),
       font: { family: "system-ui, 'Noto Sans', 'Noto Sans CJK SC', sans-serif", size, color: ink },
-      margin: paper ? { l: 40, r: 6, t: 14, b: 26 } : { l: 70, r: 14, t: 40, b: 50 },
+      margin: paper ? { l: 40, r: 6, t: 14, b: 26 } : { l: 70, r: 14, t: named ? 58 : 40, b: 50 },  // buttons above the names
       hovermode: layout.hovermode || "x unified", hoverlabel: { bgcolor: read("--paper"), font: { color: ink } },
       legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, ...(layout.legend || {}) } };
     for (const key of Object.keys(found)) if (/^[xy]axis/.test(key)) {
-      found[key] = { ...axis, ...found[key] };
+      found[key] = { ...axis, ...(found[key].type === "log" ? { tickformat: "~g" } : {}), ...found[key] };  // 0.2, not a small 2
       if (found[key].title) found[key].title = { ...found[key].title, font: { size } };
     }
     if (paper) { found.height = Math.max(190, PRINT.row * rows + PRINT.rest); found.width = PRINT.width; }
@@ -58,7 +59,7 @@
   };
   const draw = (place, paper = false) => {
     const { data, layout } = JSON.parse(document.getElementById(place.dataset.chart).textContent);
-    return Plotly.react(place, resolve(data), resolve(dressed(layout, paper)),
+    return Plotly.react(place, resolve(data), resolve(dressed(layout, data, paper)),
       { displaylogo: false, responsive: !paper, modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d"] });
   };
   const drawAll = paper => charts.forEach(place => draw(place, paper));
