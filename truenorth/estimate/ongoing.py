@@ -230,7 +230,7 @@ def _turned(record: ImuRecord, context: int, bias: Array) -> tuple[Array, Array]
     dtheta, dvel = increments(record)
     steps = record.steps
     points = np.unique(np.linspace(context, len(record), STEPS).astype(np.int64))
-    C, _, _ = inertial_integrals(dtheta - steps[:, None] * bias[:3], dvel - steps[:, None] * bias[3:], steps, points)
+    C, _, _ = inertial_integrals(dtheta, dvel, steps, points, bias[:3], bias[3:])
     C = C[0].T @ C
     edges = np.concatenate([[0.0], np.cumsum(steps)])[points]
     total = np.einsum("k,kij->ij", 0.5 * np.diff(edges), C[1:] + C[:-1])

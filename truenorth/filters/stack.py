@@ -40,10 +40,10 @@ class System(ABC):
 
     def __post_init__(self) -> None:
         """Convert and check all arrays."""
-        self._take({name: getattr(self, name) for name in self.axes})
+        self._take({name: getattr(self, name) for name in self.axes}, dict.fromkeys(self.axes))
 
-    def _take(self, arrays: Mapping[str, Array | None]) -> None:
-        """Convert these arrays, take them, and check them."""
+    def _take(self, arrays: Mapping[str, Array | None], before: Mapping[str, Array | None]) -> None:
+        """Convert these arrays, take them, and check them; `before` are those that stood in their place."""
         for name, value in arrays.items():
             if value is None:
                 object.__setattr__(self, name, None)
@@ -55,7 +55,8 @@ class System(ABC):
                 hint = " (a constant matrix needs a time axis of length 1)" if axes[0] == "K" else ""
                 raise UsageError(f"{self._owner}: {name} has shape {array.shape}, expected {shape}{hint}")
             object.__setattr__(self, name, array)
-        self._check_shapes()
+        if any(_shape_of(before[name]) != _shape_of(getattr(self, name)) for name in before):
+            self._check_shapes()
         for name, a in self._arrays():
             if name in arrays:
                 _check_finite(self._owner, name, self.axes[name], a)
@@ -86,7 +87,7 @@ class System(ABC):
     def with_arrays(self: S, **arrays: Array | None) -> S:
         """The same system with other arrays of some names; these alone are checked."""
         other = copy(self)
-        other._take(arrays)
+        other._take(arrays, {name: getattr(self, name) for name in arrays})
         return other
 
     def between(self: S, start: int, stop: int) -> S:
@@ -148,6 +149,10 @@ def _floats(owner: str, name: str, value: ArrayLike) -> Array:
         return np.ascontiguousarray(value, dtype=np.float64) if np.ndim(value) else np.asarray(value, float)
     except (TypeError, ValueError) as error:
         raise UsageError(f"{owner}: {name} is not an array of numbers ({error})") from None
+
+
+def _shape_of(a: Array | None) -> tuple[int, ...]:
+    return () if a is None else a.shape
 
 
 def _shape_text(axes: str) -> str:

@@ -113,11 +113,6 @@ def integrate(
     """
     dtheta, dvel = increments(record)
     steps = record.steps
-    if gyro_bias is not None:
-        dtheta = dtheta - steps[:, None] * gyro_bias
-    if accel_bias is not None:
-        dvel = dvel - steps[:, None] * accel_bias
-
     # Edges: edge r stands before row r, at the end of row r - 1.
     edges = np.concatenate(([0.0], np.cumsum(steps)))
     edges -= edges[context]
@@ -132,7 +127,9 @@ def integrate(
     epochs = np.clip(np.searchsorted(edges, wanted - 0.5 * record.interval), 0, len(record))
     extra = np.asarray(rows_at, dtype=np.int64) + 1
     every, back = np.unique(np.concatenate((epochs, extra)), return_inverse=True)
-    C_all, v_all, p_all = inertial_integrals(dtheta, dvel, steps, every)
+    none = np.zeros(3)
+    taken_off = (none if gyro_bias is None else gyro_bias, none if accel_bias is None else accel_bias)
+    C_all, v_all, p_all = inertial_integrals(dtheta, dvel, steps, every, *taken_off)
     if context:  # every[0] is the edge after the context: epochs begin there
         C_0, v_0, since = C_all[0].T, v_all[0], (edges[every] - edges[every[0]])[:, None]
         C_all, v_all, p_all = C_0 @ C_all, (v_all - v_0) @ C_0.T, (p_all - p_all[0] - since * v_0) @ C_0.T

@@ -62,7 +62,12 @@ def _integrate_attitude(dtheta: Any, k: Any, k_before: float, out: Any) -> None:
 
 
 def inertial_integrals(
-    dtheta: ArrayLike, dvel: ArrayLike, steps: ArrayLike, epochs: ArrayLike
+    dtheta: ArrayLike,
+    dvel: ArrayLike,
+    steps: ArrayLike,
+    epochs: ArrayLike,
+    gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
+    accel_bias: ArrayLike = (0.0, 0.0, 0.0),
 ) -> tuple[Array, Array, Array]:
     """Attitude, and first and second integral of specific force, in the inertial frame of the body at the start.
 
@@ -77,6 +82,8 @@ def inertial_integrals(
     steps : (N,) array, s
     epochs : (K,) int array
         Ascending: outputs after this many rows (0 is the start).
+    gyro_bias, accel_bias : (3,) arrays, rad/s and m/s^2
+        Taken off each row.
 
     Returns
     -------
@@ -90,24 +97,27 @@ def inertial_integrals(
     rows = read_only(dtheta)
     if wanted.size and (wanted[0] < 0 or wanted[-1] > len(rows) or np.any(np.diff(wanted) < 0)):
         raise UsageError(f"epochs are not ascending row counts between 0 and {len(rows)}")
-    k, k_before = coefficients("previous")
+    _, k_before = coefficients("previous")
+    bias = np.concatenate([gyro_bias, accel_bias]).astype(np.float64)
     out = np.empty((len(wanted), 10))
-    _inertial_integrals(rows, read_only(dvel), read_only(steps), wanted, read_only(k), k_before, out)
+    _inertial_integrals(rows, read_only(dvel), read_only(steps), wanted, bias, k_before, out)
     return dcm_from_quaternion(out[:, :4]), out[:, 4:7].copy(), out[:, 7:].copy()
 
 
 @compiled
-def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, k: Any, k_before: float, out: Any) -> None:
+def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, bias: Any, k_before: float, out: Any) -> None:
     q = (1.0, 0.0, 0.0, 0.0)
     vx = vy = vz = px = py = pz = 0.0
     a = b = before = (0.0, 0.0, 0.0)
     row = 0
     for j in range(len(epochs)):
         while row < epochs[j]:
-            K, A, a = update_sums(dtheta, row, 1, k, k_before, a)
-            L, B, b = update_sums(dvel, row, 1, k, k_before, b)
-            f = rotate(q, velocity_increment(K, A, a, L, B, b))
             T = steps[row]
+            K = (k_before * a[0], k_before * a[1], k_before * a[2])
+            L = (k_before * b[0], k_before * b[1], k_before * b[2])
+            a = (dtheta[row, 0] - T * bias[0], dtheta[row, 1] - T * bias[1], dtheta[row, 2] - T * bias[2])
+            b = (dvel[row, 0] - T * bias[3], dvel[row, 1] - T * bias[4], dvel[row, 2] - T * bias[5])
+            f = rotate(q, velocity_increment(K, a, a, L, b, b))
             if row == 0:
                 before = f
             px += (vx + 0.5 * f[0] - (f[0] - before[0]) / 12.0) * T
@@ -117,7 +127,7 @@ def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, k: Any,
             vx += f[0]
             vy += f[1]
             vz += f[2]
-            phi = rotation_vector(K, A, a)
+            phi = rotation_vector(K, a, a)
             q = normalised(quaternion_product(q, quaternion_from_rotation_vector(phi)))
             row += 1
         out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
