@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests import recordings
-from truenorth.alignment.transfer import align_transfer
+from truenorth.alignment.transfer import _colour, align_transfer
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks
@@ -26,6 +26,8 @@ from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight
+from truenorth.simulation.sway import Disturbed
+from truenorth.simulation.tones import Tone
 
 DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
 SPAN = 60.0
@@ -230,6 +232,22 @@ def test_clocks_that_agree_are_not_parted(real):
     assert parted_clocks(slave, master[:5], np.eye(3)) is None
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [0.2, 0.0])
+def test_gyros_that_are_late_are_found_though_the_master_seems_early(late):
+    """On a ship that rolls: attitude matching takes them for a master's delay, the accelerometers do not."""
+    way = course(Position.from_degrees(40.0, 20.0), straight(200.0), heading=0.6, speed=6.0)
+    tones = {"roll_tones": (Tone(4 * DEG, 8.0, 2.0),), "pitch_tones": (Tone(2 * DEG, 6.0, 1.0),)}
+    ship = Disturbed(way, **tones)
+    slave = simulate(ship, rate=50.0, duration=120.0, imu=TACTICAL, seed=6).record
+    master = simulate_sensor(ship, MASTER, duration=120.0, seed=6).record
+    rows = np.maximum(np.arange(len(slave)) - round(late / slave.interval), 0)
+    answer = align_transfer(replace(slave, gyro=slave.gyro[rows]), master, TACTICAL)
+    found = [item.figures["delay"] for item in answer.evidence if item.key == "delay.gyros_late"]
+    assert found == ([pytest.approx(0.2, abs=0.021)] if late else [])
+    assert (answer.status == "aligned") == (late == 0.0)
+
+
 def test_wild_rows_are_left_out(real, found):
     slave, master = real
     v = master.v_n.copy()
@@ -270,6 +288,20 @@ def test_the_delay_by_motion_alone(real):
             delay = find_delay(slave, record.shifted(shift), np.eye(3))
             assert delay.sure
             assert delay.delay - shift == pytest.approx(0.015, abs=0.02)
+
+
+def test_only_what_comes_back_is_noise():
+    """A seat that bends, of a second, at 20 Hz: noise of its density. A jump, and what drifts, are none."""
+    rng, t = np.random.default_rng(3), 0.05 * np.arange(2000)
+    white, bend = rng.standard_normal((2, 2000, 3))
+    kept = math.exp(-0.05 / 1.0)
+    for k in range(1, 2000):
+        bend[k] = kept * bend[k - 1] + math.sqrt(1.0 - kept**2) * bend[k]
+    assert _colour(t, white) == 1.0
+    assert _colour(t, white + 30.0 * (t > 40.0)[:, None] * np.exp(-(t - 40.0) / 3.0)[:, None]) < 1.5
+    assert _colour(t, white + (t[:, None] / 30.0) ** 2) < 1.5
+    # A first-order process of a second has sqrt(40) times the white one's density; a line off ten seconds takes some.
+    assert 3.0 < _colour(t, bend) < 7.0
 
 
 @pytest.mark.slow  # a kernel of its own size
@@ -370,6 +402,14 @@ def test_errors_of_the_master_count_in_sigma_and_not_in_the_sigma_against_it(rea
         align_transfer(slave, master, master_errors="perfect")
     assert "transfer.absolute" in [item.key for item in result.evidence]
     assert "transfer.relative" in [item.key for item in found.evidence]
+
+
+def test_positions_bear_the_masters_velocity_error_into_navigation(real):
+    """The slave's velocity is against the master's: what navigation begins with has the error that was said of it."""
+    slave, master = real
+    errors = [MasterErrors(level=1e-4, heading=1e-3, velocity=v) for v in (0.0, 0.4)]
+    sound, stated = (align_transfer(slave, master, matching="position", master_errors=e).transfer.P for e in errors)
+    np.testing.assert_allclose(np.diag(stated - sound)[3:6], 0.16, rtol=1e-6)
 
 
 def test_errors_of_the_master_by_name():

@@ -46,3 +46,17 @@ def test_a_turn_is_as_far_off_as_its_sigma_says(kind, most):
     off = np.array([(f["angle"] - np.radians(2.0)) / f["sigma"] for f in found])
     assert np.sqrt(np.mean(off**2)) == pytest.approx(1.0, abs=0.35)
     assert np.abs(off).max() < most
+
+
+def test_a_long_way_at_a_high_latitude_shows_no_turn():
+    """50 km in S-turns at 62 deg: east there is .8 deg off where it was at the beginning, along a parallel as along a meridian."""
+    t = 0.2 * np.arange(1200)
+    heading = 0.5 + 0.6 * np.sin(t / 20.0)
+    v = 210.0 * np.stack([np.sin(heading), np.cos(heading), 0.0 * t], axis=1)
+    way = 0.1 * (v[1:] + v[:-1])
+    lat = np.radians(62.0) + np.append(0.0, np.cumsum(way[:, 1])) / radii(np.radians(62.0))[0]
+    middle = 0.5 * (lat[1:] + lat[:-1])
+    lon = np.append(0.0, np.cumsum(way[:, 0] / (radii(middle)[1] * np.cos(middle))))
+    noise = np.random.default_rng(4).standard_normal((2, len(t))) / 6.4e6
+    found = turn_evidence("master", t, lat + noise[0], lon + noise[1] / np.cos(lat), v + 0.02, 0.05)
+    assert not found

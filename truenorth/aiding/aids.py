@@ -191,12 +191,15 @@ class Indexer:
         From the IMU to the body's centre of rotation, body axes; estimated when it is left out.
     angle_sigma : float, rad
         One-sigma error of the indexer's own angles and axes, which the body's attitude has in full.
+    offset_sigma : float, m
+        One sigma, along each of its axes, of how far the IMU sits from the axes of the indexer; estimated. 0: on them.
     """
 
     record: EncoderRecord | None
     axes: tuple[str, ...] = ("z", "x")
     lever_arm: ArrayLike | None = None
     angle_sigma: float = 0.0
+    offset_sigma: float = 0.01
     key: ClassVar[str] = "indexer"
 
 

@@ -54,6 +54,7 @@ from truenorth.state.now import (
     NOW_EARTH,
     NOW_FORCE,
     NOW_NORTH,
+    NOW_OTHER_RATE,
     NOW_RATE,
     NOW_SPIN,
     matrix_of,
@@ -81,9 +82,20 @@ def turned_from_north(now: Any, q: Any, first: int) -> Any:
     return quaternion_product(turn, (q[first], q[first + 1], q[first + 2], q[first + 3]))
 
 
+@compiled
+def _beyond_noise(rate: Any, variance: float) -> float:
+    """Share of a rate that is not within its noise: squares of noise are no knowledge."""
+    size = rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
+    return max(0.0, 1.0 - _BY_CHANCE * variance / max(size, 1e-30))
+
+
 @row
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    """Measured: velocity; the master's acceleration; the slave's attitude to linearise with (quaternion); all of n or NaN."""
+    """Measured: velocity; the master's acceleration; the slave's attitude to linearise with (quaternion); all of n or NaN.
+
+    Columns of the arm are of a rate with another noise than that of `z`: one that is in both (4 cm/s of an industrial gyro at
+    37 m) is taken for an arm that is too long, .6 m of it. Its own figure: the variance of a component of that rate.
+    """
     if np.isnan(measured[0]):
         return
     r = with_state(figures, ARM, assumed, at[AT_ARM])
@@ -104,8 +116,11 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     away = (-r[0], -r[1], -r[2])
     velocity_row(now, C, w_eb, push, away, lag_now(now, assumed, at[AT_LAG]), -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
+        other = vector_of(now, NOW_OTHER_RATE)
+        other = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
+        seen = _beyond_noise(other, figures[OWN])
         for j in range(3):
-            m = times(C, cross(w_eb, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))))
+            m = times(C, cross(other, (seen * (j == 0), seen * (j == 1), seen * (j == 2))))
             a = at[AT_ARM] + j
             x, y = m[0], m[1]
             s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
@@ -166,8 +181,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     turn = times(C, w)
     turn = (turn[0] - w_n[0], turn[1] - w_n[1], turn[2] - w_n[2])
     z[0], z[1], z[2] = scale * zx + lag * turn[0], scale * zy + lag * turn[1], scale * zz + lag * turn[2]
-    size = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]
-    seen = max(0.0, 1.0 - _BY_CHANCE * figures[OWN] / max(size, 1e-30))
+    seen = _beyond_noise(turn, figures[OWN])
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
         m = rotate(q_linear, e)

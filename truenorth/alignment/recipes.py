@@ -203,6 +203,7 @@ def on_indexer(r: Request) -> Alignment:
         axes=indexer.axes,
         lever_arm=None if indexer.lever_arm is None else -np.asarray(indexer.lever_arm, dtype=np.float64),
         angle_sigma=indexer.angle_sigma,
+        offset_sigma=indexer.offset_sigma,
         at=r.at,
         method=r.method,
         **r.common,

@@ -48,6 +48,7 @@ Array = NDArray[np.float64]
 
 SHORTEST = 60.0  # s: below that sway cannot be separated from tilt
 KNOWN_ARM = 0.1  # m, one sigma along each axis of an arm that was measured
+OFFSET = 0.01  # m, one sigma along each of its axes: of an IMU from the axes of its indexer
 INDEXER_METHODS = ("auto", "swaying", *FADING)
 COVER = 0.05  # s by which an encoder's log may begin late or end early
 OFF_AXIS = math.radians(0.5)  # of a body that is said to be still, and an indexer of two axes
@@ -62,6 +63,7 @@ def align_rotary(
     axes: Sequence[str] = ("z", "x"),
     lever_arm: ArrayLike | None = None,
     angle_sigma: float = 0.0,
+    offset_sigma: float = OFFSET,
     at: float | None = None,
     method: str = "auto",
     heading_limit: float = HEADING_LIMIT,
@@ -87,6 +89,9 @@ def align_rotary(
     angle_sigma : float, rad
         One-sigma error of the indexer itself: zero of each axis' angle, and what its axes are off by from those of the body. The
         IMU's attitude is found without them; that of the body has them in full, about each axis, however long the log is.
+    offset_sigma : float, m
+        One sigma, along each of its axes, of how far the IMU sits from the axes of the indexer, about which it swings in every
+        slew; estimated. 0: on them.
     at, heading_limit, progress
         As in :func:`truenorth.align`.
 
@@ -109,6 +114,8 @@ def align_rotary(
         refuse(method, INDEXER_METHODS)
     if not 0.0 <= angle_sigma < math.inf:
         raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
+    if not 0.0 <= offset_sigma < math.inf:
+        raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
     spec = imu_spec(imu).seen_in(record)
     record = bridged(record)
     if record.duration < SHORTEST:
@@ -123,11 +130,11 @@ def align_rotary(
     tell(f"aligning: {own}")
     P_bias = np.diag(spec.bias_variance)
     if encoder is None:
-        mount = Mount(np.zeros(3))
+        mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
         angles = angles_at(encoder, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
-        mount = Mount(*_arm(lever_arm), C_sb)
+        mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
     start = CoarseStart(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
     if own in FADING:
         arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)

@@ -32,6 +32,9 @@ from truenorth.strapdown.inertial import InertialIntegrals, gravity_position
 Array = NDArray[np.float64]
 
 ARM_PRIOR = 30.0  # m, one sigma along each axis, where nobody knows the arm
+OFFSET_PRIOR = (
+    0.03  # m, one sigma: an IMU from the axes of its indexer, about which its accelerometers swing in every slew
+)
 WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
@@ -47,6 +50,9 @@ class Mount:
     # (K+1, 3, 3): attitude of the base in the IMU at the ends of the filter intervals (an indexer's); None where the two are
     # one
     C_sb: Array | None = None
+    offset_sigma: float = (
+        0.0  # m; one sigma, along each of its axes, of an IMU from the axes of its indexer; zero: on them
+    )
 
 
 UNKNOWN_ARM = Mount(np.zeros(3), ARM_PRIOR)
@@ -146,7 +152,7 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     then the log is fitted with as little weight as the walk leaves it.
     """
     record, C_n0_i, position, model, P_bias, interval, rows_at = start
-    prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma)
+    prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma, offset_sigma=mount.offset_sigma)
     g = float(normal_gravity(position.lat, position.alt))
     walked = math.sqrt(record.duration / 3.0) * math.hypot(
         model.accel_random_walk, g * model.gyro_random_walk * record.duration

@@ -17,15 +17,25 @@ from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
-from truenorth.alignment.transfer_filter import Linear, Matching, TransferTrack, delay_found, transfer_filter
+from truenorth.alignment.transfer_filter import (
+    Linear,
+    Matching,
+    SlaveStart,
+    TransferTrack,
+    delay_found,
+    transfer_filter,
+)
 from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
+from truenorth.estimate.memory import REOPENED, USED
 from truenorth.estimate.rivals import noise_evidence, wandering_evidence
+from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.quality.gnss import master_evidence
+from truenorth.quality.innovations import whiteness
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
@@ -39,8 +49,10 @@ LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 GATE = 1e-6  # probability of rejecting a sound row
 PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
+PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
 LEAST = 0.1  # of the noise to begin with: less is not believed
 SHORTEST = 5.0  # s
+RIVAL_DELAY = 0.2  # s, one sigma of a master's delay where gyros may be late
 
 
 def align_transfer(
@@ -141,7 +153,8 @@ def align_transfer(
     assumed, notes = common_clock(slave, master, assumed)
     notes = (*notes, *master.notes)
     own = own_errors(master.attitude_sigma, master.velocity_sigma) if master_errors is None else None
-    model = _model(spec, assumed, what, flexure, own or errors_of(master_errors))
+    errors = own or errors_of(master_errors)
+    model = _model(spec, assumed, what, flexure, errors)
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
     noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, what.kind, position, tell)
@@ -154,12 +167,42 @@ def align_transfer(
         )
     rows = Matching(*noise, what.kind, GATE)
     track = transfer_filter(part, master, model, start, rows, linear=linear)
-    again = partial(transfer_filter, part, master, start=start, matching=rows, linear=linear)
-    seen = _seen(slave, master, model, C_mb) + noise_evidence(again, track, model, slave)
-    seen += wandering_evidence(again, track, model, spec, part.duration)
-    last = LastPass(part, master, model, assumed, start, what, noise, track)
+    seen = _seen(slave, master, model, C_mb)
+    seen += _rivals(
+        part, partial(transfer_filter, matching=rows, linear=linear, master=master), track, model, start, spec
+    )
+    carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
+    last = LastPass(part, master, model, assumed, start, what, noise, track, carried)
     answer = assemble_transfer(last, spec, where, notes, heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+
+
+def _rivals(
+    part: ImuRecord,
+    run: Callable[..., TransferTrack],
+    track: TransferTrack,
+    model: TransferModel,
+    start: SlaveStart,
+    spec: ImuSpec,
+) -> list[Evidence]:
+    """What else would explain the log; `run` with a slave, a model and a start."""
+
+    def other(model: TransferModel) -> TransferTrack:
+        return run(part, model=model, start=start)
+
+    found = noise_evidence(other, track, model, part) + wandering_evidence(other, track, model, spec, part.duration)
+    wide = _any_delay(start, model)
+    return found + gyro_delay_evidence(lambda record: run(record, model=model, start=wide), track, part)
+
+
+def _any_delay(start: SlaveStart, model: TransferModel) -> SlaveStart:
+    """The start with a delay that is hardly known: gyros that are late were taken for a master that is early."""
+    at = model.slice_of(DELAY)
+    if at is None:
+        return start
+    P = start.P.copy()
+    P[at, at] = max(float(P[at, at][0, 0]), RIVAL_DELAY**2)
+    return replace(start, P=P)
 
 
 def _known_as_well_as(position: Position, answer: Alignment) -> Alignment:
@@ -266,7 +309,11 @@ def _linear(
 def _refitted(
     track: TransferTrack, noise: tuple[float, float], fitted: Sequence[bool], first: Translation
 ) -> tuple[float, float]:
-    """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout."""
+    """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout.
+
+    Where they are coloured (a seat that bends, vibration between the rows), as much as white noise of their density: so many rows
+    tell delay, arm and mounting no better than fewer.
+    """
     later = slice(len(track.time) // 4, None)
     result = list(noise)
     for kind, (sigma, least) in enumerate(zip(noise, (FIRST_NOISE[first], FIRST_NOISE["attitude"]), strict=True)):
@@ -277,5 +324,24 @@ def _refitted(
         if np.isfinite(nu).any():
             spread = (1.4826 * float(np.nanmedian(np.abs(nu)))) ** 2
             of_state = max(0.0, float(np.nanmedian(claimed**2)) - sigma**2)
-            result[kind] = math.sqrt(max(spread - of_state, (LEAST * least) ** 2))
+            used = np.isin(track.verdict[later, kind], (USED, REOPENED))
+            colour = _colour(track.time[later][used], (nu / claimed)[used])
+            result[kind] = max(colour * math.sqrt(max(spread - of_state, 0.0)), LEAST * least)
     return result[0], result[1]
+
+
+def _colour(time: Array, e: Array) -> float:
+    """By how much a mean of innovations (K, 3), each by its sigma, errs more than one of white ones: the least of all pieces.
+
+    A line is taken off each piece: what drifts, or jumps once, is no noise, and is judged as such.
+    """
+    if len(time) == 0:
+        return 1.0
+    pieces = max(1, int((time[-1] - time[0]) / PIECE))
+    found = []
+    for x in np.array_split(e[:, np.isfinite(e).all(axis=0)], pieces):
+        line = np.column_stack([np.ones(len(x)), np.arange(len(x))])
+        x = x - line @ np.linalg.lstsq(line, x, rcond=None)[0]
+        seen = whiteness(x / max(float(np.sqrt(np.mean(x**2))), 1e-300))
+        found.append(seen.colour if seen.sure else 1.0)
+    return min(found)

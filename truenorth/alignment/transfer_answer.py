@@ -33,7 +33,7 @@ from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import BA, BG, DP, PHI, STATES
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -85,6 +85,9 @@ class LastPass(NamedTuple):
     what: Matched
     noise: tuple[float, float]  # of translation and attitude of the master's rows
     track: TransferTrack
+    carried: float = (
+        0.0  # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
+    )
 
 
 def assemble_transfer(
@@ -96,7 +99,7 @@ def assemble_transfer(
     of_master: list[Evidence],
 ) -> Alignment:
     """The answer at the last row of the master, judged; `of_master` is what was found of the master before, its clock included."""
-    slave, master, model, _, start, what, _, track = last
+    slave, master, model, _, start, what, _, track, _ = last
     P = track.last_P
     phi_covariance, floor = misalignment_covariance(P)
     gyro_prior, accel_prior = bias_sigmas(spec)
@@ -131,7 +134,7 @@ def assemble_transfer(
 
 
 def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
-    _, master, model, assumed, _, what, noise, track = last
+    _, master, model, assumed, _, what, noise, track, carried = last
     sigma, aux = track.sigma[-1], track.aux[-1]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
@@ -157,7 +160,7 @@ def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
         used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
-        P=_fifteen(track.last_P, Position(0.0)),
+        P=_fifteen(track.last_P, Position(0.0), carried),
         relative_sigma=_relative(track, model),
         considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
         jumps=_jumps(track, what),
@@ -197,9 +200,10 @@ def _relative(track: TransferTrack, model: TransferModel) -> Array:
     return euler_sigma(track.C_nb[-1], J @ P @ J.T)
 
 
-def _fifteen(P: Array, place: Position) -> Array:
+def _fifteen(P: Array, place: Position, carried: float) -> Array:
     """(15, 15) covariance as navigation takes it, the place as uncertain as `place` says by default."""
     result = P[:STATES, :STATES].copy()
+    result[DV, DV] += carried**2 * np.eye(3)
     result[DP, :], result[:, DP] = 0.0, 0.0
     result[DP, DP] = np.diag(np.square([place.horizontal_sigma, place.horizontal_sigma, place.vertical_sigma]))
     return result
@@ -225,7 +229,7 @@ def _jumps(track: TransferTrack, matched: Matched) -> tuple[str, ...]:
 
 def _open(last: LastPass) -> tuple[str, ...]:
     """What the motion as it was could not separate, from the model along the track."""
-    slave, _, model, assumed, start, what, noise, track = last
+    slave, _, model, assumed, start, what, noise, track, _ = last
     every = max(1, len(track.time) // MOST_EPOCHS)
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:

@@ -45,7 +45,8 @@ SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by mo
 WIDER = 3.0  # the same master's velocity and force are not quite news to each other
 TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
-RATE_NOISE = 1.25 / 4.0  # of the rate at an epoch: by a line through four samples
+# Variance of the rate at an epoch, of that of a sample, and of the other one in columns of the arm (`describe_instant`).
+RATE_NOISE, OTHER_NOISE = 0.85, 0.4
 
 
 @dataclass(frozen=True)
@@ -207,6 +208,7 @@ def master_aiding(
     stamps = master.time - start.delay
     patience = max(2, round(matching.patience / master.interval))
     found, place = [], None
+    of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
     if place is not None and kind != "position":
@@ -234,6 +236,7 @@ def master_aiding(
                 start.arm,
                 states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
+                figures=(OTHER_NOISE * of_sample,),
                 retimed=True,
                 patience=patience if opens is not None else 0,
                 opens=opens,
@@ -255,7 +258,7 @@ def master_aiding(
                 C_mb=start.C_mb,
                 states=_states(groups, roles),
                 gate=matching.gate,
-                figures=(0.0 if slave is None else RATE_NOISE * model.gyro_random_walk**2 / slave.interval,),
+                figures=(RATE_NOISE * of_sample,),
                 retimed=True,
                 patience=patience,
                 opens=MOUNTING if MOUNTING in groups else PHI.start,
@@ -271,6 +274,9 @@ _ROWS: dict[Translation, tuple[Row, int | None, str | None]] = {
     "position": (MASTER_POSITION, DP.start, None),
     "acceleration": (MASTER_ACCELERATION, None, ATTITUDE_ERROR),
 }
+
+
+TRANSLATIONS = tuple(row.name for row, _, _ in _ROWS.values())
 
 
 def _translation(master: MasterRecord, kind: Translation, place: Array | None, linear: Linear | None) -> Array | None:
@@ -341,7 +347,7 @@ def _acceleration(master: MasterRecord, place: Array | None) -> Array:
 
 def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStart) -> TransferTrack:
     """The loop's track and residuals, row by row of the master."""
-    kinds = {**{row.name: TRANSLATION for row, _, _ in _ROWS.values()}, MASTER_ATTITUDE.name: ATTITUDE}
+    kinds = {**dict.fromkeys(TRANSLATIONS, TRANSLATION), MASTER_ATTITUDE.name: ATTITUDE}
     said = [r for r in track.residuals if r.name in kinds]
     row = np.searchsorted(stamps, np.unique(np.concatenate([r.stamp for r in said])))
     count = len(row)

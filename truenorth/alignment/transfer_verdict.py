@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
+from truenorth.alignment.transfer_filter import TRANSLATIONS, SlaveStart, TransferTrack
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.memory import USED
 from truenorth.estimate.rivals import counted_once
-from truenorth.state.evidence import Evidence, contradiction, note, notes
+from truenorth.quality.innovations import whiteness
+from truenorth.state.evidence import Evidence, Figure, contradiction, note, notes
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -34,6 +35,7 @@ def judge_transfer(
     evidence += _rejected(transfer)
     evidence += _misses(transfer, track, start)
     lopsided = _lopsided(track, transfer)
+    evidence += [] if lopsided else _lasting(transfer)
     if lopsided:
         remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
         evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
@@ -76,6 +78,30 @@ def _misses(transfer: Transfer, track: TransferTrack, start: SlaveStart) -> list
             remedies = ("slave_axes", f"transfer.{name}")
             found.append(contradiction(f"transfer.{name}", *remedies, miss=miss, prior=float(prior)))
     return found
+
+
+def _lasting(transfer: Transfer) -> list[Evidence]:
+    """Differences of the translation that are no noise, since they last from row to row: no motion of one rigid body.
+
+    Their density at the period of manoeuvres is the noise that was fitted; where it is much more than what changes from row to
+    row, as of accelerometers whose axes are exchanged while a ship rolls, it is not a master's.
+    """
+    residuals = next((r for r in transfer.residuals if r.name in TRANSLATIONS), None)
+    if residuals is None or not residuals.used.any():
+        return []
+    e = (residuals.innovation / residuals.sigma)[residuals.used]
+    whole = e[:, np.isfinite(e).all(axis=0)]
+    found = whiteness(whole, float(np.median(np.diff(residuals.time))) if len(residuals.time) > 1 else 1.0)
+    if not found.sure or found.turning < limit("growth"):
+        return []
+    size = float(np.sqrt(np.nanmean(residuals.innovation[residuals.used] ** 2)))
+    figures: dict[str, Figure] = {
+        "name": residuals.name,
+        "size": size,
+        "unit": residuals.unit,
+        "colour": found.turning,
+    }
+    return [contradiction("transfer.lasting", "slave_axes", "transfer_geometry", **figures)]
 
 
 def _lopsided(track: TransferTrack, transfer: Transfer) -> str:

@@ -15,7 +15,17 @@ from truenorth.core.earth import earth_rate_n
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import kernel_sources
 from truenorth.records.motion import MotionStates
-from truenorth.state.now import NOW_C, NOW_EARTH, NOW_FORCE, NOW_LENGTH, NOW_MEAN_RATE, NOW_NORTH, NOW_RATE, NOW_TURN
+from truenorth.state.now import (
+    NOW_C,
+    NOW_EARTH,
+    NOW_FORCE,
+    NOW_LENGTH,
+    NOW_MEAN_RATE,
+    NOW_NORTH,
+    NOW_OTHER_RATE,
+    NOW_RATE,
+    NOW_TURN,
+)
 from truenorth.strapdown.wander import C_en
 
 Array = NDArray[np.float64]
@@ -58,7 +68,7 @@ def _now(motion: MotionStates) -> Array:
     now[:, NOW_C : NOW_C + 9] = motion.C_nb.reshape(-1, 9)
     now[:, NOW_EARTH : NOW_EARTH + 3] = w_ie
     now[:, NOW_NORTH + 1] = 1.0
-    for place in (NOW_RATE, NOW_MEAN_RATE):
+    for place in (NOW_RATE, NOW_OTHER_RATE, NOW_MEAN_RATE):
         now[:, place : place + 3] = motion.w_ib_b
     now[:, NOW_TURN : NOW_TURN + 3] = motion.w_ib_b - np.einsum("kji,kj->ki", motion.C_nb, w_ie)
     now[:, NOW_FORCE : NOW_FORCE + 3] = motion.f_b

@@ -1,8 +1,8 @@
 """A log of a base that stays: what is taken off it, and the linear system of the errors that are left.
 
 States: misalignment, velocity error, gyro and accelerometer bias (:mod:`truenorth.errors.staying`), then groups by name:
-``matrices``, the scale factors and misalignments of the sensors, ``arm``, the lever arm, and ``rate``, the earth's level rate of
-an INS that is levelled to some heading.
+``matrices``, the scale factors and misalignments of the sensors, ``arm``, the lever arm, ``offset``, that of the IMU from the axes
+of its indexer, along its own axes, and ``rate``, the earth's level rate of an INS that is levelled to some heading.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ def prior_of(
     spec: ImuSpec | None = None,
     arm: ArrayLike | None = None,
     arm_sigma: float = 0.0,
+    offset_sigma: float = 0.0,
     level_rate: float = 0.0,
 ) -> Prior:
     """The prior of a base of whose attitude nothing is known but that it is about level.
@@ -71,6 +72,8 @@ def prior_of(
         With it, the lever arm from the base's centre of rotation to the IMU is a state.
     arm_sigma : float, m
         One sigma along each axis; zero where it is known.
+    offset_sigma : float, m
+        One sigma of each component of the way from the axes of an indexer to the IMU, which turns with it; zero: it has none.
     level_rate : float, rad/s
         One sigma, along east and along north, of the earth's level rate where heading is a convention; zero where it is not.
     """
@@ -90,6 +93,11 @@ def prior_of(
         groups["arm"] = slice(size, size + 3)
         means.append(np.asarray(arm, dtype=np.float64))
         blocks.append(np.full(3, arm_sigma))
+        size += 3
+    if offset_sigma:
+        groups["offset"] = slice(size, size + 3)
+        means.append(np.zeros(3))
+        blocks.append(np.full(3, offset_sigma))
         size += 3
     if level_rate:
         groups["rate"] = slice(size, size + LEVEL_RATE)
@@ -176,6 +184,9 @@ class StayingLog:
         if "arm" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)
             system = with_arm(system, rows, self.taken[groups["arm"]])
+        if "offset" in groups:
+            rows = arm_rows(self.integrals, self.C_n0_i, lat)
+            system = with_arm(system, rows, self.taken[groups["offset"]])
         if "rate" in groups:
             system = with_level_rate(system, self.integrals, lat, alt)
         return system.with_arrays(x0=self.prior.mean - self.taken, P0=P0)

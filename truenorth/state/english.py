@@ -265,6 +265,10 @@ SENTENCES = {
         "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
         "specification ({imu:imu}) allows, or the master drifts"
     ),
+    "transfer.lasting": (
+        "{name}: what it differs from the slave by ({size:.3g} {unit}) lasts from row to row ({colour:.0f} times the error of "
+        "white noise): this is no motion of one rigid body"
+    ),
     "transfer.jumps": "the master's solution jumps {count} times: it does not fit this slave",
     "transfer.absolute": (
         "sigma is absolute, the master's own errors are in it; against the master heading is known to {heading:angle}, level "

@@ -21,7 +21,8 @@ NOW_BEHIND = 56  # s by which this epoch is later than the stamp: 0 but for rows
 NOW_NORTH = 57  # sine and cosine of the direction of north in w (x, y)
 NOW_FORCE_W = 59  # mean specific force along w since the last event, m/s^2
 NOW_FORCE_B = 62  # the same along the body
-NOW_LENGTH = 65
+NOW_OTHER_RATE = 65  # w_ib_b at this very time, of noise that is independent of that of `NOW_RATE`
+NOW_LENGTH = 68
 
 
 @borrowing
