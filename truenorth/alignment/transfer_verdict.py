@@ -13,7 +13,7 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.memory import USED
 from truenorth.estimate.rivals import counted_once
 from truenorth.quality.innovations import whiteness
-from truenorth.state.evidence import Evidence, Figure, contradiction, note, notes
+from truenorth.state.evidence import Evidence, contradiction, note, notes
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -95,13 +95,17 @@ def _lasting(transfer: Transfer) -> list[Evidence]:
     if not found.sure or found.turning < limit("growth"):
         return []
     size = float(np.sqrt(np.nanmean(residuals.innovation[residuals.used] ** 2)))
-    figures: dict[str, Figure] = {
-        "name": residuals.name,
-        "size": size,
-        "unit": residuals.unit,
-        "colour": found.turning,
-    }
-    return [contradiction("transfer.lasting", "slave_axes", "transfer_geometry", **figures)]
+    return [
+        contradiction(
+            "transfer.lasting",
+            "slave_axes",
+            "transfer_geometry",
+            name=residuals.name,
+            size=size,
+            unit=residuals.unit,
+            colour=found.turning,
+        )
+    ]
 
 
 def _lopsided(track: TransferTrack, transfer: Transfer) -> str:
