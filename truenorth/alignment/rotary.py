@@ -41,7 +41,7 @@ from truenorth.quality.encoder import encoder_evidence, zero_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
-from truenorth.state.evidence import Effect, notes
+from truenorth.state.evidence import Effect, Evidence, notes
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
@@ -169,12 +169,17 @@ def align_rotary(
     evidence += hemisphere_evidence(fine, task.position, seen)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
+    return judged(answer, _of_encoder(record, encoder, axes, task) + evidence + notes(encoder.notes), heading_limit)
+
+
+def _of_encoder(record: ImuRecord, encoder: EncoderRecord, axes: Sequence[str], task: Task) -> list[Evidence]:
+    """What the encoder's angles and the record say against each other."""
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
     given = readings.pop("given")
-    evidence = encoder_evidence(record, given, readings) + record_evidence(record, task.motion, given) + evidence
+    found = encoder_evidence(record, given, readings) + record_evidence(record, task.motion, given)
     if len(axes) == 2:
-        evidence += zero_evidence(record, given, _inner(encoder, axes))
-    return judged(answer, evidence + notes(encoder.notes), heading_limit)
+        found += zero_evidence(record, given, _inner(encoder, axes))
+    return found
 
 
 def _arm_velocity(
