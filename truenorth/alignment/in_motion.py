@@ -68,6 +68,9 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
 PASSES, MORE_PASSES, SETTLED = 2, 6, 0.3
+SLOW_PASSES = (
+    2  # once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
+)
 
 
 def align_in_motion(
@@ -201,20 +204,33 @@ def _aligned(
         task, much = task.learnt(track)
         if number < passes or much or moved > SETTLED:
             tell(f"pass {number + 1}")
-            guess, before = led_back(task.record, track, task.spec, first), track
-            track = task.run(guess, gated=True)
-            moved = abs(_turn_between(track.C_nb[-1], before.C_nb[-1])) / float(track.sigma[-1, PHI][2])
+            guess, track, moved = _once_more(task, track, first)
         number += 1
+    for _ in range(SLOW_PASSES if passes > 1 else 0):
+        slower = task.with_slow_errors(track)
+        if slower is task:
+            break
+        tell(f"pass {(number := number + 1)}")
+        task = slower
+        guess, track, moved = _once_more(task, track, first)
     if number > 1:
         left = moved * float(track.sigma[-1, PHI][2]) if moved > SETTLED else 0.0  # what has not settled
         spread = math.hypot(spread, used_twice(track, guess, first), left)
-    answer = _answer(task, track, method, why, spread)
+    answer = _answer(task, task.with_lasting_fixes(track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
     more += learnt_evidence(task.factors, answer.moving.delays) if answer.moving is not None else []
+    more += task.wanders
     more += _seen(task, track, guess, first, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)
+
+
+def _once_more(task: MovingTask, track: Track, first: Guess) -> tuple[Guess, Track, float]:
+    """A pass from where a track leads back to: its guess, its track, and by how many of its sigmas heading has moved."""
+    guess = led_back(task.record, track, task.spec, first)
+    other = task.run(guess, gated=True)
+    return guess, other, abs(_turn_between(other.C_nb[-1], track.C_nb[-1])) / float(other.sigma[-1, PHI][2])
 
 
 def _seen(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
@@ -330,6 +346,8 @@ def _answer(task: MovingTask, track: Track, method: str, why: str, spread: float
         for name, sensor in (("GNSS", task.antenna), ("odometer", task.wheel), ("velocity log", task.wheel))
         if (found := delay_of(track, name)) is not None and found[1] < NOT_ESTIMATED * found[2]
     }
+    # Navigation goes on from there: what heading is less sure of belongs to it, too.
+    moving = moving.less_sure(covariance[2, 2] - history.phi_covariance[-1][2, 2]) if spread else moving
     moving = replace(moving, delays=delays)
     return Alignment(
         status="not_converged",

@@ -1,7 +1,8 @@
-"""Do all sensors of a vehicle under way show the same moment? Its receiver, its gyros against its accelerometers."""
+"""Do all sensors of a vehicle under way show the same moment? Its receiver and wheel, its gyros against its accelerometers."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from truenorth.alignment.in_motion_learnt import SHOWN_DELAY, delay_of
@@ -11,31 +12,40 @@ from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
-from truenorth.records import ImuRecord
-from truenorth.state.evidence import Evidence
+from truenorth.records import ImuRecord, OdometerRecord
+from truenorth.state.evidence import Effect, Evidence
 from truenorth.state.limits import limit
+from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
 
 def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
     """What measurements say against the clock of a receiver whose latency is given, and against gyros of the same moment.
 
-    A receiver that is later than it is said to be looks like gyros that are early: its lag is left open first. Rivals of the gyros
-    have two passes: the guess is that of the log as it is, and `first` that of its first pass.
+    A receiver that is later than it is said to be looks like gyros that are early, and so does a wheel, whose slip goes with
+    acceleration as a delay does: their lags are left open first. Rivals of the gyros have two passes: the guess is that of the log
+    as it is, and `first` that of its first pass.
     """
     found: list[Evidence] = []
-    if task.gnss is not None and task.antenna.latency_sigma == 0.0:
-        open_ = replace(task, antenna=replace(task.antenna, latency_sigma=LATENCY_SIGMA))
+    shut = {"GNSS": ("gnss", task.antenna)} if task.gnss is not None else {}
+    if task.odometer is not None:
+        log = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
+        shut[log] = (log.split()[0], task.wheel)
+    shut = {name: (key, m) for name, (key, m) in shut.items() if m.latency_sigma == 0.0}
+    if shut:
+        open_ = replace(task, antenna=_opened(task.antenna), wheel=_opened(task.wheel))
         try:
             late = open_.run(guess, gated=gated)
         except DataError:  # the filter broke down: no explanation
             return []
-        lag = delay_of(late, "GNSS")
-        if lag is not None and abs(lag[0]) > SHOWN_DELAY * lag[1]:
-            ratio = likelihood_ratio(track.residuals, late.residuals)
-            if ratio > limit("rival"):
-                off = wrong_lag("GNSS", "gnss", task.antenna, lag[0], lag[1])
-                found.append(replace(off, kind="known", effect=moved(track, late)))
+        if likelihood_ratio(track.residuals, late.residuals) > limit("rival"):
+            lags = {name: delay_of(late, name) for name in shut}
+            off = {name: lag for name, lag in lags.items() if lag is not None and abs(lag[0]) > SHOWN_DELAY * lag[1]}
+            whole = moved(track, late)
+            share = Effect(*(size / math.sqrt(max(len(off), 1)) for _, size in whole.items()))
+            for name, lag in off.items():
+                key, mounting = shut[name]
+                found.append(replace(wrong_lag(name, key, mounting, lag[0], lag[1]), kind="known", effect=share))
         task, track = open_, late
 
     def other(record: ImuRecord) -> Track:
@@ -43,3 +53,8 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         return rival.run(led_back(record, rival.run(guess, gated=gated), task.spec, first), gated=gated)
 
     return found + gyro_delay_evidence(other, track, task.record)
+
+
+def _opened(mounting: Mounting) -> Mounting:
+    """A sensor whose clock is not taken for known."""
+    return mounting if mounting.latency_sigma > 0.0 else replace(mounting, latency_sigma=LATENCY_SIGMA)

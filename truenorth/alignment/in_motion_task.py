@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.aids import BASELINE
-from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity, place_sigma
+from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import (
     LEAST_DELAY,
@@ -26,6 +26,7 @@ from truenorth.alignment.in_motion_start import (
     coarse_guess,
     start_at,
 )
+from truenorth.core.earth import radii
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.log import LogErrors
@@ -35,9 +36,11 @@ from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.regimes import motion_summary
+from truenorth.quality.slow_aids import FIXES, USUAL_TIME, Slow, as_lasting, slow_errors, usual_bias, with_slow
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.state.evidence import Evidence
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -52,7 +55,8 @@ LONGEST_ALONE = 5.0  # s, that any IMU carries a vehicle before its first aid
 USUAL_SPEED = 30.0  # m/s, of a vehicle
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
-RECEIVER_BIAS, RECEIVER_TIME = 2.0, 60.0  # m, s: multipath and atmosphere, alike from fix to fix
+FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
+PACE = 5.0  # s, over which fixes show a speed
 LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
 
 
@@ -73,6 +77,11 @@ class MovingTask:
     slow: LogErrors = NO_LOG_ERRORS
     factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
     waited: float = 0.0  # s, that the vehicle drove before anything aided: left out of the record
+    usual_fixes: bool = (
+        False  # the slow error of fixes is the usual one, or innovations have shown it: nobody spoke of it
+    )
+    lasting: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
+    wanders: Sequence[Evidence] = ()  # and what is to be said of them
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
         """The task with what a pass has taught of its sensors, and whether that is much."""
@@ -82,6 +91,23 @@ class MovingTask:
             antenna = replace(antenna, latency=antenna.latency + late[0])
         much = antenna is not self.antenna or changed(self.factors, factors)
         return (replace(self, factors=factors, antenna=antenna), True) if much else (self, False)
+
+    def with_slow_errors(self, track: Track) -> MovingTask:
+        """The task with slow errors of its aids that a pass has shown: the same one where there are none."""
+        slow, wanders = slow_errors(track, self.aiding(gated=False))
+        if not slow:
+            return self
+        lasting = {**self.lasting, **slow}
+        return replace(
+            self,
+            usual_fixes=self.usual_fixes or FIXES in slow,
+            lasting=lasting,
+            wanders=(*self.wanders, *wanders),
+        )
+
+    def with_lasting_fixes(self, track: Track) -> Track:
+        """A track of this task with position known no better than fixes whose slow error nobody spoke of."""
+        return as_lasting(track, self.aiding(gated=True)) if self.usual_fixes else track
 
     def aiding(self, *, gated: bool) -> list[Aiding]:
         """Of all sensors; without gates as long as the filter may be wrong itself."""
@@ -95,7 +121,7 @@ class MovingTask:
         if self.gnss is not None:
             found += from_gnss(self.gnss, antenna)
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
-        return louder(found, self.factors)
+        return louder(with_slow(found, self.lasting), self.factors)
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""
@@ -171,6 +197,7 @@ def moving_task(
         stops,
         more,
         waited=waited,
+        usual_fixes=antenna is None,
     )
 
 
@@ -219,13 +246,10 @@ def _with_floors(gnss: GnssRecord) -> GnssRecord:
 
 
 def usual_antenna(gnss: GnssRecord | None) -> Mounting:
-    """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes.
-
-    By how much: what the receiver says of a fix; it is right about the size, and silent about how its errors are correlated.
-    """
-    said = gnss is not None and (gnss.position_sigma is not None or gnss.dop is not None)
-    bias = place_sigma(gnss) if said and gnss is not None else RECEIVER_BIAS
-    return Mounting(latency_sigma=LATENCY_SIGMA, bias_sigma=bias, bias_time=RECEIVER_TIME, angle_sigma=BASELINE)
+    """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes."""
+    return Mounting(
+        latency_sigma=LATENCY_SIGMA, bias_sigma=usual_bias(gnss), bias_time=USUAL_TIME, angle_sigma=BASELINE
+    )
 
 
 def has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
@@ -234,8 +258,29 @@ def has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:
 
 
 def first_fix(record: ImuRecord, gnss: GnssRecord) -> Position:
-    """Where a log begins, by GNSS."""
+    """Where a log begins, by GNSS: no farther from the nearest fix than the vehicle goes in between, and while fixes are late."""
     fixes = np.flatnonzero(gnss.has_position)
     nearest = fixes[int(np.argmin(np.abs(gnss.time[fixes] - record.time[0])))]
     alt = float(gnss.alt[nearest])
-    return Position(float(gnss.lat[nearest]), float(gnss.lon[nearest]), alt if np.isfinite(alt) else 0.0, 10.0, 20.0)
+    lat, lon = float(gnss.lat[nearest]), float(gnss.lon[nearest])
+    apart = abs(float(gnss.time[nearest] - record.time[0])) + LATENCY_SIGMA
+    gone = apart * _speed_at(gnss, float(gnss.time[nearest]))
+    far, high = math.hypot(FIRST_FIX[0], gone), math.hypot(FIRST_FIX[1], gone)
+    return Position(lat, lon, alt if np.isfinite(alt) else 0.0, far, high)
+
+
+def _speed_at(gnss: GnssRecord, time: float) -> float:
+    """Of a receiver at a time, m/s, by its velocity or by how far it gets in some seconds."""
+    if gnss.v_n is not None and gnss.has_velocity.any():
+        rows = np.flatnonzero(gnss.has_velocity)
+        return float(np.linalg.norm(gnss.v_n[rows[np.argmin(np.abs(gnss.time[rows] - time))], :2]))
+    rows = np.flatnonzero(gnss.has_position & (gnss.time >= time))
+    last = rows[min(int(np.searchsorted(gnss.time[rows], time + PACE)), len(rows) - 1)]
+    if last == rows[0]:
+        return 0.0
+    R_M, R_N = radii(float(gnss.lat[last]))
+    north, east = (
+        R_M * (gnss.lat[last] - gnss.lat[rows[0]]),
+        R_N * math.cos(gnss.lat[last]) * (gnss.lon[last] - gnss.lon[rows[0]]),
+    )
+    return math.hypot(north, east) / float(gnss.time[last] - gnss.time[rows[0]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,6 +78,14 @@ class Moving:
     vehicle_heading_sigma: float
     track: Track
     delays: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def less_sure(self, heading: float, level: float = 0.0, velocity: float = 1.0, position: float = 1.0) -> Moving:
+        """The same state with these variances (rad^2) added to heading and level, and sigmas so many times as large."""
+        factor = np.ones(len(self.P))
+        factor[DV], factor[DP] = velocity, position
+        P = factor[:, None] * self.P * factor
+        P[PHI, PHI] += np.diag([level, level, heading])
+        return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
 
     def summary(self) -> dict[str, Any]:
         """In datasheet units, ready for JSON."""

@@ -16,7 +16,7 @@ from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
 from truenorth.core.errors import AlignmentError
 from truenorth.quality.regimes import SEEN_LATE
-from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, contradiction, note
+from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
 from truenorth.state.limits import limit
 
@@ -108,15 +108,33 @@ def azimuth_sigmas(answer: Alignment) -> tuple[float, float]:
 
 
 def grown(answer: Alignment, added: Effect) -> Alignment:
-    """The same answer with an independent error in its covariance, its floor and its history."""
-    if added.heading == added.level == 0.0:
+    """The same answer with an independent error in its covariance, its floor and its history.
+
+    On the move velocity and position, and what navigation goes on from, have it too.
+    """
+    if added == NO_EFFECT:
         return answer
     more = np.diag([added.level, added.level, added.heading]) ** 2
     history = answer.history
     if history is not None:
         history = replace(history, phi_covariance=history.phi_covariance + more, phi_floor=history.phi_floor + more)
+    moving, position = answer.moving, answer.position
+    if moving is not None:
+        own = claimed(answer)
+        fast, far = (
+            math.hypot(1.0, size / sigma) if sigma > 0.0 else 1.0
+            for size, sigma in ((added.velocity, own.velocity), (added.position, own.position))
+        )
+        moving = moving.less_sure(added.heading**2, added.level**2, fast, far)
+        wider = {"horizontal_sigma": far * position.horizontal_sigma, "vertical_sigma": far * position.vertical_sigma}
+        position = replace(position, **wider)
     return replace(
-        answer, phi_covariance=answer.phi_covariance + more, phi_floor=answer.phi_floor + more, history=history
+        answer,
+        phi_covariance=answer.phi_covariance + more,
+        phi_floor=answer.phi_floor + more,
+        history=history,
+        moving=moving,
+        position=position,
     )
 
 

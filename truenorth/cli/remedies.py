@@ -27,7 +27,6 @@ OPTIONS = {
     "arm.gnss": "--lever-arm",
     "arm.odometer": "--wheel-arm",
     "arm.velocity": "--wheel-arm",
-    "gnss_drift": "--gnss-drift {drift:.2g},60",
     "height_sensor": "--altitude free",
     "use_barometer": "--altitude baro",
     "part_of_logs": "--from, --to",

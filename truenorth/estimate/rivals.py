@@ -176,7 +176,8 @@ def noise_evidence(run: Callable[[M], Along], first: Along, model: M, record: Im
     """What noise for a while does to an answer on the move: its own walk, and what the filter makes of it.
 
     The filter takes for errors of attitude and biases what the noise does to velocity. With as much noise assumed all along it
-    would not: what that moves the answer by is about what it has taken in.
+    would not: what that moves the answer by is about what it has taken in. Of the walk itself the measurements leave no more than
+    the sigma of such a filter.
 
     Parameters
     ----------
@@ -189,10 +190,12 @@ def noise_evidence(run: Callable[[M], Along], first: Along, model: M, record: Im
         name = "gyro_random_walk" if item.key == "noise.gyro_stretch" else "accel_random_walk"
         louder = {name: math.hypot(getattr(model, name), float(item.figures["density"]))}
         try:
-            taken = moved(first, run(replace(model, **louder)))  # type: ignore[type-var]  # a dataclass
+            other = run(replace(model, **louder))  # type: ignore[type-var]  # a dataclass
+            taken, left = moved(first, other), _of_states(other.sigma[-1, :9])
         except DataError:
-            taken = NO_EFFECT
-        effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(item.effect.items(), taken.items(), strict=True)))
+            taken, left = NO_EFFECT, ANY_EFFECT
+        walked = (min(a, b) for (_, a), (_, b) in zip(item.effect.items(), left.items(), strict=True))
+        effect = Effect(*(max(a, b) for a, (_, b) in zip(walked, taken.items(), strict=True)))
         found.append(replace(item, figures={**item.figures, "heading": effect.heading}, effect=effect))
     return found
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -23,7 +23,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
-from truenorth.navigation.second_look import second_look, slow_errors
+from truenorth.navigation.second_look import second_look
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
@@ -33,6 +33,7 @@ from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
+from truenorth.quality.slow_aids import Slow, as_lasting, slow_errors, with_slow
 from truenorth.records import ImuRecord, Late, Trajectory
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
@@ -150,14 +151,14 @@ def navigate(
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
     _check_places(given, begin, height)
-    tell("looking for stops" if zupt is not None else "navigating")
     if zupt is not None:
+        tell("looking for stops")
         seen = (_record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
         plan = replace(plan, always=[*zero_updates(record, zupt, plan.interval, *seen), *disturbances])
     _check_axes(plan, given)
     tell("navigating")
-    track = plan.run(aiding, smooth=smooth)
-    evidence = [*_seen(plan, track, given, found), *why, *said]
+    plan, track, wanders = _filtered(plan, given, smooth)
+    evidence = [*_seen(plan, track, given, found), *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
         evidence += _rivals(plan, track, given, noise, smooth)
@@ -201,10 +202,11 @@ class _Plan:
     always: Sequence[Aiding]  # gaps and stops
     interval: float
     every: int
+    slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
 
     def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
         """Measurements of all aids."""
-        return [source for a in given.values() for source in a.sources(self.altitude)]
+        return with_slow([source for a in given.values() for source in a.sources(self.altitude)], self.slow)
 
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
@@ -226,7 +228,22 @@ def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> l
         evidence.append(note("odometer.taken_over"))
     if "baro" in given and plan.altitude != "baro":
         evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
-    return [*evidence, *slow_errors(track, _looked_at(given)["gnss"])]
+    return evidence
+
+
+def _filtered(plan: _Plan, given: Mapping[str, Any], smooth: bool) -> tuple[_Plan, Track, list[Evidence]]:
+    """The plan with slow errors of aids that innovations show, its track, and what is to be said of them."""
+    said: list[Evidence] = []
+    track = plan.run(plan.sources(given), smooth=smooth)
+    for _ in range(2):  # one sensor's may hide another's
+        slow, shown = slow_errors(track, plan.sources(given))
+        if not slow:
+            break
+        plan = replace(plan, slow={**plan.slow, **slow})
+        said += shown
+        aiding = plan.sources(given)
+        track = as_lasting(plan.run(aiding, smooth=smooth), aiding)
+    return plan, track, said
 
 
 def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:

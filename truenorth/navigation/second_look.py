@@ -23,12 +23,6 @@ SMALL = 10.0  # times its prior: beyond it a small-angle model does not hold
 CLEAR = 6.0  # sigmas from which a contradiction is worth a warning; from HINT on its effect is added to sigma
 HINT = 3.5
 LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data do not show it
-LEAST_FIXES = 60
-LAGS = 5
-WHITE, LEAST_CORRELATION = (
-    4.0,
-    0.05,
-)  # sigmas, and least mean correlation over so many lags, from which fixes are not white
 MOST_CONTRADICTED = 0.2  # of a sensor's measurements
 KNOWN_ARM = 0.2  # of an arm, the sigma up to which the data show it
 SMALLER = {"centimetres": 1e-2, "millimetres": 1e-3}
@@ -122,38 +116,6 @@ def _contradicted(track: Track) -> float:
 def _beyond(track: Track, name: str, role: Role) -> bool:
     where = track.layout.slice_of(f"{name} {role}")
     return where is not None and bool(np.any(np.abs(track.sensors[-1, where]) > SMALL * OPEN[role].prior))
-
-
-def slow_errors(track: Track, antenna: Mounting) -> list[Evidence]:
-    """A warning where innovations of GNSS positions are correlated from row to row, though they are taken for white noise.
-
-    Of white ones the mean correlation over the first lags is zero, to one over the root of the number of products; a
-    receiver's multipath and atmosphere last for minutes, and the filter then believes their mean.
-    """
-    fixes = [r for r in track.residuals if r.name == "GNSS position"]
-    if antenna.bias_sigma > 0.0 or not fixes:
-        return []
-    used = fixes[0].innovation[fixes[0].used & (fixes[0].rows > 0)]
-    if len(used) < LEAST_FIXES:
-        return []
-    used = used[:, np.isfinite(used).all(axis=0)]
-    squares = np.sum(used**2, axis=0)
-    alike = np.stack([np.sum(used[lag:] * used[:-lag], axis=0) for lag in range(1, LAGS + 1)])
-    correlation = float(np.mean(alike / squares))
-    if correlation < max(LEAST_CORRELATION, WHITE / math.sqrt(LAGS * used.size)):
-        return []
-    wander = math.sqrt(max(float(np.mean(alike)) / len(used), 0.0))  # the filter has followed them: it is more
-    return [
-        note(
-            "innovations.wander",
-            "gnss_drift",
-            urgent=True,
-            name=fixes[0].name,
-            correlation=correlation,
-            wander=wander,
-            drift=2 * wander,
-        )
-    ]
 
 
 def _loosened(name: str, mounting: Mounting) -> Mounting:

@@ -36,11 +36,17 @@ def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
 
     NaN where the channel does not look white; no stretch at all where rows are too few or missing.
     """
+    edges, density, _ = _densities(record)
+    return edges, density
+
+
+def _densities(record: ImuRecord) -> tuple[Array, Array, Array]:
+    """The same, and how loud (S, 6) each stretch is, white or not."""
     dt = record.interval
     rows = round(STRETCH / dt)
     count = len(record) // max(rows, 1)
     if rows < (FEWEST + ORDER) * ROWS[-1] or count < 3 or record.gaps.size:
-        return np.zeros(0), np.zeros((0, 6))
+        return np.zeros(0), np.zeros((0, 6)), np.zeros((0, 6))
     data = np.hstack([record.gyro, record.accel])[: count * rows].reshape(count, rows, 6)
     if record.kind == "increments":
         data = data / dt
@@ -53,9 +59,8 @@ def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
     low, high = density.min(axis=0), density.max(axis=0)
     start = float(record.time[0]) - dt
     edges = np.append(start, record.time[rows - 1 : count * rows : rows])
-    return edges, np.where(
-        (low > 0.0) & (high < ALIKE * low), np.exp(np.log(np.maximum(density, 1e-300)).mean(axis=0)), np.nan
-    )
+    level = np.exp(np.log(np.maximum(density, 1e-300)).mean(axis=0))
+    return edges, np.where((low > 0.0) & (high < ALIKE * low), level, np.nan), level
 
 
 def walk_density(record: ImuRecord) -> Array:
@@ -74,15 +79,19 @@ def walk_density(record: ImuRecord) -> Array:
 
 
 def bursts(record: ImuRecord) -> tuple[Array, Array]:
-    """Edges (S+1,) of stretches, s, and by what density (S, 6) they exceed the usual one of the log; zero as a rule."""
-    edges, density = noise_densities(record)
+    """Edges (S+1,) of stretches, s, and by what density (S, 6) they exceed the usual one of the log; zero as a rule.
+
+    A level that the base's own motion reaches elsewhere in the log is none: a road that looks white for a stretch is a road.
+    """
+    edges, density, level = _densities(record)
     if not len(density):
         return edges, density
     known = np.where(np.isfinite(density), density, np.inf)
     usual = np.sort(known, axis=0)[: max(1, len(known) // 2)].max(
         axis=0
     )  # the median, what is not white on its upper side
-    louder = np.isfinite(known) & (known > BURST * usual)
+    moving = np.where(np.isfinite(density), 0.0, level).max(axis=0)
+    louder = np.isfinite(known) & (known > BURST * usual) & (known > moving)
     return edges, np.where(
         louder,
         np.sqrt(np.maximum(np.where(louder, known, 0.0) ** 2 - np.where(np.isfinite(usual), usual, 0.0) ** 2, 0.0)),

@@ -238,8 +238,8 @@ SENTENCES = {
     ),
     "innovations.outside": "{name}: {outside} measurements lie before the start or after the end of the IMU's log",
     "innovations.wander": (
-        "errors of the {name}s are correlated from fix to fix (correlation {correlation:.2f}) and wander by {wander:.2g} m or "
-        "more: the sigma of position is too small"
+        "{name}: its errors follow each other from row to row (correlation {correlation:.2f}) and wander by {wander:.2g} {unit} or "
+        "more: a slow error is estimated, and in sigma"
     ),
     "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
     "delay.late": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s late, which is estimated and in sigma",
@@ -345,7 +345,6 @@ REMEDIES = {
     "arm.gnss": "check the arm; metres are expected",
     "arm.odometer": "check the arm, to the axle that nothing steers; metres are expected",
     "arm.velocity": "check the arm; metres are expected",
-    "gnss_drift": "give the size and the time of that wander, such as {drift:.2g} m and 60 s",
     "height_sensor": "give a sensor of height, or let the height be free, where the vehicle climbs",
     "use_barometer": "for its heights keep the height by the barometer",
     "part_of_logs": "align a part of the logs",

@@ -1,0 +1,132 @@
+"""Errors of aiding sensors that last: a receiver's multipath and atmosphere, a wheel's slip, alike from row to row.
+
+Taken for white noise they average out within seconds, and sigma is false: of position and velocity, and where an INS is good
+enough to believe their mean, of level, heading and biases. Where innovations show them, first-order Gauss-Markov errors of their
+size are estimated with the INS. What lasts longer than such a time averages out for the filter and not in truth: position is
+never known better than the slow error of its fixes.
+
+Source: P. Misra and P. Enge, *Global Positioning System*, 2nd ed., ch. 5: errors of orbits, clocks and atmosphere last for minutes
+to hours, multipath for a minute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.sensors import place_sigma
+from truenorth.aiding.source import Aiding, Role
+from truenorth.errors.group import Group
+from truenorth.quality.innovations import whiteness
+from truenorth.records import GnssRecord
+from truenorth.state.evidence import Evidence, Figure
+from truenorth.state.layout import DP
+from truenorth.state.track import Residuals, Track
+
+Array = NDArray[np.float64]
+Slow = Mapping[str, Group]  # by the source's name
+
+FIXES = "GNSS position"
+USUAL_BIAS, USUAL_TIME = 2.0, 60.0  # m, s
+
+
+class _Kind(NamedTuple):
+    """Where a source takes up a slow error: role, name of its states, how many, their correlation time (s)."""
+
+    role: Role
+    name: str
+    axes: int
+    time: float
+    most: float  # SI: what is larger is no slow error but something else that is wrong
+    after: tuple[Role, ...] = ()  # what of it has to be estimated already
+
+
+KINDS = {
+    FIXES: _Kind("bias", "GNSS bias", 3, USUAL_TIME, 20.0),
+    "GNSS velocity": _Kind("own", "GNSS velocity drift", 2, 20.0, 0.5),
+    "odometer": _Kind(
+        "bias", "odometer slip", 3, 20.0, 0.5, ("scale", "mounting")
+    ),  # a wheel's, and of the body on its springs
+    "velocity log": _Kind("bias", "velocity log bias", 3, 60.0, 0.2, ("scale", "mounting")),
+}
+LEAST = 1e-3  # of the largest axis: what an axis without slow errors is given
+LEAST_ROWS = 60
+LAGS = 5
+MOST = 6.0 / 0.6745  # times the median, of sizes: six sigmas
+FOLLOWED = 2.0  # times what is left in innovations: the filter has followed it
+
+
+def usual_bias(record: GnssRecord | None) -> float:
+    """One sigma, m, by what the receiver says of a fix: it is right about the size, and silent about how its errors follow."""
+    said = record is not None and (record.position_sigma is not None or record.dop is not None)
+    return place_sigma(record) if said and record is not None else USUAL_BIAS
+
+
+def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Group], list[Evidence]]:
+    """Slow errors that innovations show and nobody spoke of, by the source's name, and what is to be said of them."""
+    found: dict[str, Group] = {}
+    said = []
+    for source in aiding:
+        kind = KINDS.get(source.name)
+        residuals = next((r for r in track.residuals if r.name == source.name), None)
+        if kind is None or kind.role in source.states or residuals is None:
+            continue
+        if any(role not in source.states for role in kind.after):
+            continue  # what is taken for known, and may be wrong, is looked at first
+        seen = _wander(residuals, kind.axes)
+        if seen is None:
+            continue
+        correlation, size = seen
+        sigma = FOLLOWED * size
+        if sigma.max() > kind.most:
+            continue
+        sigma = np.maximum(sigma, LEAST * sigma.max())
+        found[source.name] = Group(kind.name, sigma, kind.time, unit=residuals.unit)
+        wander = float(size.max())
+        figures: dict[str, Figure] = {
+            "name": source.name,
+            "correlation": correlation,
+            "wander": wander,
+            "unit": residuals.unit,
+        }
+        said.append(Evidence("innovations.wander", figures))
+    return found, said
+
+
+def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
+    """Mean correlation over the first lags, and the root of what rows that follow each other have in common; None: chance."""
+    rows = residuals.rows > 0
+    e, sigma = residuals.innovation[rows, :axes], residuals.sigma[rows, :axes]
+    # Rows that were rejected may be the slow error itself; outliers count as its largest.
+    most = MOST * np.nanmedian(np.abs(e), axis=0)
+    e = np.clip(e, -most, most)
+    there = np.isfinite(e).all(axis=0)
+    e, sigma = e[:, there], sigma[:, there]
+    if len(e) < LEAST_ROWS or not e.size or whiteness(e / sigma).growth <= 1.0:  # white, or no more than sigma says
+        return None
+    alike = np.mean([np.sum(e[lag:] * e[:-lag], axis=0) for lag in range(1, LAGS + 1)], axis=0)
+    correlation = float(np.mean(alike / np.sum(e**2, axis=0)))
+    if correlation <= 0.0 or alike.max() <= 0.0:
+        return None
+    size = np.zeros(axes)
+    size[there] = np.sqrt(np.maximum(alike, 0.0) / len(e))
+    return correlation, size
+
+
+def with_slow(aiding: Sequence[Aiding], slow: Slow) -> list[Aiding]:
+    """The same sources with these slow errors among their states."""
+    return [replace(s, states={**s.states, KINDS[s.name].role: slow[s.name]}) if s.name in slow else s for s in aiding]
+
+
+def as_lasting(track: Track, aiding: Iterable[Aiding]) -> Track:
+    """The track with position known no better than the slow error of its fixes."""
+    fixes = next((source for source in aiding if source.name == FIXES and "bias" in source.states), None)
+    if fixes is None or not len(track.P):
+        return track
+    P, at = track.P.copy(), np.arange(DP.start, DP.stop)
+    P[:, at, at] = np.maximum(P[:, at, at], np.asarray(fixes.states["bias"].sigma) ** 2)
+    return replace(track, P=P)
