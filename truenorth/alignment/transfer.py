@@ -18,6 +18,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
 from truenorth.alignment.transfer_filter import (
+    TRANSLATIONS,
     Linear,
     Matching,
     SlaveStart,
@@ -32,7 +33,7 @@ from truenorth.core.position import Position
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.memory import REOPENED, USED
-from truenorth.estimate.rivals import noise_evidence, wandering_evidence
+from truenorth.estimate.rivals import likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.innovations import whiteness
@@ -192,7 +193,18 @@ def _rivals(
 
     found = noise_evidence(other, track, model, part) + wandering_evidence(other, track, model, spec, part.duration)
     wide = _any_delay(start, model)
-    return found + gyro_delay_evidence(lambda record: run(record, model=model, start=wide), track, part)
+
+    def of_translation(track: TransferTrack) -> TransferTrack:
+        """Attitudes alone do not part late gyros from an early master: what velocity or place say counts."""
+        return replace(track, residuals=tuple(r for r in track.residuals if r.name in TRANSLATIONS))
+
+    def shifted(record: ImuRecord) -> TransferTrack:
+        return of_translation(run(record, model=model, start=wide))
+
+    first, free = of_translation(track), shifted(part)
+    # What a delay that is less known explains is no delay of the gyros.
+    first = free if likelihood_ratio(first.residuals, free.residuals) > 0.0 else first
+    return found + gyro_delay_evidence(shifted, first, part)
 
 
 def _any_delay(start: SlaveStart, model: TransferModel) -> SlaveStart:
