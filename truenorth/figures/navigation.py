@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+HELD = 1e-6  # of the largest sigma
+
 
 def plot_navigation(result: Navigation) -> Figure:
     """Draw track with error ellipses, height, velocity and attitude with one-sigma bands, sigmas, innovations."""
@@ -82,7 +84,7 @@ def _track(ax: Axes, result: Navigation) -> None:
 
 def _sigmas(ax: Axes, t: Array, sigma: Array, title: str, unit: str) -> None:
     for i, name in enumerate(("east", "north", "up")):
-        if np.any(sigma[:, i] > 0.0):
+        if sigma[:, i].max() > HELD * sigma.max():  # a height that is held has a sigma of rounding
             trace(ax, t, sigma[:, i], color=COLOURS[i], label=name)
     ax.set_yscale("log")
     ax.set_title(title)

@@ -98,6 +98,11 @@ def simulate(
     UsageError
         A motion that is none; a rate, a duration or a given error that makes no sense.
     """
+    if isinstance(motion, str):
+        raise UsageError(
+            f"motion {motion!r} is a name; expected a motion; a scenario is simulated by "
+            f"`truenorth.simulation.scenario.read_scenario({motion!r}).simulate()`"
+        )
     if not hasattr(motion, "states") and not isinstance(motion, IdealLog):
         raise UsageError(
             f"motion is a {type(motion).__name__}; expected a motion, such as `rest(...)`, or an ideal log"
