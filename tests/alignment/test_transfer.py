@@ -4,12 +4,14 @@ import json
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests import recordings
 from truenorth.alignment.transfer import _colour, align_transfer
+from truenorth.alignment.transfer_answer import _bent
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks
@@ -21,7 +23,7 @@ from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel, mas
 from truenorth.filters import kalman
 from truenorth.formats import read_master
 from truenorth.formats.writing import write_record
-from truenorth.records import MasterRecord
+from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
 from truenorth.simulation.course import course
@@ -288,6 +290,17 @@ def test_the_delay_by_motion_alone(real):
             delay = find_delay(slave, record.shifted(shift), np.eye(3))
             assert delay.sure
             assert delay.delay - shift == pytest.approx(0.015, abs=0.02)
+
+
+def test_an_arm_on_a_seat_that_bends_is_known_as_well_as_the_rates_are_rigid():
+    """Half of the rate's power is the seat's: half of the arm; without flexure nothing is added."""
+    t = 0.01 * np.arange(1, 2001)
+    rates = np.column_stack([0.01 * np.sqrt(2.0) * np.sin(t), 0.0 * t, 0.0 * t])
+    slave = ImuRecord(t, rates, [*np.zeros((2000, 3)), 0.0, 0.0, 9.8])
+    power = math.sqrt(float(np.var(rates[:, 0])) / 2.0)
+    for sigma, expected in ((power / 2.0, 1.5), (0.0, 0.0)):
+        last = SimpleNamespace(slave=slave, model=SimpleNamespace(flexure_sigma=(sigma, 0.0, 0.0), flexure_beta=2.0))
+        assert _bent(last, np.array([0.0, 3.0, 0.0])) == pytest.approx(expected, rel=1e-2)
 
 
 def test_only_what_comes_back_is_noise():

@@ -150,7 +150,7 @@ def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
         delay_sigma=0.0 if tau is None else float(sigma[tau][0]),
         delay_prior=assumed.delay_sigma,
         lever_arm=assumed.lever_arm + (0.0 if arm is None else aux[arm]),
-        lever_arm_sigma=np.zeros(3) if arm is None else sigma[arm],
+        lever_arm_sigma=np.zeros(3) if arm is None else np.hypot(sigma[arm], _bent(last, assumed.lever_arm + aux[arm])),
         lever_arm_prior=np.full(3, assumed.lever_arm_sigma),
         mounting=_signed(np.array(euler_from_dcm(track.C_mb[-1]))),
         mounting_sigma=sigma_of_mounting(track.last_P, mount, track.C_mb[-1]),
@@ -171,6 +171,17 @@ def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
         residuals=track.residuals,
         course=_course(model, assumed, track),
     )
+
+
+def _bent(last: LastPass, arm: Array) -> float:
+    """How much of an arm is false, m: its seat bends, which its gyros show, but its end does not move as much.
+
+    Of the rates with which the arm was found, a share ``s^2 / w^2`` is the seat's, s the root mean square of its own rate.
+    """
+    bends = np.asarray(last.model.flexure_sigma) * last.model.flexure_beta
+    rates = increments(last.slave)[0] / interval_lengths(last.slave)[:, None]
+    whole = float(np.sum(np.var(rates, axis=0)))
+    return float(np.linalg.norm(arm)) * min(1.0, float(bends @ bends) / max(whole, 1e-30))
 
 
 def _course(model: TransferModel, assumed: Assumed, track: TransferTrack) -> Relation:
