@@ -296,7 +296,7 @@ def test_an_arm_on_a_seat_that_bends_is_known_as_well_as_the_rates_are_rigid():
     """Half of the rate's power is the seat's: half of the arm; without flexure nothing is added."""
     t = 0.01 * np.arange(1, 2001)
     rates = np.column_stack([0.01 * np.sqrt(2.0) * np.sin(t), 0.0 * t, 0.0 * t])
-    slave = ImuRecord(t, rates, [*np.zeros((2000, 3)), 0.0, 0.0, 9.8])
+    slave = ImuRecord(t, rates, np.tile([0.0, 0.0, 9.8], (2000, 1)))
     power = math.sqrt(float(np.var(rates[:, 0])) / 2.0)
     for sigma, expected in ((power / 2.0, 1.5), (0.0, 0.0)):
         last = SimpleNamespace(slave=slave, model=SimpleNamespace(flexure_sigma=(sigma, 0.0, 0.0), flexure_beta=2.0))
