@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.sizes import compiled_only
+
 # Files that take the most time, longest first: no worker begins one of them when the others are done.
 LONGEST = [
     "papers/test_static",
@@ -48,3 +50,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     root = Path(__file__).parent
     order = {root / f"{name}.py": place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: order.get(item.path, len(order)))
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Where no slow test is asked for, no size of a filter is compiled but those of `truenorth warm`."""
+    if session.config.option.markexpr == "not slow":
+        compiled_only()

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from tests.sizes import in_this_process
+
 FEW = 8
 
 
@@ -22,8 +24,11 @@ def few_and_all(runs, few=FEW):
 def said_by_a_second_process(program, first_will_do):
     """The words that a program prints in a process of its own.
 
-    It runs again where the kernels that it needs were not on the disk before: `first_will_do` says so of its words.
+    Its filters have the sizes of this process. It runs again where the kernels that it needs were not on the disk before:
+    `first_will_do` says so of its words.
     """
+    if in_this_process():
+        program = f"from tests.sizes import compiled_only; compiled_only()\n{program}"
     for _ in range(2):
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
         words = done.stdout.split()

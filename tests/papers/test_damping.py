@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.runs import some
 from truenorth.damping.course import errors_of
 from truenorth.damping.spectrum import earth_line, schuler_lines
 from truenorth.errors.marine import DP, DV
@@ -26,10 +27,11 @@ def voyage():
     return sail(5.0, 3)
 
 
-@pytest.fixture(scope="module")
-def cases(voyage):
+@pytest.fixture(scope="module", params=some([(0.0, -0.3, -0.5)], [((0.0, -0.1, -0.3, -0.5),)]))
+def cases(voyage, request):
+    """By the log's error."""
     course = voyage.navigate(voyage.paper_errors())
-    return {c: run_all(voyage, course, voyage.reference(c), networks=c == -0.3) for c in (0.0, -0.1, -0.3, -0.5)}
+    return {c: run_all(voyage, course, voyage.reference(c), networks=c == -0.3) for c in request.param}
 
 
 def test_the_undamped_lines(voyage, cases):
@@ -54,7 +56,7 @@ def test_filter2_does_not(cases):
     """On the raw reference to rounding, on the smoothed one to 1 %."""
     for method, share in (("filter2_raw", 1e-9), ("filter2", 0.01)):
         none = cases[0.0].errors[method]
-        for c in (-0.1, -0.3, -0.5):
+        for c in cases:
             difference = np.abs(cases[c].errors[method] - none).max(axis=0)
             np.testing.assert_array_less(difference, share * np.abs(none).max(axis=0))
 
