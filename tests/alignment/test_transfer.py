@@ -303,6 +303,23 @@ def test_an_arm_on_a_seat_that_bends_is_known_as_well_as_the_rates_are_rigid():
         assert _bent(last, np.array([0.0, 3.0, 0.0])) == pytest.approx(expected, rel=1e-2)
 
 
+def test_the_first_row_of_a_turn_shows_no_delay():
+    """The master's log ends as a turn begins: a second later there is enough of it."""
+    t, level = 0.02 * np.arange(1, 3001), np.zeros(3000)
+    rate = np.radians(3.0) * np.clip(t - 39.85, 0.0, 0.5)
+    noise = 4e-5 * np.random.default_rng(2).standard_normal((3000, 3))
+    slave = ImuRecord(
+        t, np.stack([level, level, -rate], axis=1) + noise, np.tile([0.0, 0.0, 9.8], (3000, 1)), "rates", "made"
+    )
+    heading = np.interp(0.1 * np.arange(1, 600), t, np.cumsum(rate) * 0.02)
+    C = np.stack([dcm_from_euler(angle, 0.0, 0.0) for angle in heading])
+    master = MasterRecord(0.1 * np.arange(1, 600), C, np.zeros((599, 3)), source="made")
+    assert not find_delay(slave, master[:399], np.eye(3)).sure
+    later = find_delay(slave, master[:450], np.eye(3))
+    assert later.sure
+    assert later.delay == pytest.approx(0.0, abs=0.02)
+
+
 def test_only_what_comes_back_is_noise():
     """A seat that bends, of a second, at 20 Hz: noise of its density. A jump, and what drifts, are none."""
     rng, t = np.random.default_rng(3), 0.05 * np.arange(2000)

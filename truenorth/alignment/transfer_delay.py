@@ -28,6 +28,8 @@ UNIQUE = (
 )
 CHANCE = 5.0  # sigmas by which a correlation must exceed that of unrelated signals
 
+FEWEST = 3.0  # windows that must move: the first row of a turn at the end of a log agrees with any row of it
+
 
 class Found(NamedTuple):
     """A delay that the motion itself shows."""
@@ -76,8 +78,15 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Found:
     rival = float(np.max(score[elsewhere], initial=0.0))
     independent = float(common[k]) * step / WINDOW[kind] * a.shape[1]
     better = 0.5 * independent * math.log(max(1.0 - rival**2, 1e-12) / max(1.0 - peak**2, 1e-12))
-    sure = peak > max(SURE, CHANCE / math.sqrt(independent)) and better > UNIQUE
+    lasting = min(_lasting(a), _lasting(b)) * step > FEWEST * WINDOW[kind]
+    sure = lasting and peak > max(SURE, CHANCE / math.sqrt(independent)) and better > UNIQUE
     return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure)
+
+
+def _lasting(signal: Array) -> float:
+    """How many rows carry the power of a signal: about all of one that lasts, one of a single jolt (participation ratio)."""
+    power = np.sum((signal - signal.mean(axis=0)) ** 2, axis=1)
+    return float(np.sum(power) ** 2 / max(float(np.sum(power**2)), 1e-300))
 
 
 def _slave_signal(slave: ImuRecord, kind: str, step: float) -> Array:
