@@ -1,7 +1,9 @@
-"""This checkout and an older one in one run, in turn: ``python -m benchmarks.versus OLD_CHECKOUT``.
+"""This checkout and an older one in one run, in turn: ``python -m benchmarks.versus OLD_CHECKOUT [REPEATS [ROWS]]``.
+
+All rows take half an hour; ``ROWS`` are numbers of some of them, such as ``1,2,4``.
 
 Processor time of whole processes, children included, the least of the repetitions: what else the machine does counts
-little. Each checkout runs with the interpreter of its own ``.venv``.
+little. Each checkout runs with the interpreter of its own ``.venv`` (``make .venv/.ready`` there).
 """
 
 from __future__ import annotations
@@ -131,7 +133,6 @@ def main() -> None:
         def sizes() -> list[float]:
             return [(out(checkout) / "report.html").stat().st_size / 1e6 for checkout in (old, NEW)]
 
-        both(with_report, 1)  # what is not compiled yet
         rows: list[tuple[str, Callable[[], list[float]]]] = [
             ("`align` of 600 s, compiled, s", lambda: both(align, repeats)),
             ("the same with report, s", lambda: both(with_report, repeats)),
@@ -146,9 +147,12 @@ def main() -> None:
             ("first `align`, nothing compiled, s", lambda: both(first, 1)),
             (f"`align` after a comment was added to {EDITED[0]}, s", lambda: both(after_an_edit, 1)),
         ]
-        both(demo, 1)  # what is not compiled yet
+        asked = [int(number) for number in sys.argv[3].split(",")] if len(sys.argv) > 3 else range(1, len(rows) + 1)
+        for number, once in ((1, align), (2, with_report), (3, with_report), (6, demo)):
+            if number in asked:
+                both(once, 1)  # what is not compiled yet
         print("| what | before | now | ratio |\n| --- | ---: | ---: | ---: |", flush=True)
-        for what, measured in rows:
+        for what, measured in (rows[number - 1] for number in asked):
             before, now = measured()
             print(f"| {what} | {before:.2f} | {now:.2f} | {before / now:.1f} |", flush=True)
 

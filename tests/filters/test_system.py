@@ -97,6 +97,17 @@ def test_semidefinite_matrices_pass(system):
     replace(system, Q=one[None], P0=one, R=np.ones((1, 3, 3)))
 
 
+@pytest.mark.parametrize("name", ["Phi", "Q", "H", "R", "x0", "P0", "u", "S"])
+def test_arrays_that_take_the_place_of_others_are_checked(system, name):
+    a = getattr(system, name)
+    np.testing.assert_array_equal(getattr(system.with_arrays(**{name: 0.5 * a}), name), 0.5 * a)
+    assert getattr(system, name) is a
+    with pytest.raises(DataError, match=f"LinearSystem: {name} is nan at"):
+        system.with_arrays(**{name: changed(a, (0,) * a.ndim, np.nan)})
+    with pytest.raises(UsageError, match="LinearSystem: "):
+        system.with_arrays(**{name: np.concatenate([a, a], axis=-1)})
+
+
 def test_between_takes_epochs_and_leaves_constants():
     system = replace(random_system(epochs=5), H=np.zeros((1, 3, 4)))
     part = system.between(2, 4)
