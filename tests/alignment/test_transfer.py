@@ -16,6 +16,7 @@ from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import seen_states, system_of_motion
+from truenorth.alignment.transfer_verdict import _lasting
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
@@ -30,6 +31,7 @@ from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight
 from truenorth.simulation.sway import Disturbed
 from truenorth.simulation.tones import Tone
+from truenorth.state.track import Residuals
 
 DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
 SPAN = 60.0
@@ -332,6 +334,19 @@ def test_only_what_comes_back_is_noise():
     assert _colour(t, white + (t[:, None] / 30.0) ** 2) < 1.5
     # A first-order process of a second has sqrt(40) times the white one's density; a line off ten seconds takes some.
     assert 3.0 < _colour(t, bend) < 7.0
+
+
+@pytest.mark.parametrize(("size", "found"), [(5e-4, []), (1e-1, ["transfer.lasting"])])
+def test_what_lasts_below_the_least_noise_of_a_master_is_no_contradiction(size, found):
+    """Rows without noise are believed to .01 m/s: the filter follows them slowly, and its innovations follow each other."""
+    rng, kept = np.random.default_rng(8), math.exp(-1.0 / 100.0)
+    bend = rng.standard_normal((3000, 3))
+    for k in range(1, len(bend)):
+        bend[k] = kept * bend[k - 1] + math.sqrt(1.0 - kept**2) * bend[k]
+    time, used = 0.05 * np.arange(len(bend)), np.ones(len(bend), dtype=bool)
+    innovation, sigma = size * bend, np.full_like(bend, max(size, 0.01))
+    rows = Residuals("master velocity", time, innovation, sigma, np.ones(len(time)), used, 0, time, ~used)
+    assert [e.key for e in _lasting(SimpleNamespace(residuals=[rows]), 0.01)] == found
 
 
 @pytest.mark.slow  # a kernel of its own size

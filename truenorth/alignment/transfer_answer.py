@@ -88,6 +88,7 @@ class LastPass(NamedTuple):
     carried: float = (
         0.0  # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     )
+    least: float = 0.0  # noise of its translation, as given, or the least that is believed of a master
 
 
 def assemble_transfer(
@@ -99,7 +100,7 @@ def assemble_transfer(
     of_master: list[Evidence],
 ) -> Alignment:
     """The answer at the last row of the master, judged; `of_master` is what was found of the master before, its clock included."""
-    slave, master, model, _, start, what, _, track, _ = last
+    slave, master, model, _, start, what, _, track, *_ = last
     P = track.last_P
     phi_covariance, floor = misalignment_covariance(P)
     gyro_prior, accel_prior = bias_sigmas(spec)
@@ -130,11 +131,11 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(answer, transfer, track, start, heading_limit, of_master)
+    return judge_transfer(answer, transfer, track, start, heading_limit, of_master, last.least)
 
 
 def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
-    _, master, model, assumed, _, what, noise, track, carried = last
+    _, master, model, assumed, _, what, noise, track, carried, _ = last
     sigma, aux = track.sigma[-1], track.aux[-1]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
@@ -240,7 +241,7 @@ def _jumps(track: TransferTrack, matched: Matched) -> tuple[str, ...]:
 
 def _open(last: LastPass) -> tuple[str, ...]:
     """What the motion as it was could not separate, from the model along the track."""
-    slave, _, model, assumed, start, what, noise, track, _ = last
+    slave, _, model, assumed, start, what, noise, track, *_ = last
     every = max(1, len(track.time) // MOST_EPOCHS)
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:

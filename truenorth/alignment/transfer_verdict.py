@@ -29,13 +29,17 @@ def judge_transfer(
     start: SlaveStart,
     heading_limit: float,
     of_master: list[Evidence],
+    least: float,
 ) -> Alignment:
-    """The answer with its verdict; `of_master` is what was found of the master before, its clock included."""
+    """The answer with its verdict; `of_master` is what was found of the master before, its clock included.
+
+    `least` is the noise of its translation, as given or the least that is believed of a master.
+    """
     evidence = list(of_master)
     evidence += _rejected(transfer)
     evidence += _misses(transfer, track, start)
     lopsided = _lopsided(track, transfer)
-    evidence += [] if lopsided else _lasting(transfer)
+    evidence += [] if lopsided else _lasting(transfer, least)
     if lopsided:
         remedies = ("slave_specification", "without_jump") if transfer.jumps else ("slave_specification",)
         evidence.append(contradiction("transfer.lopsided", *remedies, rows=lopsided, imu=answer.imu_source))
@@ -80,11 +84,12 @@ def _misses(transfer: Transfer, track: TransferTrack, start: SlaveStart) -> list
     return found
 
 
-def _lasting(transfer: Transfer) -> list[Evidence]:
+def _lasting(transfer: Transfer, least: float) -> list[Evidence]:
     """Differences of the translation that are no noise, since they last from row to row: no motion of one rigid body.
 
     Their density at the period of manoeuvres is the noise that was fitted; where it is much more than what changes from row to
-    row, as of accelerometers whose axes are exchanged while a ship rolls, it is not a master's.
+    row, as of accelerometers whose axes are exchanged while a ship rolls, it is not a master's. What has no more density
+    than the noise that a master has at least is in sigma: of rows without noise, the filter follows slowly.
     """
     residuals = next((r for r in transfer.residuals if r.name in TRANSLATIONS), None)
     if residuals is None or not residuals.used.any():
@@ -92,9 +97,9 @@ def _lasting(transfer: Transfer) -> list[Evidence]:
     e = (residuals.innovation / residuals.sigma)[residuals.used]
     whole = e[:, np.isfinite(e).all(axis=0)]
     found = whiteness(whole, float(np.median(np.diff(residuals.time))) if len(residuals.time) > 1 else 1.0)
-    if not found.sure or found.turning < limit("growth"):
-        return []
     size = float(np.sqrt(np.nanmean(residuals.innovation[residuals.used] ** 2)))
+    if not found.sure or found.turning < limit("growth") or found.turning * size < least:
+        return []
     return [
         contradiction(
             "transfer.lasting",
