@@ -166,12 +166,9 @@ def align_transfer(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
-    rows = Matching(*noise, what.kind, GATE)
-    track = transfer_filter(part, master, model, start, rows, linear=linear)
-    seen = _seen(slave, master, model, C_mb)
-    seen += _rivals(
-        part, partial(transfer_filter, matching=rows, linear=linear, master=master), track, model, start, spec
-    )
+    run = partial(transfer_filter, master=master, matching=Matching(*noise, what.kind, GATE), linear=linear)
+    track = run(part, model=model, start=start)
+    seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = LEAST * FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least)
