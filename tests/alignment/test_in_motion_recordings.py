@@ -56,8 +56,9 @@ def test_cart_gets_its_heading_from_motion():
     assert abs(late - 0.9) < 0.15
     assert sigma < 0.05
     said = align_in_motion(imu, "industrial", gnss=gnss, antenna=on_time)
-    assert said.status == "inconsistent"
-    assert said.evidence[0].key == "second_look.late"
+    assert any(item.key == "second_look.late" for item in said.evidence)
+    apart = abs(signed(said.heading - answer.heading))
+    assert said.status == "inconsistent" or apart < 2.0 * said.euler_sigma[0]
     v = gnss.v_n[:, :2]
     fast = (np.hypot(*v.T) > 0.6) & (gnss.time < answer.time)
     track = answer.moving.track
