@@ -102,6 +102,18 @@ def test_the_time_of_a_drift_is_found(truth, hours, low, high):
         assert found.drift / math.sqrt(found.time) == pytest.approx(0.5 / math.sqrt(hours * HOUR), rel=0.25)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_drift_that_wanders_a_little_is_no_constant(truth, seed):
+    """A fifth of the usual size, and slow: a walk as small as that is kept, not none."""
+    rng = np.random.default_rng(seed)
+    model = MarineModel(**WALKS, groups=LogErrors(0.5).groups())
+    _, course = free(truth, model, rng)
+    drift = gauss_markov(0.1, 12.0 * HOUR, truth.interval, len(truth.time), rng, axes=2)
+    kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
+    assert likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.5)).time <= 768.0 * HOUR
+
+
 def test_two_fixes_calibrate_the_gyros(truth):
     """Position and azimuth at two times give the drifts by ``psi_2 = A psi_1 - B eps``, and the filter finds them.
 

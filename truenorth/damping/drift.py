@@ -5,7 +5,9 @@ for each correlation time in question. Under a drift that is taken for too slow 
 under one too fast S is larger than they are.
 
 The walk of the drift, ``sigma^2/tau``, shows within hours, its size ``sigma`` only over several ``tau``: the time is searched
-with the size as it is given, then both along the same walk, where a size twice the given one costs half a unit of log-likelihood.
+with the size as it is given, then both along the same walk, where a size twice the given one costs half a unit of
+log-likelihood. A drift that is taken for a constant while it wanders is believed far beyond its sigma, one that is taken for
+too fast costs a little of it: of walks within one sigma of the most likely one the fastest is taken.
 
 Source: F. Schweppe, "Evaluation of likelihood functions for Gaussian signals", IEEE Trans. Inf. Theory 11 (1965).
 """
@@ -26,9 +28,12 @@ from truenorth.errors.log import DRIFT, LogErrors
 Array = NDArray[np.float64]
 
 HOUR = 3600.0
-TIMES = (math.inf, *(HOUR * x for x in (96.0, 48.0, 24.0, 12.0, 6.0, 3.0, 1.5, 0.75, 0.375)))  # s
+TIMES = (math.inf, *(HOUR * x for x in (768.0, 384.0, 192.0, 96.0, 48.0, 24.0, 12.0, 6.0, 3.0, 1.5, 0.75, 0.375)))  # s
 SIZES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # times the given one
 DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
+AS_LIKELY = (
+    0.5  # of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same
+)
 
 
 def likely_drift(course: Course, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
@@ -47,7 +52,7 @@ def likely_drift(course: Course, reference: Array, start: int, kind: Filter, giv
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
     coarse, seen = course.between(start, course.epochs).every(stride), reference[start::stride]
 
-    def best(pairs: list[tuple[float, float]]) -> tuple[float, float]:
+    def best(pairs: list[tuple[float, float]], slack: float = 0.0) -> tuple[float, float]:
         kinds = {str(pair): _with(kind, *pair) for pair in pairs}
         found = run_filters(coarse, seen, start=0, kinds=kinds)
 
@@ -55,9 +60,12 @@ def likely_drift(course: Course, reference: Array, start: int, kind: Filter, giv
             doubt = math.log(pair[0] / given.drift) / DOUBT
             return found[str(pair)].likelihood - 0.5 * doubt**2
 
-        return max(pairs, key=weighed)
+        most = max(map(weighed, pairs))
+        return max(
+            (pair for pair in pairs if weighed(pair) >= most - slack), key=lambda p: (p[0] ** 2 / p[1], weighed(p))
+        )
 
-    size, time = best([(given.drift, time) for time in TIMES])
+    size, time = best([(given.drift, time) for time in TIMES], AS_LIKELY)
     if math.isfinite(time):
         size, time = best([(size * f, time * f**2) for f in SIZES])
     return replace(given, drift=size, drift_time=time)
