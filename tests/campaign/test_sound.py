@@ -29,7 +29,8 @@ def plan_of(scenario, runs, methods=("kalman",)):
 @pytest.mark.parametrize(
     ("runs", "change"),
     some(
-        [(2, {})], [(40, {"duration": "300 s"}), (40, {"imu": "navigation", "rate": "100 Hz"}), (20, {"imu": "mems"})]
+        [(2, {})],
+        [(40, {"duration": "300 s"}), (40, {"imu": "navigation", "rate": "100 Hz"}), (20, {"imu": "industrial"})],
     ),
 )
 def test_rows_are_those_of_a_plain_alignment(monkeypatch, runs, change):
