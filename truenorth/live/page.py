@@ -74,12 +74,13 @@ class Page:
             event["waiting"] = f"the first answer comes after {aligner.first_answer:g} s of log"
             event["note"] = "; ".join(filter(None, (note, aligner.failure)))
         else:
+            whole = self._zero is None or self._number % 5 == 1
             event |= answer.summary() | {
                 "waiting": waiting(answer, self._goal),
                 "goal_deg": float(np.degrees(self._goal)),
                 "zero_s": self._zero_of(answer.time - aligner.duration),
             }
-            if self._number % 5 == 1:
+            if whole:
                 event["spectrum"] = motion_spectrum(aligner.log)
                 solution = answer.solution if isinstance(aligner, Aligner) else None
                 event["innovations"] = newest_innovations(solution, aligner.residuals)
