@@ -336,9 +336,9 @@ def test_only_what_comes_back_is_noise():
     assert 3.0 < _colour(t, bend) < 7.0
 
 
-@pytest.mark.parametrize(("size", "found"), [(5e-4, []), (1e-1, ["transfer.lasting"])])
-def test_what_lasts_below_the_least_noise_of_a_master_is_no_contradiction(size, found):
-    """Rows without noise are believed to .01 m/s: the filter follows them slowly, and its innovations follow each other."""
+@pytest.mark.parametrize(("size", "found"), [(4e-3, []), (1e-1, ["transfer.lasting"])])
+def test_what_lasts_below_a_usual_noise_of_a_master_is_no_contradiction(size, found):
+    """Rows without noise are believed to .01 m/s at best: the filter follows them slowly, and its innovations follow each other."""
     rng, kept = np.random.default_rng(8), math.exp(-1.0 / 100.0)
     bend = rng.standard_normal((3000, 3))
     for k in range(1, len(bend)):
@@ -346,7 +346,7 @@ def test_what_lasts_below_the_least_noise_of_a_master_is_no_contradiction(size, 
     time, used = 0.05 * np.arange(len(bend)), np.ones(len(bend), dtype=bool)
     innovation, sigma = size * bend, np.full_like(bend, max(size, 0.01))
     rows = Residuals("master velocity", time, innovation, sigma, np.ones(len(time)), used, 0, time, ~used)
-    assert [e.key for e in _lasting(SimpleNamespace(residuals=[rows]), 0.01)] == found
+    assert [e.key for e in _lasting(SimpleNamespace(residuals=[rows]), 0.1)] == found
 
 
 @pytest.mark.slow  # a kernel of its own size

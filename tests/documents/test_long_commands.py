@@ -1,7 +1,6 @@
 """Lines of README's block "Your log" that take longer: streams, turntables, indexers, days at sea, campaigns, studies.
 
-Each runs as it stands in every call, on a short log or with few runs, but for the drive that is aligned live; `test-all` has
-longer ones.
+Each runs as it stands in every call, on a short log or with few runs; `test-all` has longer ones.
 """
 
 from __future__ import annotations
@@ -134,7 +133,6 @@ def test_live_until_heading_is_good_enough(tmp_path):
     assert "aligned" in out + err
 
 
-@pytest.mark.slow
 def test_live_on_the_move(tmp_path):
     """It navigates on until Ctrl-C."""
     logs = simulate(tmp_path, "van", imu="tactical")

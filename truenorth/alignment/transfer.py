@@ -170,7 +170,7 @@ def align_transfer(
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
-    least = LEAST * FIRST_NOISE[what.kind] if fitted[0] else noise[0]
+    least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least)
     answer = assemble_transfer(last, spec, where, notes, heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)

@@ -88,7 +88,7 @@ class LastPass(NamedTuple):
     carried: float = (
         0.0  # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     )
-    least: float = 0.0  # noise of its translation, as given, or the least that is believed of a master
+    least: float = 0.0  # noise of its translation, as given, or what the fit begins with
 
 
 def assemble_transfer(

@@ -33,7 +33,7 @@ def judge_transfer(
 ) -> Alignment:
     """The answer with its verdict; `of_master` is what was found of the master before, its clock included.
 
-    `least` is the noise of its translation, as given or the least that is believed of a master.
+    `least` is the noise of its translation that is no surprise: as given, or what the fit begins with.
     """
     evidence = list(of_master)
     evidence += _rejected(transfer)
@@ -89,7 +89,7 @@ def _lasting(transfer: Transfer, least: float) -> list[Evidence]:
 
     Their density at the period of manoeuvres is the noise that was fitted; where it is much more than what changes from row to
     row, as of accelerometers whose axes are exchanged while a ship rolls, it is not a master's. What has no more density
-    than the noise that a master has at least is in sigma: of rows without noise, the filter follows slowly.
+    than a noise that is no surprise is in sigma: of rows without noise, the filter follows slowly.
     """
     residuals = next((r for r in transfer.residuals if r.name in TRANSLATIONS), None)
     if residuals is None or not residuals.used.any():

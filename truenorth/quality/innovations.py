@@ -85,11 +85,12 @@ def whiteness(normalised: Array, interval: float = 1.0) -> Whiteness:
     colour = math.sqrt(1.0 + 2.0 * float(r[:last].sum()))
     turns = np.cos(2.0 * np.pi * interval * np.arange(1, last + 1) / MANOEUVRE)
     turning = math.sqrt(max(1.0 + 2.0 * float(r[:last] @ turns), 0.0))
-    colour = max(colour, scatter_of_means(e))
+    scatter = scatter_of_means(e)
+    colour = max(colour, scatter)
     size = math.sqrt(total / count)
     spread = math.sqrt(2.0 * (1.0 + 2.0 * float(np.sum(r[:last] ** 2))) / count)
     mean = float(r[:LAGS].mean())
-    coloured = mean > max(LEAST_CORRELATION, limit("chance") / math.sqrt(LAGS * count)) or colour > 1.0
+    coloured = mean > max(LEAST_CORRELATION, limit("chance") / math.sqrt(LAGS * count)) or scatter > 1.0
     return Whiteness(size, colour, turning, coloured or size**2 - 1.0 > limit("chance") * spread)
 
 
@@ -99,14 +100,15 @@ def scatter_of_means(e: Array) -> float:
     Correlations that are too small to be seen at any one lag are seen in their sum: a slow error of a tenth of the noise's power
     makes means over a hundred rows err three times as much.
     """
+    from truenorth.analysis.consistency import chi_square_quantile
+
     power, most = float(np.mean(e**2)), 1.0
-    length = 4
-    while power > 0.0 and len(e) >= FEWEST_BLOCKS * length:
+    lengths = [4 * 2**k for k in range(len(e).bit_length()) if len(e) >= FEWEST_BLOCKS * 4 * 2**k]
+    for length in lengths if power > 0.0 else ():
         means = e[: len(e) // length * length].reshape(-1, length, e.shape[1]).mean(axis=1)
         larger = length * float(np.mean(means**2)) / power
-        if larger - 1.0 > limit("chance") * math.sqrt(2.0 / means.size):
+        if larger > float(chi_square_quantile(1.0 - CHANCE / len(lengths), means.size)) / means.size:
             most = max(most, larger)
-        length *= 2
     return math.sqrt(most)
 
 
