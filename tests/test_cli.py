@@ -447,3 +447,17 @@ def test_a_folder_named_as_the_command_or_as_what_is_shipped_is_no_input(tmp_pat
         (tmp_path / name).mkdir()
     assert list(inputs(["align", "rows", "--lat", "1", "-o", "align"])) == ["rows", "--lat", "1"]
     assert list(inputs(["reproduce", "static", "-o", "static"])) == []
+
+
+def test_an_interrupt_that_python_loses_comes_again():
+    """In a finaliser nothing can be raised: the hook sends the interrupt once more, outside of itself."""
+    code = (
+        "import sys, time, types, truenorth.__main__ as program\n"
+        "class Late:\n    def __del__(self):\n        raise KeyboardInterrupt\n"
+        "def run():\n    late = Late()\n    del late\n    for _ in range(200):\n        time.sleep(0.05)\n"
+        "sys.modules['truenorth.cli'] = types.SimpleNamespace(main=run)\n"
+        "program.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=15, check=False)
+    assert done.returncode == 130
+    assert done.stderr == "truenorth: interrupted; nothing half-written is left\n"

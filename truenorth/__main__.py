@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 INTERRUPTED, INTERNAL = 130, 70
+LATER = 0.02  # s
 
 
 def main() -> None:
@@ -23,11 +24,17 @@ def main() -> None:
 
 
 def _again(lost: sys.UnraisableHookArgs) -> None:
-    """An interrupt that came where Python cannot raise it, such as in a callback of the compiler, comes again."""
+    """An interrupt that came where Python cannot raise it, such as in a callback of the compiler, comes again.
+
+    A little later, that is: what is raised in this hook is lost too.
+    """
     if lost.exc_type is KeyboardInterrupt:
         import _thread
+        import threading
 
-        _thread.interrupt_main()
+        later = threading.Timer(LATER, _thread.interrupt_main)
+        later.daemon = True
+        later.start()
     else:
         sys.__unraisablehook__(lost)
 
