@@ -179,3 +179,8 @@ def test_positions_are_three_places_of_three_lengths():
         ImuSpec(accel_positions=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     with pytest.raises(UsageError, match="1 or 2"):
         ImuSpec(gyro_filter_order=0)
+
+
+def test_a_name_that_no_file_can_have():
+    with pytest.raises(UsageError, match="so long a name"):
+        imu_spec("9" * 300)

@@ -7,6 +7,8 @@ from typing import Any
 
 from truenorth.core.errors import UsageError
 
+LONGEST = 255  # bytes, of a file's name
+
 
 def as_path(given: Any, what: str) -> Path:
     """A path of what was given.
@@ -22,4 +24,6 @@ def as_path(given: Any, what: str) -> Path:
         raise UsageError(f"{what} is a {type(given).__name__}; expected a path") from None
     if "\0" in str(path):
         raise UsageError(f"{what} {str(path)!r}: no file has such a name")
+    if any(len(part.encode("utf-8", "surrogateescape")) > LONGEST for part in path.parts):
+        raise UsageError(f"{what} {str(path)[:60]!r}...: no file has so long a name")
     return path
