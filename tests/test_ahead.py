@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from tests.campaign.test_plan import REST
 from truenorth import align
 from truenorth.alignment.matched import _sum_back
 from truenorth.cli import ahead
@@ -13,18 +14,11 @@ from truenorth.core.position import Position
 from truenorth.filters.linear import linear_runs
 from truenorth.simulation.scenario import read_scenario
 
-REST = {
-    "name": "rest",
-    "duration": "60 s",
-    "rate": "20 Hz",
-    "position": {"lat": "45 deg"},
-    "motion": {"kind": "rest"},
-    "imu": "navigation",
-}
+STILL = REST | {"duration": "60 s", "rate": "20 Hz", "imu": "navigation"}
 
 
 def test_its_kernels_are_those_of_an_alignment():
-    scenario = read_scenario(REST)
+    scenario = read_scenario(STILL)
     align(scenario.simulate(seed=1).record, Position.from_degrees(45.0, 0.0), scenario.imu_spec, method="kalman")
     matches, filters = set(_sum_back.signatures), {signature[1:] for signature in linear_runs.signatures}
     ahead.call_last()

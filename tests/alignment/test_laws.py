@@ -204,7 +204,7 @@ def test_floor_and_random_part_on_a_still_base():
     assert sigmas[600.0] < 0.6 * sigmas[120.0]
 
 
-def test_a_base_that_leaves_is_told():
+def test_a_base_that_leaves_is_said():
     """A north ramp to .05 m/s from half time on: mean NIS does not see it, the drift test does."""
     spec = imu_spec("navigation")
     log = simulate(rest(XIAN), imu=spec, rate=20.0, duration=300.0, seed=3).record

@@ -109,7 +109,7 @@ def cubic_system(z):
     )
 
 
-def test_windowed_fits_find_the_states_beside_a_tone():
+def test_windowed_fits_find_the_states_next_to_a_tone():
     t = np.arange(1.0, 301.0)
     truth = np.array([1.0, -0.02, 1e-4])
     z = truth[0] + truth[1] * t + truth[2] * t**2 / 2 + 0.5 * np.cos(2 * np.pi * t / 7.3)

@@ -59,7 +59,7 @@ def test_the_body_is_found(ship, answer):
     assert "indexer" in answer.method_reason
 
 
-def test_biases_are_told_along_the_axes_of_the_imu(ship, answer):
+def test_biases_are_said_along_the_axes_of_the_imu(ship, answer):
     """Within 4 sigma of what was put in: the indexer tells the accelerometers' within 250 s, the gyros' in part."""
     true = simulate_errors(ship)
     for found, sigma, value in (
@@ -109,7 +109,7 @@ def test_an_earlier_epoch(ship):
     assert np.all(np.abs(phi) < 4 * np.sqrt(np.diag(middle.phi_covariance)) / ARCMIN)
 
 
-def test_a_base_that_leaves_is_told(ship):
+def test_a_base_that_leaves_is_said(ship):
     """A north ramp to .05 m/s over the second half."""
     record = ship.record
     acceleration = np.where(record.time > 125.0, 0.05 / 125.0, 0.0)[:, None] * np.array([0.0, 1.0, 0.0])
@@ -212,7 +212,7 @@ def test_angles_between_and_just_beyond_the_rows():
         angles_at(encoder, [0.1], ("z", "x"))
 
 
-def test_mistakes_are_told(ship):
+def test_mistakes_are_said(ship):
     with pytest.raises(AlignmentError, match="record longer"):
         align_rotary(ship.record.between(None, 30.0), ship.encoder, ship.place, ship.imu)
     with pytest.raises(UsageError, match="three numbers"):

@@ -66,7 +66,7 @@ def test_white_noise_gives_its_density_with_honest_sigma():
     assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.25
 
 
-def test_four_processes_are_told_apart():
+def test_four_processes_are_separated():
     """Each made by its definition. Scatter over 51 channels: N .4 %, Q .4 %, K 7.5 %; bounds at 4-5 of it."""
     rng, N, K, Q, dt = np.random.default_rng(5), 2e-4, 3e-5, 2e-5, 0.02
     shape = (200_000, 3)

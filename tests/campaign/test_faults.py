@@ -157,7 +157,7 @@ def test_an_inner_angle_whose_zero_is_off_wobbles():
                 assert np.degrees(found[0].figures["off"]) == pytest.approx(off, abs=0.3)
 
 
-def test_noise_of_each_stretch_is_told_from_sway():
+def test_noise_of_each_stretch_is_separated_from_sway():
     """To a twentieth, though the sway's differences are thousands of times larger; a louder stretch is found where it is."""
     from dataclasses import replace
 

@@ -82,7 +82,7 @@ def test_the_resolved_plan_is_the_same_plan():
         ({"times": ["50 s"]}, "times: 50 s; expected a time within the 40 s of rest"),
     ],
 )
-def test_a_mistake_is_told_by_its_key(change, words):
+def test_a_mistake_is_named_by_its_key(change, words):
     with pytest.raises(DataError, match=words):
         read_plan(PLAN | change)
 

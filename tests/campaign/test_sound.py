@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.campaign.test_plan import REST
 from tests.runs import some
 from truenorth import align
 from truenorth.campaign import aligning
@@ -12,14 +13,7 @@ from truenorth.quality.density import bursts
 from truenorth.quality.sampling import check_sampling
 from truenorth.simulation.scenario import read_scenario
 
-REST = {
-    "name": "rest",
-    "duration": "100 s",
-    "rate": "20 Hz",
-    "position": {"lat": "45 deg"},
-    "motion": {"kind": "rest"},
-    "imu": "tactical",
-}
+STILL = REST | {"duration": "100 s", "rate": "20 Hz", "imu": "tactical"}
 
 
 def plan_of(scenario, runs, methods=("kalman",)):
@@ -34,7 +28,7 @@ def plan_of(scenario, runs, methods=("kalman",)):
     ),
 )
 def test_rows_are_those_of_a_plain_alignment(monkeypatch, runs, change):
-    plan = plan_of(REST | change, runs)
+    plan = plan_of(STILL | change, runs)
     rows = aligning.align_runs(plan, plan.cases[0], range(runs))
     assert not any(row.status == "failed" for row in rows)
     monkeypatch.setattr(aligning, "_is_sound", lambda scenario: False)
@@ -43,7 +37,7 @@ def test_rows_are_those_of_a_plain_alignment(monkeypatch, runs, change):
 
 
 def test_a_row_is_that_of_align():
-    plan = plan_of(REST, 1)
+    plan = plan_of(STILL, 1)
     scenario = plan.cases[0].built
     record = scenario.simulate(seed=plan.seed, run=0).record
     alone = align(record, Position(scenario.position.lat), scenario.imu_spec, method="kalman")
@@ -56,7 +50,7 @@ def test_a_row_is_that_of_align():
 
 @pytest.mark.parametrize("run", range(3))
 def test_in_such_a_log_is_nothing_to_be_found(run):
-    record = read_scenario(REST).simulate(seed=9, run=run).record
+    record = read_scenario(STILL).simulate(seed=9, run=run).record
     assert not check_sampling(record)[1]
     assert not bursts(record)[1].any()
 
@@ -81,5 +75,5 @@ def test_in_such_a_log_is_nothing_to_be_found(run):
     ],
 )
 def test_other_logs_are_looked_at(change):
-    assert aligning._is_sound(read_scenario(REST))
-    assert not aligning._is_sound(read_scenario(REST | change))
+    assert aligning._is_sound(read_scenario(STILL))
+    assert not aligning._is_sound(read_scenario(STILL | change))

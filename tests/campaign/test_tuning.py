@@ -57,7 +57,7 @@ def test_a_dishonest_or_silent_specification_scores_worse():
         ({"trials": 0}, "trials: 0"),
     ],
 )
-def test_a_mistake_is_told_by_its_key(change, words):
+def test_a_mistake_is_named_by_its_key(change, words):
     with pytest.raises(DataError, match=words):
         read_search(SEARCH | change)
 

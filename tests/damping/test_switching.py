@@ -37,7 +37,7 @@ def errors(ship, result):
     return errors_of(found, ship.truth.between(0, found.epochs))
 
 
-def test_manoeuvres_are_told_from_the_swing(ship):
+def test_manoeuvres_are_separated_from_the_swing(ship):
     """Of the true course all turns are found, to the waves' minute; a swing of three sigma at Schuler's rate is none of it."""
     truth = ship.truth
     found = manoeuvred(truth, np.full(len(truth.time), 1.0))

@@ -176,7 +176,7 @@ def test_one_normal_distribution_does_not_find_it():
     assert abs(error) > 10.0 * alone.sigma[-1, 0]
 
 
-def test_what_cannot_be_told_apart_stays_apart():
+def test_what_cannot_be_separated_stays_apart():
     # z = x^2 / 20: two sides equally likely, whatever is measured.
     @vector_function
     def stay(x, p, out):

@@ -86,7 +86,7 @@ def test_nothing_known_is_least_squares():
         assert_allclose(estimates.P[k], P, rtol=1e-7)
 
 
-def test_what_is_determined_is_told_before_all_is():
+def test_what_is_determined_is_shown_before_all_is():
     # Two constants; only the first is measured, the second comes with epoch 2. Units of the second: micro.
     z = np.array([[1.0, np.nan], [3.0, np.nan], [2.0, 5e-6]])
     system = LinearSystem(

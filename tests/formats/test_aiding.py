@@ -107,7 +107,7 @@ def test_names_and_units_of_columns(header, options, factor, tmp_path):
     np.testing.assert_allclose(record.values, factor * np.array([10.0, 20.0, -5.0]), rtol=1e-15)
 
 
-def test_a_file_beside_the_log(tmp_path):
+def test_a_file_next_to_the_log(tmp_path):
     path = log(tmp_path, "ms;n\n1000;7\n2000;8\n")
     log(tmp_path, "columns: {time: ms, pulses: n}\nunits: {time: ms}\npulse_size: 3 cm\nsigned: false\n", "log.yaml")
     record = truenorth.read_odometer(path)

@@ -60,7 +60,7 @@ def test_kind_where_the_names_mislead(log):
     np.testing.assert_allclose(record.gyro, VALUES[:, 1:4] * DEG / 3600, rtol=1e-15)
 
 
-def test_the_file_beside_and_the_options_that_win(log):
+def test_the_file_next_to_and_the_options_that_win(log):
     nearby(log, "units: {gyro: deg/s}\naxes: FRD\nkind: increments\nrate: 10 Hz\n")
     with pytest.raises(UsageError, match="gyro increments cannot be in 'deg/s'"):
         read_imu(log)
@@ -92,7 +92,7 @@ def test_a_rate_makes_the_time_that_is_missing(log):
         ("a: [", ["line", "YAML"]),
     ],
 )
-def test_mistakes_in_the_file_beside(log, text, words):
+def test_mistakes_in_the_file_next_to(log, text, words):
     nearby(log, text)
     with pytest.raises(DataError) as error:
         read_imu(log)

@@ -112,7 +112,7 @@ def test_gnss_with_a_latency_and_a_clock_offset(drive):
         assert np.all(np.abs(metres_off(result, motion)) < 4 * result.position_sigma[-1])
 
 
-def test_a_wrong_lever_arm_is_told(drive):
+def test_a_wrong_lever_arm_is_said(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.1, arm=(1.5, 2.5, 1.0))
     wrong = navigate(record, start, aid=Gnss(gnss), imu=SPEC)

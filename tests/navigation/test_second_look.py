@@ -48,7 +48,7 @@ def test_an_antenna_of_a_metre_given_in_centimetres(drive):
     assert warnings(right) == []
 
 
-def test_a_wheel_given_in_centimetres_and_a_clock_are_told_apart(drive):
+def test_a_wheel_given_in_centimetres_and_a_clock_are_separated(drive):
     """The car does not slide at its centre: a wheel half a metre to its left, given as 50 m."""
     motion, record, start = drive
     odometer = wheel_log(motion, (-0.5, 0.0, 0.0))
@@ -118,7 +118,7 @@ def test_a_long_arm_that_the_data_do_not_show(arm, sigma, words):
     assert second_look(lambda loose: found, found, known) == []
 
 
-def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
+def test_figures_of_a_model_that_does_not_hold_are_not_said(drive):
     """Vertical velocity counted downwards on a road too flat to tell by: no clock or arm is blamed for it."""
     motion, record, start = drive
     time = np.arange(0.5, 179.0, 0.5)
@@ -129,7 +129,7 @@ def test_figures_of_a_model_that_does_not_hold_are_not_told(drive):
     assert warnings(result) == []
 
 
-def test_fixes_that_wander_are_told_and_white_ones_are_not(drive):
+def test_fixes_that_wander_are_said_and_white_ones_are_not(drive):
     """A drift of 1.5 m over 60 s is estimated, said or not; of white fixes it is said by chance once in two million."""
     motion, record, start = drive
     time = np.arange(1.0, 179.0)

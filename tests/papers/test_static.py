@@ -130,7 +130,7 @@ def test_the_right_noise_helps_more_than_h_infinity(value):
     assert right < 0.5 * robust
 
 
-def test_ranks_and_what_cannot_be_told_apart(study, value):
+def test_ranks_and_what_cannot_be_separated(study, value):
     assert value("still", "states10", "rank", "value") == 7
     assert value("still", "states8", "rank", "value") == 5
     assert value("two_position", "states10", "rank", "value") == 10

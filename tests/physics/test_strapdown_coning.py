@@ -205,7 +205,7 @@ def test_a_sinusoid_is_late_and_small_as_stated():
     assert size - 1 == pytest.approx(-11 * x**4 / 720, rel=0.1)
 
 
-def test_beside_a_gap_the_trapezoid():
+def test_next_to_a_gap_the_trapezoid():
     t = np.r_[0.0:1.0:0.1, 1.5:2.0:0.1]
     record = rates(np.cos, t)
     dtheta, _ = increments(record)

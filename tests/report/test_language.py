@@ -55,7 +55,7 @@ def test_every_message_is_found_by_what_it_says(code):
             assert retold(text.format(*figures)) == translated(text).format(*figures)
 
 
-def test_a_message_inside_a_message_is_told_too():
+def test_a_message_inside_a_message_is_said_too():
     said = "a.csv: latitude 95 deg; expected -90 to 90 deg, north positive: check `lat`"
     assert retold(said) == said
     with in_language("zh"):

@@ -82,7 +82,7 @@ def test_biases_add_and_the_truth_holds_them():
     np.testing.assert_array_equal(true.accel_bias, [0.1, 0.1, 0.1])
 
 
-def test_what_wanders_is_told_to_the_last_digit():
+def test_what_wanders_is_said_to_the_last_digit():
     spec = ImuSpec(
         gyro_bias_instability=1e-4, gyro_rate_random_walk=1e-4, gyro_bias_temperature=1e-5, temperature_rate=0.1
     )

@@ -161,7 +161,7 @@ def test_a_cycle_of_a_scheme_averages_constant_errors_out(name, left):
         assert np.max(np.abs(mean)) > 1e-2  # what the sixteen are for
 
 
-def test_steps_go_where_they_are_told():
+def test_steps_go_where_they_are_said():
     (angle,) = steps([(0, deg(90)), (0, deg(-90))], dwell=10.0, duration=40.0, rate=deg(10), start=[deg(5)])
     slew = 9.0 + 0.5
     for t, expected in ((5.0, 5), (10 + slew + 5, 95), (2 * (10 + slew) + 5, 5), (1000.0, 5)):

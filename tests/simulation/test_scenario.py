@@ -63,7 +63,7 @@ def test_a_disturbance_draws_apart_from_the_others():
     assert both.motion == one
 
 
-def test_a_route_comes_from_a_file_beside_the_scenario(tmp_path):
+def test_a_route_comes_from_a_file_next_to_the_scenario(tmp_path):
     (tmp_path / "way.csv").write_text("lat,lon\n45.0,10.0\n45.001,10.0\n45.001,10.002\n")
     content = {**BASE, "motion": {"kind": "route", "file": "way.csv"}}
     del content["position"]
@@ -118,7 +118,7 @@ def test_a_route_comes_from_a_file_beside_the_scenario(tmp_path):
         ({"output": "both"}, r"output: 'both'; expected 'increments' or 'rates'"),
     ],
 )
-def test_a_mistake_is_told_by_the_path_of_its_key(change, words):
+def test_a_mistake_is_named_by_the_path_of_its_key(change, words):
     with pytest.raises(DataError, match=words):
         read_scenario(BASE | change)
 
@@ -162,7 +162,7 @@ ROCK = {"kind": "wing_rock", "duration": "3 s", "amplitude": "5 deg", "period": 
         ),
     ],
 )
-def test_an_impossible_motion_is_told_when_it_is_built(change, words):
+def test_an_impossible_motion_is_said_when_it_is_built(change, words):
     with pytest.raises(DataError, match=words):
         read_scenario(BASE | change).build_motion()
 

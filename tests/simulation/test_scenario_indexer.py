@@ -55,6 +55,6 @@ def test_a_late_encoder_of_its_own_rate():
         ({"imu": {"temperature": {"rate": "1 K"}}}, "temperature.rate: '1 K'"),
     ],
 )
-def test_a_mistake_is_told_by_the_path_of_its_key(change, words):
+def test_a_mistake_is_named_by_the_path_of_its_key(change, words):
     with pytest.raises(DataError, match=re.escape(words)):
         read_scenario(BASE | change)

@@ -68,9 +68,8 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
 PASSES, MORE_PASSES, SETTLED = 2, 6, 0.3
-SLOW_PASSES = (
-    2  # once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
-)
+# Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
+SLOW_PASSES = 2
 
 
 def align_in_motion(

@@ -79,9 +79,8 @@ class MovingTask:
     slow: LogErrors = NO_LOG_ERRORS
     factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
     waited: float = 0.0  # s, that the vehicle drove before anything aided: left out of the record
-    usual_fixes: bool = (
-        False  # the slow error of fixes is the usual one, or innovations have shown it: nobody spoke of it
-    )
+    # The slow error of fixes is the usual one, or innovations have shown it: nobody spoke of it
+    usual_fixes: bool = False
     lasting: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     wanders: Sequence[Evidence] = ()  # and what is to be said of them
 

@@ -32,9 +32,8 @@ from truenorth.strapdown.inertial import InertialIntegrals, gravity_position
 Array = NDArray[np.float64]
 
 ARM_PRIOR = 30.0  # m, one sigma along each axis, where nobody knows the arm
-OFFSET_PRIOR = (
-    0.03  # m, one sigma: an IMU from the axes of its indexer, about which its accelerometers swing in every slew
-)
+# m, one sigma: an IMU from the axes of its indexer, about which its accelerometers swing in every slew
+OFFSET_PRIOR = 0.03
 WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
@@ -50,9 +49,8 @@ class Mount:
     # (K+1, 3, 3): attitude of the base in the IMU at the ends of the filter intervals (an indexer's); None where the two are
     # one
     C_sb: Array | None = None
-    offset_sigma: float = (
-        0.0  # m; one sigma, along each of its axes, of an IMU from the axes of its indexer; zero: on them
-    )
+    # m; one sigma, along each of its axes, of an IMU from the axes of its indexer; zero: on them
+    offset_sigma: float = 0.0
 
 
 UNKNOWN_ARM = Mount(np.zeros(3), ARM_PRIOR)

@@ -85,9 +85,8 @@ class LastPass(NamedTuple):
     what: Matched
     noise: tuple[float, float]  # of translation and attitude of the master's rows
     track: TransferTrack
-    carried: float = (
-        0.0  # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
-    )
+    # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
+    carried: float = 0.0
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
 
 

@@ -23,9 +23,8 @@ GRID = 0.02  # s; finer rows of a master are not used
 WINDOW = {"rate": 0.2, "force": 1.0}  # s over which the signals are averaged
 SHORTEST = 10.0  # s that both must have in common
 SURE = 0.5  # correlation below this is no agreement
-UNIQUE = (
-    20.0  # log-likelihood by which the peak must exceed another elsewhere; signals taken as white beyond their window
-)
+# Log-likelihood by which the peak must exceed another elsewhere; signals taken as white beyond their window
+UNIQUE = 20.0
 CHANCE = 5.0  # sigmas by which a correlation must exceed that of unrelated signals
 
 FEWEST = 3.0  # windows that must move: the first row of a turn at the end of a log agrees with any row of it

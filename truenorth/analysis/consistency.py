@@ -65,30 +65,10 @@ def chi_square_quantile(probability: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def student_limit(chance: float, dof: int) -> float:
-    """What the size of a Student's t variable exceeds with the given probability: of a mean over its own estimated sigma.
+    """What the size of a Student's t variable exceeds with the given probability: of a mean over its own estimated sigma."""
+    from scipy.special import stdtrit
 
-    By halving, of the finite sums that a whole number of degrees of freedom has: every alignment of a base that sways asks
-    for it, and scipy.special would cost .2 s of import. Source: M. Abramowitz, I. Stegun, Handbook of Mathematical
-    Functions, 1964, 26.7.3 and 26.7.4.
-    """
-    if dof < 1:
-        return math.inf
-    low, high = 0.0, 0.5 * math.pi  # of the angle whose tangent is t / sqrt(dof)
-    for _ in range(60):
-        angle = 0.5 * (low + high)
-        low, high = (angle, high) if _student_within(angle, dof) < 1.0 - chance else (low, angle)
-    return math.tan(0.5 * (low + high)) * math.sqrt(dof)
-
-
-def _student_within(angle: float, dof: int) -> float:
-    """Probability that the size of t stays below ``sqrt(dof) tan(angle)``."""
-    sine, cosine, odd = math.sin(angle), math.cos(angle), dof % 2
-    term = cosine if odd else 1.0
-    total = 0.0 if dof == 1 else term
-    for k in range(2 + odd, dof - 1, 2):
-        term *= cosine * cosine * (k - 1) / k
-        total += term
-    return 2.0 / math.pi * (angle + sine * total) if odd else sine * total
+    return float(stdtrit(dof, 1.0 - 0.5 * chance)) if dof > 0 else math.inf
 
 
 def as_normal(size: float, dof: float) -> float:

@@ -25,9 +25,8 @@ Outcome = Literal["refused", "flagged", "harmless", "unseen", "silent", "crash"]
 FAULTS: tuple[Fault, ...] = (*IMU_FAULTS, *AID_FAULTS)
 SOUND = "none"
 HARMLESS = 3.0  # sigmas
-OF_THE_FAULT = (
-    1.0  # sigma, by which a fault moves an answer at least where it is to blame: the rest is the log's own chance
-)
+# sigma, by which a fault moves an answer at least where it is to blame: the rest is the log's own chance
+OF_THE_FAULT = 1.0
 BY_CHANCE = 4.0  # sigmas: a sound answer is that far off once in 16,000
 GOOD = ("aligned", "level_only", "navigated")
 

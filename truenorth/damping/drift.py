@@ -31,9 +31,8 @@ HOUR = 3600.0
 TIMES = (math.inf, *(HOUR * x for x in (768.0, 384.0, 192.0, 96.0, 48.0, 24.0, 12.0, 6.0, 3.0, 1.5, 0.75, 0.375)))  # s
 SIZES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # times the given one
 DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
-AS_LIKELY = (
-    0.5  # of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same
-)
+# Of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same
+AS_LIKELY = 0.5
 
 
 def likely_drift(course: Course, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:

@@ -32,9 +32,8 @@ PIECE = 20.0  # s, of a constant and a slope: biases and the earth turn gravity 
 MOST_TIME = 160.0  # s of a log that are looked at: its middle
 LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
 SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
-PLAIN = (
-    0.05  # of the squares that gyros at rest would leave: what is left where the gyros are right, but for rough bases
-)
+# Of the squares that gyros at rest would leave: what is left where the gyros are right, but for rough bases
+PLAIN = 0.05
 CLEARER = 3.0  # times smaller squares that another reading must leave
 EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may leave at most
 # Of a small delay and of a scale factor of sound gyros: sigma is estimated from few pieces, and the base's own motion is alike in

@@ -166,6 +166,8 @@ class Chart:
 
     def across(self, **options: Any) -> None:
         """Set options of the horizontal axis."""
+        if options.get("type") == "log":
+            options.setdefault("dtick", "D2")  # 1, 2, 5: with all nine the numbers run into each other
         self.layout["xaxis"] |= options
 
     def shade(self, start: float, stop: float) -> None:

@@ -1,0 +1,150 @@
+"""Transfer alignment in worlds that its model leaves out: late gyros, seats that bend, coloured rows, a master's own errors."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.alignment.test_transfer import ARCMIN, DEG, MASTER, TACTICAL
+from truenorth.alignment.transfer import _colour, align_transfer
+from truenorth.alignment.transfer_answer import _bent
+from truenorth.alignment.transfer_delay import find_delay
+from truenorth.alignment.transfer_verdict import _lasting
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.position import Position
+from truenorth.errors.master import MasterErrors, master_errors, own_errors
+from truenorth.formats import read_master
+from truenorth.formats.writing import write_record
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import MasterSpec, simulate, simulate_sensor
+from truenorth.simulation.course import course
+from truenorth.simulation.manoeuvres import straight
+from truenorth.simulation.sway import Disturbed
+from truenorth.simulation.tones import Tone
+from truenorth.state.track import Residuals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [0.2, 0.0])
+def test_gyros_that_are_late_are_found_though_the_master_seems_early(late):
+    """On a ship that rolls: attitude matching takes them for a master's delay, the accelerometers do not."""
+    way = course(Position.from_degrees(40.0, 20.0), straight(200.0), heading=0.6, speed=6.0)
+    tones = {"roll_tones": (Tone(4 * DEG, 8.0, 2.0),), "pitch_tones": (Tone(2 * DEG, 6.0, 1.0),)}
+    ship = Disturbed(way, **tones)
+    slave = simulate(ship, rate=50.0, duration=120.0, imu=TACTICAL, seed=6).record
+    master = simulate_sensor(ship, MASTER, duration=120.0, seed=6).record
+    rows = np.maximum(np.arange(len(slave)) - round(late / slave.interval), 0)
+    answer = align_transfer(replace(slave, gyro=slave.gyro[rows]), master, TACTICAL)
+    found = [item.figures["delay"] for item in answer.evidence if item.key == "delay.gyros_late"]
+    assert found == ([pytest.approx(0.2, abs=0.021)] if late else [])
+    assert (answer.status == "aligned") == (late == 0.0)
+
+
+def test_an_arm_on_a_seat_that_bends_is_known_as_well_as_the_rates_are_rigid():
+    """Half of the rate's power is the seat's: half of the arm; without flexure nothing is added."""
+    t = 0.01 * np.arange(1, 2001)
+    rates = np.column_stack([0.01 * np.sqrt(2.0) * np.sin(t), 0.0 * t, 0.0 * t])
+    slave = ImuRecord(t, rates, np.tile([0.0, 0.0, 9.8], (2000, 1)))
+    power = math.sqrt(float(np.var(rates[:, 0])) / 2.0)
+    for sigma, expected in ((power / 2.0, 1.5), (0.0, 0.0)):
+        last = SimpleNamespace(slave=slave, model=SimpleNamespace(flexure_sigma=(sigma, 0.0, 0.0), flexure_beta=2.0))
+        assert _bent(last, np.array([0.0, 3.0, 0.0])) == pytest.approx(expected, rel=1e-2)
+
+
+def test_the_first_row_of_a_turn_shows_no_delay():
+    """The master's log ends as a turn begins: a second later there is enough of it."""
+    t, level = 0.02 * np.arange(1, 3001), np.zeros(3000)
+    rate = np.radians(3.0) * np.clip(t - 39.85, 0.0, 0.5)
+    noise = 4e-5 * np.random.default_rng(2).standard_normal((3000, 3))
+    slave = ImuRecord(
+        t, np.stack([level, level, -rate], axis=1) + noise, np.tile([0.0, 0.0, 9.8], (3000, 1)), "rates", "made"
+    )
+    heading = np.interp(0.1 * np.arange(1, 600), t, np.cumsum(rate) * 0.02)
+    C = np.stack([dcm_from_euler(angle, 0.0, 0.0) for angle in heading])
+    master = MasterRecord(0.1 * np.arange(1, 600), C, np.zeros((599, 3)), source="made")
+    assert not find_delay(slave, master[:399], np.eye(3)).sure
+    later = find_delay(slave, master[:450], np.eye(3))
+    assert later.sure
+    assert later.delay == pytest.approx(0.0, abs=0.02)
+
+
+def test_only_what_comes_back_is_noise():
+    """A seat that bends, of a second, at 20 Hz: noise of its density. A jump, and what drifts, are none."""
+    rng, t = np.random.default_rng(3), 0.05 * np.arange(2000)
+    white, bend = rng.standard_normal((2, 2000, 3))
+    kept = math.exp(-0.05 / 1.0)
+    for k in range(1, 2000):
+        bend[k] = kept * bend[k - 1] + math.sqrt(1.0 - kept**2) * bend[k]
+    assert _colour(t, white) == 1.0
+    assert _colour(t, white + 30.0 * (t > 40.0)[:, None] * np.exp(-(t - 40.0) / 3.0)[:, None]) < 1.5
+    assert _colour(t, white + (t[:, None] / 30.0) ** 2) < 1.5
+    # A first-order process of a second has sqrt(40) times the white one's density; a line off ten seconds takes some.
+    assert 3.0 < _colour(t, bend) < 7.0
+
+
+@pytest.mark.parametrize(("size", "found"), [(4e-3, []), (1e-1, ["transfer.lasting"])])
+def test_what_lasts_below_a_usual_noise_of_a_master_is_no_contradiction(size, found):
+    """Rows without noise are believed to .01 m/s at best: the filter follows them slowly, and its innovations follow each other."""
+    rng, kept = np.random.default_rng(8), math.exp(-1.0 / 100.0)
+    bend = rng.standard_normal((3000, 3))
+    for k in range(1, len(bend)):
+        bend[k] = kept * bend[k - 1] + math.sqrt(1.0 - kept**2) * bend[k]
+    time, used = 0.05 * np.arange(len(bend)), np.ones(len(bend), dtype=bool)
+    innovation, sigma = size * bend, np.full_like(bend, max(size, 0.01))
+    rows = Residuals("master velocity", time, innovation, sigma, np.ones(len(time)), used, 0, time, ~used)
+    assert [e.key for e in _lasting(SimpleNamespace(residuals=[rows]), 0.1)] == found
+
+
+def test_errors_of_the_master_by_name():
+    given = master_errors("level=0.3 arcmin, heading=2 arcmin,velocity=0.05 m/s,correlation_time=200 s")
+    assert given == MasterErrors(0.3 * ARCMIN, 2.0 * ARCMIN, 0.05, 0.3 * ARCMIN, 0.05, 200.0)
+    for wrong, message in (
+        ("level=1", "no unit"),
+        ("tilt=1 arcmin", "expected one of"),
+        ("level 1 deg", "expected one of"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            master_errors(wrong)
+
+
+def test_a_delay_that_cannot_be_seen_is_not_printed_as_seen():
+    """Straight on in still air: the noise of the gyros, squared over two thousand rows, is no knowledge of a delay."""
+    way = course(Position.from_degrees(62.0, 20.0, 3000.0), straight(200.0), heading=0.6, speed=150.0)
+    spec = MasterSpec(clock_offset=0.06, velocity_noise=0.05, attitude_noise=math.radians(1.0 / 60.0))
+    slave = simulate(way, rate=100.0, duration=150.0, imu=imu_spec("tactical"), seed=4).record
+    master = simulate_sensor(way, spec, duration=150.0, seed=4).record
+    answer = align_transfer(slave, master, "tactical").transfer
+    assert not answer.delay_estimated
+    assert abs(answer.delay - 0.06) < 2.0 * answer.delay_sigma
+
+
+def test_a_masters_own_sigmas_make_sigma_absolute(tmp_path):
+    """Columns of its log, medians of which count: half of the variance constant, half of it drift; "none" leaves them out."""
+    way = course(Position.from_degrees(62.0, 20.0, 3000.0), straight(200.0), heading=0.6, speed=150.0)
+    slave = simulate(way, rate=100.0, duration=60.0, imu=imu_spec("tactical"), seed=4).record
+    master = simulate_sensor(way, MasterSpec(velocity_noise=0.05), duration=60.0, seed=4).record
+    rows, arcmin = len(master), math.radians(1.0 / 60.0)
+    attitude_sigma = np.tile(np.array([60.0, 4.0, 4.0]) * arcmin, (rows, 1))
+    attitude_sigma[3] = np.nan
+    master = replace(master, attitude_sigma=attitude_sigma, velocity_sigma=np.full((rows, 3), 0.1))
+    own = own_errors(master.attitude_sigma, master.velocity_sigma)
+    whole = np.hypot(
+        [own.level, own.heading, own.velocity], [own.attitude_drift, own.attitude_drift, own.velocity_drift]
+    )
+    assert whole == pytest.approx([4.0 * arcmin, 60.0 * arcmin, 0.1])
+    write_record(master, tmp_path / "master.csv")
+    read = read_master(tmp_path / "master.csv")
+    np.testing.assert_allclose(read.attitude_sigma, master.attitude_sigma, rtol=1e-9)
+    np.testing.assert_allclose(read.velocity_sigma, master.velocity_sigma)
+    absolute = align_transfer(slave, read, "tactical")
+    relative = align_transfer(slave, read, "tactical", master_errors="none")
+    assert absolute.transfer.considered
+    assert not relative.transfer.considered
+    # The master's heading comes on top, and its velocities tell less of the slave.
+    assert absolute.euler_sigma[0] > 0.97 * np.hypot(relative.euler_sigma[0], 60.0 * arcmin)
+    with pytest.raises(DataError, match="sigma"):
+        replace(master, velocity_sigma=np.zeros((rows, 3)))
