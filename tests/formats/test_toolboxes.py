@@ -5,6 +5,7 @@ import pytest
 from scipy.io import savemat
 
 from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.errors import DataError
 from truenorth.formats import read_gnss, read_imu, read_master
 
 TIME = np.arange(1, 301) / 100
@@ -37,6 +38,17 @@ def test_binary_rows_of_kf_gins_have_time_first(tmp_path):
     record = read_imu(tmp_path / "imu.bin")
     np.testing.assert_array_equal(record.time, TIME)
     np.testing.assert_array_equal(record.accel[:, 2], -INCREMENTS[:, 5])  # forward, right, down
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"), [(6, 0.5, "row 101.*column t"), (3, np.nan, "row 101.*column ax")]
+)
+def test_a_damaged_row_of_psins_is_named(tmp_path, column, value, words):
+    rows = np.column_stack([INCREMENTS, TIME])
+    rows[100, column] = value
+    rows.tofile(tmp_path / "imu.bin")
+    with pytest.raises(DataError, match=words):
+        read_imu(tmp_path / "imu.bin")
 
 
 @pytest.mark.parametrize("within", [False, True])
