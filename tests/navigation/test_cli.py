@@ -89,9 +89,3 @@ def test_exit_codes_and_messages(capsys, monkeypatch, folder, options, code, mes
     assert ended == code, said.out + said.err
     assert message in said.err
     assert "Traceback" not in said.err
-
-
-def test_a_start_that_is_not_there_is_wrong_usage(capsys, monkeypatch, folder):
-    code, said = run_command(capsys, monkeypatch, "navigate", folder / "log.parquet", "--start", folder / "none")
-    assert code == 2
-    assert "none: no such file; expected the folder of a saved alignment" in said.err.replace("\n", " ")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,9 +14,8 @@ from numpy.typing import NDArray
 
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION, normal_gravity
-from truenorth.core.errors import AlignmentError, DataError, UsageError
+from truenorth.core.errors import AlignmentError, DataError
 from truenorth.core.json_file import read_object
-from truenorth.core.paths import as_path
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.navigation.handover import Handover
@@ -178,16 +178,12 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
 
     Raises
     ------
-    UsageError
-        No such folder.
     DataError
         No summary.json in it, or one that lacks what navigation needs.
     AlignmentError
         The alignment has no heading that may be used.
     """
-    path = as_path(folder, "start")
-    if not path.exists():
-        raise UsageError(f"{path}: no such file; expected the folder of a saved alignment")
+    path = Path(folder)
     path = path / SUMMARY if path.is_dir() else path
     try:
         s = read_object(path)
