@@ -34,11 +34,14 @@ def test_as_forward(other):
     fine = SimpleNamespace(system=system, estimates=estimates, gains=filter_gains(system, estimates))
     epochs = np.array([0, 3, 3, 7, K - 1])
     count = len(epochs)
-    shapes = ((N, count), (M, count), (W, count))
-    signatures = Signatures(epochs, *(rng.standard_normal(shape) for shape in shapes))
-    U, A = rng.standard_normal((N, W)), rng.standard_normal((K, M, W))
+    shapes = ((N, count), (M, count), (W, count), (N, W), (K, M, W))
+    signatures, more = (Signatures(epochs, *(rng.standard_normal(shape) for shape in shapes)) for _ in range(2))
+    U, A = signatures.state_course, signatures.measured_course
     others = rng.standard_normal((K, M, other)) if other else None
-    ratio, size, left = matched(innovations_of(fine, others), signatures, U, A)
+    seen = innovations_of(fine, others)
+    ratio, size, left = (match := matched(seen, signatures)[0])
+    for together, alone in zip(matched(seen, more, signatures), (matched(seen, more)[0], match), strict=True):
+        np.testing.assert_array_equal(np.vstack([*together]), np.vstack([*alone]))
 
     L = np.linalg.cholesky(estimates.innovation_covariance)
     white = np.linalg.solve(L, estimates.innovation[..., None]).ravel()

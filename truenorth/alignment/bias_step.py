@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.inference import usual
-from truenorth.alignment.matched import Innovations, Signatures, matched
+from truenorth.alignment.matched import Match, Signatures
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -37,14 +37,14 @@ SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
 SENSORS = slice(BG.start, BA.stop)
 
 
-def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, seen: Innovations) -> list[Evidence]:
+def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list[Evidence]:
     """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves.
 
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
-    that beats slowly. They explain what they can (:func:`matrix_signatures`, the others of `seen`). An accelerometer's bias
+    that beats slowly. They explain what they can (:func:`matrix_signatures`). An accelerometer's bias
     wanders by its instability, which stands on the vertical for all to see: so small a step is none.
     """
-    ratio, size, ends = matched(seen, *_signatures(fine))
+    ratio, size, ends = match
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
     accel = np.arange(len(ratio)) % 6 >= 3
     ratio = np.where(accel & (np.abs(size) < WANDERS * instability), 0.0, ratio)
@@ -67,7 +67,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, seen: Innovations) ->
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 
-def _signatures(fine: FineAlignment) -> tuple[Signatures, Array, Array]:
+def bias_signatures(fine: FineAlignment) -> Signatures:
     """Of each course, in each of the six biases."""
     count, n, rows = len(fine.estimates.innovation), fine.system.states, fine.system.rows
     begin = np.repeat([round(onset * count) for _, onset in SIGNATURES], 6)
@@ -77,7 +77,7 @@ def _signatures(fine: FineAlignment) -> tuple[Signatures, Array, Array]:
     state[SENSORS] = every * steps
     course[SENSORS] = np.eye(6)
     after = every * np.where(steps, 0.0, 1.0 / (count - begin))
-    return Signatures(begin, state, np.zeros((rows, len(begin))), after), course, np.zeros((count, rows, 6))
+    return Signatures(begin, state, np.zeros((rows, len(begin))), after, course, np.zeros((count, rows, 6)))
 
 
 def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.alignment.matched import Innovations, Signatures, matched
+from truenorth.alignment.matched import Match, Signatures
 from truenorth.errors.staying import PHI
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
 from truenorth.state.limits import limit
@@ -68,10 +68,10 @@ class Drift:
         return Evidence(f"drift.{self.kind}", figures, kind, Effect(self.heading, self.level), remedies=("still_part",))
 
 
-def detect_drift(fine: FineAlignment, seen: Innovations) -> Drift:
-    """Match the innovations of a fine alignment with the bank of drift signatures."""
+def detect_drift(fine: FineAlignment, match: Match) -> Drift:
+    """The best of the drift signatures, of how they match."""
     courses = list(product(ONSETS, KINDS, AXES))
-    ratio, size, left = matched(seen, *_signatures(fine))
+    ratio, size, left = match
     best = int(np.argmax(ratio))
     onset, kind, axis_name = courses[best]
     start = onset * fine.integrals.time[-1]
@@ -80,7 +80,7 @@ def detect_drift(fine: FineAlignment, seen: Innovations) -> Drift:
     return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 
 
-def _signatures(fine: FineAlignment) -> tuple[Signatures, Array, Array]:
+def drift_signatures(fine: FineAlignment) -> Signatures:
     """Of each onset, each kind, along each axis; the courses are those of the mean velocity, or of the velocity gained."""
     t, n, by_velocity = fine.integrals.time, fine.system.states, fine.form == "velocity"
     at = (t[1:] + t[:-1]) / 2 if by_velocity else t[1:]
@@ -100,4 +100,4 @@ def _signatures(fine: FineAlignment) -> tuple[Signatures, Array, Array]:
     after[2 + axes, each] = np.where(steps, 0.0, 1.0 / span)
     if by_velocity:
         after[axes, each] = np.where(steps, 1.0, -start / span)
-    return Signatures(epoch, np.zeros((n, len(start))), measured, after), np.zeros((n, 4)), course
+    return Signatures(epoch, np.zeros((n, len(start))), measured, after, np.zeros((n, 4)), course)

@@ -6,7 +6,8 @@ Something begins at epoch k: errors ``u`` enter the state, ``a`` the measurement
     e_i = (I - K_i H_i) Phi_i (e_(i-1) + u_i) - K_i a_i,    seen in the innovation as    y_i = H_i Phi_i (e_(i-1) + u_i) + a_i
 
 Match ``sum y' W^-1 nu`` and energy ``sum y' W^-1 y`` of all epochs behind k are a linear and a quadratic form of ``(e_k, w)``:
-both are summed up once, from the last epoch back, for whatever begins when. The likelihood ratio is ``match^2 / energy``.
+both are summed up once, from the last epoch back, for whatever begins when and goes on in whatever course. The likelihood
+ratio is ``match^2 / energy``.
 
 Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in
 linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 class Signatures(NamedTuple):
-    """What may begin, S of them.
+    """What may begin, S of them, and the courses that they take.
 
     Attributes
     ----------
@@ -39,12 +40,34 @@ class Signatures(NamedTuple):
         Errors of the measurement at that epoch.
     after : (w, S) array
         Sizes of the courses behind it.
+    state_course, measured_course : (n, w) and (K, m, w) arrays
+        ``U`` and ``A`` of the courses.
     """
 
     epoch: NDArray[np.int64]
     state: Array
     measured: Array
     after: Array
+    state_course: Array
+    measured_course: Array
+
+
+class Match(NamedTuple):
+    """How signatures match.
+
+    Attributes
+    ----------
+    ratio : (S,) array
+        Twice the logarithm of each likelihood ratio.
+    size : (S,) array
+        Of each signature, the most likely.
+    left : (n, S) array
+        Errors of the last estimate that a signature of size one leaves.
+    """
+
+    ratio: Array
+    size: Array
+    left: Array
 
 
 class Innovations(NamedTuple):
@@ -54,14 +77,12 @@ class Innovations(NamedTuple):
     ----------
     L : (K, m, m) array
         Of each innovation's covariance ``L L'``.
-    H_Phi : (K, m, n) array
     gains : Gains
     white : (K, m, 1 + M) array
         ``L^-1`` of the innovations, and of what M other errors of one sigma make of them.
     """
 
     L: Array
-    H_Phi: Array
     gains: Gains
     white: Array
 
@@ -75,58 +96,61 @@ def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovati
         Signatures, of one sigma each, of errors in the measurements that the filter leaves out and any log may have: they
         explain what they can.
     """
-    system, seen = fine.system, fine.estimates.innovation[..., None]
+    seen = fine.estimates.innovation[..., None]
     L = np.asarray(np.linalg.cholesky(fine.estimates.innovation_covariance), dtype=np.float64)
     if others is not None:
-        seen = np.concatenate([seen, through(system, fine.gains, others)[0]], axis=2)
-    H_Phi = np.broadcast_to(system.H @ system.Phi, (len(seen), system.rows, system.states)).copy()
+        seen = np.concatenate([seen, through(fine.gains, others)[0]], axis=2)
     white = np.asarray(np.linalg.solve(L, seen), dtype=np.float64)
-    return Innovations(L, H_Phi, fine.gains, white)
+    return Innovations(L, fine.gains, white)
 
 
-def matched(
-    seen: Innovations, signatures: Signatures, state_course: Array, measured_course: Array
-) -> tuple[Array, Array, Array]:
-    """Match innovations with those that signatures make.
+def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
+    """Match innovations with those that signatures make, all banks of them in one pass.
 
     Parameters
     ----------
     seen : Innovations
-    signatures : Signatures
-        What may begin.
-    state_course, measured_course : (n, w) and (K, m, w) arrays
-        ``U`` and ``A`` of the courses that it takes.
+    *banks : Signatures
 
     Returns
     -------
-    ratio : (S,) array
-        Twice the logarithm of each likelihood ratio.
-    size : (S,) array
-        Of each signature, the most likely.
-    left : (n, S) array
-        Errors of the last estimate that a signature of size one leaves.
+    tuple of Match
+        One for each bank.
     """
+    state_course = np.concatenate([bank.state_course for bank in banks], axis=1)
+    measured_course = np.concatenate([bank.measured_course for bank in banks], axis=2)
     (n, courses), right, gains = state_course.shape, seen.white.shape[2], seen.gains
-    behind, place = np.unique(signatures.epoch, return_inverse=True)
+    behind = np.unique(np.concatenate([bank.epoch for bank in banks]))
     energies = np.empty((len(behind), n + courses, n + courses))
     matches, ends = np.empty((len(behind), n + courses, right)), np.empty((len(behind), n, n + courses))
-    arrays = (gains.step, seen.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
+    arrays = (gains.step, gains.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
     _sum_back(*(np.ascontiguousarray(a) for a in arrays), behind.astype(np.int64), energies, matches, ends)
 
-    k = signatures.epoch  # their first epoch by itself
-    first = np.einsum("smi,is->sm", seen.H_Phi[k], signatures.state) + signatures.measured.T
+    found, first = [], n
+    for bank in banks:
+        own = np.r_[0:n, first : first + len(bank.after)]  # e, and this bank's courses
+        at = np.searchsorted(behind, bank.epoch)
+        found.append(_match(seen, bank, energies[at][:, own[:, None], own], matches[at][:, own], ends[at][:, :, own]))
+        first += len(bank.after)
+    return tuple(found)
+
+
+def _match(seen: Innovations, bank: Signatures, energies: Array, matches: Array, ends: Array) -> Match:
+    """Of the signatures of a bank; the forms of ``(e_k, w)`` are those behind the epoch of each."""
+    gains, k = seen.gains, bank.epoch
+    first = np.einsum("smi,is->sm", gains.H_Phi[k], bank.state) + bank.measured.T  # their first epoch by itself
     first = np.linalg.solve(seen.L[k], first[..., None])[..., 0]
-    e = np.einsum("sij,js->si", gains.step[k], signatures.state)
-    e = e - np.einsum("sim,ms->si", gains.gain[k], signatures.measured)
-    begun = np.concatenate([e, signatures.after.T], axis=1)
-    energy = np.sum(first**2, axis=1) + np.einsum("si,sij,sj->s", begun, energies[place], begun)
-    match = np.einsum("sm,smr->sr", first, seen.white[k]) + np.einsum("si,sir->sr", begun, matches[place])
-    others = seen.white[:, :, 1:].reshape(seen.white[..., 0].size, right - 1)
+    e = np.einsum("sij,js->si", gains.step[k], bank.state)
+    e = e - np.einsum("sim,ms->si", gains.gain[k], bank.measured)
+    begun = np.concatenate([e, bank.after.T], axis=1)
+    energy = np.sum(first**2, axis=1) + np.einsum("si,sij,sj->s", begun, energies, begun)
+    match = np.einsum("sm,smr->sr", first, seen.white[k]) + np.einsum("si,sir->sr", begun, matches)
+    others = seen.white[:, :, 1:].reshape(seen.white[..., 0].size, -1)
     known = np.column_stack([others.T @ seen.white[:, :, 0].ravel(), match[:, 1:].T])
-    explained = np.linalg.solve(np.eye(right - 1) + others.T @ others, known)
+    explained = np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, known)
     energy = np.maximum(energy - np.einsum("sr,rs->s", match[:, 1:], explained[:, 1:]), 1e-300)
     of_innovations = match[:, 0] - match[:, 1:] @ explained[:, 0]
-    return of_innovations**2 / energy, of_innovations / energy, np.einsum("sij,sj->is", ends[place], begun)
+    return Match(of_innovations**2 / energy, of_innovations / energy, np.einsum("sij,sj->is", ends, begun))
 
 
 @compiled

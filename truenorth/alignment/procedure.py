@@ -16,17 +16,16 @@ from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, 
 from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
-from truenorth.alignment.bias_step import bias_step_evidence, matrix_signatures, turn_evidence
+from truenorth.alignment.bias_step import matrix_signatures, turn_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, sharper
-from truenorth.alignment.drift import Drift, detect_drift
+from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
-from truenorth.alignment.hemisphere import hemisphere_evidence
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
-from truenorth.alignment.matched import innovations_of
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
 from truenorth.alignment.turning import infer_turning, turning_align, turning_noise, turns_blindly, with_usual
@@ -287,11 +286,10 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    seen = innovations_of(fine, matrix_signatures(fine, used) if sways else None)
-    steps = bias_step_evidence(fine, used, seen) + ([] if sound else bad_stretches(fine, task.record))
-    steps += hemisphere_evidence(fine, task.position, seen)
+    drift, steps, hemisphere = what_begins(fine, used, task.position, matrix_signatures(fine, used) if sways else None)
+    steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     way = farthest(fine, task.position) if sways else math.inf
-    return _Found(answer, check, fine.settled, detect_drift(fine, seen), "" if sways else form, steps, way)
+    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:

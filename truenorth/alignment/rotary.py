@@ -21,14 +21,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
-from truenorth.alignment.bias_step import bias_step_evidence
-from truenorth.alignment.drift import detect_drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment
-from truenorth.alignment.hemisphere import hemisphere_evidence
-from truenorth.alignment.matched import innovations_of
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
 from truenorth.alignment.task import Task, bridged, make_task
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
@@ -163,10 +160,9 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
-    seen = innovations_of(fine)
-    evidence = model_evidence(detect_drift(fine, seen), settled=fine.settled)
-    evidence += base_speed(answer) + bias_step_evidence(fine, spec, seen) + bad_stretches(fine, record)
-    evidence += hemisphere_evidence(fine, task.position, seen)
+    drift, steps, hemisphere = what_begins(fine, spec, task.position)
+    evidence = model_evidence(drift, settled=fine.settled)
+    evidence += base_speed(answer) + steps + bad_stretches(fine, record) + hemisphere
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     return judged(answer, _of_encoder(record, encoder, axes, task) + evidence + notes(encoder.notes), heading_limit)

@@ -124,7 +124,7 @@ def ratio_on_sway(spoilt: ImuRecord, sound: ImuRecord, answer: Alignment) -> flo
         CoarseStart(task.record, C_n0_i, task.position, StaticModel.of(answer.imu), P, task.interval, np.empty(0, int))
     )
     made, true = (mean_velocity(integrate(log, task.interval), fine.C_n0_i, lat, alt) for log in (task.record, sound))
-    seen = through(fine.system, fine.gains, (made - true)[..., None])[0]
+    seen = through(fine.gains, (made - true)[..., None])[0]
     L = np.linalg.cholesky(fine.estimates.innovation_covariance)
     fault = np.linalg.solve(L, seen)
     white = np.linalg.solve(L, fine.estimates.innovation[..., None])

@@ -63,6 +63,7 @@ def call_last() -> None:
     system = LinearSystem(Phi, Phi, H, R, np.zeros((K, m)), np.zeros(n), np.eye(n), S=S)
     nothing = SimpleNamespace(innovation=np.zeros((K, m)), innovation_covariance=R, P=Phi)
     fine = SimpleNamespace(system=system, estimates=nothing, gains=filter_gains(system, nothing))  # type: ignore[arg-type]
-    one = Signatures(np.zeros(1, dtype=np.int64), np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((1, 1)))
-    matched(innovations_of(fine), one, np.zeros((n, 1)), np.zeros((K, m, 1)))  # type: ignore[arg-type]
+    state, measured, course = np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((K, m, 1))
+    one = Signatures(np.zeros(1, dtype=np.int64), state, measured, np.zeros((1, 1)), state, course)
+    matched(innovations_of(fine), one)  # type: ignore[arg-type]
     kalman(system, history="full")

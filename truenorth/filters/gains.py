@@ -29,11 +29,14 @@ class Gains(NamedTuple):
         ``(I - K_k H_k) Phi_k``: how an error goes on.
     H : (..., K, m, n) array
         The system's own; of one epoch where all are the same.
+    H_Phi : (..., K, m, n) array
+        ``H_k Phi_k``: how an error of the epoch before is measured.
     """
 
     gain: Array
     step: Array
     H: Array
+    H_Phi: Array
 
     @property
     def keep(self) -> Array:
@@ -62,32 +65,34 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
             f"epochs, expected all {system.epochs}: filter with history='full'"
         )
     runs, K = estimates.P.shape[:-3], system.epochs
-    found = Gains(np.empty((*runs, K, n, m)), np.empty((*runs, K, n, n)), system.H)
+    H_Phi = np.broadcast_to(system.H @ system.Phi, (*runs, K, m, n))
+    found = Gains(np.empty((*runs, K, n, m)), np.empty((*runs, K, n, n)), system.H, H_Phi)
     for first in range(0, K, BLOCK):
         epochs = slice(first, min(first + BLOCK, K))
-        found.gain[..., epochs, :, :], found.step[..., epochs, :, :] = _gains(system, estimates, epochs)
+        _fill(found, system, estimates, epochs)
     return found
 
 
-def _gains(system: LinearSystem, estimates: Estimates, epochs: slice) -> tuple[Array, Array]:
+def _fill(found: Gains, system: LinearSystem, estimates: Estimates, epochs: slice) -> None:
     """Gains of some epochs, and how an error goes on in them."""
 
     def cut(a: Array) -> Array:
         return a if a.shape[-3] == 1 else a[..., epochs, :, :]
 
-    Phi, H, first = cut(system.Phi), cut(system.H), epochs.start
+    Phi, H, H_Phi, first = cut(system.Phi), cut(system.H), found.H_Phi[..., epochs, :, :], epochs.start
     P0 = np.broadcast_to(system.P0, (*estimates.P.shape[:-3], system.states, system.states))[..., None, :, :]
     before = estimates.P[..., max(0, first - 1) : epochs.stop - 1, :, :]
     before = before if first else np.concatenate([P0, before], axis=-3)
-    P_predicted = Phi @ before @ np.swapaxes(Phi, -1, -2) + cut(system.Q)
-    cross = P_predicted @ np.swapaxes(H, -1, -2) + (0.0 if system.S is None else cut(system.S))
+    # (Phi P Phi' + Q) H' + S, from the right: of m columns, not n.
+    cross = Phi @ (before @ np.swapaxes(H_Phi, -1, -2)) + cut(system.Q) @ np.swapaxes(H, -1, -2)
+    cross = cross + (0.0 if system.S is None else cut(system.S))
     # An absent row becomes one of its own without information.
     absent = np.isnan(estimates.innovation[..., epochs, :])
     covariance = estimates.innovation_covariance[..., epochs, :, :]
     W = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), covariance)
     cross = np.where(absent[..., None, :], 0.0, cross)
     gain = np.swapaxes(np.linalg.solve(W, np.swapaxes(cross, -1, -2)), -1, -2)
-    return gain, (np.eye(system.states) - gain @ H) @ Phi
+    found.gain[..., epochs, :, :], found.step[..., epochs, :, :] = gain, Phi - gain @ H_Phi
 
 
 def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[Array, Array]:
@@ -108,25 +113,26 @@ def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[A
     last : (n, n) array
         Of all states, at the last epoch.
     """
-    whole = np.asarray(P0, dtype=np.float64)
+    whole, size = np.asarray(P0, dtype=np.float64), step.shape[-1]
+    known = np.flatnonzero(whole.any(axis=0))  # the others make no part
+    inner = whole[np.ix_(known, known)]
     part = np.empty((len(step), *whole[states, states].shape))
-    response = np.empty((min(BLOCK, len(step)), *step.shape[1:]))
-    before = np.eye(step.shape[-1])
+    response = np.empty((min(BLOCK, len(step)), size, len(known)))
+    before = np.ascontiguousarray(np.eye(size)[:, known])
     for first in range(0, len(step), BLOCK):
         block = response[: min(BLOCK, len(step) - first)]
         _products(np.ascontiguousarray(step[first : first + BLOCK]), before, block)
-        whole = block @ P0 @ np.swapaxes(block, -1, -2)
-        part[first : first + BLOCK] = whole[:, states, states]
+        wanted = block[:, states]
+        part[first : first + BLOCK] = wanted @ inner @ np.swapaxes(wanted, -1, -2)
         before = block[-1].copy()
-    return part, whole[-1]
+    return part, np.asarray(before @ inner @ before.T)
 
 
-def through(system: LinearSystem, gains: Gains, signature: Array) -> tuple[Array, Array]:
+def through(gains: Gains, signature: Array) -> tuple[Array, Array]:
     """What a filter makes of signatures in its measurements.
 
     Parameters
     ----------
-    system : LinearSystem
     gains : Gains
         Of :func:`filter_gains`.
     signature : (K, m, S) array
@@ -137,15 +143,15 @@ def through(system: LinearSystem, gains: Gains, signature: Array) -> tuple[Array
     x : (n, S) array
         The state at the last epoch.
     """
-    innovation, x = np.empty_like(signature), np.zeros((system.states, signature.shape[2]))
-    arrays = (system.H @ system.Phi, gains.gain, gains.step, signature)
+    innovation, x = np.empty_like(signature), np.zeros((gains.step.shape[-1], signature.shape[2]))
+    arrays = (gains.H_Phi, gains.gain, gains.step, signature)
     _through(*(np.ascontiguousarray(a) for a in arrays), innovation, x, np.empty_like(x))
     return innovation, x
 
 
 @compiled
 def _products(step: Any, before: Any, response: Any) -> None:
-    """``response[k] = step[k] ... step[1] step[0] before``, (K, n, n)."""
+    """``response[k] = step[k] ... step[1] step[0] before``, (K, n, p)."""
     times(step[0], before, response[0])
     for k in range(1, step.shape[0]):
         times(step[k], response[k - 1], response[k])

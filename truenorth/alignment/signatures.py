@@ -1,0 +1,34 @@
+"""What innovations show to have begun on the way: a drift of the base, a step of a bias, the gravity of the other hemisphere."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias_step import bias_signatures, bias_step_evidence
+from truenorth.alignment.drift import Drift, detect_drift, drift_signatures
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
+from truenorth.alignment.matched import innovations_of, matched
+from truenorth.core.position import Position
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
+
+Array = NDArray[np.float64]
+
+
+def what_begins(
+    fine: FineAlignment, spec: ImuSpec, position: Position, others: Array | None = None
+) -> tuple[Drift, list[Evidence], list[Evidence]]:
+    """The drift that matches best, evidence of a bias that steps, and of the other hemisphere; `others` explain what they can.
+
+    Parameters
+    ----------
+    others : (K, m, M) array, optional
+        As of :func:`truenorth.alignment.matched.innovations_of`.
+    """
+    seen = innovations_of(fine, others)
+    drift, bias, gravity = matched(
+        seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
+    )
+    return detect_drift(fine, drift), bias_step_evidence(fine, spec, bias), hemisphere_evidence(gravity)
