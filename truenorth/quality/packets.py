@@ -39,14 +39,18 @@ def exchanged_packets(data: Array) -> Exchanged | None:
     count = data.shape[1]
     if count < 2 * LONGEST + 6:
         return None
-    squares = _beyond(data[:, :-3], data[:, 1:-2], data[:, 2:-1], data[:, 3:])
-    usual = np.median(squares, axis=1)
+    jumps = np.zeros(count + 1, dtype=np.bool_)  # between row k - 1 and row k
+    beyond, usual = np.zeros(count - 3), np.zeros(len(data))
+    for i, x in enumerate(data):  # one after the other: of a long log all six at once are much memory
+        squares = _beyond(x[:-3], x[1:-2], x[2:-1], x[3:])
+        usual[i] = np.median(squares)
+        if usual[i] > 0.0:
+            beyond += squares / usual[i]
     known = usual > 0.0
     if not known.any():
         return None
     data, usual = data[known], usual[known]
-    jumps = np.zeros(count + 1, dtype=np.bool_)  # between row k - 1 and row k
-    jumps[2 : count - 1] = np.einsum("ik,i->k", squares[known], 1.0 / usual) > JUMP
+    jumps[2 : count - 1] = beyond > JUMP
     best: Exchanged | None = None
     for length in range(1, LONGEST + 1):
         edges = jumps[: -2 * length] & jumps[length:-length] & jumps[2 * length :]
