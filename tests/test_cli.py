@@ -291,6 +291,7 @@ def test_no_command_writes_over_its_input(capsys, monkeypatch, log, tmp_path, ca
     assert "is an input of the command" in err
 
 
+@pytest.mark.slow
 def test_a_result_of_another_kind_is_not_overwritten_unless_forced(capsys, monkeypatch, log, tmp_path):
     out = tmp_path / "start"
     assert run(capsys, monkeypatch, "align", log, *WHERE, "--imu", "navigation", "-o", out)[0] == 0

@@ -75,6 +75,7 @@ BASELINE = ("--baseline", "90,0.5")
 MAGNETOMETER = ("--date", "2025-07-01", "--magnetometer-iron", "5,1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gnss", "more", "best"),
     [

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 PROGRAM = """
 import sys
 sys.modules["matplotlib"] = None
@@ -37,6 +39,7 @@ imu: navigation
 """
 
 
+@pytest.mark.slow
 def test_without_matplotlib(tmp_path):
     (tmp_path / "still.yaml").write_text(STILL, encoding="utf-8")
     done = subprocess.run([sys.executable, "-c", PROGRAM], cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -171,6 +171,7 @@ def failures(monkeypatch, sizes):
         yield f"files of {limit} bytes", file_ends(limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [pytest.param(name, marks=[pytest.mark.slow] if name in LONGER else []) for name in COMMANDS]
 )

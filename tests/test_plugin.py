@@ -66,6 +66,7 @@ def run(installed, *arguments):
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, env=environment)
 
 
+@pytest.mark.slow
 def test_reader_method_motion_errors_and_aid(installed):
     done = run(installed, "-c", PROGRAM, str(installed))
     same, method, speed, grown = done.stdout.split() or ["", "", "", "nan"]

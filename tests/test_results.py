@@ -57,6 +57,7 @@ def test_saved_and_read_back_to_the_same_bits(results, name, tmp_path):
         assert tn.plot(again).axes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["alignment", "navigation", "inspection", "advice", "manoeuvres"])
 def test_shown_in_a_notebook(results, name):
     result = results[name]

@@ -119,6 +119,7 @@ def inside(totals):
     return low < np.sum(totals) < high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["attitude", "antennas", "magnetometer"])
 def test_navigation_is_honest_with_it(drive, kind):
     motion, totals, sigmas = drive[0], [], []
@@ -137,6 +138,7 @@ def test_navigation_is_honest_with_it(drive, kind):
     assert max(sigmas) < np.radians(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["attitude", "antennas", "magnetometer"])
 def test_alignment_on_the_move_is_honest_with_it(drive, kind):
     totals = []

@@ -67,6 +67,7 @@ def test_the_accelerometer_form_tells_what_an_error_does_to_the_log():
     assert np.abs(system.H[:, 0, PHI.start + 1]).min() > 9.0
 
 
+@pytest.mark.slow
 def test_a_still_log_is_taken_by_its_accelerometers():
     """White noise is accused once in 1000 logs: 40 logs, at most one."""
     reasons = [align(still(seed), PLACE, SPEC).method_reason for seed in range(40)]

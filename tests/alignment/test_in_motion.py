@@ -62,6 +62,7 @@ def error(answer, sim):
     return rotation_vector_from_dcm(C @ answer.C_nb.T) / ARCMIN
 
 
+@pytest.mark.slow
 @few_and_all(6, few=3)
 def test_ring_from_any_heading(runs):
     errors, sigmas = [], []
@@ -104,6 +105,7 @@ def test_coarse_alignment_by_the_odometer(ring):
     assert max(rms["velocity", 600.0], rms["position", 600.0]) < 10.0 * ARCMIN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "scale"),
     [
@@ -195,6 +197,7 @@ def test_under_way_at_the_first_sample(ring):
     assert np.sqrt(np.mean(error(answer, sim)[:2] ** 2)) < 0.1
 
 
+@pytest.mark.slow
 def test_driving_backwards():
     """The wheel counts negative; one that counts magnitudes is shown by a contradiction, not by a wrong heading."""
     legs = [{"kind": "straight", "duration": "5 s"}]
@@ -237,6 +240,7 @@ def test_gnss_from_an_unknown_heading(imu, heading, runs):
     assert low < np.sqrt(np.mean(np.square(off))) < high
 
 
+@pytest.mark.slow
 @few_and_all(3, few=1)
 def test_a_latitude_that_nobody_gives_is_found(runs):
     """Either hemisphere's mirror refused: within 3.3 sigma of the truth, heading as good as with it."""
@@ -252,6 +256,7 @@ def test_a_latitude_that_nobody_gives_is_found(runs):
         assert answer.phi_covariance[2, 2] > given.phi_covariance[2, 2]
 
 
+@pytest.mark.slow
 def test_poor_gyros_do_not_find_a_latitude(ring):
     scenario = changed(imu="consumer")
     sim = scenario.simulate(run=0, seed=7, ideal=ring)
@@ -261,6 +266,7 @@ def test_poor_gyros_do_not_find_a_latitude(ring):
     assert answer.reasons[-1].startswith("the latitude was not given: 45 deg assumed")
 
 
+@pytest.mark.slow
 def test_a_receiver_that_is_late_is_found_late():
     """A van in town, .4 s that nobody tells: heading within 3.3 sigma in three runs, and half as far off as if it were timely."""
     mapping = read_scenario("van").to_mapping()

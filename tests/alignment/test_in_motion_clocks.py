@@ -22,6 +22,7 @@ def found(answer):
     return [item for item in answer.evidence if item.key.startswith("delay.gyros_")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("procedure", ["gnss", "odometer"])
 @pytest.mark.parametrize("late", [0.1, -0.2])
 def test_gyros_of_another_moment_are_found_on_the_move(procedure, late):

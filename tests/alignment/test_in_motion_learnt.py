@@ -83,6 +83,7 @@ def test_an_odometer_noisier_than_usual_is_no_contradiction():
     assert answer.status == "aligned", answer.reasons
 
 
+@pytest.mark.slow
 def test_a_class_of_imu_that_is_too_good_is_the_suspect(late):
     gnss = late.aiding["gnss"].shifted(-1.0)
     answer = align_in_motion(late.record, "tactical", gnss=gnss)

@@ -35,6 +35,7 @@ def van(seed):
     return record, odometer, np.arctan2(C[0, 1], C[1, 1]), Position(float(at.lat), float(at.lon), float(at.alt))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 2, 3])
 def test_a_van_with_poor_gyros_and_a_wheel_of_pulses(seed):
     """Gyros of 100 deg/h; as every pass began from zero biases and 4 deg of level: 23, 11 and -7 deg off, sigma 2.3 to 3.6."""

@@ -42,6 +42,7 @@ def test_fog_aligned_with_gnss_while_the_engine_idles():
     assert abs(moving.roll - at_rest.roll) < math.radians(0.02)
 
 
+@pytest.mark.slow
 def test_cart_gets_its_heading_from_motion():
     """Its IMU looks backwards: the course is 180 deg from the y axis, along the whole way."""
     imu, _ = recordings.stim300_cart_chicago()
@@ -78,6 +79,7 @@ def car():
     return imu, odometer, gnss, align_in_motion(imu, "consumer", odometer=odometer, gnss=gnss, wheel=CAR_WHEEL)
 
 
+@pytest.mark.slow
 def test_car_heading_with_a_tilted_imu(car):
     """Vehicle's heading, its IMU turned in the car by 8 deg about the vertical, against GNSS course above 4 m/s."""
     _, _, gnss, answer = car
@@ -113,6 +115,7 @@ def test_car_dead_reckons_by_the_odometer(car):
     assert np.sqrt(np.trace(P)) < 0.1 * moving.distance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(35.0, 110.0), (50.0, 125.0)])
 def test_car_levels_alike_by_gnss_and_by_both(begin, end):
     """A wheel that stays on the road and the heights of a receiver agree on pitch: these err by more than its places."""

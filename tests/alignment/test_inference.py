@@ -31,6 +31,7 @@ def test_noise_alone_proves_no_bias():
     assert predictive_sigma(np.array([1e-4, 1e-4]), noise, 1e-7, math.log(3.0), 1e-9, 1.0) > 3e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "width"), [(2, math.log(7.0)), (1, math.log(2.0))])
 def test_sigma_is_the_rms_of_the_unseen_component(count, width):
     """Over scales drawn from the prior, unseen / sigma has mean square 1, and few beyond four (20000 draws, +-.1)."""

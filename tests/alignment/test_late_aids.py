@@ -51,6 +51,7 @@ def test_a_first_fix_before_driving_off(drive):
     assert all(item.key != "aids.late" for item in answer.evidence)
 
 
+@pytest.mark.slow
 def test_an_odometer_that_begins_late(drive):
     """The place that is given is that of the beginning: by then the vehicle is elsewhere."""
     made, aids = drive

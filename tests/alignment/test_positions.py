@@ -70,6 +70,7 @@ def test_sigma_is_honest(grade, turns, dwell, runs):
         assert np.all(np.abs(apart) < 5.0)
 
 
+@pytest.mark.slow
 @few_and_all(8, few=4)
 def test_without_a_specification_sigma_is_honest_too(runs):
     """Heading over its sigma: the sum of squares within its 99.9 % band; of 8 runs .7 to 27.9."""
@@ -98,6 +99,7 @@ def test_two_positions_take_the_biases_out():
     assert not one.accel_bias_estimated[:2].any()
 
 
+@pytest.mark.slow
 def test_a_large_turn_needs_scale_factor_states():
     """500 ppm over 180 deg are 5.4 arcmin of heading that the answer does not have: the state takes them."""
     spec = imu_spec({"gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "scale_factor": "500 ppm"},

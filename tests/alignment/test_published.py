@@ -59,6 +59,7 @@ def logs(content, runs):
         yield made.record, scenario.imu_spec, made.motion.states(made.record.time[-1:]).C_nb[0]
 
 
+@pytest.mark.slow
 @few_and_all(12)
 @pytest.mark.parametrize(("content", "methods"), some([(SWAY, list(FADING))], [(STILL, [*FADING, *STATIONARY])]))
 def test_their_sigma_is_honest(content, methods, runs):
@@ -116,6 +117,7 @@ def phi_of(answer, motion, C_bm):
     return misalignment(answer.C_nb, motion.states(np.array([answer.time])).C_nb[0] @ C_bm)
 
 
+@pytest.mark.slow
 @few_and_all(4, few=2)
 @pytest.mark.parametrize("method", some(["sgkf"], ["ekf", "gh3"]))
 def test_filters_of_the_odometer_paper(drives, method, runs):
@@ -196,6 +198,7 @@ def test_an_odometer_is_needed(drives):
         align_in_motion(record, spec, gnss=gnss, position=place, method="gh3")
 
 
+@pytest.mark.slow
 def test_the_command_line(tmp_path):
     """`align --method imakf` and `--method sgkf` on logs made by `simulate`."""
     run = CliRunner().invoke

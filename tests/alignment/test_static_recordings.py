@@ -32,6 +32,7 @@ def _by_hypotheses(record, position, start, spec):
     return earth_rotation(integrals.time[-1], position.lat).T @ B.T @ start @ integrals.C_ib[-1]
 
 
+@pytest.mark.slow
 def test_every_method_on_the_laboratory_log_against_its_reference():
     """Heading to a tenth of a degree, level to .002 deg, by all methods; three start from an azimuth that is 140 deg off."""
     record, position, given = recordings.navgrade_static_beijing()

@@ -50,6 +50,7 @@ def test_mems_on_a_table_rotation_tells_offsets_from_tilt():
     assert 0.5 < radius < 0.8
 
 
+@pytest.mark.slow
 def test_mems_on_a_table_that_was_touched():
     record, position = recordings.mems_rotation_table()
     answer = align_positions(record, position, MEMS)

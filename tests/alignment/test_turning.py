@@ -33,6 +33,7 @@ def spinning(rng):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [True, False])
 def test_level_of_a_spinning_imu_is_honest(given):
     """Squares over sigma of two axes, 8 runs: chi-square of 16, whose mean lies in .32 to 2.14 in 99 of 100 such tests."""
@@ -51,6 +52,7 @@ def test_level_of_a_spinning_imu_is_honest(given):
     assert np.max(squares) < 16.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", some([0.0], [60.0, 100.0, 135.0]))
 @pytest.mark.parametrize("imu", ["consumer", None])
 def test_a_turntable_that_turns_while_the_log_runs(start, imu):
@@ -83,6 +85,7 @@ def turned(positions, duration, imu="tactical", rate="10 deg/s"):
     )
 
 
+@pytest.mark.slow
 @few_and_all(24)
 @pytest.mark.parametrize(
     ("positions", "duration"),
@@ -114,6 +117,7 @@ def test_a_turned_table_without_a_specification():
         assert np.all(np.abs(phi) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", some(["oba", "sakf"], ["inertial", "kf", "makf", "imakf"]))
 def test_methods_that_know_no_misalignments_are_held_against_the_library_s_own(method):
     """Of six runs of a turned table none is more than four sigmas off unsaid; some are, by their own sigma."""

@@ -95,6 +95,7 @@ def at_sea(run):
     )
 
 
+@pytest.mark.slow
 @few_and_all(16, few=4)
 def test_a_high_sea_takes_a_ship_nowhere(runs):
     """Its velocity is more than .5 m/s, and it stays within metres: aligned, none more than four sigmas off."""

@@ -288,6 +288,7 @@ def test_the_bound_is_not_beaten_and_nearly_reached(tmp_path, runs):
         assert abs(ratio - 1) < 3.3 / np.sqrt(2 * runs)
 
 
+@pytest.mark.slow
 def test_published_filters_on_an_indexer_and_on_the_move_are_judged_by_the_truth(tmp_path):
     """Errors within four of their own sigmas: of the body on the indexer, of the vehicle by its odometer."""
     plan = {

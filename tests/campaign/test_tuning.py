@@ -24,6 +24,7 @@ SEARCH = {
 }
 
 
+@pytest.mark.slow
 def test_the_same_search_gives_the_same_answer_and_judges_on_other_data():
     pytest.importorskip("optuna")
     first, second = tune(SEARCH), tune(SEARCH)

@@ -70,6 +70,7 @@ def test_latitude_is_found_with_its_sign(lat):
     assert estimate_latitude(integrals) == pytest.approx(place.lat, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_latitude_sigma_is_that_of_monte_carlo():
     spec = ImuSpec(gyro_bias=2e-8, gyro_random_walk=2e-7, accel_random_walk=1e-4, name="latitude")
     ideal = ideal_log(rest(PLACE, 0.9), rate=10.0, duration=200.0)

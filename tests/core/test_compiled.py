@@ -161,6 +161,7 @@ def test_a_value_of_another_kind_is_not_guessed():
         fingerprint(kernel, {}, ())
 
 
+@pytest.mark.slow
 def test_another_process_and_another_checkout_compile_nothing(tmp_path):
     first, second = write(tmp_path / "one"), write(tmp_path / "two")
     assert run(CALL.format(folder=str(first)), tmp_path) == ["4.0 3.0", "1 0", "1 0"]
@@ -181,6 +182,7 @@ def test_the_folder_that_the_environment_names_is_taken(tmp_path):
     assert not (tmp_path / "cache").exists()
 
 
+@pytest.mark.slow
 def test_without_a_folder_to_write_to_a_process_compiles_for_itself(tmp_path):
     folder = write(tmp_path / "one")
     (tmp_path / "file").write_text("no folder can stand below a file")
@@ -214,6 +216,7 @@ for factor in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_functions_of_one_name_stay_apart(tmp_path):
     """Each compiled by a process of its own: the linker of a third sees two functions of one name."""
     for factors in (("2",), ("3",), ("2", "3", "4")):
@@ -234,6 +237,7 @@ for kind in sys.argv[1:]:
 """
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_leave_each_signature_its_own_code(tmp_path):
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
 

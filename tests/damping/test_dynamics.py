@@ -23,6 +23,7 @@ def carried(course, x):
     return np.array(states)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lat", "heading"), some([(-45.78, 231.0)], [(79.0, 120.0), (45.78, 51.34), (-80.0, -30.0), (0.5, 270.0)])
 )
@@ -45,6 +46,7 @@ def test_every_column_is_that_of_the_strapdown(lat, heading):
         )
 
 
+@pytest.mark.slow
 def test_the_papers_errors_over_two_days():
     """The paper's own errors: 20 km and .2 deg of heading, within 1 % of the linear model."""
     ideal, truth = ideal_and_truth(interval=20.0)

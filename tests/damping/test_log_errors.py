@@ -67,6 +67,7 @@ def test_bands_of_a_filter_that_knows_all_are_its_own(truth):
     np.testing.assert_allclose(bands.errors[1:], found.sigma[1:, :7], rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [math.inf, 1.0 * HOUR])
 def test_bands_hold_what_a_filter_does_not_know(truth, time):
     """A drift of .3 m/s that filter 1 knows nothing of: RMS over 20 voyages against the bands, 99.9 %."""
@@ -87,6 +88,7 @@ def test_bands_hold_what_a_filter_does_not_know(truth, time):
     np.testing.assert_array_less(1 - 4.0 / math.sqrt(40), rms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("hours", "low", "high"), [(math.inf, 48.0, math.inf), (1.0, 0.37, 3.0), (6.0, 1.5, 24.0)])
 def test_the_time_of_a_drift_is_found(truth, hours, low, high):
     rng = np.random.default_rng(8)
@@ -158,6 +160,7 @@ def test_two_fixes_calibrate_the_gyros(truth):
     assert np.abs(found.x[first - 1, DP] - x[first - 1, DP]).max() > 100.0  # before the fix it was off
 
 
+@pytest.mark.slow
 @few_and_all(24, few=4)
 def test_bands_of_the_double_filter_follow_imu_and_place(runs):
     """Filters 1 and 2 fused, as `navigate` runs them: place, heading, IMU (five times better to worse) drawn in each voyage.

@@ -97,6 +97,7 @@ def swing(values):
     return np.sqrt(np.mean(np.array(left) ** 2, axis=(0, 1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_calms_the_oscillation(ship, method):
     """Velocity swings by less than a fifth of the free INS's from 6 h on, and errors keep inside 4.5 sigma."""
@@ -144,6 +145,7 @@ def test_the_logs_constant_error_is_found(ship):
     assert f"min (to {apart:.1f} min)" in result.damping.in_words()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lat", "heading"), some([(-45.78, 231.0)], [(79.0, 120.0), (-80.0, -30.0), (0.5, 270.0)]))
 def test_both_hemispheres_east_and_west(lat, heading):
     ship = Ship(lat, heading, seed=3)
@@ -158,6 +160,7 @@ def test_both_hemispheres_east_and_west(lat, heading):
         assert (np.abs(left[late]) / sigma[late]).max() < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", some(["double"], ["external", "kalman", "augmented"]))
 def test_a_sick_log(ship, method):
     """Outliers, a jump of 1.1 m/s and two hours of silence: named, and what is left is near to a healthy log's."""

@@ -122,6 +122,7 @@ def test_a_fix_in_a_turn_holds_at_its_own_time():
     assert np.abs(off * 6.37e6).max() < 0.5
 
 
+@pytest.mark.slow
 def test_hard_turns_and_a_coarse_track():
     """Filter 1 and the double filter on a track of 8 s, a log of 4 s: within their bands, through `navigate`."""
     ship = voyage(3, 1, hours=8.0)

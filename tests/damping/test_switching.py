@@ -63,6 +63,7 @@ def test_hysteresis(ship):
     assert set(found.mu[between]) == {0.0, 1.0}  # of one size, as it came there
 
 
+@pytest.mark.slow
 @few_and_all(8, few=1)
 def test_switching_is_no_worse_than_either(runs):
     """RMS of velocity after six hours: none, always on, switched; place, course and errors drawn in each voyage."""

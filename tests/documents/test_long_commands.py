@@ -48,6 +48,7 @@ def simulate(folder: Path, name: str, **changes: object) -> Path:
     return folder / name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", some(["50 Hz"], ["100 Hz"]))
 def test_an_indexer(rate, tmp_path):
     logs = simulate(tmp_path, "rotary_ship", rate=rate)
@@ -61,6 +62,7 @@ def test_a_turntable(tmp_path):
     run(tmp_path, *words_of("--positions"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("duration", some(["2 h"], ["6 h"]))
 def test_a_voyage(duration, tmp_path):
     logs = simulate(tmp_path, "marine_damping", duration=duration, imu="navigation", errors={})
@@ -71,6 +73,7 @@ def test_a_voyage(duration, tmp_path):
     run(tmp_path, *words_of("--damping"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", some([1], [3]))
 def test_a_campaign(points, tmp_path):
     """The plan of the page on campaigns, with some points of its grid and two runs of each."""
@@ -81,6 +84,7 @@ def test_a_campaign(points, tmp_path):
     run(tmp_path, *words_of("campaign"))
 
 
+@pytest.mark.slow
 def test_a_study(tmp_path):
     run(tmp_path, *words_of("reproduce"), "--runs", "2")
 
@@ -121,6 +125,7 @@ def stream(folder: Path, words: list[str], logs: dict[int, Path], pace: float) -
     return process
 
 
+@pytest.mark.slow
 def test_live_until_heading_is_good_enough(tmp_path):
     """It ends by itself, before the rows do."""
     still = {"lat": "48.1 deg", "lon": "11.5 deg", "alt": "500 m"}
@@ -133,6 +138,7 @@ def test_live_until_heading_is_good_enough(tmp_path):
     assert "aligned" in out + err
 
 
+@pytest.mark.slow
 def test_live_on_the_move(tmp_path):
     """It navigates on until Ctrl-C."""
     logs = simulate(tmp_path, "van", imu="tactical")

@@ -84,6 +84,7 @@ def test_lines_of_48_hours_at_rest():
     assert_lines(track.time, dL, lines, left=0.01, without=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speeds", [(0.0, 0.0), (10.0, 8.0)])
 @pytest.mark.parametrize(
     "dx",
@@ -130,6 +131,7 @@ def test_error_model_of_48_hours_is_the_navigation(speeds, dx):
         np.testing.assert_allclose(predicted[:, columns], found[:, group], rtol=0, atol=0.02 * scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", some(["sway"], ["cruise"]))
 def test_halving_the_step_moves_position_by_less_than_a_millimetre(kind):
     """An hour of a ship in a moderate sea, or on its course, 200 Hz against 100 Hz of the same increments.

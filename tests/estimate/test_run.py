@@ -394,6 +394,7 @@ print(len(kernel.run.signatures), sum(stats.cache_misses.values()), sum(stats.ca
 """
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing():
     """One specialisation a padded size of the filter's states, whatever the sensors; from the disk the second time."""
     signatures, misses, hits = map(int, said_by_a_second_process(PROGRAM, lambda words: words[1] == "0"))

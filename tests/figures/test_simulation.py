@@ -11,6 +11,7 @@ def page(name, duration):
     return scenario.simulate().plot(title=name, aiding=scenario.simulate_aiding())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_every_scenario_has_its_page(name, tmp_path):
     figure = page(name, 60.0)

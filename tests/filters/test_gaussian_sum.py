@@ -29,6 +29,7 @@ def some_hypotheses(n, L, seed=0):
     return Hypotheses(weight / weight.sum(), 2.0 * rng.standard_normal((L, n)), root @ np.swapaxes(root, 1, 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filter", [kalman, square_root])
 def test_on_a_linear_system_it_is_the_dense_sum(filter):
     system, start = random_system(epochs=5, S=False), some_hypotheses(4, 5)

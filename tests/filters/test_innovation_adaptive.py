@@ -18,6 +18,7 @@ def constant(z, R=1.0, P0=4.0) -> LinearSystem:
     return LinearSystem(one, 0 * one, one, R * one, np.asarray(z, float)[:, None], np.zeros(1), P0 * one[0])
 
 
+@pytest.mark.slow
 def test_by_hand():
     # P = 4, R = 1, z = 5, window 2: nu^2 - P = 21, with the given 1 in the other place r = 11; k = 4/15, P+ = 44/15.
     found = innovation_adaptive(constant([5.0, 1.0]), window=2, history="full")

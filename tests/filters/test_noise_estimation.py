@@ -32,6 +32,7 @@ def predictions(system, k, x, P):
     return system.Phi[k] @ x + system.u[k], system.Phi[k] @ P @ system.Phi[k].T + system.Q[k]
 
 
+@pytest.mark.slow
 def test_sage_husa_step_by_step():
     system, b, low, high = simple(), 0.9, 0.5, 3.0
     estimates = sage_husa(system, b=b, smallest=low, largest=high, history="full")
@@ -55,6 +56,7 @@ def test_sage_husa_step_by_step():
     assert 0 < touched < 60
 
 
+@pytest.mark.slow
 def test_variational_step_by_step():
     system, rho, worth = simple(), 0.9, 4.0
     estimates = variational(system, rho=rho, worth=worth, iterations=4, history="full")

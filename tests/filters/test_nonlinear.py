@@ -61,6 +61,7 @@ def test_close_unscented_nodes_cost_digits_and_no_more():
     assert_allclose(ours.P, exact.P, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["extended", "gauss_hermite 3", "reduced"])
 def test_options_on_a_linear_system_are_the_linear_filters(name):
     linear = random_system(S=False, epochs=40, seed=3)
@@ -143,6 +144,7 @@ def test_iteration_finds_the_largest_posterior_density():
     assert_array_equal(iterated(system, iterations=1).x, extended(system).x)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILTERS)
 def test_consistent_on_mildly_nonlinear_tracking(name):
     # NEES of 4 states over 400 runs, at three epochs far apart: 1 % two-sided each, so .03 of false alarms a filter.

@@ -40,6 +40,7 @@ def bound(runs, rate=1e-3):
 LINEAR = random_system(S=False, n=3, m=2, epochs=8, seed=5)
 
 
+@pytest.mark.slow
 @few_and_all(100)
 @pytest.mark.parametrize("nonlinear", [None, [1], [2, 0]])
 def test_on_a_linear_system_it_is_the_kalman_filter_on_average(nonlinear, runs):
@@ -111,6 +112,7 @@ def growing(epochs, seed):
     return NonlinearSystem(growth, squared, 10.0 * one, one, z[:, None], np.zeros(1), 5.0 * one[0], p[:, None])
 
 
+@pytest.mark.slow
 @few_and_all(100)
 def test_on_a_nonlinear_system_it_is_bayes_rule_on_average(runs):
     # Mean and variance at 4 epochs and the likelihood: 9 values, .009 of false alarms.
@@ -126,6 +128,7 @@ def test_on_a_nonlinear_system_it_is_bayes_rule_on_average(runs):
     assert np.max(np.abs(gaussian - exact[:, 0]) / np.sqrt(exact[:, 1])) > 1.0
 
 
+@pytest.mark.slow
 @few_and_all(60)
 def test_the_conditionally_linear_model_with_and_without_its_structure(runs):
     # Two samplings of one posterior: two-sample t over the runs of each; 4 states at 2 epochs, .008 of false alarms.
@@ -138,6 +141,7 @@ def test_the_conditionally_linear_model_with_and_without_its_structure(runs):
         assert np.abs(t).max() < bound(2 * runs - 1)
 
 
+@pytest.mark.slow
 @few_and_all(150)
 def test_consistent_on_mildly_nonlinear_tracking(runs):
     # NEES of 4 states over the runs at two epochs: 1 % two-sided each. Velocities are linear given positions. Coarse

@@ -180,6 +180,7 @@ def test_a_hostile_file_is_one_message(name, tmp_path):
     assert len(text.strip().splitlines()) <= 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

@@ -138,6 +138,7 @@ def test_after_a_long_gap_alignment_begins_anew_and_says_when(record):
     assert found.status == "aligned"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rates", "increments"])
 @pytest.mark.parametrize("chunk", [1, 7, 333])
 def test_merged_rows_keep_the_sums_whatever_the_chunks(kind, chunk):

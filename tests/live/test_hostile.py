@@ -65,6 +65,7 @@ def van():
     return scenario.simulate(seed=2).record, scenario.simulate_aiding(seed=2)
 
 
+@pytest.mark.slow
 def test_rows_of_aiding_sensors_that_cannot_be_are_left_out(van):
     record, aiding = van
     fixes, wheel = aiding["gnss"].record, aiding["odometer"].record

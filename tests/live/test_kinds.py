@@ -181,6 +181,7 @@ def replayed(aligner, record, aids, chunk):
 SOME = [13, pytest.param(1, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.slow)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunk", SOME)
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_the_last_answer_is_the_batch_to_the_bit(kind, chunk):
@@ -202,6 +203,7 @@ def test_the_last_answer_is_the_batch_to_the_bit(kind, chunk):
     assert answer.counts.left_out == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rotary", "turntable"])
 def test_an_imu_that_is_turned_has_the_attitude_of_its_last_solution_and_never_leaves(kind):
     record, place, imu, feeds, aids = KINDS[kind]()

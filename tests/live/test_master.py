@@ -44,6 +44,7 @@ def fed(aligner, record, master, chunk):
         aligner.push(record.time[part], record.gyro[part], record.accel[part])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunk", some([13], [1, 1000]))
 def test_the_last_answer_is_that_of_the_whole_log_to_the_bit(flight, chunk):
     sim, master = flight
@@ -61,6 +62,7 @@ def test_the_last_answer_is_that_of_the_whole_log_to_the_bit(flight, chunk):
     assert answer.time == record.time[-1]
 
 
+@pytest.mark.slow
 def test_between_two_solutions_navigation_goes_on(flight):
     sim, master = flight
     record = sim.record

@@ -55,6 +55,7 @@ def kept(record, end):
     return record[: int(np.searchsorted(record.time, end, side="right"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chunk", "with_odometer"),
     some([(7, False)], [(7, True), *((n, aided) for n in (1, 1000) for aided in (False, True))]),
@@ -81,6 +82,7 @@ def test_on_the_move_the_last_answer_is_that_of_the_whole_log_to_the_bit(van, ch
     assert np.all(np.abs(answer.motion.v_n - truth.v_n[0]) < 4.0 * answer.motion.v_sigma + 0.02)
 
 
+@pytest.mark.slow
 def test_between_two_solutions_the_loop_goes_on(van):
     """Its answer is at the newest row, with a velocity within four sigmas of the truth."""
     sim, gnss, _ = van
@@ -109,6 +111,7 @@ def navigated(start, record, gnss, odometer, chunk):
         return answer, past, run.finish()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunks", some([(7, 1000)], [((1, 7, 1000),)]))
 def test_navigation_in_chunks_is_one_and_the_same_to_the_bit(van, chunks):
     sim, gnss, odometer = van
@@ -137,6 +140,7 @@ def test_navigation_in_chunks_is_one_and_the_same_to_the_bit(van, chunks):
         np.testing.assert_allclose(answer.motion.v_n, whole.v_n[-1], atol=0.02)
 
 
+@pytest.mark.slow
 def test_from_alignment_to_navigation_without_a_gap(van):
     """The navigator takes the rows after the alignment's epoch, and goes on with those that come."""
     sim, gnss, _ = van
@@ -170,6 +174,7 @@ def test_a_gap_that_is_too_long_is_named_and_the_answer_lost(van):
     assert any("a gap of 3.0" in reason for reason in after.reasons)
 
 
+@pytest.mark.slow
 def test_a_run_that_is_saved_goes_on_to_the_same_bits(van, tmp_path):
     sim, gnss, _ = van
     record = sim.record
@@ -209,6 +214,7 @@ def test_a_run_that_is_saved_goes_on_to_the_same_bits(van, tmp_path):
     assert np.array_equal(runs[0].finish().position, runs[1].finish().position)
 
 
+@pytest.mark.slow
 def test_without_a_place_the_first_solution_waits_for_a_fix(van):
     """A receiver that starts cold gives none for a minute: the run says so, and goes on."""
     sim, gnss, _ = van

@@ -252,6 +252,7 @@ def test_nmea_has_its_checksum_and_heading(log):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
 def test_lines_go_to_a_socket(kind, log):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM) as line:

@@ -66,6 +66,7 @@ def test_a_replayed_run_on_the_move_is_the_batch_to_the_bit(logs):
     assert np.array_equal(found.phi_covariance, whole.phi_covariance)
 
 
+@pytest.mark.slow
 def test_rows_of_aids_are_kept_and_a_resumed_run_needs_no_log_of_them(logs, tmp_path):
     """The first 50 s, then a run to which only what came after them is given: the answer of the whole to the bit."""
     for half, (first, last) in {"first": (None, 50.0), "second": (50.0, None)}.items():
@@ -158,7 +159,10 @@ class ByHand:
             time.sleep(0.02)
 
     def drive(self, happened):
-        """Rows until this holds of what was published; the next ones only when the last ones have been solved for."""
+        """Rows until this holds of what was published; the next ones only when the last ones have been solved for.
+
+        The number of rows that were sent.
+        """
         sent, solutions = 0, 0
         for count in np.diff([0, 1250, 1500, 1800, 2200, 2700, 3300, 4000]):
             self.send(count)
@@ -170,9 +174,10 @@ class ByHand:
                 )
             )
             if happened(*self.now):
-                return
+                return sent
             solutions = self.now[0].solutions
         self.wait_for(happened)
+        return sent
 
     def __exit__(self, *error):
         self.line.close()
@@ -206,7 +211,8 @@ def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
 def test_navigation_that_begins_with_the_last_row_leaves_the_alignment(logs):
     """Rows end, heading is good, and an interrupt or the end of the stream comes without another row."""
     with ByHand(logs, navigate=True) as run:
-        run.drive(heading_known)
+        sent = run.drive(heading_known)
+        run.wait_for(lambda aligner, *_: aligner.intake.counts.taken == sent)
         run.session.go.set()
         run.wait_for(navigates)
         _, answer, note = run.now
@@ -218,6 +224,7 @@ def test_navigation_that_begins_with_the_last_row_leaves_the_alignment(logs):
     assert "fewer than two rows came after the alignment at" in note
 
 
+@pytest.mark.slow
 def test_the_page_asks_for_navigation_by_its_token_alone(logs):
     pytest.importorskip("uvicorn")
     from truenorth.live.page import serve

@@ -11,6 +11,7 @@ from truenorth.navigation import Mounting, Start, navigate
 from truenorth.records import GnssRecord
 
 
+@pytest.mark.slow
 def test_ring_laser_on_a_parked_vehicle():
     """Aligned on 300 s, then free inertial for 600 s: it drifts 7 m and .03 m/s, and its sigma says so (15 m, .06 m/s).
 
@@ -109,6 +110,7 @@ def test_car_with_gnss_and_odometer(car):
     assert np.median(np.abs(off)) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(60.0, 120.0), (85.0, 145.0)])
 def test_car_through_an_outage_of_a_minute(car, begin, end):
     """At its end, 400 to 600 m on: 2 to 7 m with the odometer, 300 to 750 m without it, both within 4 of their sigmas.

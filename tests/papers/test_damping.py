@@ -34,6 +34,7 @@ def cases(voyage, request):
     return {c: run_all(voyage, course, voyage.reference(c), networks=c == -0.3) for c in request.param}
 
 
+@pytest.mark.slow
 def test_the_undamped_lines(voyage, cases):
     """80 and 89 min, and the 24 h line, of the full strapdown's errors."""
     free = errors_of(cases[0.0].course, voyage.truth)

@@ -26,6 +26,7 @@ def phi(results, *key):
     return results.found[key].phi / ARCMIN
 
 
+@pytest.mark.slow
 def test_a_run_of_configuration_a(run_a):
     """The bars are on RMS; one run within three of them."""
     assert np.all(np.abs(phi(run_a, "A", "kf", 600.0)) < 3 * np.array([0.006, 0.006, 0.05]))

@@ -88,6 +88,7 @@ def test_the_model_is_that_of_the_mechanisation():
             np.testing.assert_allclose((v1 - v0) / step, column[DV], atol=1e-3 * max(np.abs(column[DV]).max(), 1.0))
 
 
+@pytest.mark.slow
 def test_both_filters_agree_on_a_still_base(value):
     for time in (60.0, 120.0, 300.0, 600.0):
         eight, ten = (value("still", f"states{n}", "heading", "rms", time) for n in (8, 10))

@@ -29,6 +29,7 @@ def banked():
     return errors_of(Flights(CASES["banked_turn"][0], 1), ("states16_att",), 10, 1)
 
 
+@pytest.mark.slow
 def test_sixteen_states_beat_twelve_in_the_turn(flat):
     """Bars of 50 runs and more, with room for the scatter of 30: an RMS of independent runs by 13 % at one sigma."""
     level = {name: level_in_turn(errors) for name, errors in flat.items()}

@@ -155,6 +155,7 @@ def test_ideal_imu_gives_its_motion_back(lat, algorithm):
     assert position < 5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["3", "4"])
 def test_ideal_imu_with_three_and_four_samples(drive, double_rate, algorithm):
     """Their coefficients are made for coning, not for symmetry in time: 200 Hz for the same figures (see below)."""

@@ -30,6 +30,7 @@ def log(rng, kind, turn=0.0, late=0):
     return t[at], 0.7 + p.imag / R_M, p.real / R_N / np.cos(0.7), np.stack([v.real, v.imag, 0.0 * v.real], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["drive", "wandering", "circles"])
 def test_a_sound_log_shows_no_turn(kind):
     """40 drawn logs of each; by chance one in 250 such tests fails."""
@@ -37,6 +38,7 @@ def test_a_sound_log_shows_no_turn(kind):
     assert not any(turn_evidence("gnss", *log(rng, kind, late=int(rng.integers(-6, 7)))) for _ in range(RUNS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "most"), [("drive", 3.4), ("wandering", 3.6)])
 def test_a_turn_is_as_far_off_as_its_sigma_says(kind, most):
     """Two degrees, found in nearly all; Student's t has 20 degrees of freedom and more."""

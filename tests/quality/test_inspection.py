@@ -67,6 +67,7 @@ def voyage(gyro_noise):
     return ImuRecord(record.time, record.gyro + noise, record.accel, record.kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("written", [False, True])
 def test_what_stays_in_a_simulation_without_noise_is_not_stuck(written):
     """As it is made, and with the ten digits of a file; gyros with noise make of the same accelerometers stuck ones."""

@@ -59,6 +59,7 @@ def test_the_curve_is_what_allantools_measures():
     assert_allclose(np.mean(measured, axis=0), gauss_markov_variance(taus, T), rtol=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some([0], [1, 2]))
 def test_a_simulated_imu_is_found(seed):
     # 4 h, 72 correlation times. Scatter of a channel over 240: random walk .8 %, slope of the bias 10 %; the worst of three
@@ -96,6 +97,7 @@ def test_white_noise_alone_shows_nothing_else():
     assert found.spec.accel_scale_factor == preset.accel_scale_factor
 
 
+@pytest.mark.slow
 def test_scaling_the_data_scales_the_noise():
     record = log(KNOWN, hours=0.5)
     once, twice = (

@@ -38,6 +38,7 @@ def test_their_length_and_where_they_are(procedure, length):
     assert len(found.rows) > 0.3 * len(first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("procedure", BENCHES)
 def test_sound_logs_have_none(procedure):
     for run in range(3):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import re
+from functools import cache
 from itertools import count
 from pathlib import Path
 
@@ -33,6 +34,7 @@ KEYWORDS = {"_": None, "translated": None}
 OTHERS = [code for code in LANGUAGES if code != "en"]
 
 
+@cache
 def texts() -> set[str]:
     """Every English text that can reach a reader through the catalogue."""
     found = {text for _, _, text, *_ in extract_from_dir(HOME, METHODS, keywords=KEYWORDS) if isinstance(text, str)}
@@ -40,6 +42,7 @@ def texts() -> set[str]:
     return found | tables | set(WORDS) | messages() | {FRAME}
 
 
+@cache
 def messages() -> set[str]:
     """Templates of what is raised or found anywhere in the package, their figures as ``{0}``, ``{1}``, .."""
     found: set[str] = set()

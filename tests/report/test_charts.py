@@ -10,7 +10,8 @@ import pytest
 from truenorth.alignment.transfer_result import Relation
 from truenorth.core.units import significant
 from truenorth.figures.convergence import Course
-from truenorth.report.chart import Chart, Clock, angle_unit, length_unit, speed_unit
+from truenorth.figures.units import Clock, angle_unit, length_unit, speed_unit
+from truenorth.report.chart import Chart
 from truenorth.report.charts import _convergence, _sigmas
 from truenorth.report.coast import coast_within
 from truenorth.report.transfer import transfer_panels

@@ -118,6 +118,7 @@ def test_two_days_at_sea_do_not_drift():
     assert abs(float(at.lon) - PLACE.lon - 48 * 3600 * 10.0 / parallel) * parallel < 1e-6
 
 
+@pytest.mark.slow
 def test_a_long_log_is_not_integrated_anew_for_every_block():
     """Blocks in order, as the simulator takes them; their order does not change the bits."""
     ahead, back = (course(PLACE, [Leg(100.0, speed=10.0)], heading=0.4) for _ in range(2))

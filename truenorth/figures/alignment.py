@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
 from truenorth.figures.style import AXES_NAMES, COLOURS, REFERENCE, band, new_figure, style, trace
+from truenorth.figures.units import Clock
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,6 +33,8 @@ def plot_alignment(result: Alignment) -> Figure:
     if h is None:
         raise ValueError(f"method {result.method!r} gives one answer and keeps no history to draw")
     angles = courses(result)
+    clock = Clock.of(h.time)
+    t = clock(h.time)
     with style():
         figure = new_figure(12.0, 10.5)
         columns = figure.add_gridspec(1, 2)
@@ -41,23 +44,23 @@ def plot_alignment(result: Alignment) -> Figure:
         sigmas, gyro, accel, innovations = (figure.add_subplot(right[i]) for i in range(4))
 
         for i, (ax, course) in enumerate(zip(convergence, angles)):
-            _converge(ax, h.time, course, COLOURS[i])
+            _converge(ax, t, course, COLOURS[i])
         convergence[0].set_title("Attitude as known at each time, ±1σ (dark: floor)")
-        _sigmas(sigmas, h.time, angles)
-        _biases(gyro, h.time, h.gyro_bias / DEG_PER_HOUR, h.gyro_bias_sigma / DEG_PER_HOUR)
+        _sigmas(sigmas, t, angles)
+        _biases(gyro, t, h.gyro_bias / DEG_PER_HOUR, h.gyro_bias_sigma / DEG_PER_HOUR)
         gyro.set_title("Gyro bias, ±1σ")
         gyro.set_ylabel("deg/h")
         gyro.legend(ncols=3, loc="upper right")
-        _biases(accel, h.time, h.accel_bias / MICRO_G, h.accel_bias_sigma / MICRO_G)
+        _biases(accel, t, h.accel_bias / MICRO_G, h.accel_bias_sigma / MICRO_G)
         accel.set_title("Accelerometer bias, ±1σ")
         accel.set_ylabel("µg")
-        _innovations(innovations, h)
-        _nis(nis, h)
+        _innovations(innovations, h, t)
+        _nis(nis, h, clock)
         for ax in figure.axes:
-            ax.set_xlim(h.time[0], h.time[-1])
+            ax.set_xlim(t[0], t[-1])
             ax.tick_params(labelbottom=ax in (nis, innovations))
         for ax in (nis, innovations):
-            ax.set_xlabel("time, s")
+            ax.set_xlabel(f"time, {clock.unit}")
         figure.suptitle(f"{result.source}: {result.status}, method {result.method}", x=0.01, ha="left")
     return figure
 
@@ -89,22 +92,22 @@ def _biases(ax: Axes, t: Array, bias: Array, sigma: Array) -> None:
     ax.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
 
 
-def _innovations(ax: Axes, h: History) -> None:
+def _innovations(ax: Axes, h: History, t: Array) -> None:
     for axis in h.components:
         ratio = h.innovation[:, axis] / h.innovation_sigma[:, axis]
-        trace(ax, h.time, ratio, color=COLOURS[axis], label=h.innovation_axes[axis], linewidth=0.8)
+        trace(ax, t, ratio, color=COLOURS[axis], label=h.innovation_axes[axis], linewidth=0.8)
     for level, dashes in ((2.0, ":"), (3.0, "--")):
         for sign in (1.0, -1.0):
             ax.axhline(sign * level, color=REFERENCE, linestyle=dashes, linewidth=1.0)
     ax.set_ylim(-5.0, 5.0)
-    ax.set_title(f"Innovations of {h.innovation_of} over their σ (lines: 2σ, 3σ)")
+    ax.set_title(f"Innovations of {h.innovation_of}, in σ")
     ax.set_ylabel("sigmas")
     ax.legend(ncols=3, loc="upper right")
 
 
-def _nis(ax: Axes, h: History) -> None:
+def _nis(ax: Axes, h: History, clock: Clock) -> None:
     t, mean, low, high = averaged_nis(h)
-    trace(ax, t, mean, color=COLOURS[0], marker=".", markersize=3.0)
+    trace(ax, clock(t), mean, color=COLOURS[0], marker=".", markersize=3.0)
     ax.axhspan(low, high, color=REFERENCE, alpha=0.12, linewidth=0.0)
     ax.set_ylim(0.0, max(1.3 * high, float(np.quantile(mean, 0.98)) if mean.size else 0.0))
     ax.set_title(f"NIS, mean of {NIS_BLOCK} epochs (grey: 95 % band)")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from truenorth.figures.style import COLOURS, REFERENCE, band, new_figure, style, trace
 from truenorth.figures.thinning import evenly
 from truenorth.figures.track import ellipses, track_unit
+from truenorth.figures.units import Clock
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +32,8 @@ def plot_navigation(result: Navigation) -> Figure:
         track, height, velocity = (figure.add_subplot(left[i]) for i in range(3))
         heading, level, position, speeds, innovations = (figure.add_subplot(right[i]) for i in range(5))
         _track(track, result)
-        t = result.time
+        clock = Clock.of(result.time)
+        t = clock(result.time)
         band(height, t, result.position[:, 2], result.position_sigma[:, 2], color=COLOURS[2])
         height.set_title(f"Height ({result.altitude}), ±1σ")
         height.set_ylabel("m")
@@ -53,12 +55,12 @@ def plot_navigation(result: Navigation) -> Figure:
         level.legend(ncols=2, loc="best")
         _sigmas(position, t, result.position_sigma, "One sigma of position", "m")
         _sigmas(speeds, t, result.v_sigma, "One sigma of velocity", "m/s")
-        _innovations(innovations, result)
+        _innovations(innovations, result, clock)
         for ax in figure.axes[1:]:
             ax.set_xlim(t[0], t[-1])
             ax.tick_params(labelbottom=ax in (velocity, innovations))
         for ax in (velocity, innovations):
-            ax.set_xlabel("time, s")
+            ax.set_xlabel(f"time, {clock.unit}")
         figure.align_ylabels([height, velocity])
         figure.align_ylabels([heading, level, position, speeds, innovations])
         smoothed = ", smoothed" if result.smoothed else ""
@@ -84,7 +86,7 @@ def _track(ax: Axes, result: Navigation) -> None:
 
 def _sigmas(ax: Axes, t: Array, sigma: Array, title: str, unit: str) -> None:
     for i, name in enumerate(("east", "north", "up")):
-        if sigma[:, i].max() > HELD * sigma.max():  # a height that is held has a sigma of rounding
+        if np.median(sigma[:, i]) > HELD * np.median(sigma):  # a height that is held has a sigma of rounding
             trace(ax, t, sigma[:, i], color=COLOURS[i], label=name)
     ax.set_yscale("log")
     ax.set_title(title)
@@ -93,19 +95,19 @@ def _sigmas(ax: Axes, t: Array, sigma: Array, title: str, unit: str) -> None:
     ax.legend(ncols=3, loc="best")
 
 
-def _innovations(ax: Axes, result: Navigation) -> None:
-    ax.set_title("Innovations over their σ (lines: 2σ, 3σ; crosses: rejected)")
+def _innovations(ax: Axes, result: Navigation, clock: Clock) -> None:
+    ax.set_title("Innovations, in σ (crosses: rejected)")
     ax.set_ylabel("sigmas")
     for number, r in enumerate(result.residuals):
         if len(r.time) == 0:
             continue
         ratio = r.innovation / r.sigma
-        rows = evenly(len(r.time), 1000)
+        time, rows = clock(r.time), evenly(len(r.time), 1000)
         colour = COLOURS[number % len(COLOURS)]
         for i in range(3):
-            ax.plot(r.time[rows], ratio[rows, i], linestyle="", marker=".", markersize=2.5, color=colour)
+            ax.plot(time[rows], ratio[rows, i], linestyle="", marker=".", markersize=2.5, color=colour)
         ax.plot([], [], linestyle="", marker=".", color=colour, label=r.name)
-        out = r.time[~r.used]
+        out = time[~r.used]
         ax.plot(out, np.full(len(out), 4.8), linestyle="", marker="x", markersize=4.0, color=colour)
     for limit, dashes in ((2.0, ":"), (3.0, "--")):
         for sign in (1.0, -1.0):

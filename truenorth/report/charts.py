@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from truenorth.core.language import translated as _
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
-from truenorth.report.chart import Chart, Clock, unit_of
+from truenorth.figures.units import Clock, unit_of
+from truenorth.report.chart import Chart
 from truenorth.report.document import Panel
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from truenorth.damping.loop import in_words
 from truenorth.damping.spectrum import PADDING
 from truenorth.errors.log import BIAS
 from truenorth.errors.marine import DP, DV, PHI
-from truenorth.report.chart import Chart, Clock
+from truenorth.figures.units import Clock
+from truenorth.report.chart import Chart
 from truenorth.report.charts import over_time
 from truenorth.report.document import Panel
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.language import translated as _
+from truenorth.figures.units import Clock, angle_unit, length_unit, speed_unit
 from truenorth.quality.innovations import mean_nis
-from truenorth.report.chart import Chart, Clock, angle_unit, length_unit, speed_unit
+from truenorth.report.chart import Chart
 from truenorth.report.charts import over_time
 from truenorth.report.damping import damping_facts, damping_panels
 from truenorth.report.document import Panel, Table, render

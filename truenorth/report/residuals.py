@@ -9,7 +9,8 @@ import numpy as np
 
 from truenorth.core.language import translated as _
 from truenorth.figures.thinning import evenly
-from truenorth.report.chart import POINTS, Chart, Clock, unit_of
+from truenorth.figures.units import Clock, unit_of
+from truenorth.report.chart import POINTS, Chart
 from truenorth.report.charts import limits, over_time
 from truenorth.report.document import Panel
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from truenorth.core.language import translated as _
 from truenorth.figures.convergence import settled_limits
-from truenorth.report.chart import Chart, Clock
+from truenorth.figures.units import Clock
+from truenorth.report.chart import Chart
 from truenorth.report.charts import over_time
 from truenorth.report.document import Panel
 from truenorth.report.residuals import innovation_panels

@@ -1,0 +1,65 @@
+"""Units that fit what is drawn: hours where hours are, kilometres, arcminutes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+HOURS_FROM = 7200.0  # s: longer spans are drawn in hours
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The unit in which times of one log are drawn: seconds, or hours from two hours on."""
+
+    scale: float
+    unit: str
+
+    @classmethod
+    def of(cls, time: Array) -> Clock:
+        """Choose for these times, s."""
+        long = len(time) > 0 and float(time[-1] - time[0]) >= HOURS_FROM
+        return cls(3600.0, "h") if long else cls(1.0, "s")
+
+    def __call__(self, time: ArrayLike) -> Array:
+        """Seconds in this unit."""
+        return np.asarray(time, dtype=np.float64) / self.scale
+
+
+def length_unit(values: ArrayLike) -> tuple[float, str]:
+    """Metres in the unit that fits these lengths, and its name."""
+    return _fitting(values, ((1000.0, "km", 5000.0), (1.0, "m", 0.1), (1e-3, "mm", 0.0)))
+
+
+def speed_unit(values: ArrayLike) -> tuple[float, str]:
+    """Metres a second in the unit that fits these speeds, and its name."""
+    return _fitting(values, ((1.0, "m/s", 0.1), (1e-3, "mm/s", 0.0)))
+
+
+def angle_unit(values: ArrayLike) -> tuple[float, str]:
+    """Radians in the unit that fits these angles, and its name."""
+    degree = np.pi / 180.0
+    return _fitting(
+        values, ((degree, "deg", degree), (degree / 60, "arcmin", degree / 60), (degree / 3600, "arcsec", 0.0))
+    )
+
+
+def unit_of(unit: str, values: ArrayLike) -> tuple[float, str]:
+    """An SI unit in that of its kind that fits these values, and its name."""
+    if unit == "rad/s":
+        return float(np.radians(1.0 / 3600.0)), "deg/h"
+    fitting = {"m": length_unit, "m/s": speed_unit, "rad": angle_unit}.get(unit)
+    return (1.0, unit) if fitting is None else fitting(values)
+
+
+def _fitting(values: ArrayLike, units: Sequence[tuple[float, str, float]]) -> tuple[float, str]:
+    """The first unit whose least value the greatest of these values reaches."""
+    finite = np.abs(np.asarray(values, dtype=np.float64))
+    finite = finite[np.isfinite(finite)]
+    greatest = float(finite.max()) if finite.size else 0.0
+    return next((scale, name) for scale, name, least in units if greatest >= least)
