@@ -325,6 +325,7 @@ def test_brackets_in_names_are_no_markup(capsys, monkeypatch, log, tmp_path):
     assert "run[red]1.csv" in out
 
 
+@pytest.mark.slow
 def test_a_terminal_without_plus_minus_still_gets_the_answer(log, tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     process = start(tmp_path, "align", str(log), *WHERE, env=environment)

@@ -130,6 +130,7 @@ def test_a_start_from_a_row_of_a_master(files):
     assert sigma < 0.5
 
 
+@pytest.mark.slow
 def test_clocks_by_sensor(files, tmp_path):
     """A receiver and a magnetometer, each off by its own: corrected by name the answer is that of sound clocks to the bit."""
     folder = files[0]

@@ -27,6 +27,7 @@ def test_an_interrupt_is_exit_code_130_and_no_half_result(log, tmp_path):
     assert list((tmp_path / "result").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_an_unexpected_error_is_one_line_and_its_traceback_is_in_a_file(log, tmp_path):
     code = (
         "import truenorth.alignment as a\n"
@@ -49,6 +50,7 @@ def test_an_unexpected_error_is_one_line_and_its_traceback_is_in_a_file(log, tmp
     assert "Traceback" in details.read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", [0.0, 0.03, 0.1, 0.3, 0.6])
 def test_an_interrupt_at_the_start_is_one_line_too(log, moment):
     code = "from truenorth.__main__ import main; print('Python has started', flush=True); main()"

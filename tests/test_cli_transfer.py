@@ -41,6 +41,7 @@ def test_what_a_person_reads(logs):
     assert "does not separate all" in result.stdout
 
 
+@pytest.mark.slow
 def test_sigma_is_absolute_where_the_master_s_own_errors_are_given(logs):
     slave, master = logs
     found = {}

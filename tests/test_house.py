@@ -39,6 +39,7 @@ def tree(name: str) -> ast.Module:
     return ast.parse(FILES[name].read_text(encoding="utf-8"))
 
 
+@cache
 def imports(name: str) -> set[str]:
     """Files that a file imports: a name that is a file itself, or the file in which the name stands."""
     found = set()

@@ -29,6 +29,7 @@ def run(capsys, *words):
     return stop.value.code, capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_white_noise_comes_back_and_stands_in_both_files(still, tmp_path, capsys):
     code, out = run(capsys, "noise", still, "-o", tmp_path / "noise", "--json")
     assert code == 0

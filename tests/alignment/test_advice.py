@@ -29,6 +29,7 @@ def at(scheme, T):
     return float(np.exp(np.interp(math.log(T), np.log(scheme.time), np.log(scheme.sigma))))
 
 
+@pytest.mark.slow
 def test_one_position_is_what_an_alignment_says(navigation):
     """Sigma of heading after 300 s, with the quiet base's velocity that the alignment found itself."""
     record = simulate(rest(PLACE), imu=imu_spec("navigation"), rate=20.0, duration=300.0, seed=4).record
@@ -71,6 +72,7 @@ def test_out_of_reach_says_what_is_in_the_way():
     assert "gyro bias" in found.words[0]
 
 
+@pytest.mark.slow
 def test_what_would_reach_it_does():
     """The IMU that is named reaches the wish in the scheme that is named, and one a tenth poorer does not."""
     two, wanted = {"two positions, 180 deg apart": (180.0,)}, math.radians(0.2)
@@ -81,6 +83,7 @@ def test_what_would_reach_it_does():
     assert advise(short, PLACE, wanted, schemes=two, longest=600.0).best is None
 
 
+@pytest.mark.slow
 def test_no_imu_sees_through_a_deflected_plumb_line():
     found = advise("navigation", PLACE, math.radians(4.0 / 3600), schemes={"one position": ()}, longest=600.0)
     assert found.would == "deflection of the vertical"
@@ -108,6 +111,7 @@ def test_what_makes_no_sense(given, text):
         advise("navigation", PLACE, **{"heading_sigma": 0.01} | given)
 
 
+@pytest.mark.slow
 def test_the_command(capsys, monkeypatch, tmp_path):
     where = ("--lat", 45, "--imu", "navigation", "--longest", 900)
     code, out = run_command(
@@ -133,6 +137,7 @@ def test_the_command_for_manoeuvres(capsys, monkeypatch, tmp_path):
     assert "expected --speed with it" in out.err
 
 
+@pytest.mark.slow
 def test_advice_after_an_alignment(capsys, monkeypatch, tmp_path):
     from truenorth.formats import write_imu
 

@@ -7,6 +7,7 @@ from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bench", "run"), some([("swaying", 1), ("rotary", 0)], [("swaying", 2), ("rotary", 4)]))
 def test_the_other_hemisphere_is_named_and_the_right_one_is_not(bench, run):
     """Of 10 draws of each the ratios were -20 to -180 at the right latitude, 22 to 160 at the wrong one."""

@@ -79,6 +79,7 @@ def test_ring_from_any_heading(runs):
     assert low < np.sqrt(np.mean((errors[:, 2] / sigmas[:, 2]) ** 2)) < high
 
 
+@pytest.mark.slow
 def test_what_is_learnt_of_the_place_turns_nothing():
     """The vehicle went as its velocity says, wherever the track's first half was believed to be."""
     sim, _, answer = usual(0)
@@ -91,6 +92,7 @@ def test_what_is_learnt_of_the_place_turns_nothing():
     np.testing.assert_array_equal(backtracked(sim.record, moved), backtracked(sim.record, track))
 
 
+@pytest.mark.slow
 def test_coarse_alignment_by_the_odometer(ring):
     """Both forms, six runs, against the bars of 4 deg after 120 s and 10 arcmin after 600 s."""
     found = {(form, end): [] for form in ("velocity", "position") for end in (120.0, 600.0)}
@@ -129,6 +131,7 @@ def test_a_bad_odometer(ring, wrong, scale):
         )  # two lost pulses of a tenth of a second are an outlier
 
 
+@pytest.mark.slow
 def test_mounting_and_lever_arm_are_found():
     """The IMU stands askew, in front of the axle on which the vehicle turns; the wheel sits on that axle."""
     arm, C = np.array([0.4, -0.8, 0.0]), dcm_from_euler(*np.radians([1.5, -1.0, 0.0]))  # C: vehicle's axes to the IMU's
@@ -188,6 +191,7 @@ def late(record, odometer, begin):
     return record.between(begin, None), odometer.between(begin - 1.0, None)
 
 
+@pytest.mark.slow
 def test_under_way_at_the_first_sample(ring):
     sim, odometer = logs(ring, 4)
     record, odometer = late(sim.record, odometer, 40.0)
@@ -284,6 +288,7 @@ def test_a_receiver_that_is_late_is_found_late():
     assert np.linalg.norm(errors["open"]) < 0.5 * np.linalg.norm(errors["timely"])
 
 
+@pytest.mark.slow
 @few_and_all(6, few=3)
 def test_by_a_velocity_log(runs):
     """An underwater vehicle on its first leg."""

@@ -48,6 +48,7 @@ def test_align_and_go_on(files, tmp_path):
     assert "the latitude was not given: found from the log" in unplaced.stdout
 
 
+@pytest.mark.slow
 def test_navigation_takes_the_wheel_over(files, tmp_path):
     """Pulses are 2 % shorter than given: the alignment finds it, and navigation takes it from there."""
     log, odometer = files / "imu.csv", tmp_path / "odo.csv"

@@ -49,6 +49,7 @@ def test_the_drive_with_late_gyros_that_passed_in_silence():
     assert answer.status == "inconsistent" or max(np.abs(x).max() for x in misses(answer, truth).values()) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("procedure", ["gnss", "odometer"])
 def test_sound_gyros_are_of_one_moment(procedure):
     """Chance exceeds the limit once in 148 for each delay that is tried; here in none of four."""

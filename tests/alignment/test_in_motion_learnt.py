@@ -67,6 +67,7 @@ def test_a_late_receiver_is_found_out_and_said(late):
     assert answer.moving.summary()["delays_s"]["GNSS"] == [delay, sigma]
 
 
+@pytest.mark.slow
 def test_places_without_velocities_or_with_sigmas_too_small(late):
     """Neither is refused, and the second says so."""
     gnss = late.aiding["gnss"].shifted(-1.0)

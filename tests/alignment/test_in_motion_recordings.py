@@ -95,6 +95,7 @@ def test_car_heading_with_a_tilted_imu(car):
     assert abs(yaw - 8.9) < 3.0  # its author's
 
 
+@pytest.mark.slow
 def test_car_dead_reckons_by_the_odometer(car):
     """150 s without GNSS, from the start that the aligner leads back to: the miss is what its sigma says.
 

@@ -32,6 +32,7 @@ def from_on(gnss, first):
     return GnssRecord(gnss.time[rows], gnss.lat[rows], gnss.lon[rows], gnss.alt[rows], v_n=gnss.v_n[rows])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", some([100.0], [60.0, 200.0, 300.0]))
 def test_a_first_fix_after_driving_off(drive, first):
     """Heading was off by 4 to 123 deg, and the answer `inconsistent`."""
@@ -43,6 +44,7 @@ def test_a_first_fix_after_driving_off(drive, first):
     assert any(item.key == "aids.late" for item in answer.evidence)
 
 
+@pytest.mark.slow
 def test_a_first_fix_before_driving_off(drive):
     """What stands until then is used whole."""
     made, aids = drive

@@ -157,6 +157,7 @@ def test_still_base_sigmas_are_honest(runs):
     assert sum(a.status == "aligned" for a in answers) >= 0.97 * runs
 
 
+@pytest.mark.slow
 def test_innovations_of_a_still_base_are_as_large_as_expected():
     """NIS over 3 rows of six logs of 600 s, each within a tenth of 1: 1800 squares scatter by .033 at one sigma.
 

@@ -50,6 +50,7 @@ def errors_of(turns, spec, runs, dwell):
     return np.array(phi), np.array(P), answers
 
 
+@pytest.mark.slow
 @few_and_all(12, few=6)
 @pytest.mark.parametrize(
     ("grade", "turns", "dwell"),
@@ -116,6 +117,7 @@ def test_a_large_turn_needs_scale_factor_states():
         assert abs(answer.table.gyro_matrix[2, 2] - errors.gyro.scale_factor[2]) < 5 * sigma
 
 
+@pytest.mark.slow
 def test_a_touched_table_is_noticed_and_an_untouched_one_is_not():
     """A step of 1 mg in one accelerometer, which the gyros do not show; the log without it is not accused."""
     spec = imu_spec("navigation")

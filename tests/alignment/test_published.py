@@ -143,6 +143,7 @@ def test_filters_of_the_odometer_paper(drives, method, runs):
     np.testing.assert_allclose(answer.C_nb, usual.C_nb @ C_mb, atol=1e-9)
 
 
+@pytest.mark.slow
 @few_and_all(3, few=1)
 @pytest.mark.parametrize("method", some(["sgkf"], ["ekf", "gh3", "ckf"]))
 def test_an_azimuth_that_the_closed_loop_contradicts_is_not_believed(method, runs):
@@ -165,6 +166,7 @@ def test_an_azimuth_that_the_closed_loop_contradicts_is_not_believed(method, run
     assert method != "sgkf" or "inconsistent" in statuses
 
 
+@pytest.mark.slow
 def test_gyros_that_do_not_see_the_earth_turn_are_refused(drives):
     record, odometer, place, _, _ = drives[0]
     with pytest.raises(AlignmentError, match=r"which gyro biases of 100 deg/h hide: choose auto or motion"):

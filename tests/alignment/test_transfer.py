@@ -241,6 +241,7 @@ def test_wrong_axes_of_the_slave_are_a_contradiction(real):
     assert "mounting" in result.reasons[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options", [{"imu": "tactical"}, {"imu": "navigation"}, {"imu": "tactical", "matching": "velocity"}]
 )

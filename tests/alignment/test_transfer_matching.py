@@ -55,6 +55,7 @@ def test_without_noise_it_finds_the_truth(flight, ideal, kind, sigma, tau):
     np.testing.assert_allclose(phi, 0, atol=0.2 * ARCMIN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("matching", some(["position", "acceleration+attitude"], ["acceleration", "position+attitude"]))
 def test_sigmas_are_honest(flight, ideal, matching):
     """Attitude and gyro bias over 6 flights, and the delay: 42 numbers, false alarms 1 in 1000 above; the arm known to 2 cm."""

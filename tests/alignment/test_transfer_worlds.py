@@ -122,6 +122,7 @@ def test_a_delay_that_cannot_be_seen_is_not_printed_as_seen():
     assert abs(answer.delay - 0.06) < 2.0 * answer.delay_sigma
 
 
+@pytest.mark.slow
 def test_a_masters_own_sigmas_make_sigma_absolute(tmp_path):
     """Columns of its log, medians of which count: half of the variance constant, half of it drift; "none" leaves them out."""
     way = course(Position.from_degrees(62.0, 20.0, 3000.0), straight(200.0), heading=0.6, speed=150.0)

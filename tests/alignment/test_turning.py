@@ -107,6 +107,7 @@ def test_gyros_that_see_the_earth_turned_on_a_table(positions, duration, runs):
     assert low < np.mean(squares) < high, squares
 
 
+@pytest.mark.slow
 def test_a_turned_table_without_a_specification():
     scenario = turned(HEADINGS[:3], 300, "navigation")
     for run in range(4):

@@ -53,6 +53,7 @@ def test_sigma_is_the_scatter_on_white_noise():
     assert np.all(np.abs(ratio - 1.0) < 0.15)
 
 
+@pytest.mark.slow
 def test_white_noise_gives_its_density_with_honest_sigma():
     """300 channels; the mean z-score's sigma is 0.06, the RMS's 0.04: bounds at 4 of these, p < 2e-4."""
     rng = np.random.default_rng(4)

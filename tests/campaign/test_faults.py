@@ -47,6 +47,7 @@ def test_nothing_that_passed_in_silence_does_so_again(procedure, runs):
     assert silent(run_faults([procedure], ONCE_SILENT[procedure], runs=runs, seed=SEED)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("procedure", BENCHES)
 def test_a_sound_log_is_left_alone(procedure):
     trials = run_faults([procedure], [SOUND], runs=2, seed=SEED)
@@ -187,6 +188,7 @@ def test_exchanged_velocities_fit_no_turn():
     assert found.key == "master.velocity"
 
 
+@pytest.mark.slow
 def test_white_innovations_leave_sigma_alone_and_others_make_it_grow():
     """White: chance is exceeded in less than one of 300 series. Of a first-order process the mean errs by a known factor."""
     rng = np.random.default_rng(1)

@@ -43,6 +43,7 @@ def test_a_shard_is_plain_parquet(undisturbed):
     assert list(pd.read_parquet(shard).columns)[:4] == ["case", "method", "run", "time_s"]
 
 
+@pytest.mark.slow
 def test_processes_give_the_bits_of_one_process(undisturbed, tmp_path):
     pd.testing.assert_frame_equal(run_campaign(PLAN, tmp_path, workers=2).table, undisturbed.table, check_exact=True)
 
@@ -97,6 +98,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path):
     assert ends["status"][1] == "aligned"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("others", [[], [REST]], ids=["alone", "with a good one"])
 def test_a_scenario_that_cannot_be_is_rows_and_does_not_spoil_the_report(tmp_path, others):
     """What is wrong with the motion shows when it is built, after the plan has been read."""
@@ -241,6 +243,7 @@ def test_the_command_writes_tables_figures_and_a_page(tmp_path):
     assert len(again.summary) == len(pd.read_csv(tmp_path / "out" / "summary.csv"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", some([1], [2]))
 def test_alignment_in_motion_is_a_method_too(tmp_path, workers):
     """By the odometer that the scenario has; the same bits by two processes; no error beyond five sigma."""

@@ -28,6 +28,7 @@ def test_statistics_of_three_runs():
     assert row["rms_over_sigma"] == pytest.approx(math.sqrt(25 / 3) / 2)
 
 
+@pytest.mark.slow
 @few_and_all(400, few=60)
 def test_bands_hold_what_they_promise(runs):
     """Honest sigmas and NEES of many campaigns of 50 runs: 95 % of the ratios inside; a false alarm in a thousand."""

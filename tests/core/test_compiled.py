@@ -175,6 +175,7 @@ def test_another_process_and_another_checkout_compile_nothing(tmp_path):
     assert run(CALL.format(folder=str(first)), tmp_path) == ["4.0 3.0", "0 1", "0 1"]
 
 
+@pytest.mark.slow
 def test_the_folder_that_the_environment_names_is_taken(tmp_path):
     folder = write(tmp_path / "one")
     run(CALL.format(folder=str(folder)), tmp_path / "cache", NUMBA_CACHE_DIR=str(tmp_path / "named"))
@@ -191,6 +192,7 @@ def test_without_a_folder_to_write_to_a_process_compiles_for_itself(tmp_path):
         assert lines == ["4.0 3.0", "1 0", "1 0"]
 
 
+@pytest.mark.slow
 def test_a_torn_file_is_compiled_anew(tmp_path):
     folder = write(tmp_path / "one")
     run(CALL.format(folder=str(folder)), tmp_path)

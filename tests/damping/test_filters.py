@@ -53,6 +53,7 @@ def paper_filters(course):
     }
 
 
+@pytest.mark.slow
 def test_the_mean_of_the_rows_of_F_is_the_change_of_velocity(linear):
     """``H x`` of filter 2 against ``(dv(t) - dv(t - T))/T`` of the truth: the biases are constant here, T is 30 s."""
     truth, x, _ = linear

@@ -116,6 +116,7 @@ def test_a_drift_that_wanders_a_little_is_no_constant(truth, seed):
     assert likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.5)).time <= 768.0 * HOUR
 
 
+@pytest.mark.slow
 def test_two_fixes_calibrate_the_gyros(truth):
     """Position and azimuth at two times give the drifts by ``psi_2 = A psi_1 - B eps``, and the filter finds them.
 

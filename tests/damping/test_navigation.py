@@ -113,6 +113,7 @@ def test_every_method_calms_the_oscillation(ship, method):
         np.testing.assert_array_less(np.abs(left[late]), 4.5 * sigma[late])
 
 
+@pytest.mark.slow
 @few_and_all(12, few=4)
 def test_bands_of_the_network_are_its_scatter(runs):
     """Propagated through the closed loop, against voyages with a log error drawn anew; RMS/sigma in its 99.9 % band."""
@@ -129,6 +130,7 @@ def test_bands_of_the_network_are_its_scatter(runs):
     assert abs(np.mean(mean) - 1) < 3.3 * np.sqrt(2 / runs / 3)  # some three of seven are independent
 
 
+@pytest.mark.slow
 def test_the_logs_constant_error_is_found(ship):
     result = ship.navigate(Damper("augmented"), ship.log(), None)
     found, sigma = result.damping.reference_error, result.damping.reference_error_sigma
@@ -189,6 +191,7 @@ def test_a_sick_log(ship, method):
     assert np.degrees(np.abs(two[after, PHI.stop - 1]).max()) < np.degrees(np.abs(one[after, PHI.stop - 1]).max()) + 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", some(["kalman"], ["external"]))
 @pytest.mark.parametrize("factor", some([0.0], [1.0 / 0.514444]))
 def test_a_log_that_cannot_be_this_ships(ship, method, factor):
@@ -211,6 +214,7 @@ def test_a_switch_later_than_the_start(ship):
     assert result.damping.switch == pytest.approx(9000.0, abs=10.0)
 
 
+@pytest.mark.slow
 def test_a_real_recording():
     """A parked vehicle with people and engine: 300 s of alignment, 600 s of navigation, a zero log that is .1 m/s wrong.
 
@@ -236,6 +240,7 @@ def test_a_real_recording():
     assert (np.abs(k.v_n[-1, :2]) < 3 * k.v_sigma[-1, :2]).all()
 
 
+@pytest.mark.slow
 def test_a_log_in_body_axes_mounted_askew(ship):
     """Forward and right as the hull has them, the IMU turned in it by 20 deg: the same answer as in navigation axes."""
     log = ship.log()
@@ -263,6 +268,7 @@ def test_rows_of_a_long_log_are_close_enough():
     assert _intervals(long, None, None, True) == (1.0, 8)
 
 
+@pytest.mark.slow
 def test_a_ramp_throws_the_switch_slowly(ship):
     """Halfway through it, half the network: the track lies between the undamped and the damped one."""
     log = ship.log()

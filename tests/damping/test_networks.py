@@ -92,6 +92,7 @@ def undamped(hours):
     return truth, F, x, free, Course(truth.time, truth.C_nb, v, truth.position)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [first_order, second_order])
 @pytest.mark.parametrize("azimuth", [0.0, 0.5])
 def test_the_correction_is_the_loop(make, azimuth):

@@ -35,6 +35,7 @@ def log(truth, seed):
     return truth.v_n[:, :2] - 0.3 + NOISE * rng.standard_normal((len(truth.time), 2)), rng
 
 
+@pytest.mark.slow
 def test_a_healthy_log_is_left_as_it_is(course):
     """Over 43 000 numbers: limits of 6 and 8 sigma with room for curvature make a false alarm rarer than one in 1e5 logs."""
     truth, free = course

@@ -76,6 +76,7 @@ def test_switching_is_no_worse_than_either(runs):
         assert switched < 1.05 * min(none, on), (run, none, on, switched)
 
 
+@pytest.mark.slow
 def test_bands_hold_what_manoeuvres_add(ship):
     for switched in (True, False):
         result = navigated(ship, Damper("internal", switching=switched))

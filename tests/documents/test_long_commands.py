@@ -57,6 +57,7 @@ def test_an_indexer(rate, tmp_path):
     run(tmp_path, *words_of("--indexer"))
 
 
+@pytest.mark.slow
 def test_a_turntable(tmp_path):
     (simulate(tmp_path, "table") / "imu.csv").rename(tmp_path / "table.csv")
     run(tmp_path, *words_of("--positions"))

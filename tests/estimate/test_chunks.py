@@ -90,6 +90,7 @@ def test_chunks_give_the_bits_of_one_batch(drive, retimed):
         assert_same(in_chunks(setting, start, record, size, sources), batch, size)
 
 
+@pytest.mark.slow
 def test_chunks_of_invariant_errors_give_the_bits_of_one_batch(drive):
     """As alignment on the move with an odometer runs the loop: from a heading 60 deg off."""
     record, start, fixes, _ = drive
@@ -103,6 +104,7 @@ def test_chunks_of_invariant_errors_give_the_bits_of_one_batch(drive):
         assert_same(in_chunks(setting, start, record, size, (fixes,)), batch, size)
 
 
+@pytest.mark.slow
 def test_chunks_of_transfer_alignment_give_the_bits_of_one_batch():
     """A master's place, velocity and attitude, re-timed by a delay that is being found; mounting, arm and flexure."""
     legs = [*straight(5.0), *s_turn(0.4, 0.08), *straight(SECONDS)]

@@ -54,6 +54,7 @@ def test_near_the_vertical_the_combination_is_drawn(sign):
     assert np.max(np.abs(difference[late])) < 0.05 * scatter
 
 
+@pytest.mark.slow
 def test_every_panel_has_its_unit(still, tmp_path):
     figure = still.plot()
     assert [ax.get_ylabel() for ax in figure.axes] == [

@@ -23,6 +23,7 @@ def record(duration=60.0, rows=None) -> ImuRecord:
     )
 
 
+@pytest.mark.slow
 def test_the_page_shows_source_regimes_and_units(tmp_path):
     figure = inspect(record()).plot()
     figure.savefig(tmp_path / "log.png")
@@ -43,6 +44,7 @@ def test_gaps_are_marked_and_findings_named():
     assert "gap" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [2, 50, 700])
 def test_short_records_have_a_page_too(rows, tmp_path):
     inspect(record(rows=rows)).plot().savefig(tmp_path / "short.svg")

@@ -38,6 +38,7 @@ def test_limits_and_absent_rows():
     assert_allclose(found.adaptation, [[0.5], [0.5], [9.0]])  # an absent row leaves its window alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("factor", [0.1, 25.0])
 def test_a_wrong_noise_is_found(kind, factor):

@@ -87,6 +87,7 @@ def drifting(noise: np.ndarray, seed: int = 0) -> tuple[LinearSystem, np.ndarray
     return LinearSystem(one, 0.09 * one, one, one, z[..., None], np.zeros(1), one[0]), truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filter_", BOTH)
 @pytest.mark.parametrize("variance", [0.3, 1.0, 20.0])
 def test_the_noise_is_found(filter_, variance):
@@ -97,6 +98,7 @@ def test_the_noise_is_found(filter_, variance):
     assert np.std(found / variance) < 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filter_", BOTH)
 def test_a_change_of_noise_is_followed_and_pays(filter_):
     noise = np.where(np.arange(800) < 400, 1.0, 25.0)

@@ -193,6 +193,7 @@ def test_histories_are_opt_in():
     assert_array_equal(last.log_likelihood, full.log_likelihood)
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing():
     # Another model, another run count, read-only or not, any option: one kernel a padded size.
     program = """

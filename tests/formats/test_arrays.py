@@ -31,6 +31,7 @@ def assert_is(record, kind="rates"):
     np.testing.assert_array_equal(np.hstack([record.gyro, record.accel]), SENSORS)
 
 
+@pytest.mark.slow
 def test_one_variable_for_each_sensor(save):
     assert_is(read_imu(save(time=TIME, gyro=SENSORS[:, :3], accel=SENSORS[:, 3:])))
     assert_is(read_imu(save(time=TIME, dtheta=SENSORS[:, :3], dvel=SENSORS[:, 3:])), "increments")
@@ -41,6 +42,7 @@ def test_arrays_that_lie_on_their_side(save):
     assert_is(read_imu(save(time=TIME[None], gyro=SENSORS[:, :3].T, accel=SENSORS[:, 3:].T)))
 
 
+@pytest.mark.slow
 def test_one_variable_for_each_column(save):
     names = ["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
     columns = dict(zip(names, SENSORS.T))
@@ -49,6 +51,7 @@ def test_one_variable_for_each_column(save):
     assert_is(read_imu(save(ts=0.01, **columns), columns={"interval": "ts"}))
 
 
+@pytest.mark.slow
 def test_parts_of_one_array(save):
     path = save(mimu=np.column_stack([SENSORS, TIME]))
     columns = {"dtheta": "mimu[0:3]", "dvel": "mimu[3:6]", "time": "mimu[6]"}
@@ -57,6 +60,7 @@ def test_parts_of_one_array(save):
     np.testing.assert_array_equal(turned.accel, SENSORS[:, 3:] * [1, -1, 1])
 
 
+@pytest.mark.slow
 def test_counts_with_a_scale_and_an_interval(save):
     counts = np.arange(42).reshape(7, 6)
     path = save(counts=counts.astype(np.int16), scale=np.full(6, 1 / 3), ts=10.0)

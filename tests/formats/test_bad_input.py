@@ -219,6 +219,7 @@ def test_a_known_content_needs_no_suffix(tmp_path):
     assert len(read_imu((tmp_path / "a.parquet").rename(tmp_path / "a.dat"))) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["csv", "txt", "imu", "bin", "npz", "parquet"])
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(data=st.data())

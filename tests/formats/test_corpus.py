@@ -112,6 +112,7 @@ def test_the_corpus_is_as_large_as_it_should_be():
     assert len({log.name for log in CORPUS}) == len(CORPUS)
 
 
+@pytest.mark.slow
 def test_a_gyros_unit_is_asked_where_our_names_stand_over_degrees():
     """32 sensors of four grades, noise and bias a third to three times the preset's, at rest: in rad/s none is asked for.
 

@@ -81,6 +81,7 @@ DEVICES = {
 SLOW = ("u-blox",)  # its decoder takes 3 ms a message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "device", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in DEVICES]
 )

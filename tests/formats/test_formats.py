@@ -92,6 +92,7 @@ def test_kf_gins_text_and_binary(record, tmp_path):
         read_imu(binary)
 
 
+@pytest.mark.slow
 def test_mat_and_npz_by_variable(record, tmp_path):
     from scipy.io import savemat
 

@@ -171,6 +171,7 @@ def table(cell):
     return ("time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + rows).encode()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_one_message(name, tmp_path):
     code, text = run("align", HOSTILE[name](tmp_path), "--lat", "45", "--lon", "10", "--imu", "navigation")

@@ -43,6 +43,7 @@ def test_the_last_answer_is_that_of_the_whole_log_to_the_bit(record, chunk):
     assert found.status == whole.status == "aligned"
 
 
+@pytest.mark.slow
 def test_between_solutions_the_filter_goes_on_as_the_batch_does(record):
     with Aligner(PLACE, "navigation", kind=record.kind, background=False) as aligner:
         pushed(aligner, record, 50)
@@ -79,6 +80,7 @@ def test_a_thread_solves_while_rows_come(record):
     assert aligner.answer is not None
 
 
+@pytest.mark.slow
 def test_hostile_rows_are_counted_and_the_answer_is_unharmed(record):
     rows, random = rows_of(record), np.random.default_rng(5)
     hostile = []
@@ -174,6 +176,7 @@ def test_rows_of_a_tenth_of_a_second_are_merged_no_further_and_the_oldest_go():
     assert log.dropped + len(log) == 5000
 
 
+@pytest.mark.slow
 def test_a_base_that_drives_off_is_noticed_and_the_heading_until_then_kept(record):
     rows = rows_of(record)
     drive = rows[:, 0] > 90.0

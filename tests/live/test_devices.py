@@ -28,6 +28,7 @@ def in_pieces(data, hear, seed=0, longest=700):
     return found
 
 
+@pytest.mark.slow
 def test_ublox_in_pieces_is_the_log(tmp_path):
     pyubx2 = pytest.importorskip("pyubx2")
     parts = ubx_bytes(pyubx2)

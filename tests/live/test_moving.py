@@ -159,6 +159,7 @@ def test_from_alignment_to_navigation_without_a_gap(van):
     assert np.all(np.abs(off) < 4.0 * result.position_sigma[-1, 1::-1] + 0.1)
 
 
+@pytest.mark.slow
 def test_a_gap_that_is_too_long_is_named_and_the_answer_lost(van):
     sim, gnss, _ = van
     record = sim.record

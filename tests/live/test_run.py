@@ -138,7 +138,9 @@ def live(*arguments, **options):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
-@pytest.mark.parametrize("how", ["replay", "stdin", "udp", "tcp"])
+@pytest.mark.parametrize(
+    "how", ["replay", *(pytest.param(how, marks=pytest.mark.slow) for how in ("stdin", "udp", "tcp"))]
+)
 def test_every_source_gives_the_answer_of_the_file(how, record, log):
     lines = log.read_bytes().splitlines(keepends=True)
     if how == "replay":

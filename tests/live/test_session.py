@@ -193,6 +193,7 @@ def navigates(run, answer, note):
     return isinstance(run, Navigator)
 
 
+@pytest.mark.slow
 def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
     with ByHand(logs, until=np.radians(0.5), navigate=True, folder=tmp_path) as run:
         run.drive(navigates)
@@ -208,6 +209,7 @@ def test_it_goes_on_to_navigation_when_the_heading_is_good(logs, tmp_path):
     assert kept == len(tn.read_imu(logs / "log.csv"))
 
 
+@pytest.mark.slow
 def test_navigation_that_begins_with_the_last_row_leaves_the_alignment(logs):
     """Rows end, heading is good, and an interrupt or the end of the stream comes without another row."""
     with ByHand(logs, navigate=True) as run:

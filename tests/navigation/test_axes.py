@@ -12,6 +12,7 @@ def line_of(name, grade, runs, seed, wrong="both"):
     return run_case(Case("navigation, GNSS", f"{grade} IMU, {name}, {wrong}", run), seed, runs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VEHICLES)
 def test_a_consumer_imu_in_a_few_drives(name):
     """Without states for its axes the level was off by 4.4 sigma RMS, worst 12."""

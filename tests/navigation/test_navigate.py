@@ -165,6 +165,7 @@ def test_a_gap_is_bridged_counted_and_believed(drive):
         navigate(without(kept), start, imu=SPEC)
 
 
+@pytest.mark.slow
 def test_smoothing_is_at_least_as_good(drive):
     motion, record, start = drive
     gnss = fixes(motion, np.arange(1.0, 179.0, 5.0), sigma=1.0)

@@ -67,6 +67,7 @@ def test_a_wheel_given_in_centimetres_and_a_clock_are_separated(drive):
     assert "late: shift the times of that log by -0.25" in words
 
 
+@pytest.mark.slow
 def test_scale_and_mounting_that_are_not_estimated(drive):
     motion, record, start = drive
     log = wheel_log(motion)
@@ -152,6 +153,7 @@ def test_fixes_that_wander_are_said_and_white_ones_are_not(drive):
         assert ("GNSS bias" in result.track.layout.groups) is (gnss is wandering)
 
 
+@pytest.mark.slow
 def test_a_latency_on_a_shaking_vehicle():
     """The acceleration of single samples is vibration, by which a latency seemed half as long: within 5 % of .2 s."""
     from truenorth.records.specs import imu_spec

@@ -44,6 +44,7 @@ def test_the_undamped_lines(voyage, cases):
     assert 23.0 <= earth_line(free[:, DP.start + 1], 5.0)[0] / 3600 <= 24.0
 
 
+@pytest.mark.slow
 def test_filter1_follows_the_log(cases):
     slope = (reading(cases[-0.5], "filter1") - reading(cases[0.0], "filter1")) / 5.0
     assert slope[PHI_U] == pytest.approx(-0.024, abs=0.004)

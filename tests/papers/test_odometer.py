@@ -28,6 +28,7 @@ def rms(errors):
     return np.sqrt(np.mean(heading(errors, 600.0) ** 2)) / ARCMIN
 
 
+@pytest.mark.slow
 def test_the_invariant_filter_does_not_mind_where_it_begins(drives):
     one, sixty = (from_angle(run_invariant, drives, degrees) for degrees in (1.0, 60.0))
     assert max(rms(one), rms(sixty)) < 2.0
@@ -40,6 +41,7 @@ def test_the_invariant_filter_does_not_mind_where_it_begins(drives):
     assert rms(ordinary) > 20.0 * rms(sixty)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "degrees"), some([("gh3", 10.0), ("sgkf7", 30.0)], [("gh7", 10.0), ("gh7", 30.0)]))
 def test_the_papers_model_converges(drives, method, degrees):
     errors = from_angle(run_method, drives, degrees, method)
@@ -47,12 +49,14 @@ def test_the_papers_model_converges(drives, method, degrees):
     assert rms(errors) < 4.0
 
 
+@pytest.mark.slow
 def test_velocity_is_turned_with_the_azimuth(drives):
     """Without it the reduced filter of order 7 does not hold 30 deg."""
     turned, left = (from_angle(run_method, drives, 30.0, "gh7", turned=t) for t in (True, False))
     assert rms(left) > 3.0 * rms(turned)
 
 
+@pytest.mark.slow
 def test_slip_is_kept_out_by_a_gate_not_by_strong_tracking(drives):
     slips = slipping(drives, 21)
     gated, plain = (from_angle(run_invariant, slips, 10.0, gate) for gate in (True, False))

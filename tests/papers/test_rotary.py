@@ -41,6 +41,7 @@ def test_a_run_of_configuration_a(run_a):
         assert found.sigma[2] / ARCMIN < BARS[at]
 
 
+@pytest.mark.slow
 def test_what_the_filters_of_the_paper_do(run_a):
     """MAKF and IMAKF are one; both lose to the Kalman filter by far; with a large R no factor fires."""
     makf, imakf = phi(run_a, "A", "makf", 600.0), phi(run_a, "A", "imakf", 600.0)

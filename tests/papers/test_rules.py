@@ -134,6 +134,7 @@ def test_noise_alone_settles_nothing():
     assert better <= 22
 
 
+@pytest.mark.slow
 @few_and_all(60, few=12)
 def test_the_interval_of_an_rms_holds_the_truth(runs):
     """Said to be below 1.0 where it is 1.0: in 2.5 % of the cases, more with few runs; at most 10 % here (99.9 %: 46 of 300)."""

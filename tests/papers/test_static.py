@@ -103,6 +103,7 @@ def test_bars_of_the_still_base(value):
     assert value("still", "states10", "heading", "rms", 600.0) <= 3.9 * 1.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["still", "two_position", "multi_position"])
 def test_sigma_is_honest(case, study, value):
     """RMS over sigma within its 99.9 % band; NEES of three numbers a run likewise."""

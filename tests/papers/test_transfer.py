@@ -44,6 +44,7 @@ def test_sixteen_states_beat_twelve_in_the_turn(flat):
     assert rms(gyro) <= 0.45
 
 
+@pytest.mark.slow
 def test_sixteen_states_are_honest_and_twelve_are_not(flat):
     """NEES/3 at the end: 90 numbers, within its 99.9 % band."""
     assert abs(np.mean(flat["states16"].nees[:, -1]) - 1.0) < 3.3 * math.sqrt(2 / (3 * RUNS))

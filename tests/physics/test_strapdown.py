@@ -165,6 +165,7 @@ def test_ideal_imu_with_three_and_four_samples(drive, double_rate, algorithm):
     assert position < 5e-3
 
 
+@pytest.mark.slow
 def test_without_correction_the_motion_does_not_come_back(drive, record):
     """So that the round trips above are known to see coning and sculling."""
     attitude, _, position = departure(mechanise(record, drive.state(), algorithm="1", every=100), drive)
@@ -172,6 +173,7 @@ def test_without_correction_the_motion_does_not_come_back(drive, record):
     assert position > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_errors_fall_with_the_sampling_interval(drive, algorithm):
     """Attitude: second order without correction; third where crosses with the last sample make an update that is not

@@ -234,6 +234,7 @@ def test_the_summary_is_cheap():
     assert min(times) < 0.12
 
 
+@pytest.mark.slow
 @few_and_all(3, few=1)
 def test_waves_do_not_carry_a_moored_ship_away(runs):
     """A swell that shakes the mast by .1 m/s^2 and turns the hull by a fifth of a degree; a start of a van, for comparison."""

@@ -78,6 +78,7 @@ def test_a_simulated_imu_is_found(seed):
     assert_allclose(StaticModel.of(found.spec).gyro_random_walk, KNOWN.gyro_random_walk, rtol=0.03)
 
 
+@pytest.mark.slow
 def test_quantisation_is_separated_from_random_walk():
     spec = replace(KNOWN, gyro_quantisation=3e-6, accel_quantisation=6e-4)  # about three sigma of a sample's noise
     found = noise_from_log(log(spec, hours=1.0)).spec

@@ -142,6 +142,7 @@ def test_a_refused_heading_is_refused_on_the_page(levelled, tmp_path):
     assert levelled.reasons[0] in page.replace("&#39;", "'")
 
 
+@pytest.mark.slow
 def test_the_figure(aligned, levelled, tmp_path):
     aligned.plot().savefig(tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 20_000

@@ -73,6 +73,7 @@ def test_the_ideal_imu_of_system_1_comes_back():
     assert velocity < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("indexer", [DUAL, CROOKED, SLEWS], ids=["system 1", "crooked", "eight positions"])
 def test_what_the_strapdown_leaves_is_its_own(indexer):
     """It falls by eight when the interval is halved, the order of the algorithm: the increments are not what limits it."""

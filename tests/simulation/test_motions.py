@@ -107,6 +107,7 @@ def test_a_shaken_mount_leaves_what_sculling_theory_says():
         assert abs(np.polyfit(t, v[:, 2], 1)[0]) == pytest.approx(abs(theory), rel=0.2)
 
 
+@pytest.mark.slow
 def test_two_days_at_sea_do_not_drift():
     """East along the parallel for 48 h: latitude stays, longitude is distance over the parallel's radius."""
     from truenorth.core.earth import radii

@@ -235,6 +235,7 @@ def test_quantities_are_never_bare_numbers():
     assert set(bare(Scenario, "", set())) <= dimensionless
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_folder_that_reads_back(tmp_path):
     (tmp_path / "s.yaml").write_text(yaml.safe_dump(BASE | {"imu": "tactical", "seed": 5}))
     result = run(str(tmp_path / "s.yaml"), "-o", str(tmp_path / "out"))

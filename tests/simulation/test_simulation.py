@@ -67,6 +67,7 @@ def test_rates_and_forces_are_the_derivatives_of_the_truth():
     np.testing.assert_allclose((ahead.alt - behind.alt) / (2 * h), at.v_n[:, 2], atol=1e-7)
 
 
+@pytest.mark.slow
 def test_allan_deviation_is_what_was_asked_for():
     """Random walks at 1 s within 3 % (each of 6 estimates has 1 %: a false alarm in 1 of 60 sets of seeds)."""
     spec = ImuSpec(gyro_random_walk=2e-5, accel_random_walk=3e-4, name="white")

@@ -35,6 +35,7 @@ def test_places_in_a_plane_are_refused():
         field_of(np.zeros((3, 3)), np.eye(3))
 
 
+@pytest.mark.slow
 def test_the_filter_is_honest():
     """60 numbers at the end: RMS over sigma within its 99.9 % band, .70 to 1.30; and far below what integrating gives."""
     true, found, sigma = simulate(AMPLITUDES, 20, 9, 0)
