@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.runs import some
 from truenorth.damping.course import errors_of
 from truenorth.damping.spectrum import earth_line, schuler_lines
 from truenorth.errors.marine import DP, DV
@@ -27,11 +26,11 @@ def voyage():
     return sail(5.0, 3)
 
 
-@pytest.fixture(scope="module", params=some([(0.0, -0.3, -0.5)], [((0.0, -0.1, -0.3, -0.5),)]))
-def cases(voyage, request):
+@pytest.fixture(scope="module")
+def cases(voyage):
     """By the log's error."""
     course = voyage.navigate(voyage.paper_errors())
-    return {c: run_all(voyage, course, voyage.reference(c), networks=c == -0.3) for c in request.param}
+    return {c: run_all(voyage, course, voyage.reference(c), networks=c == -0.3) for c in (0.0, -0.1, -0.3, -0.5)}
 
 
 @pytest.mark.slow
@@ -54,6 +53,7 @@ def test_filter1_follows_the_log(cases):
         assert reading(case, "filter1")[DV] == pytest.approx([c, c], abs=0.01)
 
 
+@pytest.mark.slow
 def test_filter2_does_not(cases):
     """On the raw reference to rounding, on the smoothed one to 1 %."""
     for method, share in (("filter2_raw", 1e-9), ("filter2", 0.01)):
@@ -63,6 +63,7 @@ def test_filter2_does_not(cases):
             np.testing.assert_array_less(difference, share * np.abs(none).max(axis=0))
 
 
+@pytest.mark.slow
 def test_bars_of_the_fusion(cases):
     fused, one = (window_rms(cases[-0.3], method, (18, 24)) for method in ("fused", "filter1"))
     assert fused[PHI_U] < 0.05
@@ -74,6 +75,7 @@ def test_bars_of_the_fusion(cases):
     assert early < 0.4
 
 
+@pytest.mark.slow
 def test_bars_of_the_15_state_filter(cases):
     middle = window_rms(cases[-0.3], "augmented", (6, 12))
     assert middle[[LAT, LON]].max() < 0.02
@@ -82,6 +84,7 @@ def test_bars_of_the_15_state_filter(cases):
     assert late < 1.15 * early  # heading does not degrade
 
 
+@pytest.mark.slow
 def test_networks_calm_the_schuler_line(cases):
     """By an order of magnitude in tilt; the 24 h line of heading only with azimuth damping."""
     free, internal, external = (cases[-0.3].errors[m] for m in ("undamped", "network_internal", "network_external"))
@@ -93,6 +96,7 @@ def test_networks_calm_the_schuler_line(cases):
     assert np.std(internal[late, PHI_U]) > 0.5 * np.std(free[late, PHI_U])
 
 
+@pytest.mark.slow
 def test_switching_overshoots_and_need_not(voyage, cases):
     found = switches(voyage, cases[-0.3], voyage.reference(-0.3))
     most = overshoot(cases[-0.3], found)

@@ -16,11 +16,10 @@ from truenorth.papers.static.study import ACCEL_BIAS, GYRO_BIAS, LAT
 from truenorth.papers.static.truth import ARCMIN
 from truenorth.papers.table import UNITS
 
-WHOLE = pytest.param(60, marks=pytest.mark.slow)
-few, whole = (pytest.mark.parametrize("study", [runs], indirect=True) for runs in (FEW, WHOLE))
+few, whole = (pytest.mark.parametrize("study", [runs], indirect=True) for runs in (FEW, 60))
 
 
-@pytest.fixture(scope="module", params=[FEW, WHOLE])
+@pytest.fixture(scope="module", params=[FEW, 60])
 def study(request):
     return reproduce("static", runs=request.param, seed=11)
 
@@ -95,6 +94,7 @@ def test_both_filters_agree_on_a_still_base(value):
         assert eight == pytest.approx(ten, rel=0.03)
 
 
+@pytest.mark.slow
 @whole
 def test_bars_of_the_still_base(value):
     """60 runs: the bars leave room for the scatter of an RMS, 9 % at one sigma."""
@@ -115,23 +115,27 @@ def test_sigma_is_honest(case, study, value):
         assert abs(value(case, method, "nees", "mean", 600.0) - 1) < 3.3 * math.sqrt(2 / (3 * runs))
 
 
+@pytest.mark.slow
 @whole
 def test_two_positions_take_the_biases_out(value):
     assert value("two_position", "states10", "level", "rms", 600.0) <= 0.012
     assert value("two_position", "states10", "heading", "rms", 600.0) <= 1.1
 
 
+@pytest.mark.slow
 @whole
 def test_sway_hurts_the_eight_states_more(value):
     assert value("sway", "states8", "heading", "rms", 120.0) > 2 * value("sway", "states10", "heading", "rms", 120.0)
 
 
+@pytest.mark.slow
 @whole
 def test_the_right_noise_helps_more_than_h_infinity(value):
     right, robust = (value("sway", method, "heading", "rms", 120.0) for method in ("kf_retuned", "h_infinity"))
     assert right < 0.5 * robust
 
 
+@pytest.mark.slow
 def test_ranks_and_what_cannot_be_separated(study, value):
     assert value("still", "states10", "rank", "value") == 7
     assert value("still", "states8", "rank", "value") == 5
@@ -141,6 +145,7 @@ def test_ranks_and_what_cannot_be_separated(study, value):
     assert "nabla_x" in claim.evidence
 
 
+@pytest.mark.slow
 def test_degrees_say_what_a_second_position_brings(value):
     """One position leaves the biases that tilt and turn north as they were; two do not."""
     for name in ("gyro_bias_x", "accel_bias_x", "accel_bias_y"):
@@ -149,6 +154,7 @@ def test_degrees_say_what_a_second_position_brings(value):
     assert value("still", "states10", "degree_7", "value") > 1e3 * value("still", "states10", "degree_8", "value")
 
 
+@pytest.mark.slow
 @whole
 def test_from_any_azimuth_the_product_finds_north(value):
     """60 runs, none of which may fail; 4.6' is 1.3 times the sigma, 3.3 standard deviations of an RMS of 60 above it."""
@@ -157,6 +163,7 @@ def test_from_any_azimuth_the_product_finds_north(value):
     assert abs(value("large_180", "product", "heading", "rms_over_sigma") - 1) < 3.3 / math.sqrt(2 * 60)
 
 
+@pytest.mark.slow
 @whole
 def test_what_becomes_of_one_normal_distribution_on_a_circle(value):
     """Filters with one mean lose many runs, and do not know it; several hypotheses or several passes lose none.
