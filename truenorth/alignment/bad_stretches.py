@@ -79,7 +79,7 @@ def _pulse(fine: FineAlignment, channel: int, begin: float, end: float, size: fl
     time = fine.integrals.start + fine.integrals.time
     share = np.clip((np.minimum(time[1:], end) - np.maximum(time[:-1], begin)) / np.diff(time), 0.0, 1.0)
     Phi, H = fine.system.Phi, fine.system.H
-    gain, step, _ = fine.gains
+    gain, step = fine.gains.gain, fine.gains.step
     d, x = np.zeros(fine.system.states), np.zeros(fine.system.states)
     state = BG.start + channel
     for k in range(len(share)):
