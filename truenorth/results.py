@@ -38,7 +38,9 @@ RESULTS = {
         marker="plan.yaml",
         load="truenorth.campaign.run:read_campaign",
     ),
-    "truenorth.campaign.tuning:Tuned": Views(files="truenorth.report.files:tuned_files", archive=False),
+    "truenorth.campaign.tuning:Tuned": Views(
+        plot="truenorth.figures.tuning:plot_tuning", files="truenorth.report.files:tuned_files", archive=False
+    ),
 }
 
 for _kind, _views in RESULTS.items():

@@ -2,13 +2,15 @@
 
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
 from typer.testing import CliRunner
 
+import truenorth as tn
 from tests.campaign.test_plan import REST
-from truenorth.campaign.tuning import _score, read_search, tune
+from truenorth.campaign.tuning import Tuned, _score, read_search, tune
 from truenorth.cli import app
 from truenorth.core.errors import DataError
 from truenorth.records.specs import imu_spec
@@ -71,3 +73,22 @@ def test_the_command(tmp_path):
     assert "which the search never saw" in result.output
     assert imu_spec(tmp_path / "out" / "tuned.yaml").name == "tuned"
     assert len(pd.read_csv(tmp_path / "out" / "trials.csv")) == 2
+    assert (tmp_path / "out" / "search.png").stat().st_size > 10_000
+
+
+def test_the_figure_shows_every_trial_that_has_an_answer():
+    bands = {"rms_low": 1.5, "rms_high": 3.0, "ratio_low": 0.6, "ratio_high": 1.4}
+    rows = [
+        {"gyro.bias": value, "answers": 12, "rms": 2.0, "rms_over_sigma": ratio, "in_band": ratio < 1.4} | bands
+        for value, ratio in ((1e-8, 3.0), (1e-7, 1.1), (1e-6, 0.9))
+    ]
+    silent = {"gyro.bias": 5e-6, "answers": 0, "rms": math.inf, "in_band": False}
+    found = Tuned(
+        read_search(SEARCH), imu_spec({"gyro": {"bias": "0.02 deg/h"}}), pd.DataFrame([*rows, silent]), pd.DataFrame()
+    )
+    above, below = tn.plot(found).axes
+    drawn = [np.asarray(line.get_xdata()) for line in below.lines if line.get_linestyle() == "None"]
+    unit = np.radians(1.0) / 3600
+    assert sorted(np.concatenate(drawn)) == pytest.approx([1e-8 / unit, 1e-7 / unit, 1e-6 / unit])
+    assert above.get_ylabel() == "RMS of phi_u, arcmin"
+    assert below.get_xlabel() == "gyro.bias, deg/h"

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from truenorth.core.shown import Write
+from truenorth.core.shown import Write, can_draw, plot
 from truenorth.formats.arrow import table_from
 from truenorth.navigation.export import geojson
 from truenorth.navigation.start import navigation_block
@@ -67,12 +67,13 @@ def simulation_files(result: Simulation) -> dict[str, Write]:
 
 
 def tuned_files(result: Tuned) -> dict[str, Write]:
-    """tuned.yaml (the specification), trials.csv and judged.csv."""
-    return {
+    """tuned.yaml (the specification), trials.csv and judged.csv; search.png where matplotlib is installed."""
+    files: dict[str, Write] = {
         "tuned.yaml": result.spec.to_yaml,
         "trials.csv": lambda path: result.trials.to_csv(path, index=False),
         "judged.csv": lambda path: result.judged.to_csv(path, index=False),
     }
+    return files | ({"search.png": lambda path: plot(result).savefig(path)} if can_draw() else {})
 
 
 def _json(content: dict[str, Any]) -> Write:
