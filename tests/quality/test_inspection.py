@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import truenorth as tn
 from tests.quality.made import LAT, G, as_increments, base, car, changed, codes
 from tests.runs import few_and_all
+from truenorth.core.errors import AlignmentError
+from truenorth.core.position import Position
 from truenorth.quality import inspect, motion_summary
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
@@ -272,3 +275,22 @@ def test_a_log_without_any_noise_is_a_simulation_and_no_dead_sensor():
     assert "no_noise" in codes(inspect(ImuRecord(record.time, record.gyro, still)), "note")
     dead = np.zeros_like(record.gyro)
     assert "constant_channel" in codes(inspect(ImuRecord(record.time, dead, record.accel)), "error")
+
+
+def without(axes) -> ImuRecord:
+    record = base(duration=60.0)
+    accel = record.accel.copy()
+    accel[:, axes] = 0.0
+    return ImuRecord(record.time, record.gyro, accel)
+
+
+@pytest.mark.parametrize("axes", [[0, 1], [2]])
+def test_dead_accelerometers_are_an_error_of_the_log(axes):
+    assert codes(inspect(without(axes), LAT), "error")
+    assert tn.align(without(axes), Position(LAT, 0.0)).status == "inconsistent"
+
+
+def test_without_any_specific_force_there_is_no_attitude():
+    assert codes(inspect(without([0, 1, 2]), LAT), "error")
+    with pytest.raises(AlignmentError, match="no attitude: are sensors dead"):
+        tn.align(without([0, 1, 2]), Position(LAT, 0.0))

@@ -29,7 +29,7 @@ from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
 from truenorth.alignment.turning import infer_turning, turning_align, turning_noise, turns_blindly, with_usual
-from truenorth.alignment.verdict import base_evidence, judged, leaves
+from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.analytic import static_covariance
 from truenorth.coarse.uncertainty import base_velocity
@@ -120,6 +120,8 @@ def align_base(
 
     tell("looking at the motion")
     task = make_task(record, position, at)
+    if not task.means.f_b.any():
+        raise no_attitude(record.source)
     chosen, why = _choose(method, task)
     tell(f"aligning: {chosen}")
     blind = is_blind(task.motion, check_means(task.means, position.lat, task.gravity))

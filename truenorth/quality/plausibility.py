@@ -252,7 +252,9 @@ def _vertical_earth_rate(
     findings: list[Finding],
 ) -> None:
     """Compare the vertical part of the mean rate with ``w_ie sin(lat)``."""
-    up = motion.specific_force[inside].mean(axis=0)
+    up, force = motion.specific_force[inside].mean(axis=0), np.linalg.norm(motion.specific_force[inside], axis=1)
+    if np.linalg.norm(up) <= ONE_DIRECTION * np.median(force):
+        return  # no vertical: the base turned over, or its accelerometers show nothing
     vertical = float(mean @ up / np.linalg.norm(up))
     horizontal = float(np.sqrt(max(0.0, float(mean @ mean) - vertical**2)))
     apparent = float(np.degrees(np.arctan2(vertical, horizontal)))

@@ -26,6 +26,7 @@ STILL_ANGLE = 3.0 * ARCSEC
 SEEN_TURN = np.radians(2.0)  # of gravity in body axes within WINDOW: accelerometers that shake still see it
 QUARTER_TURN = np.radians(90.0)
 UNTURNED = 0.1  # part of the turn that gyros show, below which gravity has not turned at all
+SCATTERED = 0.5  # length of the mean of unit vectors, below which gravity has no one direction
 MISALIGNED = 0.1  # rad: of the gyros and of a turntable's axis, at the most
 LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, whatever the sensor
 
@@ -160,6 +161,8 @@ def bias_by_gravity(rate: Array, force: Array) -> Array | None:
     mean = rate.mean(axis=1)
     up = force / np.maximum(np.linalg.norm(force, axis=0), 1e-9)
     vertical = up.mean(axis=1)
+    if np.linalg.norm(vertical) < SCATTERED:
+        return None
     along = vertical * (mean @ vertical) / (vertical @ vertical)
     across = float(np.linalg.norm(mean - along))
     if across < MISALIGNED * float(np.linalg.norm(along)):
