@@ -51,6 +51,7 @@ Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying", Pub
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
+NO_FORCE = 1e-6  # m/s^2, mean specific force that shows no vertical: accelerometers that are dead
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
 MOSTLY = 0.95  # of the seconds
 GOES = 10.0  # m: of the way from where a base was in the mean, that still passes for sway
@@ -120,7 +121,7 @@ def align_base(
 
     tell("looking at the motion")
     task = make_task(record, position, at)
-    if not task.means.f_b.any():
+    if np.linalg.norm(task.means.f_b) < NO_FORCE:
         raise no_attitude(record.source)
     chosen, why = _choose(method, task)
     tell(f"aligning: {chosen}")
