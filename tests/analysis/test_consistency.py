@@ -3,7 +3,6 @@
 Statistical tests use bands of probability 1 - 1e-6 each: with the right code, one of a million seeds fails.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from truenorth.analysis.consistency import (
-    as_normal,
     chi_square_band,
     chi_square_quantile,
     consistency,
@@ -19,7 +17,6 @@ from truenorth.analysis.consistency import (
     nis,
     sigma_ratio,
     standardised,
-    student_limit,
     whiteness,
 )
 from truenorth.core.errors import DataError, UsageError
@@ -157,13 +154,3 @@ def test_bad_input_is_said():
         chi_square_band(2, level=95)
     with pytest.raises(UsageError, match="10 epochs are too few for 20 lags"):
         whiteness(np.ones((10, 1)), np.ones((10, 1, 1)))
-
-
-@pytest.mark.parametrize(("dof", "table"), [(1, 12.706), (4, 2.776), (30, 2.042)])
-def test_the_limit_of_students_t_is_that_of_the_tables(dof, table):
-    assert student_limit(0.05, dof) == pytest.approx(table, abs=5e-4)
-    assert as_normal(student_limit(0.05, dof), dof) == pytest.approx(1.95996, abs=1e-5)
-
-
-def test_without_a_degree_of_freedom_nothing_is_beyond_the_limit():
-    assert student_limit(0.05, 0) == math.inf

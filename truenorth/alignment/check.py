@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import CoarseStart, settle_fine
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
-from truenorth.analysis.consistency import as_normal
+from truenorth.analysis.student import as_normal
 from truenorth.coarse.analytic import BLOCKS, Means
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.errors.staying import StaticModel, mean_velocity

@@ -6,7 +6,6 @@ section 5.4; G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time seri
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,20 +61,6 @@ def chi_square_quantile(probability: ArrayLike, dof: ArrayLike) -> Array:
 
     dof = np.asarray(dof, dtype=np.float64)
     return np.where(dof > 0, chdtri(np.maximum(dof, 1), 1.0 - np.asarray(probability, dtype=np.float64)), 0.0)
-
-
-def student_limit(chance: float, dof: int) -> float:
-    """What the size of a Student's t variable exceeds with the given probability: of a mean over its own estimated sigma."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(dof, 1.0 - 0.5 * chance)) if dof > 0 else math.inf
-
-
-def as_normal(size: float, dof: float) -> float:
-    """How many sigmas of a normal variable are as rare as a Student's t variable of this size."""
-    from scipy.special import ndtri, stdtr
-
-    return abs(size) if math.isinf(dof) else float(-ndtri(stdtr(dof, -abs(size))))
 
 
 def chi_square_band(dof: ArrayLike, runs: int = 1, level: float = 0.95) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.consistency import student_limit
+from truenorth.analysis.student import student_limit
 from truenorth.core.attitude import dcm_from_quaternion, rotation_vector_from_dcm
 from truenorth.quality.tilt import whole_cells
 from truenorth.records import ImuRecord

@@ -18,7 +18,7 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.consistency import student_limit
+from truenorth.analysis.student import student_limit
 from truenorth.core.attitude import dcm_from_quaternion
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
