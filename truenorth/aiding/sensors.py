@@ -27,7 +27,7 @@ HEADING_SIGMA = math.radians(1.0)  # of a baseline whose receiver says nothing
 ODOMETER_SIGMA = 0.05  # m/s, besides the pulses' size
 LOG_SIGMA = 0.1  # m/s
 DRIFT_TIME = 3.0 * 3600.0  # s, of a log's drift where nobody knows it: between tides and eddies
-BARO_SIGMA, BARO_DRIFT, BARO_TIME = 1.0, 10.0, 3600.0  # m, m, s: noise, weather
+BARO_SIGMA = 1.0  # m: noise; the weather is a group of its own, see `aids.WEATHER`
 FASTEST = 10.0  # Hz: faster odometers are averaged, since their errors are not new ten times a second
 
 

@@ -15,15 +15,14 @@ from truenorth.aiding.source import Aiding
 from truenorth.alignment.against import against
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
+from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import (
-    delay_of,
     learnt_evidence,
 )
 from truenorth.alignment.in_motion_start import (
     Guess,
-    departures,
     guesses_all_round,
     led_back,
     used_twice,
@@ -36,12 +35,9 @@ from truenorth.alignment.in_motion_task import (
     moving_task,
 )
 from truenorth.alignment.in_motion_verdict import judge_moving
-from truenorth.alignment.moving import fifteen, moving_of
-from truenorth.alignment.result import NOT_ESTIMATED, Alignment, History
+from truenorth.alignment.result import Alignment
 from truenorth.alignment.suspect import name_specification
-from truenorth.alignment.task import deflection_covariance
-from truenorth.core.attitude import UNIFORM_SIGMA
-from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
@@ -56,7 +52,7 @@ from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRec
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import BA, BG, DP, PHI
+from truenorth.state.layout import DP, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -215,7 +211,7 @@ def _aligned(
     if number > 1:
         left = moved * float(track.sigma[-1, PHI][2]) if moved > SETTLED else 0.0  # what has not settled
         spread = math.hypot(spread, used_twice(track, guess, first), left)
-    answer = _answer(task, task.with_lasting_fixes(track), method, why, spread)
+    answer = moving_answer(task, task.with_lasting_fixes(track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
@@ -263,7 +259,7 @@ def _published(
             f"{significant(math.degrees(bias) * 3600)} deg/h hide: choose auto or motion, or use better gyros"
         )
     track, acted = azimuth_track(task.record, task.odometer, task.position, task.spec, task.wheel, method)
-    answer = _answer(task, track, method, reason(method, acted), 0.0)
+    answer = moving_answer(task, track, method, reason(method, acted), 0.0)
     own = _aligned(task, "auto", heading_limit, PASSES, unknown, tell)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     return judge_moving(answer, track, heading_limit, more + against(own, answer))
@@ -316,91 +312,3 @@ def _turn_between(C: Array, D: Array) -> float:
     """About the vertical, rad."""
     R = C @ D.T
     return float(math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
-
-
-def _answer(task: MovingTask, track: Track, method: str, why: str, spread: float) -> Alignment:
-    place = track.position[-1]
-    sigma = track.sigma[-1]
-    try:
-        position = Position(
-            float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8])
-        )
-    except UsageError:
-        raise AlignmentError(
-            f"the solution runs away: a height of {place[2]:.3g} m at the end; the measurements do not hold it: check their clock, "
-            "axes and units, and the specification `imu`"
-        ) from None
-    history = _history(track, task)
-    covariance = history.phi_covariance[-1].copy()
-    covariance[2, 2] = min(covariance[2, 2] + spread**2, UNIFORM_SIGMA**2)
-    sensor = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
-    mounting = None if task.odometer is None else (sensor, task.wheel.C_mb, task.wheel.lever_arm)
-    speed = np.linalg.norm(track.v_n, axis=1)
-    distance = float(np.trapezoid(speed, track.time))
-    prior = np.sqrt(task.spec.bias_variance)
-    prior[3:] = np.hypot(prior[3:], np.sqrt(task.spec.acting_variance(standing())))
-    moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting)
-    delays = {
-        name: (sensor.latency + found[0], found[1])
-        for name, sensor in (("GNSS", task.antenna), ("odometer", task.wheel), ("velocity log", task.wheel))
-        if (found := delay_of(track, name)) is not None and found[1] < NOT_ESTIMATED * found[2]
-    }
-    # Navigation goes on from there: what heading is less sure of belongs to it, too.
-    moving = moving.less_sure(covariance[2, 2] - history.phi_covariance[-1][2, 2]) if spread else moving
-    moving = replace(moving, delays=delays)
-    return Alignment(
-        status="not_converged",
-        evidence=(),
-        method=method,
-        method_reason=why,
-        time=float(track.time[-1]),
-        C_nb=track.C_nb[-1],
-        phi_covariance=covariance,
-        phi_floor=history.phi_floor[-1],
-        gyro_bias=track.gyro_bias[-1],
-        gyro_bias_sigma=history.gyro_bias_sigma[-1],
-        gyro_bias_prior=prior[:3],
-        accel_bias=track.accel_bias[-1],
-        accel_bias_sigma=history.accel_bias_sigma[-1],
-        accel_bias_prior=prior[3:],
-        position=position,
-        imu=task.spec,
-        imu_source=f"specification {task.spec.name!r}",
-        duration=task.record.duration,
-        disturbance=np.full(3, np.nan),
-        history=history,
-        source=task.record.source,
-        moving=moving,
-    )
-
-
-def _history(track: Track, task: MovingTask) -> History:
-    P = fifteen(track)
-    sigma = np.sqrt(np.maximum(np.einsum("kii->ki", P), 0.0))
-    g = float(normal_gravity(task.position.lat, task.position.alt))
-    deflection = deflection_covariance(task.position.lat, g)
-    count = len(track.time)
-    aided = max((r for r in track.residuals if len(r.time)), key=lambda r: len(r.time), default=None)
-    innovation, expected, nis = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
-    if aided is not None:
-        last = np.searchsorted(aided.time, track.time, "right") - 1
-        known = last >= 0
-        innovation[known], expected[known] = aided.innovation[last[known]], aided.sigma[last[known]]
-        nis[known] = aided.nis[last[known]]
-    return History(
-        time=track.time,
-        C_nb=track.C_nb,
-        phi_covariance=P[:, PHI, PHI] + deflection,
-        phi_floor=np.broadcast_to(deflection, (count, 3, 3)),
-        departure=departures(task.record, track),
-        gyro_bias=track.gyro_bias,
-        gyro_bias_sigma=sigma[:, BG],
-        accel_bias=track.accel_bias,
-        accel_bias_sigma=sigma[:, BA],
-        innovation=innovation,
-        innovation_sigma=expected,
-        nis=nis,
-        innovation_of=aided.name if aided is not None else "nothing",
-        innovation_unit=aided.unit if aided is not None else "1",
-        innovation_axes=aided.axes if aided is not None else (),
-    )

@@ -31,8 +31,8 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
+from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.run import navigate_track, with_states
-from truenorth.navigation.procedure import bridge_gaps
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.regimes import motion_summary

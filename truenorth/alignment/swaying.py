@@ -32,8 +32,6 @@ from truenorth.strapdown.inertial import InertialIntegrals, gravity_position
 Array = NDArray[np.float64]
 
 ARM_PRIOR = 30.0  # m, one sigma along each axis, where nobody knows the arm
-# m, one sigma: an IMU from the axes of its indexer, about which its accelerometers swing in every slew
-OFFSET_PRIOR = 0.03
 WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled

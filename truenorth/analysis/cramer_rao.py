@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.compiled import Callback
 from truenorth.core.errors import DataError, UsageError
-from truenorth.core.linalg import symmetric
+from truenorth.core.linalg import scaled_cholesky, symmetric
 from truenorth.filters import LinearSystem, NonlinearSystem
 from truenorth.filters.nonlinear_system import require_jacobians, require_vector_space
 
@@ -159,12 +159,9 @@ def _said(system: LinearSystem, k: int) -> Array:
 
 def _inverse(A: Array, trouble: str) -> Array:
     """Of positive definite matrices in whatever units."""
-    size = np.sqrt(np.maximum(np.diagonal(A, axis1=-2, axis2=-1), 0.0))
-    scale = size[..., :, None] * size[..., None, :]
     try:
-        if not np.all(size > 0.0):
-            raise np.linalg.LinAlgError
-        L = np.linalg.inv(np.linalg.cholesky(A / scale))
+        size, root = scaled_cholesky(A)
     except np.linalg.LinAlgError:
         raise DataError(f"cramer_rao: {trouble}") from None
-    return np.asarray(np.swapaxes(L, -1, -2) @ L / scale)
+    L = np.linalg.inv(root) / size[..., None, :]
+    return np.asarray(np.swapaxes(L, -1, -2) @ L)

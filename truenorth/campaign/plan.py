@@ -218,6 +218,11 @@ class Plan(Strict):
             )
         at[last] = value
 
+    @property
+    def method_names(self) -> list[str]:
+        """In the order of the plan."""
+        return [method.name for method in self.methods]
+
     def with_runs(self, runs: int) -> Plan:
         """The same plan with another number of runs."""
         other = self.model_copy(update={"runs": runs})

@@ -58,7 +58,7 @@ class Campaign(Shown):
         """Methods in pairs on the same data; see :func:`truenorth.campaign.compare`."""
         from truenorth.campaign.comparison import compare
 
-        return compare(self.table, names=self.case_names, methods=[method.name for method in self.plan.methods])
+        return compare(self.table, names=self.case_names, methods=self.plan.method_names)
 
     @cached_property
     def convergence(self) -> pd.DataFrame:
@@ -89,7 +89,7 @@ class Campaign(Shown):
     def in_brief(self) -> dict[str, str]:
         """Name, cases, methods and runs of the plan."""
         plan = self.plan
-        methods = ", ".join(method.name for method in plan.methods)
+        methods = ", ".join(plan.method_names)
         return {"name": plan.name, "cases": str(len(plan.cases)), "methods": methods, "runs": str(plan.runs)}
 
     def to_frame(self) -> pd.DataFrame:

@@ -21,7 +21,7 @@ from truenorth.cli.options import option
 
 if TYPE_CHECKING:
     from truenorth.core.position import Position
-    from truenorth.live.feeds import Feed
+    from truenorth.live.feed import Feed
     from truenorth.live.regime import Turner
 
 

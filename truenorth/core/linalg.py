@@ -119,3 +119,17 @@ def symmetric(P: Any) -> Array:
 def times(A: Any, x: Any) -> Array:
     """``A x`` of (..., m, n) matrices and (..., n) vectors."""
     return np.asarray((A @ x[..., None])[..., 0])
+
+
+def scaled_cholesky(A: Array) -> tuple[Array, Array]:
+    """``(size, L)`` with ``A = D L L' D``, ``D = diag(size)``, of positive definite (..., n, n) matrices in whatever units.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        One that is not positive definite.
+    """
+    size = np.sqrt(np.maximum(np.diagonal(A, axis1=-2, axis2=-1), 0.0))
+    if not np.all(size > 0.0):
+        raise np.linalg.LinAlgError("a diagonal that is not positive")
+    return size, np.linalg.cholesky(A / (size[..., :, None] * size[..., None, :]))

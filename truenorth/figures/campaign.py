@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from truenorth.campaign.requirement import Requirement, heading_at_end, requirements
 from truenorth.figures.style import COLOURS, REFERENCE, headed, new_figure, style
 
 if TYPE_CHECKING:
@@ -40,9 +40,8 @@ def plot_campaign(campaign: Campaign) -> dict[str, Figure]:
         figures = {"distribution": plot_distribution(campaign), "overview": plot_overview(campaign)}
         if table["time_s"].nunique() > 1:
             figures["convergence"] = plot_convergence(campaign)
-        for path in campaign.plan.grid:
-            if len(campaign.plan.grid[path]) > 1 and all(_number(v) is not None for v in campaign.plan.grid[path]):
-                figures[f"requirement_{re.sub(r'[^A-Za-z0-9]+', '_', path)}"] = plot_requirement(campaign, path)
+        for found in requirements(campaign):
+            figures[f"requirement_{re.sub(r'[^A-Za-z0-9]+', '_', found.path)}"] = plot_requirement(campaign, found)
     return figures
 
 
@@ -54,7 +53,7 @@ def plot_convergence(campaign: Campaign) -> Figure:
     figure = new_figure(4.6 * columns + 0.4, 3.4 * rows + 0.6)
     axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for ax, (case, name) in zip(axes.flat, cases, strict=False):
-        for colour, method in zip(COLOURS, _methods(campaign), strict=False):
+        for colour, method in zip(COLOURS, campaign.plan.method_names, strict=False):
             rows_of = _rows(campaign.table, case, method, "phi_u")
             if len(rows_of):
                 _fan(ax, rows_of, method, colour)
@@ -104,7 +103,7 @@ def _fan(ax: Axes, rows: pd.DataFrame, method: str, colour: str) -> None:
 
 def plot_distribution(campaign: Campaign) -> Figure:
     """Errors of heading and north tilt at the end of the log, a violin for each method, a column for each case."""
-    methods, cases = _methods(campaign), list(campaign.case_names.items())[:MOST_CASES]
+    methods, cases = campaign.plan.method_names, list(campaign.case_names.items())[:MOST_CASES]
     figure = new_figure(max(6.0, 1.0 + len(cases) * (0.7 + 0.75 * len(methods))), 7.0)
     axes = figure.subplots(2, len(cases), squeeze=False, sharex=True)
     for row, (quantity, label) in enumerate((("phi_u", "heading"), ("phi_n", "north tilt"))):
@@ -146,9 +145,8 @@ def _violin(ax: Axes, at: int, values: Array, sigmas: Array, colour: str) -> Non
 
 def plot_overview(campaign: Campaign) -> Figure:
     """Heading RMS, and RMS over the claimed sigma, of each method in each case, as a map with its numbers."""
-    methods, cases = _methods(campaign), campaign.case_names
-    last = campaign.summary
-    last = last[last["quantity"] == "phi_u"].sort_values("time_s").groupby(["case", "method"], observed=True).last()
+    methods, cases = campaign.plan.method_names, campaign.case_names
+    last = heading_at_end(campaign).set_index(["case", "method"])
     rms, ratio, answers = (
         np.array([[_cell(last, case, method, column) for method in methods] for case in cases])
         for column in ("rms", "rms_over_sigma", "runs")
@@ -182,46 +180,24 @@ def plot_overview(campaign: Campaign) -> Figure:
     return figure
 
 
-def plot_requirement(campaign: Campaign, path: str) -> Figure:
+def plot_requirement(campaign: Campaign, found: Requirement) -> Figure:
     """What heading error a value of a parameter leads to: RMS with its interval, the claimed sigma, and what is wanted."""
-    plan = campaign.plan
-    values = np.array([_number(value) for value in plan.grid[path]], dtype=np.float64)
+    values, lines = found.values, found.lines
     figure = new_figure(7.5, 5.0)
     ax = figure.subplots()
-    last = campaign.summary
-    last = last[last["quantity"] == "phi_u"].sort_values("time_s").groupby(["case", "method"], observed=True).last()
-    others: dict[str, list[int]] = {}
-    for case in plan.cases:
-        words = [
-            str(case.scenario["name"]),
-            *(f"{k.rpartition('.')[2]} {v}" for k, v in case.parameters.items() if k != path),
-        ]
-        others.setdefault(", ".join(words), []).append(case.number)
-    lines = [(name, cases, method) for name, cases in others.items() for method in _methods(campaign)]
-    for colour, (name, cases, method) in zip(COLOURS * (1 + len(lines) // len(COLOURS)), lines, strict=False):
-        rms, low, high, sigma = (
-            np.array([_cell(last, case, method, column) for case in cases])
-            for column in ("rms", "rms_low", "rms_high", "sigma")
-        )
-        if not np.isfinite(rms).any():
-            continue
-        bars = np.maximum([rms - low, high - rms], 0.0)
-        ax.errorbar(values, rms, bars, fmt="o-", color=colour, capsize=3, label=f"{name}, {method}")
-        ax.plot(values, sigma, "--", color=colour, linewidth=1.0)
-    wanted = np.degrees(plan.converged)
+    for colour, line in zip(COLOURS * (1 + len(lines) // len(COLOURS)), lines, strict=False):
+        ax.errorbar(values, line.rms, line.bars, fmt="o-", color=colour, capsize=3, label=line.name)
+        ax.plot(values, line.sigma, "--", color=colour, linewidth=1.0)
+    wanted = np.degrees(campaign.plan.converged)
     ax.axhline(60 * wanted, color=REFERENCE, linestyle=":", linewidth=1.2, label=f"wanted: {wanted:g} deg")
     ax.set_xscale("log")
     ax.set_xticks(values, [f"{value:g}" for value in values])
     ax.minorticks_off()
     ax.margins(x=0.08)
-    ax.set(yscale="log", xlabel=f"{path}, {_unit(plan.grid[path])}", ylabel="heading RMS, arcmin")
+    ax.set(yscale="log", xlabel=found.words, ylabel="heading RMS, arcmin")
     ax.legend()
     _title(figure, campaign, "with its 95 % interval; dashed: claimed sigma")
     return figure
-
-
-def _methods(campaign: Campaign) -> list[str]:
-    return [method.name for method in campaign.plan.methods]
 
 
 def _rows(table: pd.DataFrame, case: int, method: str, quantity: str) -> pd.DataFrame:
@@ -236,18 +212,6 @@ def _cell(summary: pd.DataFrame, case: int, method: str, column: str) -> float:
     if (case, method) not in summary.index:
         return np.nan
     return float(np.asarray(summary.loc[(case, method), column]))
-
-
-def _number(text: object) -> float | None:
-    try:
-        return float(str(text).split()[0])
-    except (ValueError, IndexError):
-        return None
-
-
-def _unit(values: Sequence[object]) -> str:
-    units = {str(value).partition(" ")[2] for value in values}
-    return units.pop() if len(units) == 1 else "in their own units"
 
 
 def _folded(name: str) -> str:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.core.linalg import symmetric, times
+from truenorth.core.linalg import scaled_cholesky, symmetric, times
 from truenorth.filters.gains import filter_gains
 from truenorth.filters.kalman import kalman
 from truenorth.filters.stack import Array
@@ -311,11 +311,8 @@ def _inverse(A: Array) -> Array:
 
 def _solved(A: Array, B: Array) -> Array:
     """``A^-1 B`` for a positive definite A, its rows and columns scaled first."""
-    size = np.sqrt(np.maximum(np.diagonal(A, axis1=-2, axis2=-1), 0.0))
     try:
-        if not np.all(size > 0.0):
-            raise np.linalg.LinAlgError
-        L = np.linalg.cholesky(A / (size[..., :, None] * size[..., None, :]))
+        size, L = scaled_cholesky(A)
     except np.linalg.LinAlgError:
         raise DataError(
             "fusion: a covariance that must be inverted is singular; leave out what is known exactly, or what both "

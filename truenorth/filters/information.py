@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.core.linalg import symmetric, times
+from truenorth.core.linalg import scaled_cholesky, symmetric, times
 from truenorth.filters.kalman import kalman
 from truenorth.filters.smoother import Smoothed
 from truenorth.filters.stack import Array
@@ -257,11 +257,8 @@ def _said(system: LinearSystem, k: int) -> tuple[Array, Array]:
     # An absent row becomes one of its own that sees nothing.
     R = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), R)
     H = np.where(absent[..., :, None], 0.0, H)
-    sigma = np.sqrt(np.diagonal(R, axis1=-2, axis2=-1))
     try:
-        if not np.all(sigma > 0.0):
-            raise np.linalg.LinAlgError
-        L = np.linalg.cholesky(R / (sigma[..., :, None] * sigma[..., None, :]))
+        sigma, L = scaled_cholesky(R)
     except np.linalg.LinAlgError:
         raise DataError(
             f"information filter: R is singular at epoch {k}, its information infinite; use the Kalman filter"

@@ -3,7 +3,8 @@
 from truenorth.live.aligner import Aligner
 from truenorth.live.answer import Answer, Motion
 from truenorth.live.attitude_feeds import AttitudeFeed, MagnetometerFeed
-from truenorth.live.feeds import Feed, GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
+from truenorth.live.feed import Feed
+from truenorth.live.feeds import GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
 from truenorth.live.indexer_feed import IndexerFeed
 from truenorth.live.intake import Counts
 from truenorth.live.master_feed import MasterFeed

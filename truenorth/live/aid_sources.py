@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import TruenorthError, UsageError
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.live.journal import AidJournal
 from truenorth.live.listening import READERS, Listener
 from truenorth.live.sources import open_bytes

@@ -31,9 +31,11 @@ from truenorth.core.attitude import angle_text, euler_sigma
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.free_memory import give_back
 from truenorth.core.position import Position
+from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.live.answer import Answer, Motion, under_way
 from truenorth.live.carry import Carry
-from truenorth.live.feeds import Feed, GnssFeed
+from truenorth.live.feed import Feed
+from truenorth.live.feeds import GnssFeed
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.known_feeds import FEEDS
@@ -43,7 +45,6 @@ from truenorth.live.reasons import reasons_of
 from truenorth.live.recent import Recent
 from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
-from truenorth.navigation.procedure import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.track import Residuals

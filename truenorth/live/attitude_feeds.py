@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.attitude import Attitude
 from truenorth.aiding.magnetometer import HARD, SOFT, Magnetometer
-from truenorth.live.feeds import Feed, table
+from truenorth.live.feed import Feed, table
 from truenorth.records import MasterRecord
 from truenorth.records.magnetometer import MagnetometerRecord
 from truenorth.state.mounting import Mounting
@@ -68,10 +68,6 @@ class MagnetometerFeed(Feed):
             mounting=self.mounting or Mounting(),
         )
 
-    def speed_of(self, rows: Array) -> Array:
-        """Says nothing of motion."""
-        return np.full(len(rows), np.nan)
-
     def dummy(self) -> Array:
         """The earth's field."""
         return np.column_stack([[0.0, 1.0], np.tile(self.field, (2, 1))])
@@ -107,10 +103,6 @@ class AttitudeFeed(Feed):
         """See :class:`Feed`."""
         record = MasterRecord(rows[:, 0], rows[:, 1:].reshape(-1, 3, 3), source="live attitude")
         return Attitude(record, self.noise, self.slow, self.slow_time, self.mounting or Mounting())
-
-    def speed_of(self, rows: Array) -> Array:
-        """Says nothing of motion."""
-        return np.full(len(rows), np.nan)
 
     def dummy(self) -> Any:
         """No turn."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Indexer
 from truenorth.core.errors import UsageError
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.records import EncoderRecord
 
 Array = NDArray[np.float64]
@@ -56,10 +56,6 @@ class IndexerFeed(Feed):
         angles = np.ascontiguousarray(rows[:, 1 : 1 + len(self.axes)])
         record = EncoderRecord(rows[:, 0], angles[:, 0] if len(self.axes) == 1 else angles, source="live encoder")
         return Indexer(record, self.axes, self.lever_arm, self.angle_sigma)
-
-    def speed_of(self, rows: Array) -> Array:
-        """Says nothing of the vehicle's motion."""
-        return np.full(len(rows), np.nan)
 
     def continued(self, rows: Array) -> Array:
         """Rows that were read for themselves, with the turns that were counted before them."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.atomic import atomic_path, writable_folder
 from truenorth.core.errors import DataError, UsageError
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.live.log import Kind, record_of
 
 if TYPE_CHECKING:

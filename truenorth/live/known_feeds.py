@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from truenorth.live.attitude_feeds import AttitudeFeed, MagnetometerFeed
-from truenorth.live.feeds import Feed, GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
+from truenorth.live.feed import Feed
+from truenorth.live.feeds import GnssFeed, HeightFeed, OdometerFeed, VelocityFeed
 from truenorth.live.indexer_feed import IndexerFeed
 from truenorth.live.master_feed import MasterFeed
 

@@ -22,7 +22,7 @@ from truenorth.core.errors import DataError
 from truenorth.core.units import parse_unit
 from truenorth.formats import read_encoder, read_gnss, read_height, read_master, read_odometer, read_velocity
 from truenorth.formats.magnetometer import read_magnetometer
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.live.messages import LONGEST_LINE, Messages, protocol_of
 
 Array = NDArray[np.float64]

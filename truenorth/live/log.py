@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.task import LONGEST_BRIDGE
 from truenorth.records import ImuRecord
 from truenorth.strapdown.increments import increments
 
@@ -22,7 +23,6 @@ MOST_ROWS = 125_000
 LONGEST_ROW = 0.101  # s
 FIRST_ROWS = 4096
 INTERVAL_ROWS = 200  # from which the nominal interval is taken
-LONGEST_BRIDGE = 4.5  # nominal intervals: up to three lost rows in a line are bridged by an alignment
 
 
 def record_of(rows: Array, kind: Kind, source: str = "live") -> ImuRecord:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Master
-from truenorth.live.feeds import Feed, or_none, table
+from truenorth.live.feed import Feed, or_none, table
 from truenorth.records import MasterRecord
 from truenorth.state.mounting import Mounting
 
@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 class MasterFeed(Feed):
     """The solution of a master INS on the same vehicle: attitude, velocity, place, whatever it gives.
+
+    It says no speed: its word is taken at rest and under way alike, so that its motion does not decide how to align.
 
     Parameters
     ----------
@@ -78,7 +80,3 @@ class MasterFeed(Feed):
         rows = super().dummy()
         rows[:, 1:10] = np.eye(3).ravel()
         return rows
-
-    def speed_of(self, rows: Array) -> Array:
-        """Says nothing of how to align: the master's word is taken, at rest and under way."""
-        return np.full(len(rows), np.nan)

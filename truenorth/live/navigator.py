@@ -24,15 +24,17 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.axes import standing
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import LoopState, Setting
+from truenorth.estimate.gaps import LONGEST_BRIDGE
 from truenorth.estimate.run import begin, go_on, with_states
 from truenorth.live.answer import Answer, Motion
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
-from truenorth.navigation.procedure import FINE, LONGEST_BRIDGE, PLUMB_LINE, kept_altitude, start_of
+from truenorth.navigation.given import kept_altitude
+from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from truenorth.alignment import Alignment
 from truenorth.live.answer import under_way
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.live.intake import Intake
 from truenorth.live.log import Log
 

@@ -10,7 +10,7 @@ import numpy as np
 from truenorth.aiding.aids import Indexer, Positions
 from truenorth.alignment.recipes import RECIPES
 from truenorth.alignment.rotary import covered_until
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 
 Turner = Positions | Indexer
 

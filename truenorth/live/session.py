@@ -24,7 +24,7 @@ from truenorth.formats.layout import Layout
 from truenorth.live.aid_sources import AidSource, Replayed, open_aid
 from truenorth.live.aligner import SHARE, UNKNOWN, Aligner
 from truenorth.live.answer import Answer
-from truenorth.live.feeds import Feed
+from truenorth.live.feed import Feed
 from truenorth.live.journal import Journal
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator

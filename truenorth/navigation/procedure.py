@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
@@ -20,8 +20,10 @@ from truenorth.errors.axes import standing
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
+from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
+from truenorth.navigation.given import by_key, kept_altitude, looked_at, mounted_as, record_of, sits_as_found
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import second_look
 from truenorth.navigation.start import read_start, start_from_alignment
@@ -41,7 +43,6 @@ from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Track
-from truenorth.strapdown.increments import across_gaps
 
 if TYPE_CHECKING:
     from truenorth.alignment import Alignment
@@ -56,9 +57,6 @@ FINE, COARSE = 0.2, 1.0
 AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
 SHORTEST_AXES = 20.0  # s
 DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
-LONGEST_BRIDGE = 1.0  # s: of a gap in the IMU's log that the rate before it may bridge
-AIDS = (Gnss, Odometer, VelocityLog, Barometer)
-USUAL = {"baro": WEATHER}
 NEVER = Late(0, 0.0)
 PLUMB_LINE = Deflection()
 
@@ -131,7 +129,7 @@ def navigate(
         The alignment has no usable heading.
     """
     tell = progress or (lambda stage: None)
-    given = _by_key(aid)
+    given = by_key(aid)
     begin, spec, imu_source = start_of(start, imu)
     check_start(begin)
     record = ImuRecord.of(record)
@@ -143,7 +141,7 @@ def navigate(
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
-    found = _sits_as_found(given, begin)
+    found = sits_as_found(given, begin)
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
     model = _model(begin, noise, groups, scale_factors, height)
@@ -153,7 +151,7 @@ def navigate(
     _check_places(given, begin, height)
     if zupt is not None:
         tell("looking for stops")
-        seen = (_record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
+        seen = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
         plan = replace(plan, always=[*zero_updates(record, zupt, plan.interval, *seen), *disturbances])
     _check_axes(plan, given)
     tell("navigating")
@@ -222,7 +220,7 @@ class _Plan:
 def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
     """What the measurements and the log show; `found`: the odometer sits as an alignment on the move has found."""
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
-    receiver = _record_of(given, Gnss)
+    receiver = record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
     if found:
         evidence.append(note("odometer.taken_over"))
@@ -256,48 +254,7 @@ def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, 
     found = noise_evidence(again, track, plan.model, plan.record)
     found += wandering_evidence(again, track, plan.model, spec, plan.record.duration)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
-    return found + second_look(lambda loose: plan.run(plan.sources(_mounted(given, loose))), track, _looked_at(given))
-
-
-def _by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
-    """The aids in the order in which their measurements are taken."""
-    aids: Sequence[Aid] = aid if isinstance(aid, list | tuple) else (aid,)
-    for a in aids:
-        if not isinstance(a, Aid):
-            raise UsageError(
-                f"aid {type(a).__name__} is not for navigation; expected {', '.join(k.__name__ for k in AIDS)}, or an object "
-                "with key, record and sources"
-            )
-    found = {a.key: a for a in aids}
-    if len(found) < len(aids):
-        raise UsageError(f"aid holds two of one kind: {', '.join(a.key for a in aids)}; expected one of each")
-    order = [kind.key for kind in AIDS]
-    return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
-
-
-def _sits_as_found(given: dict[str, Any], begin: Start) -> bool:
-    """Whether the odometer sits and counts as an alignment on the move has found; mounts it so where nothing else is said."""
-    odometer, found = given.get("odometer"), begin.wheel
-    if found is None or not isinstance(odometer, Odometer):
-        return False
-    if odometer.mounting is None:
-        given["odometer"] = odometer.mounted(found)
-        return True
-    return bool(np.all(odometer.mounting.C_mb == found.C_mb)) and odometer.mounting.scale_sigma == found.scale_sigma
-
-
-def _record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:
-    return next((a.record for a in given.values() if isinstance(a, kind)), None)
-
-
-def _mounted(given: Mapping[str, Any], mountings: Mapping[str, Mounting]) -> dict[str, Any]:
-    return {key: a.mounted(mountings[key]) if isinstance(a, AIDS) else a for key, a in given.items()}
-
-
-def _looked_at(given: Mapping[str, Any]) -> dict[str, Mounting]:
-    """Mountings that a second look can open."""
-    found = {kind.key: USUAL.get(kind.key, Mounting()) for kind in AIDS}
-    return found | {key: a.mounting for key, a in given.items() if getattr(a, "mounting", None) is not None}
+    return found + second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
 
 
 def _intervals(
@@ -347,66 +304,13 @@ def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
     return record[first:]
 
 
-def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float], ...], list[Aiding]]:
-    """Gaps bridged by rates that change evenly, and what they add to the uncertainty.
-
-    What the base did in a gap is as different from that as its rates differ over the log.
-    """
-    record.check_rate()
-    rows = record.gaps[record.gaps > 0]
-    if rows.size == 0:
-        return record, (), []
-    lengths = record.steps[rows]
-    missing = lengths - record.interval
-    if missing.max() > LONGEST_BRIDGE:
-        worst = int(np.argmax(missing))
-        raise DataError(
-            f"{record.source}: row {rows[worst] + 1}, column time: a gap of {lengths[worst]:.3f} s after "
-            f"{record.time[rows[worst] - 1]:.3f} s; expected gaps of {LONGEST_BRIDGE:g} s at most: what the vehicle did in it is "
-            "not known; navigate the parts, each from an alignment of its own"
-        )
-    scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
-    unrest = [np.std(values * scale, axis=0).max() for values in (record.gyro, record.accel)]
-    gaps = tuple((float(record.time[row - 1]), float(length)) for row, length in zip(rows, lengths))
-    turn, push = (np.tile(missing[:, None] * max(rate, 1e-9), 3) for rate in unrest)
-    # The kernel's form of a disturbance: variance of velocity as measured, of attitude as variance.
-    return across_gaps(record), gaps, [Aiding("gap", "velocity", record.time[rows], push**2, turn, does="disturbance")]
-
-
-def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:
-    """How height is kept with these aids, and what is to be said of it.
-
-    Raises
-    ------
-    UsageError
-        What is wanted, no aid measures.
-    """
-    gnss = _record_of(given, Gnss)
-    heights = gnss is not None and bool(np.isfinite(gnss.alt).any())
-    if wanted is not None and wanted not in get_args(Altitude):
-        raise UsageError(f"altitude {wanted!r}; expected one of {', '.join(get_args(Altitude))}")
-    if wanted == "baro" and "baro" not in given:
-        raise UsageError("altitude 'baro' without a barometer's record; expected an aid `Barometer(record)`")
-    if wanted == "gnss" and not heights:
-        raise UsageError("altitude 'gnss' without heights of GNSS; expected an aid `Gnss(record)` with heights")
-    if wanted is not None:
-        return wanted, []  # type: ignore[return-value]  # one of the four
-    if heights:
-        return "gnss", []
-    if "baro" in given:
-        return "baro", []
-    if given.keys() - {"gnss", Fixes.key}:
-        return "free", [note("height.free")]
-    return "fixed", [note("height.fixed", "height_sensor")]
-
-
 def _check_places(given: Mapping[str, Aid], begin: Start, altitude: str) -> None:
     """Refuse fixes and heights that lie far from where the alignment stands."""
     sigma = np.sqrt(np.diag(begin.P)[DP])
     place = Position(begin.lat, begin.lon, begin.alt, float(sigma[:2].max()), float(sigma[2]))
-    if (gnss := _record_of(given, Gnss)) is not None:
+    if (gnss := record_of(given, Gnss)) is not None:
         check_fixes(gnss, place, begin.time, heights=altitude in ("gnss", "free"))
-    if altitude == "baro" and (baro := _record_of(given, Barometer)) is not None:
+    if altitude == "baro" and (baro := record_of(given, Barometer)) is not None:
         check_heights(baro, place, begin.time)
 
 

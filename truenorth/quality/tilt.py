@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
-from truenorth.core.attitude import dcm_from_quaternion
+from truenorth.core.attitude import dcm_from_quaternion, skew
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
 from truenorth.strapdown.increments import increments
@@ -203,7 +203,7 @@ class _Bench:
             turn = np.swapaxes(base[:, :-1], -1, -2) @ base[:, 1:]
             w = np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1) / self.interval
             w = np.concatenate([w[:, :1], 0.5 * (w[:, 1:] + w[:, :-1]), w[:, -1:]], axis=1)
-        W = _cross(_changes(w) / self.interval) + _cross(w) @ _cross(w)
+        W = skew(_changes(w) / self.interval) + skew(w) @ skew(w)
         columns = np.concatenate([C @ self.force[..., None], base @ W], axis=3)
         return self._freed(columns).reshape(-1, 4), C
 
@@ -299,13 +299,6 @@ def _changes(w: Array) -> Array:
     last = np.tensordot(EDGES[::-1, ::-1], w[:, -4:], (1, 1)).swapaxes(0, 1)
     edges = np.concatenate([first, inner, last], axis=1)
     return np.diff(edges, axis=1)
-
-
-def _cross(w: Array) -> Array:
-    """(..., 3, 3) matrices ``[w x]``."""
-    out = np.zeros((*w.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -w[..., 2], w[..., 1], -w[..., 0]
-    return np.asarray(out - np.swapaxes(out, -1, -2))
 
 
 def _shifted(theta: Array, cells: float) -> Array:

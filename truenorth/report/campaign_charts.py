@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.campaign.requirement import Requirement, heading_at_end, requirements
 from truenorth.core.language import translated as _
 from truenorth.report.chart import Chart
 from truenorth.report.document import Panel
@@ -29,7 +30,7 @@ CHANCE = 0.05  # of a sign test
 def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
     """Mood, the finding in a sentence, and what else there is to say of the heading at the end of the log."""
     plan = campaign.plan
-    last = _last(campaign.summary)
+    last = heading_at_end(campaign)
     lines = [
         _(
             "{cases} case(s), {methods} method(s), {runs} runs of each, seed {seed}. Every method meets the same data."
@@ -122,10 +123,7 @@ def campaign_panels(campaign: Campaign) -> list[Panel]:
     if campaign.table["time_s"].nunique() > 1:
         shown += _convergence(campaign)
     shown.append(_distribution(campaign))
-    for path, values in campaign.plan.grid.items():
-        if len(values) > 1 and all(_number(v) is not None for v in values):
-            shown.append(_requirement(campaign, path))
-    return shown
+    return shown + [_requirement(campaign, found) for found in requirements(campaign)]
 
 
 def _convergence(campaign: Campaign) -> list[Panel]:
@@ -136,7 +134,7 @@ def _convergence(campaign: Campaign) -> list[Panel]:
     panels = []
     for case, name in list(campaign.case_names.items())[:MOST_CASES]:
         chart = Chart([_("heading error, arcmin")], _("length of the log, s"), height=360)
-        for number, method in enumerate(_methods(campaign)):
+        for number, method in enumerate(campaign.plan.method_names):
             rows = _rows(campaign.table, case, method)
             if len(rows):
                 _fan(chart, rows, method, f"c{number % 6}")
@@ -166,7 +164,7 @@ def _distribution(campaign: Campaign) -> Panel:
     cases = list(campaign.case_names.items())[:MOST_CASES]
     chart = Chart([_folded(name) for _case, name in cases], _("method"), height=110 + 150 * len(cases))
     for row, (case, _name) in enumerate(cases):
-        for number, method in enumerate(_methods(campaign)):
+        for number, method in enumerate(campaign.plan.method_names):
             rows = _rows(campaign.table, case, method)
             rows = rows[rows["time_s"] == rows["time_s"].max()]
             if len(rows):
@@ -182,31 +180,14 @@ def _distribution(campaign: Campaign) -> Panel:
     )
 
 
-def _requirement(campaign: Campaign, path: str) -> Panel:
-    plan = campaign.plan
-    values = np.array([_number(value) for value in plan.grid[path]], dtype=np.float64)
-    unit = {str(value).partition(" ")[2] for value in plan.grid[path]}
-    over = f"{path}, {unit.pop()}" if len(unit) == 1 else path
-    chart = Chart([_("heading RMS, arcmin")], over, height=400)
-    last = _last(campaign.summary).set_index(["case", "method"])
-    others: dict[str, list[int]] = {}
-    for case in plan.cases:
-        fixed = [f"{k.rpartition('.')[2]} {v}" for k, v in case.parameters.items() if k != path]
-        others.setdefault(", ".join([str(case.scenario["name"]), *fixed]), []).append(case.number)
-    number = 0
-    for name, numbers in others.items():
-        for method in _methods(campaign):
-            rms, low, high, sigma = (
-                np.array([_cell(last, case, method, column) for case in numbers])
-                for column in ("rms", "rms_low", "rms_high", "sigma")
-            )
-            if np.isfinite(rms).any():
-                bars = (np.maximum(rms - low, 0.0), np.maximum(high - rms, 0.0))
-                colour, words = f"c{number % 6}", f"{name}, {method}"
-                chart.points(0, values, rms, colour, words, size=6, key=True, error=bars, joined=True)
-                chart.line(0, values, sigma, colour, _("{method}, claimed sigma").format(method=words), dash="dash")
-                number += 1
-    wanted = 60.0 * float(np.degrees(plan.converged))
+def _requirement(campaign: Campaign, found: Requirement) -> Panel:
+    path, values = found.path, found.values
+    chart = Chart([_("heading RMS, arcmin")], found.words, height=400)
+    for number, line in enumerate(found.lines):
+        colour = f"c{number % 6}"
+        chart.points(0, values, line.rms, colour, line.name, size=6, key=True, error=line.bars, joined=True)
+        chart.line(0, values, line.sigma, colour, _("{method}, claimed sigma").format(method=line.name), dash="dash")
+    wanted = 60.0 * float(np.degrees(campaign.plan.converged))
     chart.line(
         0,
         values[[0, -1]],
@@ -225,29 +206,8 @@ def _requirement(campaign: Campaign, path: str) -> Panel:
     )
 
 
-def _methods(campaign: Campaign) -> list[str]:
-    return [method.name for method in campaign.plan.methods]
-
-
 def _rows(table: pd.DataFrame, case: int, method: str) -> pd.DataFrame:
     return table[(table["case"] == case) & (table["method"] == method) & (table["quantity"] == "phi_u")]
-
-
-def _last(summary: pd.DataFrame) -> pd.DataFrame:
-    """Heading of each method in each case at the end of the log, with a method's answers only."""
-    heading = summary[(summary["quantity"] == "phi_u") & summary["rms"].notna()]
-    return heading.sort_values("time_s").groupby(["case", "method"], observed=True).tail(1)
-
-
-def _cell(last: pd.DataFrame, case: int, method: str, column: str) -> float:
-    return float(np.asarray(last.loc[(case, method), column])) if (case, method) in last.index else np.nan
-
-
-def _number(text: object) -> float | None:
-    try:
-        return float(str(text).split()[0])
-    except (ValueError, IndexError):
-        return None
 
 
 def _folded(name: str) -> str:

@@ -1,0 +1,111 @@
+"""The last epoch of a track on the move as an `Alignment`, with its history; the verdict comes after."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from truenorth.alignment.in_motion_learnt import delay_of
+from truenorth.alignment.in_motion_start import departures
+from truenorth.alignment.in_motion_task import MovingTask
+from truenorth.alignment.moving import fifteen, moving_of
+from truenorth.alignment.result import NOT_ESTIMATED, Alignment, History
+from truenorth.alignment.task import deflection_covariance
+from truenorth.core.attitude import UNIFORM_SIGMA
+from truenorth.core.earth import normal_gravity
+from truenorth.core.errors import AlignmentError, UsageError
+from truenorth.core.position import Position
+from truenorth.errors.axes import standing
+from truenorth.records import OdometerRecord
+from truenorth.state.layout import BA, BG, PHI
+from truenorth.state.track import Track
+
+
+def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread: float) -> Alignment:
+    """The alignment at the end of a track, before any verdict; `spread` (rad): of heading, besides the filter's."""
+    place = track.position[-1]
+    sigma = track.sigma[-1]
+    try:
+        position = Position(
+            float(place[0]), float(place[1]), float(place[2]), float(np.max(sigma[6:8])), float(sigma[8])
+        )
+    except UsageError:
+        raise AlignmentError(
+            f"the solution runs away: a height of {place[2]:.3g} m at the end; the measurements do not hold it: check their clock, "
+            "axes and units, and the specification `imu`"
+        ) from None
+    history = _history(track, task)
+    covariance = history.phi_covariance[-1].copy()
+    covariance[2, 2] = min(covariance[2, 2] + spread**2, UNIFORM_SIGMA**2)
+    sensor = "odometer" if isinstance(task.odometer, OdometerRecord) else "velocity log"
+    mounting = None if task.odometer is None else (sensor, task.wheel.C_mb, task.wheel.lever_arm)
+    speed = np.linalg.norm(track.v_n, axis=1)
+    distance = float(np.trapezoid(speed, track.time))
+    prior = np.sqrt(task.spec.bias_variance)
+    prior[3:] = np.hypot(prior[3:], np.sqrt(task.spec.acting_variance(standing())))
+    moving = moving_of(track, distance, "motion" if method == "motion" else "the earth's rate", mounting)
+    delays = {
+        name: (sensor.latency + found[0], found[1])
+        for name, sensor in (("GNSS", task.antenna), ("odometer", task.wheel), ("velocity log", task.wheel))
+        if (found := delay_of(track, name)) is not None and found[1] < NOT_ESTIMATED * found[2]
+    }
+    # Navigation goes on from there: what heading is less sure of belongs to it, too.
+    moving = moving.less_sure(covariance[2, 2] - history.phi_covariance[-1][2, 2]) if spread else moving
+    moving = replace(moving, delays=delays)
+    return Alignment(
+        status="not_converged",
+        evidence=(),
+        method=method,
+        method_reason=why,
+        time=float(track.time[-1]),
+        C_nb=track.C_nb[-1],
+        phi_covariance=covariance,
+        phi_floor=history.phi_floor[-1],
+        gyro_bias=track.gyro_bias[-1],
+        gyro_bias_sigma=history.gyro_bias_sigma[-1],
+        gyro_bias_prior=prior[:3],
+        accel_bias=track.accel_bias[-1],
+        accel_bias_sigma=history.accel_bias_sigma[-1],
+        accel_bias_prior=prior[3:],
+        position=position,
+        imu=task.spec,
+        imu_source=f"specification {task.spec.name!r}",
+        duration=task.record.duration,
+        disturbance=np.full(3, np.nan),
+        history=history,
+        source=task.record.source,
+        moving=moving,
+    )
+
+
+def _history(track: Track, task: MovingTask) -> History:
+    P = fifteen(track)
+    sigma = np.sqrt(np.maximum(np.einsum("kii->ki", P), 0.0))
+    g = float(normal_gravity(task.position.lat, task.position.alt))
+    deflection = deflection_covariance(task.position.lat, g)
+    count = len(track.time)
+    aided = max((r for r in track.residuals if len(r.time)), key=lambda r: len(r.time), default=None)
+    innovation, expected, nis = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
+    if aided is not None:
+        last = np.searchsorted(aided.time, track.time, "right") - 1
+        known = last >= 0
+        innovation[known], expected[known] = aided.innovation[last[known]], aided.sigma[last[known]]
+        nis[known] = aided.nis[last[known]]
+    return History(
+        time=track.time,
+        C_nb=track.C_nb,
+        phi_covariance=P[:, PHI, PHI] + deflection,
+        phi_floor=np.broadcast_to(deflection, (count, 3, 3)),
+        departure=departures(task.record, track),
+        gyro_bias=track.gyro_bias,
+        gyro_bias_sigma=sigma[:, BG],
+        accel_bias=track.accel_bias,
+        accel_bias_sigma=sigma[:, BA],
+        innovation=innovation,
+        innovation_sigma=expected,
+        nis=nis,
+        innovation_of=aided.name if aided is not None else "nothing",
+        innovation_unit=aided.unit if aided is not None else "1",
+        innovation_axes=aided.axes if aided is not None else (),
+    )

@@ -1,0 +1,89 @@
+"""The aids of a navigation as they are given: which there are, how they sit, and how height is kept with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, get_args
+
+import numpy as np
+
+from truenorth.aiding.aids import WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.fixes import Fixes
+from truenorth.core.errors import UsageError
+from truenorth.navigation.result import Altitude
+from truenorth.state.evidence import Evidence, note
+from truenorth.state.mounting import Mounting
+from truenorth.state.state import Start
+
+AIDS = (Gnss, Odometer, VelocityLog, Barometer)
+USUAL = {"baro": WEATHER}
+
+
+def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
+    """The aids in the order in which their measurements are taken."""
+    aids: Sequence[Aid] = aid if isinstance(aid, list | tuple) else (aid,)
+    for a in aids:
+        if not isinstance(a, Aid):
+            raise UsageError(
+                f"aid {type(a).__name__} is not for navigation; expected {', '.join(k.__name__ for k in AIDS)}, or an object "
+                "with key, record and sources"
+            )
+    found = {a.key: a for a in aids}
+    if len(found) < len(aids):
+        raise UsageError(f"aid holds two of one kind: {', '.join(a.key for a in aids)}; expected one of each")
+    order = [kind.key for kind in AIDS]
+    return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
+
+
+def sits_as_found(given: dict[str, Any], begin: Start) -> bool:
+    """Whether the odometer sits and counts as an alignment on the move has found; mounts it so where nothing else is said."""
+    odometer, found = given.get("odometer"), begin.wheel
+    if found is None or not isinstance(odometer, Odometer):
+        return False
+    if odometer.mounting is None:
+        given["odometer"] = odometer.mounted(found)
+        return True
+    return bool(np.all(odometer.mounting.C_mb == found.C_mb)) and odometer.mounting.scale_sigma == found.scale_sigma
+
+
+def record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:
+    """The record of the aid of a kind; None where there is none."""
+    return next((a.record for a in given.values() if isinstance(a, kind)), None)
+
+
+def mounted_as(given: Mapping[str, Any], mountings: Mapping[str, Mounting]) -> dict[str, Any]:
+    """The aids with other mountings."""
+    return {key: a.mounted(mountings[key]) if isinstance(a, AIDS) else a for key, a in given.items()}
+
+
+def looked_at(given: Mapping[str, Any]) -> dict[str, Mounting]:
+    """Mountings that a second look can open."""
+    found = {kind.key: USUAL.get(kind.key, Mounting()) for kind in AIDS}
+    return found | {key: a.mounting for key, a in given.items() if getattr(a, "mounting", None) is not None}
+
+
+def kept_altitude(wanted: str | None, given: Mapping[str, Aid]) -> tuple[Altitude, list[Evidence]]:
+    """How height is kept with these aids, and what is to be said of it.
+
+    Raises
+    ------
+    UsageError
+        What is wanted, no aid measures.
+    """
+    gnss = record_of(given, Gnss)
+    heights = gnss is not None and bool(np.isfinite(gnss.alt).any())
+    if wanted is not None and wanted not in get_args(Altitude):
+        raise UsageError(f"altitude {wanted!r}; expected one of {', '.join(get_args(Altitude))}")
+    if wanted == "baro" and "baro" not in given:
+        raise UsageError("altitude 'baro' without a barometer's record; expected an aid `Barometer(record)`")
+    if wanted == "gnss" and not heights:
+        raise UsageError("altitude 'gnss' without heights of GNSS; expected an aid `Gnss(record)` with heights")
+    if wanted is not None:
+        return wanted, []  # type: ignore[return-value]  # one of the four
+    if heights:
+        return "gnss", []
+    if "baro" in given:
+        return "baro", []
+    if given.keys() - {"gnss", Fixes.key}:
+        return "free", [note("height.free")]
+    return "fixed", [note("height.fixed", "height_sensor")]
