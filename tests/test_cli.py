@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -235,6 +236,27 @@ def test_inspect(capsys, monkeypatch, log, tmp_path):
     assert code == 0
     assert (tmp_path / "log.png").stat().st_size > 10_000
     assert "Hz" in out
+
+
+def test_a_layout_under_a_name_of_ones_own(capsys, monkeypatch, log, tmp_path):
+    own, named = tmp_path / "day1.csv", tmp_path / "day2.yaml"
+    shutil.copy(log, own)
+    code, out, _ = run(capsys, monkeypatch, "inspect", own, "--write-layout", named)
+    assert (code, named.is_file(), own.with_suffix(".yaml").exists()) == (0, True, False)
+    assert "day2.yaml" in out
+    code, _, err = run(capsys, monkeypatch, "inspect", own, "--write-layout", named)
+    assert code == 2
+    assert "day2.yaml: is there already and is kept" in err
+    assert "--force" in err
+    named.write_text("spoilt")
+    assert run(capsys, monkeypatch, "inspect", own, "--force", "--write-layout", named)[0] == 0
+    assert "spoilt" not in named.read_text()
+    # The word behind the option may be the log.
+    assert run(capsys, monkeypatch, "inspect", "--write-layout", own)[0] == 0
+    assert own.with_suffix(".yaml").read_text() == named.read_text()
+    code, _, err = run(capsys, monkeypatch, "inspect", own, "--write-layout=day.txt")
+    assert code == 2
+    assert ".yaml" in err
 
 
 def test_near_the_vertical_the_combination_is_said_with_its_floor(capsys, monkeypatch, tmp_path):

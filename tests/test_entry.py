@@ -35,8 +35,12 @@ def test_place_in_degrees_and_a_table(still):
         tn.align(still, (40.0,), "navigation")
     with pytest.raises(tn.UsageError, match="place is missing"):
         tn.align(still)
-    with pytest.raises(tn.UsageError, match="as `place`, not as position"):
-        tn.align(still, position=(40.0, 118.0))
+    aid = tn.Odometer(tn.OdometerRecord(still.time, np.zeros(len(still)), "speed"))
+    for given in ({}, {"place": PLACE}, {"aid": aid}):
+        with pytest.raises(tn.UsageError, match=r"'position' is no option .*; write place=\(lat_deg, lon_deg, alt_m\)"):
+            tn.align(still, imu="navigation", position=(40.0, 118.0), **given)
+    with pytest.raises(tn.UsageError, match=r"'gnss' is no option .*; write aid=Gnss\(record\)"):
+        tn.align(still, PLACE, gnss=None)
     with pytest.raises(tn.UsageError, match="'passes' is no option of an alignment of a base that stays"):
         tn.align(still, PLACE, "navigation", passes=3)
     assert tn.inspect(still.to_frame()).samples == len(still)

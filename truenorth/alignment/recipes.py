@@ -68,14 +68,29 @@ class Request:
             None was given.
         """
         if self.place is None:
-            instead = f" as `place`, not as {', '.join(self.options)}" if self.options else ""
-            raise UsageError(
-                f"place is missing; expected a Position, or (lat, lon, alt) in degrees and metres{instead}"
-            )
+            misnamed = next((name for name in self.options if MEANT.get(name) == PLACE), None)
+            if misnamed is not None:
+                raise _no_option(misnamed, "")
+            raise UsageError("place is missing; expected a Position, or (lat, lon, alt) in degrees and metres")
         return self.place
 
 
 Run = Callable[[Request], Alignment]
+
+PLACE, IMU, AT = "place=(lat_deg, lon_deg, alt_m)", "imu=", "at="
+# What people who know other programs, or the procedures behind the recipes, write for an argument of `align`.
+MEANT = {
+    **dict.fromkeys(("position", "pos", "location", "origin", "lat", "latitude", "lon", "alt"), PLACE),
+    **dict.fromkeys(("spec", "specification", "imu_spec", "sensor"), IMU),
+    **dict.fromkeys(("epoch", "time"), AT),
+    **dict.fromkeys(("aids", "aiding", "sources"), "aid=[...]"),
+    "gnss": "aid=Gnss(record)",
+    "odometer": "aid=Odometer(record)",
+    "velocity": "aid=VelocityLog(record)",
+    "master": "aid=Master(record)",
+    "encoder": "aid=Indexer(record)",
+    "indexer": "aid=Indexer(record)",
+}
 
 
 @dataclass(frozen=True)
@@ -324,10 +339,21 @@ def align(
     try:
         return recipe(request)
     except TypeError as error:
-        wrong = next((name for name in options if f"unexpected keyword argument '{name}'" in str(error)), None)
+        refused = (
+            "unexpected keyword argument",
+            "multiple values for argument",
+            "multiple values for keyword argument",
+        )
+        wrong = next((name for name in options if any(f"{said} '{name}'" in str(error) for said in refused)), None)
         if wrong is None:
             raise
-        raise UsageError(f"{wrong!r} is no option of an alignment of {recipe.name}") from None
+        raise _no_option(wrong, recipe.name) from None
+
+
+def _no_option(name: str, of: str) -> UsageError:
+    if name in MEANT:
+        return UsageError(f"{name!r} is no option of an alignment; write {MEANT[name]}")
+    return UsageError(f"{name!r} is no option of an alignment of {of}")
 
 
 def _recipe(kinds: set[type]) -> Recipe:

@@ -18,7 +18,7 @@ from truenorth.cli.campaign import campaign
 from truenorth.cli.console import explain_compiling
 from truenorth.cli.example import example
 from truenorth.cli.faults import faults
-from truenorth.cli.files import FORCE, check_output, inputs
+from truenorth.cli.files import FORCE, check_output, inputs, with_layout_name
 from truenorth.cli.imu import imu
 from truenorth.cli.inspect import inspect
 from truenorth.cli.live import live
@@ -73,7 +73,7 @@ def _version(wanted: bool) -> None:
 def _main(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
     lang: str = typer.Option("en", "--lang", help="Language of verdicts and reports: en or zh; anywhere on the line."),
-    force: bool = typer.Option(  # taken off the line before, see main
+    force: bool = typer.Option(  # put first by main
         False, FORCE, help="Write over inputs, and into a folder with a result of another kind; anywhere on the line."
     ),
 ) -> None:
@@ -110,11 +110,11 @@ def main() -> None:
         words = sys.argv[1:]
         _speak_early(words)
         forced = FORCE in words
-        words = [word for word in words if word != FORCE]
+        words = with_layout_name([word for word in words if word != FORCE])
         if not forced:
             check_output(words)
         with protected([] if forced else inputs(words)):
-            app(args=_language_first(words))
+            app(args=[*([FORCE] if forced else []), *_language_first(words)])
     except TruenorthError as error:
         print(f"truenorth: {in_options(retold(str(error)))}", file=sys.stderr)
         sys.exit(error.exit_code)

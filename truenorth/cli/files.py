@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-FORCE = "--force"
-OUTPUTS = ("-o", "--output", "--plot")
+FORCE, LAYOUT = "--force", "--write-layout"
+OUTPUTS = ("-o", "--output", "--plot", LAYOUT)
 KINDS = {  # by command: the kind of result that it writes into its output folder
     "align": "Alignment",
     "live": "Alignment",
@@ -47,6 +47,20 @@ def inputs(words: Sequence[str]) -> Iterator[str]:
         if at != first and before not in OUTPUTS and option not in OUTPUTS and not folder:
             yield name
         before = word
+
+
+def with_layout_name(words: Sequence[str]) -> list[str]:
+    """The command line with ``--write-layout``, whose file need not be named, as one word with its file.
+
+    Only a word that ends in .yaml is its file: the word behind it may as well be the log.
+    """
+    found: list[str] = []
+    for word in words:
+        if found and found[-1] == f"{LAYOUT}=" and word.lower().endswith(".yaml"):
+            found[-1] += word
+        else:
+            found.append(f"{word}=" if word == LAYOUT else word)
+    return found
 
 
 def check_output(words: Sequence[str]) -> None:

@@ -6,7 +6,10 @@ import json
 from pathlib import Path
 from typing import Annotated
 
+import typer
+
 from truenorth.cli.console import make_console, print_written
+from truenorth.cli.files import LAYOUT
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Log, ReadingWindow, in_line
 from truenorth.cli.wording import in_options
@@ -23,18 +26,26 @@ Examples:
   truenorth inspect log.csv --lat 34.2 --plot log.png
   truenorth inspect bag/ --axes FLU --json
   truenorth inspect any.csv --write-layout
+  truenorth inspect day1.csv --write-layout day2.yaml
 """
 
 
 @command(EXAMPLES)
 def inspect(
+    context: typer.Context,
     log: Log,
     reading: ReadingWindow,
     lat: Annotated[float | None, option("Latitude, deg: lets the earth's rate be checked.")] = None,
     plot: Annotated[Path | None, option("Write a figure (.png, .svg, .pdf).", panel="Files")] = None,
     layout: Annotated[
-        bool, option("Write what the log was taken for as LOG.yaml next to it.", "--write-layout", panel="Files")
-    ] = False,
+        str | None,
+        option(
+            "Write what the log was taken for as LOG.yaml next to it, or as the file that is named.",
+            LAYOUT,
+            metavar="[<file.yaml>]",
+            panel="Files",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Look at a log: what it is taken for, rate, gaps, frozen or saturated samples, mistakes of units and axes, motion, noise."""
@@ -60,7 +71,11 @@ def inspect(
     if plot is not None:
         with atomic_path(plot) as path:
             found.plot().savefig(path)
-    written = write_layout(record, log) if layout else None
+    written = (
+        None
+        if layout is None
+        else write_layout(record, log, layout or None, replace=context.find_root().params["force"])
+    )
     if as_json:
         taken = [guess._asdict() for guess in record.taken_for]
         print(json.dumps(found.to_dict() | {"taken_for": taken}, allow_nan=False))

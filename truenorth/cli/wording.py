@@ -19,6 +19,7 @@ OPTIONS = {
     "mounting.latency": "--delay",
     "place": "--lat, --lon, --alt",
     "rate": "--rate",
+    "replace=True": "--force",
     "record.between": "--from, --to",
     "record.shifted": "--offset",
     "resume=False": "--no-resume",

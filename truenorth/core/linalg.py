@@ -131,5 +131,5 @@ def scaled_cholesky(A: Array) -> tuple[Array, Array]:
     """
     size = np.sqrt(np.maximum(np.diagonal(A, axis1=-2, axis2=-1), 0.0))
     if not np.all(size > 0.0):
-        raise np.linalg.LinAlgError("a diagonal that is not positive")
+        raise np.linalg.LinAlgError
     return size, np.linalg.cholesky(A / (size[..., :, None] * size[..., None, :]))

@@ -49,21 +49,40 @@ def layout_of(guesses: Sequence[Guess]) -> dict[str, Any]:
     return layout
 
 
-def write_layout(record: ImuRecord, path: str | PathLike[str]) -> Path:
+def write_layout(
+    record: ImuRecord, path: str | PathLike[str], target: str | PathLike[str] | None = None, *, replace: bool = False
+) -> Path:
     """Write what a reader took a log for as ``LOG.yaml`` next to it, which the reader then obeys.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    path : path
+        Of the log.
+    target : path, optional
+        Another place for the file: the ``LOG.yaml`` of another log of the same kind.
+    replace : bool
+        Write over a file that is there.
 
     Raises
     ------
     UsageError
-        There is such a file, which is not replaced.
+        There is such a file, which is not replaced; a name that does not end in ``.yaml``.
     """
     import yaml
 
     from truenorth.core.atomic import atomic_path
 
-    target = Path(path).with_suffix(".yaml")
-    if target.exists():
-        raise UsageError(f"{target}: is there already; remove it, or edit it by hand")
+    target = Path(path).with_suffix(".yaml") if target is None else Path(target)
+    if target.suffix.lower() != ".yaml":
+        raise UsageError(
+            f"{target}: no name of a layout; expected one that ends in .yaml, and is that of a log otherwise"
+        )
+    if target.exists() and not replace:
+        raise UsageError(
+            f"{target}: is there already and is kept; edit it by hand, name another file, or replace it by "
+            "`replace=True`"
+        )
     with atomic_path(target) as temporary:
         temporary.write_text(yaml.safe_dump(layout_of(record.taken_for), sort_keys=False, allow_unicode=True), "utf-8")
     return target
