@@ -13,6 +13,7 @@ import yaml
 
 from tests.campaign.test_plan import PLAN, REST
 from tests.helpers import run_command
+from truenorth.cli.console import make_console
 from truenorth.core.position import Position
 from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
@@ -257,6 +258,15 @@ def test_a_layout_under_a_name_of_ones_own(capsys, monkeypatch, log, tmp_path):
     code, _, err = run(capsys, monkeypatch, "inspect", own, "--write-layout=day.txt")
     assert code == 2
     assert ".yaml" in err
+
+
+def test_lines_are_whole_where_no_terminal_reads_them(capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    make_console().print(" ".join(["word"] * 60))
+    assert len(capsys.readouterr().out.splitlines()) == 1
+    monkeypatch.setenv("COLUMNS", "80")
+    make_console().print(" ".join(["word"] * 60))
+    assert len(capsys.readouterr().out.splitlines()) == 4
 
 
 def test_near_the_vertical_the_combination_is_said_with_its_floor(capsys, monkeypatch, tmp_path):

@@ -65,6 +65,7 @@ def test_shown_in_a_notebook(results, name):
     html = result._repr_html_()
     assert "<table>" in html
     assert "data:image/png" in html
+    assert len(html) < 100_000  # a notebook keeps each one
     assert result._repr_png_().startswith(b"\x89PNG")
     assert len(result.to_frame())
 

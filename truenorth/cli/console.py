@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -16,13 +17,19 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]  # done and total
 COMPILING = "truenorth.core.kernel_store"  # the log that has a line for each kernel that is compiled
+WITHOUT_TERMINAL = 400  # columns: wider than any table of ours
 
 
 def make_console(*, stderr: bool = False) -> Console:
-    """A console that takes brackets for brackets, also those in the name of a log such as ``run[red].csv``."""
+    """A console that takes brackets for brackets, also those in the name of a log such as ``run[red].csv``.
+
+    A file or a pipe has no width: tables keep their columns whole there, and sentences their lines.
+    """
     from rich.console import Console
 
-    return Console(stderr=stderr, highlight=False, markup=False, emoji=False)
+    stream = sys.stderr if stderr else sys.stdout
+    width = None if stream.isatty() or "COLUMNS" in os.environ else WITHOUT_TERMINAL
+    return Console(stderr=stderr, highlight=False, markup=False, emoji=False, width=width)
 
 
 def drawing() -> bool:
