@@ -131,7 +131,8 @@ def test_what_a_message_names_has_an_option():
     from truenorth.cli import app
     from truenorth.cli.wording import OPTIONS
 
-    parameters = [p for command in get_command(app).commands.values() for p in command.params]
+    program = get_command(app)
+    parameters = [p for command in (program, *program.commands.values()) for p in command.params]
     known = {flag for p in parameters for flag in (*p.opts, *p.secondary_opts)}
     text = "".join(path.read_text("utf-8") for name, path in FILES.items() if folder(name) != "cli")
     for name, option in OPTIONS.items():
