@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
+from truenorth.aiding.source import Aiding
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.earth import earth_rate_n, normal_gravity
+from truenorth.errors.model import InsModel
 from truenorth.estimate import predict
 from truenorth.estimate.memory import Samples
+from truenorth.estimate.run import navigate_track
+from truenorth.records import ImuRecord
 from truenorth.state.now import NOW_LENGTH, NOW_OTHER_RATE, NOW_RATE
+from truenorth.state.state import Start
 
 
 @pytest.fixture
@@ -47,3 +54,28 @@ def test_both_rates_have_noises_of_their_own(described, done):
     assert 0.02 * np.sum(other) == pytest.approx(1.0)
     assert 0.02**2 * rate @ rate < 1.2
     assert 0.02**2 * other @ other < 0.55
+
+
+@pytest.mark.parametrize("kind", ["velocity", "body velocity"])
+def test_a_sensor_on_an_arm_moves_with_the_rate_of_its_own_time(kind):
+    """A base turns to and fro about the vertical: exactly ``w x l`` half a second after the last event, not that of before."""
+    dt, size, w = 0.01, 0.4, 2.0 * np.pi * 0.7  # s, rad, rad/s
+    t = dt * np.arange(1501)
+    psi = size * np.sin(w * t)
+    C = dcm_from_euler(psi, np.zeros_like(psi), np.zeros_like(psi))
+    earth, middle = earth_rate_n(0.7), 0.5 * (C[1:] + C[:-1])
+    dtheta = dt * np.einsum("kji,j->ki", middle, earth) - np.diff(psi)[:, None] * [0.0, 0.0, 1.0]
+    dvel = np.tile([0.0, 0.0, float(normal_gravity(0.7, 0.0)) * dt], (1500, 1))
+    record = ImuRecord(t[1:], dtheta, dvel, kind="increments")
+    start = Start(0.0, C[0], np.zeros(3), 0.7, 0.1, 0.0, np.zeros(3), np.zeros(3), 1e-16 * np.eye(15))
+    at = np.arange(1.0, 14.0)
+    arm = np.array([0.5, 3.0, 1.0])
+    rate = size * w * np.cos(w * at)[:, None] * [0.0, 0.0, -1.0]
+    shown = np.cross(rate, arm)
+    if kind == "velocity":
+        shown = np.einsum("kij,kj->ki", dcm_from_euler(size * np.sin(w * at), 0.0 * at, 0.0 * at), shown)
+    source = Aiding("sensor", kind, at, shown, np.full((len(at), 3), 0.05), arm)
+    track = navigate_track(record, start, InsModel(0.0, 0.0), [source], interval=0.5)
+    late = 0.25 * size * w**2 * np.linalg.norm(arm[:2])  # m/s, of the mean over half a second
+    assert late > 5.0 * 0.05
+    assert np.abs(track.residuals[0].innovation).max() < 0.003 * late

@@ -31,7 +31,7 @@ items = st.builds(
     Evidence,
     key=st.just("text"),
     figures=st.just({"text": "seen"}),
-    kind=st.sampled_from(["known", "bounded", "unknown"]),
+    kind=st.sampled_from(["hint", "known", "bounded", "unknown"]),
     effect=effects,
 )
 
@@ -40,7 +40,7 @@ items = st.builds(
 def test_what_has_no_effect_changes_nothing(claim, evidence):
     """A note, and evidence of any kind whose effect is zero."""
     before = judge(claim, evidence)
-    for kind in ("note", "known", "bounded", "unknown"):
+    for kind in ("note", "hint", "known", "bounded", "unknown"):
         after = judge(claim, [*evidence, Evidence("text", {"text": ""}, kind, NO_EFFECT)])
         assert (after.finding, after.sigma, after.added) == (before.finding, before.sigma, before.added)
     assert judge(claim, [*evidence, Evidence("text", {"text": ""}, "note", ANY_EFFECT)]).finding == before.finding
@@ -91,6 +91,18 @@ def test_what_is_added_is_in_sigma():
     claim = Claim(Effect(3e-3, 1e-4, math.inf, math.inf), heading_limit=0.1)
     verdict = judge(claim, [Evidence("text", {}, "known", Effect(heading=4e-3))])
     assert (verdict.finding, verdict.sigma.heading, verdict.sigma.level) == ("good", pytest.approx(5e-3), 1e-4)
+
+
+@given(claims, items)
+def test_what_chance_may_have_shown_refuses_nothing(claim, item):
+    """However large: its effect is in sigma, which may then be too large to be of use."""
+    item = replace(
+        item, kind="hint", effect=Effect(*(size if math.isfinite(size) else 0.0 for _, size in item.effect.items()))
+    )
+    verdict = judge(claim, [item])
+    assert verdict.finding != "inconsistent"
+    for name in OUTPUTS:
+        assert getattr(verdict.sigma, name) >= getattr(claim.sigma, name)
 
 
 def test_a_sigma_that_grows_beyond_its_limit_is_no_good():

@@ -157,4 +157,5 @@ BODY_VELOCITY = Row(
     _body_velocity,
     {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1, "own": 2},
     axes=BODY_FRAME,
+    swings=True,
 )

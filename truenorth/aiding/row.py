@@ -53,6 +53,9 @@ class Row:
         Numbers in a measurement, at most `LARGEST`.
     instant : bool
         It needs rate and specific force at its very time; the loop then waits for the three samples after it.
+    swings : bool
+        A velocity: where its sensor sits on an arm it needs the rate at its very time, too. The mean since the last event, T ago,
+        is that of ``T / 2`` before: an antenna two metres away would be off by ``.5 a T l``, decimetres a second on rough ground.
     unit : str
         Of `z`, SI: what its innovations are shown in.
     axes : tuple of str
@@ -65,6 +68,7 @@ class Row:
     rows: int = 3
     width: int = 3
     instant: bool = False
+    swings: bool = False
     unit: str = "m/s"
     axes: tuple[str, ...] = LEVEL_FRAME
 

@@ -125,6 +125,12 @@ class Aiding:
         """Its compiled row."""
         return KINDS[self.kind] if isinstance(self.kind, str) else self.kind
 
+    @property
+    def instant(self) -> bool:
+        """Whether its rows need the rate at their very time."""
+        on_an_arm = bool(self.lever_arm.any()) or "lever arm" in self.states
+        return self.row.instant or (self.row.swings and on_an_arm)
+
     def gates(self) -> Array:
         """(3,) limits of the normalised innovation squared of one, two and three rows."""
         if self.gate <= 0.0:

@@ -69,4 +69,4 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             H[j, at[AT_OWN] + j] = -1.0
 
 
-VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "own": 2})
+VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "own": 2}, swings=True)

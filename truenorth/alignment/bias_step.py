@@ -25,7 +25,7 @@ from truenorth.filters.gains import times
 from truenorth.quality.regimes import KINDS
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
-from truenorth.state.limits import limit
+from truenorth.state.limits import limit, may_be_chance
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list
         "heading": heading,
         "level": level,
     }
-    kind: Kind = "bounded" if ratio[best] > limit("drift") else "known"  # what may be chance is added to sigma
+    kind: Kind = "hint" if may_be_chance(float(ratio[best])) else "bounded"
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 

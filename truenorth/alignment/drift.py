@@ -20,7 +20,7 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Match, Signatures
 from truenorth.errors.staying import PHI
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind
-from truenorth.state.limits import limit
+from truenorth.state.limits import limit, may_be_chance
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class Drift:
     @property
     def sure(self) -> bool:
         """Whether chance is ruled out."""
-        return self.ratio > limit("drift")
+        return not may_be_chance(self.ratio)
 
     def evidence(self) -> Evidence:
         """The drift, with its effect: another course of the same size does about as much."""
@@ -64,7 +64,7 @@ class Drift:
             "heading": self.heading,
             "level": self.level,
         }
-        kind: Kind = "bounded" if self.sure else "known"  # what may be chance is added to sigma
+        kind: Kind = "bounded" if self.sure else "hint"
         return Evidence(f"drift.{self.kind}", figures, kind, Effect(self.heading, self.level), remedies=("still_part",))
 
 

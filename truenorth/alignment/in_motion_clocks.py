@@ -13,8 +13,8 @@ from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
 from truenorth.records import ImuRecord, OdometerRecord
-from truenorth.state.evidence import Effect, Evidence
-from truenorth.state.limits import limit
+from truenorth.state.evidence import Effect, Evidence, Kind
+from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -38,14 +38,16 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
             late = open_.run(guess, gated=gated)
         except DataError:  # the filter broke down: no explanation
             return []
-        if likelihood_ratio(track.residuals, late.residuals) > limit("rival"):
+        ratio = likelihood_ratio(track.residuals, late.residuals)
+        if ratio > limit("rival"):
+            kind: Kind = "hint" if may_be_chance(ratio) else "known"
             lags = {name: delay_of(late, name) for name in shut}
             off = {name: lag for name, lag in lags.items() if lag is not None and abs(lag[0]) > SHOWN_DELAY * lag[1]}
             whole = moved(track, late)
             share = Effect(*(size / math.sqrt(max(len(off), 1)) for _, size in whole.items()))
             for name, lag in off.items():
                 key, mounting = shut[name]
-                found.append(replace(wrong_lag(name, key, mounting, lag[0], lag[1]), kind="known", effect=share))
+                found.append(replace(wrong_lag(name, key, mounting, lag[0], lag[1]), kind=kind, effect=share))
         task, track = open_, late
 
     def other(record: ImuRecord) -> Track:

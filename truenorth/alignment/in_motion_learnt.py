@@ -5,7 +5,8 @@ the mean square of the *difference* of innovations that follow each other is the
 large as the variances ``S = H P H' + R`` say, R is ``1 + (q - 1) S / R`` times too small, and the next pass takes it as large. What
 is slow is left to the verdict (:mod:`truenorth.quality.innovations`).
 
-A delay acts as its first derivative as long as it is short against manoeuvres; the next pass begins with the delay found.
+A delay acts as its first derivative as long as it is short against manoeuvres, and on an arm against the tremble of the vehicle;
+the next pass begins with the delay found.
 
 Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970).
 """
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
 MEDIAN = 0.4549  # of chi-square with one degree of freedom
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
-LEAST_DELAY = 0.1  # s: a shorter one acts as its derivative
+LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word
 
 

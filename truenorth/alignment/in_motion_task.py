@@ -47,9 +47,7 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 SHORTEST = 10.0  # s
-# s, of the filter's prediction; with an antenna, since the rate that moves it on its arm is the mean since the last event: with
-# half a second the tremble of a vehicle on the road looked like gyros that are .06 s early.
-INTERVAL, INTERVAL_WITH_ARM = 0.5, 0.1
+INTERVAL = 0.5  # s, of the filter's prediction
 OUTPUT = 1.0  # s, of the history
 NO_LOG_ERRORS = LogErrors()
 WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
@@ -136,8 +134,8 @@ class MovingTask:
             start,
             with_states(self.model, used),
             used,
-            interval=_interval(self.gnss),
-            every=max(1, round(OUTPUT / _interval(self.gnss))),
+            interval=INTERVAL,
+            every=max(1, round(OUTPUT / INTERVAL)),
             invariant=self.odometer is not None,
         )
 
@@ -185,7 +183,7 @@ def moving_task(
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)
-        stops += updates_at(record, still, disturbed, _interval(gnss))
+        stops += updates_at(record, still, disturbed, INTERVAL)
     return MovingTask(
         record,
         spec,
@@ -200,10 +198,6 @@ def moving_task(
         waited=waited,
         usual_fixes=antenna is None,
     )
-
-
-def _interval(gnss: GnssRecord | None) -> float:
-    return INTERVAL if gnss is None else INTERVAL_WITH_ARM
 
 
 def _from_the_first_aid(

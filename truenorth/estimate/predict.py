@@ -93,13 +93,20 @@ def describe(m: Memory, model: Model, now: Any) -> None:
         now[NOW_FORCE_W + j] = force[j]
         now[NOW_FORCE_B + j] = m.means.vectors[3, j]
     for j in range(3):
-        now[NOW_TURN + j] = m.means.vectors[2, j] - (
-            C[0, j] * now[NOW_EARTH] + C[1, j] * now[NOW_EARTH + 1] + C[2, j] * now[NOW_EARTH + 2]
-        )
+        now[NOW_TURN + j] = m.means.vectors[2, j] - _earth_along(now, j)
     now[NOW_SINCE] = m.means.T[0]
     now[NOW_GYRO_NOISE] = model.dynamics.noise[_PHI]
     now[NOW_BEHIND] = 0.0
     now[NOW_NORTH], now[NOW_NORTH + 1] = azimuth(s)
+
+
+@borrowing(forceinline=True)
+def _earth_along(now: Any, j: int) -> float:
+    """The earth's rate along an axis of the body, rad/s."""
+    total = 0.0
+    for k in range(3):
+        total += now[NOW_C + 3 * k + j] * now[NOW_EARTH + k]
+    return total
 
 
 @borrowing(forceinline=True)
@@ -166,6 +173,8 @@ def describe_instant(samples: Samples, i: int, done: float, model: Model, aux: A
             now[NOW_OTHER_RATE + j] = off - aux[_BG + j]
             if slow_gyro >= 0:
                 now[NOW_OTHER_RATE + j] -= aux[slow_gyro + j]
+    for j in range(3):
+        now[NOW_TURN + j] = now[NOW_RATE + j] - _earth_along(now, j)
 
 
 @borrowing(forceinline=True)

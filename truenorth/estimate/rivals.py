@@ -26,8 +26,8 @@ from truenorth.quality.density import burst_evidence
 from truenorth.quality.innovations import whiteness
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure
-from truenorth.state.limits import limit
+from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, Kind
+from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.track import Residuals
 from truenorth.strapdown.increments import without_gaps
 
@@ -140,7 +140,8 @@ def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: 
         "heading": effect.heading,
         "level": effect.level,
     }
-    return [Evidence(f"rival.{sensor}_wanders", figures, "known", effect, ("specification",))]
+    kind: Kind = "hint" if may_be_chance(ratio) else "known"
+    return [Evidence(f"rival.{sensor}_wanders", figures, kind, effect, ("specification",))]
 
 
 def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRecord) -> list[Evidence]:

@@ -227,7 +227,7 @@ def _stacked(first: ImuRows, second: ImuRows) -> ImuRows:
 def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Track]:
     model, sources = setting.model, setting.sources
     n, there = model.states, len(state.samples.end)
-    wait = AHEAD if any(source.row.instant for source in sources) and not last else 0
+    wait = AHEAD if any(source.instant for source in sources) and not last else 0
     # The first sample needs the second: the one before it is not there.
     horizon = max(state.taken, there - wait) if not state.fresh or there > 1 or last else 0
     if state.fresh and not horizon:
@@ -334,7 +334,7 @@ def kernel_sources(aiding: Sequence[Aiding], model: InsModel) -> Sources:
         states,
         gates,
         np.array([source.loop for source in aiding], dtype=np.float64),
-        np.array([source.row.instant for source in aiding], dtype=np.bool_),
+        np.array([source.instant for source in aiding], dtype=np.bool_),
         np.array([source.patience if source.opens is not None else NEVER for source in aiding], dtype=np.int64),
         opens,
     )

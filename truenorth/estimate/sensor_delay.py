@@ -22,8 +22,8 @@ from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
-from truenorth.state.evidence import Evidence, Figure
-from truenorth.state.limits import limit
+from truenorth.state.evidence import Evidence, Figure, Kind
+from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record:
         step = _likelier(run, track, record, rows)
         if step is None:
             break
-        ratio = ratio or step[2]
+        ratio += step[2]
         rows, track = step[:2]
     if rows == 0:
         return []
@@ -63,7 +63,8 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record:
         "heading": effect.heading,
         "level": effect.level,
     }
-    return [Evidence(f"delay.gyros_{'late' if rows > 0 else 'early'}", figures, "known", effect, ("common_clock",))]
+    kind: Kind = "hint" if may_be_chance(ratio) else "known"
+    return [Evidence(f"delay.gyros_{'late' if rows > 0 else 'early'}", figures, kind, effect, ("common_clock",))]
 
 
 def _likelier(

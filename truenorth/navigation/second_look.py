@@ -20,7 +20,7 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 SMALL = 10.0  # times its prior: beyond it a small-angle model does not hold
-CLEAR = 6.0  # sigmas from which a contradiction is worth a warning; from HINT on its effect is added to sigma
+CLEAR = 6.0  # sigmas from which a contradiction is worth a warning; from HINT on its effect is added to sigma, however large
 HINT = 3.5
 LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data do not show it
 MOST_CONTRADICTED = 0.2  # of a sensor's measurements
@@ -98,7 +98,7 @@ def second_look(
         return found
     whole = moved(first, track)
     share = Effect(*(size / math.sqrt(len(against)) for _, size in whole.items()))
-    return [replace(item, kind="known", effect=share) for item in against] + found
+    return [replace(item, kind="known" if item.urgent else "hint", effect=share) for item in against] + found
 
 
 def _contradicted(track: Track) -> float:

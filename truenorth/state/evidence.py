@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["note", "known", "bounded", "unknown"]
+Kind = Literal["note", "hint", "known", "bounded", "unknown"]
 Figure = float | int | str
 OUTPUTS = ("heading", "level", "velocity", "position")
 
@@ -41,8 +41,9 @@ class Evidence:
     # what was seen, such as ``drift.step``; the text that belongs to it stands in :mod:`truenorth.state.english`
     key: str
     figures: Mapping[str, Figure] = field(default_factory=dict)  # what the text needs, SI
-    # ``note``: worth knowing, no effect. ``known``: an error whose one-sigma size is known. ``bounded``: a suspicion that, if
-    # it is true, has an effect of at most this size. ``unknown``: the model does not hold, and nobody knows what that does.
+    # ``note``: worth knowing, no effect. ``hint``: an error that chance may have shown, of a known one-sigma size if it is there.
+    # ``known``: an error whose one-sigma size is known. ``bounded``: a suspicion that, if it is true, has an effect of at most
+    # this size. ``unknown``: the model does not hold, and nobody knows what that does.
     kind: Kind = "note"
     # one sigma, or the bound, of the error in each output; an output whose effect is zero is not touched
     effect: Effect = NO_EFFECT

@@ -59,15 +59,15 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
 
     An effect that is small compared with sigma is a note. One whose size is known, or bounded by sigma, is added to sigma.
     What can make the answer wrong by more than sigma says makes the result inconsistent. An output that the result does
-    not give cannot be made wrong.
+    not give cannot be made wrong. A hint, which chance gives sound logs too, is added however large it is: it refuses none.
 
     Parameters
     ----------
     claim : Claim
     evidence : iterable of Evidence
     """
-    deciding, adding, rest = [], [], []
-    added = NO_EFFECT
+    deciding, adding, hints, rest = [], [], [], []
+    added = hinted = NO_EFFECT
     given = claim.sigma
     if given.heading > claim.heading_limit:  # refused, whatever else is found
         given = replace(given, heading=claim.heading_limit if claim.able else math.inf)
@@ -75,6 +75,9 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
         size = weight(item.effect, given)
         if item.kind == "note" or size <= limit("negligible"):
             rest.append(item)
+        elif item.kind == "hint" and math.isfinite(size):
+            hinted = hinted.joined(_on(item.effect, given))
+            hints.append(item)
         elif size <= (limit("growth") if item.kind == "known" else limit("bound")) and item.kind != "unknown":
             added = added.joined(_on(item.effect, given))
             adding.append(item)
@@ -84,9 +87,10 @@ def judge(claim: Claim, evidence: Iterable[Evidence]) -> Verdict:
     if not deciding and weight(added, given) > limit("growth"):
         deciding, adding = adding, []
     if deciding:
-        return Verdict("inconsistent", claim.sigma, NO_EFFECT, (*deciding, *adding, *rest))
+        return Verdict("inconsistent", claim.sigma, NO_EFFECT, (*deciding, *adding, *hints, *rest))
+    added = added.joined(hinted)
     sigma = claim.sigma.joined(added)
-    return Verdict(_reached(replace(claim, sigma=sigma)), sigma, added, (*adding, *rest))
+    return Verdict(_reached(replace(claim, sigma=sigma)), sigma, added, (*adding, *hints, *rest))
 
 
 def weight(effect: Effect, sigma: Effect) -> float:

@@ -47,7 +47,7 @@ LIMITS: dict[str, Limit] = {
     "hint": Limit(
         12.0,
         "1",
-        "the same, of which chance gives as much in 5e-4 of signatures: its effect is added to sigma, no more",
+        "the same, of which chance gives as much in 5e-4 of signatures: its effect is added to sigma, however large",
     ),
     "hemisphere": Limit(
         15.0,
@@ -57,7 +57,8 @@ LIMITS: dict[str, Limit] = {
     "rival": Limit(
         10.0,
         "1",
-        "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 148, by Markov's inequality",
+        "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 148, by Markov's inequality: up to the "
+        "limit of a drift, which one of 268,000 exceeds, a hint whose effect is added to sigma, however large",
     ),
     # ---- measurements of aiding sensors and masters
     "rejected": Limit(
@@ -76,3 +77,8 @@ LIMITS: dict[str, Limit] = {
 def limit(name: str) -> float:
     """The value of a limit."""
     return LIMITS[name].value
+
+
+def may_be_chance(ratio: float) -> bool:
+    """Whether sound logs have such a likelihood ratio now and then: what it shows is a hint, and refuses no log."""
+    return ratio <= limit("drift")

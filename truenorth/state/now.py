@@ -9,7 +9,7 @@ from truenorth.core.compiled import borrowing, compiled
 # Places in the vector `now`: the state of strapdown.wander first (24 numbers, along the level frame w), then
 NOW_C = 24  # C_wb, 9, by rows
 NOW_MEAN_RATE = 33  # mean of w_ib_b since the last event, rad/s, sensor errors taken off
-NOW_TURN = 36  # rate of the body against the earth, body axes, from that mean, rad/s
+NOW_TURN = 36  # rate of the body against the earth, body axes, rad/s: by that mean, or by `NOW_RATE` once that is there
 NOW_PUSH = 39  # dv_w/dt by the mean specific force since the last event, m/s^2
 NOW_EARTH = 42  # the earth's rate along w, rad/s
 NOW_RATE = 45  # w_ib_b at this very time, rad/s: for rows that ask for it (`instant`)
