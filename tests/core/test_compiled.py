@@ -202,6 +202,41 @@ def test_a_torn_file_is_compiled_anew(tmp_path):
     assert run(CALL.format(folder=str(folder)), tmp_path) == ["4.0 3.0", "0 1", "0 1"]
 
 
+ARRAYS = """
+import sys
+sys.path.insert(0, {folder!r})
+import plugin_arrays
+
+for n in (2, 5, -1):
+    try:
+        print(plugin_arrays.filled(n))
+    except ValueError as error:
+        print(error)
+print("numba.np.arrayobj" in sys.modules)
+"""
+
+
+def test_kernels_that_make_arrays_come_from_the_disk_without_what_compiled_them(tmp_path):
+    """It takes longer to load than the kernel; what they say in errors, Numba's own among it, stays."""
+    kernel = """
+import numpy as np
+from truenorth.core.compiled import compiled
+
+@compiled
+def filled(n):
+    a = np.zeros(n)
+    for i in range(n):
+        a[i] = i + 1.0
+    if n > 3:
+        raise ValueError("too many")
+    return a[0] + a[1]
+"""
+    folder = write(tmp_path / "code", plugin_arrays=kernel)
+    said = ["3.0", "too many", "negative dimensions not allowed"]
+    assert run(ARRAYS.format(folder=str(folder)), tmp_path) == [*said, "True"]
+    assert run(ARRAYS.format(folder=str(folder)), tmp_path) == [*said, "False"]
+
+
 MADE_ANEW = """
 import sys
 import numpy as np

@@ -9,10 +9,12 @@ code under the wrong number.
 from __future__ import annotations
 
 import hashlib
+import io
 import logging
 import os
 import pickle
 import re
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -23,11 +25,12 @@ from typing import Any
 
 from numba.core import config
 from numba.core.compiler import CompileResult
+from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
-from truenorth.core.inner_library import KIND, InnerLibrary
+from truenorth.core.inner_library import KIND, InnerLibrary, ReadyLibrary
 
 PACKAGE = Path(__file__).parents[1]
 BOUND = 512 * 2**20  # bytes that the kernels of all versions may take, before the longest unused go
@@ -65,7 +68,7 @@ class KernelStore:
         for folder in folders() if name else ():
             payload = _read(folder / str(name))
             if payload is not None:
-                return _rebuilt(target, *payload)
+                return _rebuilt(target, "callback" in self.options, *payload)
         if name and "<locals>" in self.function.__code__.co_qualname:
             # The linker takes what has one name for one function, and a function made anew has the name of the last.
             self.function.__qualname__ = f"{self.function.__code__.co_qualname}.{Path(name).stem[-16:]}"
@@ -139,16 +142,17 @@ def write_folder() -> Path | None:
     return None
 
 
-def _rebuilt(target: Any, code: Any, fndesc: Any, environment: Any, *rest: Any) -> Any:
-    """A kernel from what it was reduced to; Numba's own rebuilds none that has no machine code."""
-    if code[1] != KIND:
+def _rebuilt(target: Any, callback: bool, code: Any, fndesc: Any, environment: Any, *rest: Any) -> Any:
+    """A kernel from what it was reduced to: with the code that it is used for, Numba's own rebuilds all of it."""
+    if callback:
         return CompileResult._rebuild(target, code, fndesc, environment, *rest)
     signature, objectmode, lifted, annotation, initial, environments = rest
     for begin in initial:
         begin()
-    library = InnerLibrary._unserialize(target.codegen(), code)
+    kind: Any = InnerLibrary if code[1] == KIND else ReadyLibrary
+    library = kind._unserialize(target.codegen(), code)
     result: Any = CompileResult
-    return result(
+    kernel = result(
         typing_context=target.typing_context,
         target_context=target,
         library=library,
@@ -165,6 +169,37 @@ def _rebuilt(target: Any, code: Any, fndesc: Any, environment: Any, *rest: Any) 
         reload_init=initial,
         referenced_envs=environments,
     )
+    if kind is ReadyLibrary:
+        for other in environments:  # of the kernels that it took up
+            library.codegen.set_env(other.env_name, other)
+    return kernel
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads a kernel without the modules of Numba that parts of its code come from.
+
+    Code of ours that makes an array has taken up Numba's own, whose environment Numba ties to its module: what that knows of NumPy
+    for compiling takes .03 s to load. Compiled code asks its environment for constants only, never for names of the module.
+    """
+
+    def find_class(self, module: str, name: str, /) -> Any:
+        """What a name stands for."""
+        if (module, name) == ("numba.core.environment", "_rebuild_env"):
+            return _environment
+        return super().find_class(module, name)
+
+
+def _environment(module: str, constants: Any, name: str) -> Any:
+    """An environment; one of Numba's own code has nothing of its module but the name, where that is not loaded."""
+    if module in sys.modules or not module.startswith("numba."):
+        return _rebuild_env(module, constants, name)
+    found = lookup_environment(name)
+    if found is None:
+        found = Environment({"__name__": module})
+        found.consts[:] = constants
+        found.env_name = name
+        Environment._memo[name] = found
+    return found
 
 
 def _read(path: Path) -> Any:
@@ -179,7 +214,7 @@ def _read(path: Path) -> Any:
         if time.time() - path.stat().st_mtime > DAY:
             os.utime(path)  # used today: the last to be pruned
     try:
-        return pickle.loads(content[SUM:])
+        return _Unpickler(io.BytesIO(content[SUM:])).load()
     except ImportError:  # of a module that was run from a file without a name to import it by
         return None
 
