@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.linalg import Size, padded
 from truenorth.filters.gains import Gains, through
 
 Array = NDArray[np.float64]
@@ -124,7 +125,9 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     energies = np.empty((len(behind), n + courses, n + courses))
     matches, ends = np.empty((len(behind), n + courses, right)), np.empty((len(behind), n, n + courses))
     arrays = (gains.step, gains.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
-    _sum_back(*(np.ascontiguousarray(a) for a in arrays), behind.astype(np.int64), energies, matches, ends)
+    whole = tuple(np.ascontiguousarray(a) for a in arrays)
+    states = padded(n)
+    _sum_back(states, padded(len(states) + courses), *whole, behind.astype(np.int64), energies, matches, ends)
 
     found, first = [], n
     for bank in banks:
@@ -155,6 +158,8 @@ def _match(seen: Innovations, bank: Signatures, energies: Array, matches: Array,
 
 @compiled
 def _sum_back(
+    states: Size,
+    size: Size,
     step: Any,
     H_Phi: Any,
     gain: Any,
@@ -167,13 +172,17 @@ def _sum_back(
     matches: Any,
     ends: Any,
 ) -> None:
-    """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last error of it."""
-    n, m, size, right = step.shape[1], gain.shape[2], energies.shape[1], matches.shape[2]
-    energy, match, end = np.zeros((size, size)), np.zeros((size, right)), np.zeros((n, size))
+    """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last error of it.
+
+    Forms are squares of `size`, with zeros at their ends; of the states there are as many as `states` says, the last of them
+    zero.
+    """
+    N, n, m, right = len(size), step.shape[1], gain.shape[2], matches.shape[2]
+    energy, match, end = np.zeros((N, N)), np.zeros((N, right)), np.zeros((n, N))
     for i in range(n):
         end[i, i] = 1.0
     # e goes on as F (e, w), and is seen, made white, as G (e, w).
-    F, G, T = np.zeros((n, size)), np.zeros((m, size)), np.zeros((size, size))
+    F, G, T = np.zeros((len(states), N)), np.zeros((m, N)), np.zeros((N, N))
     before, match_before, end_before = np.zeros_like(energy), np.zeros_like(match), np.zeros_like(end)
     row = len(behind) - 1
     for k in range(step.shape[0] - 1, -1, -1):
@@ -185,85 +194,110 @@ def _sum_back(
         if row < 0:
             break
         _go_on(step[k], H_Phi[k], gain[k], A[k], U, F, G)
-        _whiten(L[k], G)
-        _times_course(energy, F, T)
-        _course_times(F, T, before)
-        _add_product(G, G, before)
+        _whiten(size, L[k], G)
+        _times_course(states, size, n, energy, F, T)
+        _course_times(states, size, n, F, T, before)
+        _add_square(size, G, before)
         energy, before = before, energy
-        _course_times(F, match, match_before)
-        _add_product(G, seen[k], match_before)
+        _few_course_times(n, F, match, match_before)
+        _add_few(G, seen[k], match_before)
         match, match_before = match_before, match
-        _times_course(end, F, end_before)
+        _times_course(states, size, n, end, F, end_before)
         end, end_before = end_before, end
 
 
 @compiled
 def _keep(values: Any, place: Any) -> None:
-    """``place = values``: one by one, since Numba takes a second to compile what checks the shapes of whole arrays."""
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
+    """``place = values``, as far as it goes: one by one, since Numba takes a second to compile what checks whole arrays' shapes."""
+    for i in range(place.shape[0]):
+        for j in range(place.shape[1]):
             place[i, j] = values[i, j]
 
 
 @compiled
 def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any) -> None:
     """``F = [step, step U - gain A]`` and ``G = [H Phi, H Phi U + A]``."""
-    n, m = F.shape[0], G.shape[0]
+    n, m = len(step), len(G)
     for i in range(n):
         for j in range(n):
             F[i, j] = step[i, j]
         for j in range(U.shape[1]):
-            F[i, n + j] = 0.0
+            total = 0.0
             for r in range(n):
-                F[i, n + j] += step[i, r] * U[r, j]
+                total += step[i, r] * U[r, j]
             for r in range(m):
-                F[i, n + j] -= gain[i, r] * A[r, j]
+                total -= gain[i, r] * A[r, j]
+            F[i, n + j] = total
     for i in range(m):
         for j in range(n):
             G[i, j] = H_Phi[i, j]
         for j in range(U.shape[1]):
-            G[i, n + j] = A[i, j]
+            total = A[i, j]
             for r in range(n):
-                G[i, n + j] += H_Phi[i, r] * U[r, j]
+                total += H_Phi[i, r] * U[r, j]
+            G[i, n + j] = total
 
 
-@compiled
-def _whiten(L: Any, G: Any) -> None:
+@borrowing(forceinline=True)
+def _whiten(size: Size, L: Any, G: Any) -> None:
     """``G = L^-1 G``, L lower triangular."""
     for i in range(G.shape[0]):
         for r in range(i):
-            for j in range(G.shape[1]):
+            for j in range(len(size)):
                 G[i, j] -= L[i, r] * G[r, j]
-        for j in range(G.shape[1]):
+        for j in range(len(size)):
             G[i, j] /= L[i, i]
 
 
-@compiled
-def _times_course(X: Any, F: Any, Y: Any) -> None:
-    """``Y = X M`` with ``M = [F; 0 I]``."""
-    n = F.shape[0]
+@borrowing(forceinline=True)
+def _times_course(states: Size, size: Size, n: int, X: Any, F: Any, Y: Any) -> None:
+    """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n."""
     for i in range(X.shape[0]):
-        for j in range(X.shape[1]):
-            Y[i, j] = X[i, j] if j >= n else 0.0
-        for r in range(n):
-            for j in range(X.shape[1]):
-                Y[i, j] += X[i, r] * F[r, j]
+        for j in range(len(size)):
+            total = 0.0
+            for r in range(len(states)):
+                total += X[i, r] * F[r, j]
+            Y[i, j] = total
+        for j in range(n, len(size)):
+            Y[i, j] += X[i, j]
+
+
+@borrowing(forceinline=True)
+def _course_times(states: Size, size: Size, n: int, F: Any, X: Any, Y: Any) -> None:
+    """``Y = M' X`` with ``M = [F; 0 I]``, the identity behind the first n."""
+    for i in range(X.shape[0]):
+        for j in range(len(size)):
+            total = 0.0
+            for r in range(len(states)):
+                total += F[r, i] * X[r, j]
+            Y[i, j] = total
+        if i >= n:
+            for j in range(len(size)):
+                Y[i, j] += X[i, j]
+
+
+@borrowing(forceinline=True)
+def _add_square(size: Size, G: Any, C: Any) -> None:
+    """``C += G' G``, of the rows that C has."""
+    for i in range(C.shape[0]):
+        for k in range(G.shape[0]):
+            for j in range(len(size)):
+                C[i, j] += G[k, i] * G[k, j]
 
 
 @compiled
-def _course_times(F: Any, X: Any, Y: Any) -> None:
-    """``Y = M' X`` with ``M = [F; 0 I]``."""
-    n = F.shape[0]
+def _few_course_times(n: int, F: Any, X: Any, Y: Any) -> None:
+    """``Y = M' X`` with ``M = [F; 0 I]``, the identity behind the first n, of few columns."""
     for i in range(X.shape[0]):
         for j in range(X.shape[1]):
             Y[i, j] = X[i, j] if i >= n else 0.0
-    _add_product(F, X, Y)
+    _add_few(F, X, Y)
 
 
 @compiled
-def _add_product(A: Any, B: Any, C: Any) -> None:
-    """``C += A' B``, of the rows that A has."""
+def _add_few(A: Any, B: Any, C: Any) -> None:
+    """``C += A' B``, of the rows that A and C have."""
     for k in range(A.shape[0]):
-        for i in range(A.shape[1]):
+        for i in range(C.shape[0]):
             for j in range(B.shape[1]):
                 C[i, j] += A[k, i] * B[k, j]

@@ -211,7 +211,7 @@ def _fine(
     if rest is not None:  # no north to be found: i is the body at the first sample
         log.C_n0_i = level_of(log.integrals.mean_force[np.flatnonzero(rests)[0]])
     else:
-        log.C_n0_i = oba(log.integrals, lat, alt).C_n0_i
+        log.C_n0_i = oba(log.integrals, lat, alt, history=False).C_n0_i
     parts = [part for part in (rests, ~rests) if np.count_nonzero(part) >= FEWEST]
     velocity = mean_velocity(log.integrals, log.C_n0_i, lat, alt)
     noise = VelocityNoise(np.tile(white_variance(velocity[rests]), (len(velocity), 1)), parts, NOISE_PASSES)

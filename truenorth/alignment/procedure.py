@@ -250,7 +250,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     lat, alt = task.position.lat, task.position.alt
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
-    coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt)
+    coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt, history=False)
     filtered, noise = check_filter(
         task, integrals, coarse.C_n0_i, usual_noise(), None if spec is None else StaticModel.of(spec)
     )

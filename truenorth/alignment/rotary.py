@@ -122,7 +122,7 @@ def align_rotary(
     task = make_task(record, position, at)
     rows = np.array([task.epoch.row])
     coarse = integrate(record, task.interval, rows_at=rows)
-    C_n0_i = oba(coarse, position.lat, position.alt).C_n0_i
+    C_n0_i = oba(coarse, position.lat, position.alt, history=False).C_n0_i
     own = method if method in FADING else "swaying"
     tell(f"aligning: {own}")
     P_bias = np.diag(spec.bias_variance)

@@ -147,6 +147,8 @@ def lost_walk(record: ImuRecord, x: Array) -> float:
     A bridge over ``m`` samples misses ``sum x - m (x_before + x_after) / 2``: as much as it would miss of those that are there.
     """
     gaps = record.gaps[record.gaps > 0]
+    if not gaps.size:
+        return 0.0
     lost = np.rint(record.steps[gaps] / record.interval).astype(int) - 1
     total, sums = np.zeros(3), np.vstack([np.zeros(3), np.cumsum(x, axis=0)])
     for m, count in zip(*np.unique(lost, return_counts=True), strict=True):

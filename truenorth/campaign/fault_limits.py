@@ -118,7 +118,7 @@ def ratio_on_sway(spoilt: ImuRecord, sound: ImuRecord, answer: Alignment) -> flo
     """
     task = make_task(spoilt, answer.position, None)
     lat, alt = task.position.lat, task.position.alt
-    C_n0_i = oba(integrate(task.record, task.interval), lat, alt).C_n0_i
+    C_n0_i = oba(integrate(task.record, task.interval), lat, alt, history=False).C_n0_i
     P = task.bias_prior(answer.imu, C_n0_i.T)
     fine = sway_align(
         CoarseStart(task.record, C_n0_i, task.position, StaticModel.of(answer.imu), P, task.interval, np.empty(0, int))

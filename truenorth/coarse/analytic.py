@@ -7,14 +7,16 @@ signs the static limits ``phi_E = -nabla_N/g``, ``phi_N = nabla_E/g``, ``phi_U =
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.coarse.wahba import triad
+from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.records import ImuRecord
-from truenorth.strapdown.level import increments
+from truenorth.strapdown.increments import increments, read_only
 
 Array = NDArray[np.float64]
 BLOCKS = 10  # the scatter of this many block means shows how well the mean is known
@@ -44,17 +46,29 @@ def means(record: ImuRecord) -> Means:
     dtheta, dvel = increments(record)
     starts = np.linspace(0, len(record), min(BLOCKS, len(record)) + 1).astype(int)[:-1]
     blocks = len(starts)
-    steps = record.steps
-    T = np.add.reduceat(steps, starts)[:, None]
-    w = np.add.reduceat(dtheta, starts) / T
-    f = np.add.reduceat(dvel, starts) / T
-    total = float(steps.sum())
+    sums = np.empty((blocks, 7))
+    _block_sums(read_only(record.steps), read_only(dtheta), read_only(dvel), np.append(starts, len(record)), sums)
+    T, total = sums[:, :1], sums.sum(axis=0)
+    w, f = sums[:, 1:4] / T, sums[:, 4:] / T
     return Means(
-        w_ib_b=dtheta.sum(axis=0) / total,
-        f_b=dvel.sum(axis=0) / total,
+        w_ib_b=total[1:4] / total[0],
+        f_b=total[4:] / total[0],
         w_covariance=np.cov(w.T) / blocks,
         f_covariance=np.cov(f.T) / blocks,
     )
+
+
+@compiled
+def _block_sums(steps: Any, dtheta: Any, dvel: Any, edges: Any, sums: Any) -> None:
+    """Sums (B, 7) of time, angle and velocity over the rows between edges (B + 1,)."""
+    for b in range(len(sums)):
+        for j in range(7):
+            sums[b, j] = 0.0
+        for k in range(edges[b], edges[b + 1]):
+            sums[b, 0] += steps[k]
+            for i in range(3):
+                sums[b, 1 + i] += dtheta[k, i]
+                sums[b, 4 + i] += dvel[k, i]
 
 
 def static_jacobian(lat: float, g: float) -> Array:

@@ -66,7 +66,9 @@ def dual_vector(integrals: InertialIntegrals, lat: float, alt: float, form: Form
     return _as_coarse(C, gain, form)
 
 
-def oba(integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velocity") -> CoarseAttitude:
+def oba(
+    integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velocity", *, history: bool = True
+) -> CoarseAttitude:
     """Optimisation-based alignment: the q-method over the intervals from ``t_k/2`` to ``t_k``, for all k.
 
     Intervals do not begin at 0, as in the usual form: the base's velocity at that one instant would be in all of
@@ -77,23 +79,26 @@ def oba(integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velo
     integrals : InertialIntegrals
     lat, alt : float, rad and m
     form : {"velocity", "position"}
+    history : bool
+        Whether the attitude of each epoch is wanted.
 
     Returns
     -------
     CoarseAttitude
-        With its history.
+        With its history, where that is wanted.
     """
     b, r = _vectors(integrals, lat, alt, form)
     ends = np.arange(1, len(b))
     starts = ends // 2
     db, dr = b[ends] - b[starts], r[ends] - r[starts]
     weights = np.ones(len(ends))
-    history = rotation_from_davenport(np.cumsum(davenport_matrices(db, dr, weights), axis=0))
+    sums = np.cumsum(davenport_matrices(db, dr, weights), axis=0)
+    found = rotation_from_davenport(sums if history else sums[-1:])
     pair_gain = error_gain(dr, weights)
     gain = np.zeros((len(b), 3, 3))
     np.add.at(gain, ends, pair_gain)
     np.add.at(gain, starts, -pair_gain)
-    return _as_coarse(history[-1], gain, form, np.concatenate([history[:1], history]))
+    return _as_coarse(found[-1], gain, form, np.concatenate([found[:1], found]) if history else None)
 
 
 def estimate_latitude(integrals: InertialIntegrals, alt: float = 0.0) -> float:

@@ -23,14 +23,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import skew
+from truenorth.core.compiled import compiled
 from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem
+from truenorth.filters.gains import times
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, gravity_position, gravity_velocity
 
 Array = NDArray[np.float64]
@@ -40,6 +42,7 @@ PHI = slice(0, 3)
 DV = slice(3, 6)
 BG = slice(6, 9)
 BA = slice(9, 12)
+STARTS = tuple(states.start for states in (PHI, DV, BG, BA))  # for kernels
 STATES = 12
 QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without noise
 
@@ -78,38 +81,66 @@ class StaticModel(Walks):
         LinearSystem
             ``Phi, Q, H, R, S, z`` with K epochs; `S` ties process noise and measurement within an interval.
         """
-        T = integrals.intervals[:, None, None]
-        C_mean = C_n0_i @ integrals.C_mean  # (1/T) int C_n0_b
-        C_late = C_n0_i @ integrals.C_late  # (1/T^2) int s C_n0_b
         known = _known_of(self, integrals.time.tobytes(), lat, alt)
-        f, f_late, C_n_n0 = known.f, known.f_late, known.C_n_n0
-        count = len(T)
-
-        Phi = np.zeros((count, STATES, STATES))
-        Phi[:] = np.eye(STATES)
-        Phi[:, PHI, BG] = -T * C_mean
-        Phi[:, DV, PHI] = T * f
-        Phi[:, DV, BG] = -2 * T * (f_late @ (C_mean - C_late))
-        Phi[:, DV, BA] = T * C_mean
-
-        # Mean velocity error by the states at the interval's end: dv(t) = dv_k - int_t^k (f x phi + C nabla), f = -g,
-        # phi(t) = phi_k + int_t^k C eps; averaged, the force counts with its elapsed part s/T of the interval.
-        H = np.zeros((count, 3, STATES))
-        H[:, :, DV] = np.eye(3)
-        H[:, :, PHI] = -f_late
-        H[:, :, BG] = -(T**2) / 6 * (f @ C_mean)
-        H[:, :, BA] = -T * C_late
+        count, C_n_n0 = len(integrals.intervals), known.C_n_n0
+        Phi, H = np.zeros((count, STATES, STATES)), np.zeros((count, 3, STATES))
+        nominal = (np.ascontiguousarray(x) for x in (C_n0_i, integrals.C_mean, integrals.C_late))
+        _transitions(integrals.intervals, *nominal, known.f, known.f_late, C_n_n0, Phi, H)
         z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
         return LinearSystem(
             Phi=Phi,
             Q=known.Q,
-            H=C_n_n0 @ H,
+            H=H,
             R=known.R + np.diag(R),
             S=known.S,
             z=z,
             x0=np.zeros(STATES) if x0 is None else x0,
             P0=P0,
         )
+
+
+@compiled
+def _transitions(
+    T: Any, C_n0_i: Any, C_ib_mean: Any, C_ib_late: Any, f: Any, f_late: Any, C_n_n0: Any, Phi: Any, H: Any
+) -> None:
+    """Fill ``Phi`` (K, 12, 12) and ``H`` (K, 3, 12), both zero so far.
+
+    Mean velocity error by the states at the interval's end: ``dv(t) = dv_k - int_t^k (f x phi + C nabla)``, f = -g,
+    ``phi(t) = phi_k + int_t^k C eps``; averaged, the force counts with its elapsed part s/T of the interval.
+
+    Parameters
+    ----------
+    T : (K,) array, s
+    C_n0_i : (3, 3) array
+    C_ib_mean, C_ib_late : (K, 3, 3) arrays
+        ``(1/T) int C_ib`` and ``(1/T^2) int s C_ib``.
+    f, f_late : (K, 3, 3) arrays
+        As of :func:`gravity_force`.
+    C_n_n0 : (K, 3, 3) array
+    """
+    phi, dv, bg, ba = STARTS
+    mean, late, own = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, STATES))
+    for i in range(3):
+        own[i, dv + i] = 1.0
+    for k in range(len(T)):
+        times(C_n0_i, C_ib_mean[k], mean)
+        times(C_n0_i, C_ib_late[k], late)
+        for i in range(STATES):
+            Phi[k, i, i] = 1.0
+        for i in range(3):
+            for j in range(3):
+                turned, fallen = 0.0, 0.0
+                for r in range(3):
+                    turned += f[k, i, r] * mean[r, j]
+                    fallen += f_late[k, i, r] * (mean[r, j] - late[r, j])
+                Phi[k, phi + i, bg + j] = -T[k] * mean[i, j]
+                Phi[k, dv + i, phi + j] = T[k] * f[k, i, j]
+                Phi[k, dv + i, bg + j] = -2.0 * T[k] * fallen
+                Phi[k, dv + i, ba + j] = T[k] * mean[i, j]
+                own[i, phi + j] = -f_late[k, i, j]
+                own[i, bg + j] = -(T[k] ** 2) / 6.0 * turned
+                own[i, ba + j] = -T[k] * late[i, j]
+        times(C_n_n0[k], own, H[k])
 
 
 class _Known(NamedTuple):
@@ -209,21 +240,50 @@ def force_system(
     LinearSystem
         Whose R holds the variance of the quietest base only.
     """
-    # z = J x_{k-1} + w_dv, and x_{k-1} = Phi^-1 (x_k - w): by the state after the interval, as the filter has it.
-    J = core.Phi[:, DV].copy()
-    J[:, :, DV] -= np.eye(3)
-    back = J @ np.linalg.inv(core.Phi)
-    own = np.eye(STATES)[DV] - back
-    C = local_axes(integrals.time, lat)
-    C_t = np.swapaxes(C, 1, 2)
-    noise = C @ own @ core.Q @ np.swapaxes(own, 1, 2) @ C_t
+    C, count = local_axes(integrals.time, lat), len(integrals.intervals)
+    H, R, S = np.empty((count, 3, STATES)), np.empty((count, 3, 3)), np.empty((count, STATES, 3))
+    _gains_of_velocity(core.Phi, core.Q, np.ascontiguousarray(C), H, R, S)
     z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-    return core.with_arrays(
-        H=C @ back,
-        R=0.5 * (noise + np.swapaxes(noise, 1, 2)) + QUIETEST_BASE**2 * np.eye(3),
-        S=core.Q @ np.swapaxes(own, 1, 2) @ C_t,
-        z=z,
-    )
+    return core.with_arrays(H=H, R=R, S=S, z=z)
+
+
+@compiled
+def _gains_of_velocity(Phi: Any, Q: Any, C: Any, H: Any, R: Any, S: Any) -> None:
+    """The measurement of :func:`force_system`, of ``Phi`` and ``Q`` (K, 12, 12) in axes ``C_n_n0`` (K, 3, 3).
+
+    ``z = J x_{k-1} + w_dv``, and ``x_{k-1} = Phi^-1 (x_k - w)``: by the state after the interval, as the filter has it,
+    ``z = J Phi^-1 x_k + (E - J Phi^-1) w`` with ``E`` the rows of velocity. ``Phi = I + N``, whose only chain is from gyro bias by
+    misalignment to velocity: ``J Phi^-1 = J - J N``.
+    """
+    phi, dv, bg, _ = STARTS
+    back, own, work, noise = np.zeros((3, STATES)), np.zeros((3, STATES)), np.zeros((3, STATES)), np.zeros((3, 3))
+    for k in range(len(Phi)):
+        for i in range(3):
+            for j in range(STATES):
+                back[i, j] = Phi[k, dv + i, j]
+            back[i, dv + i] -= 1.0
+        for i in range(3):
+            for j in range(3):
+                for r in range(3):
+                    back[i, bg + j] -= back[i, phi + r] * Phi[k, phi + r, bg + j]
+        for i in range(3):
+            for j in range(STATES):
+                own[i, j] = -back[i, j]
+            own[i, dv + i] += 1.0
+        times(C[k], back, H[k])
+        times(C[k], own, work)
+        times(work, Q[k], own)  # C (E - J Phi^-1) Q: the transpose of S, as Q is symmetric
+        for i in range(3):
+            for j in range(STATES):
+                S[k, j, i] = own[i, j]
+            for j in range(3):
+                noise[i, j] = 0.0
+                for r in range(STATES):
+                    noise[i, j] += own[i, r] * work[j, r]
+        for i in range(3):
+            for j in range(3):
+                R[k, i, j] = 0.5 * (noise[i, j] + noise[j, i])
+            R[k, i, i] += QUIETEST_BASE**2
 
 
 def grown(system: LinearSystem, n: int) -> dict[str, Array]:

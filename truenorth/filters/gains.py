@@ -13,7 +13,7 @@ import numpy as np
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
 from truenorth.filters.stack import Array
-from truenorth.filters.system import Estimates, LinearSystem
+from truenorth.filters.system import Estimates, LinearSystem, runs_of
 
 BLOCK = 512  # epochs that are worked on at once: what stands in between takes memory for these alone
 
@@ -64,35 +64,73 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
             f"the estimates hold P of {estimates.P.shape[-3]} and innovations of {estimates.innovation.shape[-2]} "
             f"epochs, expected all {system.epochs}: filter with history='full'"
         )
-    runs, K = estimates.P.shape[:-3], system.epochs
-    H_Phi = np.broadcast_to(system.H @ system.Phi, (*runs, K, m, n))
-    found = Gains(np.empty((*runs, K, n, m)), np.empty((*runs, K, n, n)), system.H, H_Phi)
-    for first in range(0, K, BLOCK):
-        epochs = slice(first, min(first + BLOCK, K))
-        _fill(found, system, estimates, epochs)
+    shape, K = estimates.P.shape[:-3], system.epochs
+    runs = runs_of(system, shape)
+    found = Gains(np.empty((*shape, K, n, m)), np.empty((*shape, K, n, n)), system.H, np.empty((*shape, K, m, n)))
+    given = (estimates.P, estimates.innovation, estimates.innovation_covariance, found.gain, found.step, found.H_Phi)
+    _fill(runs, *(np.ascontiguousarray(a).reshape(-1, K, *a.shape[len(shape) + 1 :]) for a in given))
     return found
 
 
-def _fill(found: Gains, system: LinearSystem, estimates: Estimates, epochs: slice) -> None:
-    """Gains of some epochs, and how an error goes on in them."""
+@compiled
+def _fill(runs: Any, P: Any, innovation: Any, covariance: Any, gain: Any, step: Any, H_Phi: Any) -> None:
+    """Gains of each run and epoch, and how an error goes on in it."""
+    n, m = gain.shape[2], gain.shape[3]
+    seen, cross, W = np.zeros((m, n)), np.zeros((m, n)), np.zeros((m, m))
+    for b in range(gain.shape[0]):
+        for k in range(gain.shape[1]):
+            Phi = runs.Phi[min(b, runs.Phi.shape[0] - 1), min(k, runs.Phi.shape[1] - 1)]
+            Q = runs.Q[min(b, runs.Q.shape[0] - 1), min(k, runs.Q.shape[1] - 1)]
+            H = runs.H[min(b, runs.H.shape[0] - 1), min(k, runs.H.shape[1] - 1)]
+            S = runs.S[min(b, runs.S.shape[0] - 1), min(k, runs.S.shape[1] - 1)]
+            times(H, Phi, H_Phi[b, k])
+            # H (Phi P Phi' + Q) + S', of m rows, not n: covariances are symmetric.
+            if k == 0:
+                times(H_Phi[b, k], runs.P0[min(b, runs.P0.shape[0] - 1)], seen)
+            else:
+                times(H_Phi[b, k], P[b, k - 1], seen)
+            times(H, Q, cross)
+            for a in range(m):
+                for i in range(n):
+                    for j in range(n):
+                        cross[a, i] += seen[a, j] * Phi[i, j]
+                    cross[a, i] += S[i, a]
+            # An absent row becomes one of its own without information.
+            for a in range(m):
+                absent = np.isnan(innovation[b, k, a])
+                for c in range(m):
+                    apart = absent or np.isnan(innovation[b, k, c])
+                    W[a, c] = (1.0 if a == c else 0.0) if apart else covariance[b, k, a, c]
+                for i in range(n):
+                    cross[a, i] = 0.0 if absent else cross[a, i]
+            _solve(W, cross)
+            for i in range(n):
+                for a in range(m):
+                    gain[b, k, i, a] = cross[a, i]
+                for j in range(n):
+                    step[b, k, i, j] = Phi[i, j]
+                for a in range(m):
+                    for j in range(n):
+                        step[b, k, i, j] -= cross[a, i] * H_Phi[b, k, a, j]
 
-    def cut(a: Array) -> Array:
-        return a if a.shape[-3] == 1 else a[..., epochs, :, :]
 
-    Phi, H, H_Phi, first = cut(system.Phi), cut(system.H), found.H_Phi[..., epochs, :, :], epochs.start
-    P0 = np.broadcast_to(system.P0, (*estimates.P.shape[:-3], system.states, system.states))[..., None, :, :]
-    before = estimates.P[..., max(0, first - 1) : epochs.stop - 1, :, :]
-    before = before if first else np.concatenate([P0, before], axis=-3)
-    # (Phi P Phi' + Q) H' + S, from the right: of m columns, not n.
-    cross = Phi @ (before @ np.swapaxes(H_Phi, -1, -2)) + cut(system.Q) @ np.swapaxes(H, -1, -2)
-    cross = cross + (0.0 if system.S is None else cut(system.S))
-    # An absent row becomes one of its own without information.
-    absent = np.isnan(estimates.innovation[..., epochs, :])
-    covariance = estimates.innovation_covariance[..., epochs, :, :]
-    W = np.where(absent[..., :, None] | absent[..., None, :], np.eye(system.rows), covariance)
-    cross = np.where(absent[..., None, :], 0.0, cross)
-    gain = np.swapaxes(np.linalg.solve(W, np.swapaxes(cross, -1, -2)), -1, -2)
-    found.gain[..., epochs, :, :], found.step[..., epochs, :, :] = gain, Phi - gain @ H_Phi
+@compiled
+def _solve(W: Any, X: Any) -> None:
+    """``X = W^-1 X`` of a positive definite `W`, by elimination in place: it needs no pivots."""
+    m = len(W)
+    for a in range(m):
+        for c in range(a + 1, m):
+            share = W[c, a] / W[a, a]
+            for d in range(a + 1, m):
+                W[c, d] -= share * W[a, d]
+            for i in range(X.shape[1]):
+                X[c, i] -= share * X[a, i]
+    for a in range(m - 1, -1, -1):
+        for c in range(a + 1, m):
+            for i in range(X.shape[1]):
+                X[a, i] -= W[a, c] * X[c, i]
+        for i in range(X.shape[1]):
+            X[a, i] /= W[a, a]
 
 
 def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ separates motion from noise is where the power lies. White rate noise gives an a
 ``N sqrt(t)``; motion moves the angle by more than that over seconds, though single samples may not show it.
 Acceleration is separated from tilt by carrying the specific force with the gyros into axes that do not turn.
 
-NumPy only: `auto` alignment calls it on every record.
+`auto` alignment calls it on every record.
 """
 
 from __future__ import annotations
@@ -24,14 +24,13 @@ from truenorth.quality.signals import (
     WINDOW,
     acceleration,
     angle_wander,
-    attitude_from,
     bias_by_gravity,
     box_mean,
     even_rates,
     offset,
     rate_bias,
-    rotate,
     second_means,
+    unturned,
     white_noise,
 )
 from truenorth.records import ImuRecord
@@ -204,7 +203,7 @@ def motion_summary(record: ImuRecord) -> MotionSummary:
     gyro = rates[:3] - bias[:, None]
     rate = second_means(gyro, per_second)
     force = second_means(rates[3:], per_second)
-    steady = rotate(attitude_from(gyro * interval), rates[3:])  # specific force in axes that do not turn
+    steady = unturned(gyro * interval, rates[3:])  # specific force in axes that do not turn
     motion, gain = acceleration(second_means(steady, per_second), force)
 
     turned = np.minimum(1.0, np.linalg.norm(box_mean(rate, LEVEL_WINDOW), axis=0) * LEVEL_WINDOW)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from truenorth.core.attitude import normalised, quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import compiled
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
@@ -36,11 +37,11 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
     """Cell length (about 0.1 s) and (6, cells) mean rates and specific forces on an even grid."""
     rows_a_cell = max(1, round(CELL / record.interval))
     interval = rows_a_cell * record.interval
-    data = np.hstack([record.gyro, record.accel])
     if not record.gaps.size and abs(record.duration / len(record) - record.interval) < 0.01 * record.interval:
-        cells = len(record) // rows_a_cell
-        mean = data[: cells * rows_a_cell].reshape(cells, rows_a_cell, 6).mean(axis=1).T
-        return interval, np.ascontiguousarray(mean if record.kind == "rates" else mean / record.interval)
+        mean = np.empty((6, len(record) // rows_a_cell))
+        _cell_means(record.gyro, record.accel, rows_a_cell, mean)
+        return interval, mean if record.kind == "rates" else mean / record.interval
+    data = np.hstack([record.gyro, record.accel])
     # Uneven time: integrals to the cell edges, no rate inside a gap other than the mean of its ends.
     steps = np.minimum(record.steps, 1.5 * record.interval)[:, None]
     cumulated = np.cumsum(data * steps if record.kind == "rates" else data, axis=0)
@@ -56,6 +57,19 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
         integral = np.interp(covered, np.append(0.0, clock), np.append(0.0, cumulated[:, channel]))
         rates[channel] = np.interp(middle, middle[full], np.diff(integral)[full] / length[full])
     return interval, rates
+
+
+@compiled
+def _cell_means(gyro: Any, accel: Any, rows: int, mean: Any) -> None:
+    """Means (6, cells) of so many rows each."""
+    for cell in range(mean.shape[1]):
+        for i in range(3):
+            w, f = 0.0, 0.0
+            for k in range(cell * rows, (cell + 1) * rows):
+                w += gyro[k, i]
+                f += accel[k, i]
+            mean[i, cell] = w / rows
+            mean[i + 3, cell] = f / rows
 
 
 def second_means(signal: Array, per_second: int) -> Array:
@@ -174,35 +188,20 @@ def bias_by_gravity(rate: Array, force: Array) -> Array | None:
     return mean if float(np.quantile(turned, 0.9)) < UNTURNED * across * lag else None
 
 
-def attitude_from(angles: Array) -> Array:
-    """(4, n) attitudes (w, x, y, z) after each of the rotations (3, n): running product by doubling."""
-    half = 0.5 * np.linalg.norm(angles, axis=0)
-    q = np.vstack([np.cos(half), 0.5 * angles * np.sinc(half / np.pi)])
-    reach = 1
-    while reach < q.shape[1]:
-        q[:, reach:] = _product(q[:, :-reach], q[:, reach:])
-        reach *= 2
-    return q
+def unturned(angles: Array, vectors: Array) -> Array:
+    """(3, n) vectors of a body after each of its rotations (3, n), in the axes that it had before the first."""
+    found = np.empty(vectors.shape)
+    _unturn(np.ascontiguousarray(angles), np.ascontiguousarray(vectors), found)
+    return found
 
 
-def _product(p: Array, q: Array) -> Array:
-    """Hamilton product of (4, n) quaternions."""
-    a, b, c, d = p
-    e, f, g, h = q
-    return np.stack(
-        [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
-    )
-
-
-def rotate(q: Array, v: Array) -> Array:
-    """(3, n) vectors turned by (4, n) unit quaternions."""
-    t = 2.0 * np.cross(q[1:], v, axis=0)
-    return v + q[0] * t + np.cross(q[1:], t, axis=0)
+@compiled
+def _unturn(angles: Any, vectors: Any, found: Any) -> None:
+    q = (1.0, 0.0, 0.0, 0.0)
+    for k in range(angles.shape[1]):
+        turn = quaternion_from_rotation_vector((angles[0, k], angles[1, k], angles[2, k]))
+        q = normalised(quaternion_product(q, turn))
+        found[0, k], found[1, k], found[2, k] = rotate(q, (vectors[0, k], vectors[1, k], vectors[2, k]))
 
 
 def acceleration(steady: Array, body: Array) -> tuple[Array, Array]:
@@ -227,12 +226,11 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
     """
     seconds = signal.shape[1]
     width = min(LEVEL_WINDOW, seconds)
-    windows = sliding_window_view(signal, width, axis=1)
     first = offset(seconds, width)
     within = np.arange(seconds) - first
     half = width // 2
-    early = np.median(windows[..., :half], axis=2)[:, first]
-    late = np.median(windows[..., width - half :], axis=2)[:, first]
+    early = _medians(signal[:, : seconds - width + half], half)[:, first]
+    late = _medians(signal[:, width - half :], half)[:, first]
     line = early + (late - early) * (within - (half - 1) / 2.0) / (width - half)
     return _running_median(signal), line
 
@@ -240,7 +238,37 @@ def _running_level(signal: Array) -> tuple[Array, Array]:
 def _running_median(signal: Array) -> Array:
     """(3, m) median of the 31 s around each second."""
     width = min(LEVEL_WINDOW, signal.shape[1])
-    return np.asarray(np.median(sliding_window_view(signal, width, axis=1), axis=2)[:, offset(signal.shape[1], width)])
+    return _medians(signal, width)[:, offset(signal.shape[1], width)]
+
+
+def _medians(signal: Array, width: int) -> Array:
+    """(3, m - width + 1) medians of all windows of so many neighbours."""
+    found = np.empty((len(signal), signal.shape[1] - width + 1))
+    _sliding_medians(np.ascontiguousarray(signal), np.empty(width), found)
+    return found
+
+
+@compiled
+def _sliding_medians(signal: Any, ordered: Any, found: Any) -> None:
+    """Medians (c, m - w + 1) of windows of w; `ordered` (w,) is worked in: a value leaves it and the next one finds its place."""
+    width = len(ordered)
+    for i in range(signal.shape[0]):
+        for k in range(signal.shape[1]):
+            if k < width:
+                place = k
+            else:
+                place = 0
+                while ordered[place] != signal[i, k - width] and place < width - 1:
+                    place += 1
+                for m in range(place, width - 1):
+                    ordered[m] = ordered[m + 1]
+                place = width - 1
+            while place > 0 and ordered[place - 1] > signal[i, k]:
+                ordered[place] = ordered[place - 1]
+                place -= 1
+            ordered[place] = signal[i, k]
+            if k >= width - 1:
+                found[i, k - width + 1] = 0.5 * (ordered[(width - 1) // 2] + ordered[width // 2])
 
 
 def offset(seconds: int, width: int) -> NDArray[np.intp]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
+from truenorth.core.remembered import remembered
 from truenorth.core.shown import as_xarray
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ class Record(_Ordered):
     @cached_property
     def interval(self) -> float:
         """Nominal sampling interval, s: the median step."""
-        return float(np.median(np.diff(self.time)))
+        return _median_step(self.time)
 
     @property
     def rate(self) -> float:
@@ -198,6 +199,12 @@ class Record(_Ordered):
             xarray is not installed.
         """
         return as_xarray(self.to_frame())
+
+
+@remembered
+def _median_step(time: Array) -> float:
+    """The same for records that share their time, such as the runs of a campaign."""
+    return float(np.median(np.diff(time)))
 
 
 def _own(given: Any, name: str, source: str) -> Array:

@@ -86,8 +86,7 @@ class ImuRecord(Record):
         DataError
             More than a second between two rows.
         """
-        whole = self.kind == "increments" and self._adds_up_to_gravity()
-        if self.interval > SLOWEST and not whole:
+        if self.interval > SLOWEST and not (self.kind == "increments" and self._adds_up_to_gravity()):
             raise DataError(
                 f"{self.source}: a row every {self.interval:.4g} s; expected {SLOWEST:g} s at most: time is probably in "
                 "milliseconds, microseconds or ticks; convert it to seconds, or give the rate"

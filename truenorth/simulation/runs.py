@@ -119,7 +119,9 @@ def simulate(
     )
     if kind == "rates":
         dtheta, dvel = dtheta / interval, dvel / interval
-    record = ImuRecord(ideal.edges[1:], dtheta, dvel, kind, "simulation")
+    for rows in (dtheta, dvel):  # nobody else has them: the record need not copy
+        rows.flags.writeable = False
+    record = ImuRecord(ideal.times, dtheta, dvel, kind, "simulation")
     return Simulation(record, ideal.motion, drawn)
 
 

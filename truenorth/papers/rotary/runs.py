@@ -198,7 +198,7 @@ def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> No
             mount = replace(UNKNOWN_ARM, C_sb=np.swapaxes(C_bs_from_angles(AXES, angles), -1, -2))
         truth = data.C_ns(np.array([integrals.start + at]))[0]
         C_n_n0 = earth_rotation(at, place.lat).T
-        C_n0_i = oba(integrals, place.lat, place.alt).C_n0_i
+        C_n0_i = oba(integrals, place.lat, place.alt, history=False).C_n0_i
         start = CoarseStart(record, C_n0_i, place, walks, P_bias, 1.0)
         begun = time.perf_counter()
         C_start, inside = windowed_align(start, mount)

@@ -156,7 +156,7 @@ def align_all(logs: Logs, setting: Setting, workers: int) -> Answers:
     x[:, 2] = np.angle(np.einsum("rl,rl->r", weight, np.exp(1j * X[..., 2])))  # an angle has no mean but this
     found["particle"] = at_end(_corrected(logs.start, x)), None
 
-    found["oba"] = at_end(np.stack([oba(one, lat, alt).C_n0_i for one in logs.integrals])), None
+    found["oba"] = at_end(np.stack([oba(one, lat, alt, history=False).C_n0_i for one in logs.integrals])), None
     gyro, accel = (np.stack([getattr(record, name) for record in logs.records]) for name in ("gyro", "accel"))
     loop = gyrocompass_loop(gyro, accel, 1.0 / RATE, logs.start, lat, alt)
     found["gyrocompass_loop"] = misalignment(loop, logs.C_nb), None
