@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from typing import Any, Literal, get_args
 
@@ -239,11 +240,14 @@ def _seen(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: 
     found += jump_evidence(other, track, task.record)
     found += clock_evidence(task, track, guess, first, gated=gated)
 
-    def again(model: InsModel) -> Track:
-        return replace(task, model=model).run(guess, gated=gated)
-
+    again = partial(_of_model, task, guess, gated)
+    without = [partial(_of_model, less, guess, gated) for less in task.without_slow_errors()]
     found += noise_evidence(again, track, task.model, task.record)
-    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration)
+    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration, without)
+
+
+def _of_model(task: MovingTask, guess: Guess, gated: bool, model: InsModel) -> Track:
+    return replace(task, model=model).run(guess, gated=gated)
 
 
 def _published(

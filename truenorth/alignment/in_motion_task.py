@@ -36,7 +36,16 @@ from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.regimes import motion_summary
-from truenorth.quality.slow_aids import FIXES, USUAL_TIME, Slow, as_lasting, slow_errors, usual_bias, with_slow
+from truenorth.quality.slow_aids import (
+    FIXES,
+    USUAL_TIME,
+    Slow,
+    as_lasting,
+    one_less,
+    slow_errors,
+    usual_bias,
+    with_slow,
+)
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -103,6 +112,10 @@ class MovingTask:
             lasting=lasting,
             wanders=(*self.wanders, *wanders),
         )
+
+    def without_slow_errors(self) -> list[MovingTask]:
+        """The task without each of the slow errors that innovations have shown."""
+        return [replace(self, lasting=less) for less in one_less(self.lasting)]
 
     def with_lasting_fixes(self, track: Track) -> Track:
         """A track of this task with position known no better than fixes whose slow error nobody spoke of."""

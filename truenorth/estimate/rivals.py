@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -91,8 +92,18 @@ class Walking(Protocol):
 M = TypeVar("M", bound=Walking)
 
 
-def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: ImuSpec, span: float) -> list[Evidence]:
+def wandering_evidence(
+    run: Callable[[M], Along],
+    first: Along,
+    model: M,
+    spec: ImuSpec,
+    span: float,
+    without: Sequence[Callable[[M], Along]] = (),
+) -> list[Evidence]:
     """Whether biases that wander explain the measurements better, and what that does to the answer.
+
+    A bias that steps makes the errors of a wheel seem to last. So each slow error that was taken from the innovations has rivals
+    of its own: biases that wander, and a sensor without that error.
 
     Parameters
     ----------
@@ -105,6 +116,8 @@ def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: 
         Its biases are the measure of the walks.
     span : float, s
         Length of the log.
+    without : sequence of callable
+        As `run`, each without one of the slow errors that the innovations have shown.
 
     Returns
     -------
@@ -114,19 +127,21 @@ def wandering_evidence(run: Callable[[M], Along], first: Along, model: M, spec: 
     if not any(int(np.sum(r.rows > 0)) >= FEWEST for r in first.residuals):
         return []
     found: list[tuple[float, str, float, Effect]] = []
-    for sensor, ladder in LADDERS.items():
+    for of_other, (sensor, ladder) in product((run, *without), LADDERS.items()):
         sigma, name = math.sqrt(float(spec.bias_variance[0 if sensor == "gyro" else 3])), f"{sensor}_rate_walk"
+        before = 0.0 if of_other is run else -math.inf  # of no walk at all, which without a slow error may be ruled out
         for size in ladder:
             walk = math.hypot(getattr(model, name), size * sigma / math.sqrt(span))
             try:
-                rival = run(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
+                rival = of_other(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
             except DataError:  # the filter broke down: no explanation
                 break
             ratio = likelihood_ratio(first.residuals, rival.residuals)
             if ratio > limit("rival"):
                 found.append((ratio, sensor, size * sigma, _effect(first, rival)))
-            elif ratio < RULED_OUT:
+            elif ratio < min(RULED_OUT, before):
                 break
+            before = ratio
     if not found:
         return []
     ratio, sensor, size, _ = max(found, key=lambda item: item[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
-from truenorth.quality.slow_aids import Slow, as_lasting, slow_errors, with_slow
+from truenorth.quality.slow_aids import Slow, as_lasting, one_less, slow_errors, with_slow
 from truenorth.records import ImuRecord, Late, Trajectory
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
@@ -248,11 +249,14 @@ def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, 
     """What other biases, clocks and mountings explain better."""
     aiding = plan.sources(given)
 
-    def again(model: InsModel) -> Track:
-        return replace(plan, model=model).run(aiding, smooth=smooth)
+    def again(slow: Slow, model: InsModel) -> Track:
+        other = replace(plan, model=model, slow=slow)
+        return other.run(other.sources(given), smooth=smooth)
 
-    found = noise_evidence(again, track, plan.model, plan.record)
-    found += wandering_evidence(again, track, plan.model, spec, plan.record.duration)
+    usual = partial(again, plan.slow)
+    without = [partial(again, less) for less in one_less(plan.slow)]
+    found = noise_evidence(usual, track, plan.model, plan.record)
+    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     return found + second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
 

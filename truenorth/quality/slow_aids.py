@@ -122,6 +122,11 @@ def with_slow(aiding: Sequence[Aiding], slow: Slow) -> list[Aiding]:
     return [replace(s, states={**s.states, KINDS[s.name].role: slow[s.name]}) if s.name in slow else s for s in aiding]
 
 
+def one_less(slow: Slow) -> list[Slow]:
+    """These slow errors without each of them in turn."""
+    return [{name: group for name, group in slow.items() if name != left_out} for left_out in slow]
+
+
 def as_lasting(track: Track, aiding: Iterable[Aiding]) -> Track:
     """The track with position known no better than the slow error of its fixes."""
     fixes = next((source for source in aiding if source.name == FIXES and "bias" in source.states), None)
