@@ -15,8 +15,8 @@ from truenorth.cli import app
 from truenorth.core.errors import UsageError
 from truenorth.quality.encoder import encoder_evidence
 from truenorth.quality.gnss import gnss_evidence, turn_evidence
-from truenorth.quality.innovations import whiteness
 from truenorth.quality.tilt import check_tilt
+from truenorth.quality.whiteness import whiteness
 
 SEED = 11
 # Procedure and faults that gave a wrong answer without a word before there was one judge.

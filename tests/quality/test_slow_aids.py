@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from truenorth.aiding.source import Aiding, state
-from truenorth.quality.innovations import scatter_of_means
 from truenorth.quality.slow_aids import slow_errors, with_slow
+from truenorth.quality.whiteness import scatter_of_means
 from truenorth.state.track import Residuals
 
 ROWS, INTERVAL = 1500, 0.2

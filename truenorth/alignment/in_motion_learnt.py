@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
-from truenorth.quality.innovations import FEWEST
+from truenorth.quality.whiteness import FEWEST
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track

@@ -36,8 +36,8 @@ from truenorth.estimate.memory import REOPENED, USED
 from truenorth.estimate.rivals import likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.quality.gnss import master_evidence
-from truenorth.quality.innovations import whiteness
 from truenorth.quality.record_evidence import moving_evidence
+from truenorth.quality.whiteness import whiteness
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec

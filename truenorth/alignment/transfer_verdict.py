@@ -12,7 +12,7 @@ from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.estimate.memory import USED
 from truenorth.estimate.rivals import counted_once
-from truenorth.quality.innovations import whiteness
+from truenorth.quality.whiteness import whiteness
 from truenorth.state.evidence import Evidence, contradiction, note, notes
 from truenorth.state.limits import limit
 

@@ -24,7 +24,7 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.quality.density import burst_evidence
-from truenorth.quality.innovations import whiteness
+from truenorth.quality.whiteness import whiteness
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, Kind

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.sensors import place_sigma
 from truenorth.aiding.source import Aiding, Role
 from truenorth.errors.group import Group
-from truenorth.quality.innovations import whiteness
+from truenorth.quality.whiteness import whiteness
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence, Figure
 from truenorth.state.layout import DP

@@ -241,6 +241,10 @@ SENTENCES = {
         "{name}: its errors follow each other from row to row (correlation {correlation:.2f}) and wander by {wander:.2g} {unit} or "
         "more: a slow error is estimated, and in sigma"
     ),
+    "innovations.step": (
+        "{name}: at {onset:.0f} s it steps by {size:.2g} m/s, and the IMU does not (likelihood ratio {ratio:.3g}; chance gives "
+        "{chance:.3g}): the receiver may be led away, by {distance:.2g} m until the end"
+    ),
     "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
     "delay.late": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s late, which is estimated and in sigma",
     "delay.early": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s early, which is estimated and in sigma",

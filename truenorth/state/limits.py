@@ -70,6 +70,11 @@ LIMITS: dict[str, Limit] = {
     "mounting": Limit(5.0, "sigma", "by which a delay, an arm or a mounting may miss what was said of it"),
     "log": Limit(5.0, "sigma", "between INS and velocity log for half of the time: of sound ones one in a million"),
     # ---- innovations
+    "step": Limit(
+        1e-3,
+        "1",
+        "probability that a step of a sound receiver is seen at any row: false alarms of the whole are below 1 %",
+    ),
     "chance": Limit(5.0, "sigma", "a statistic of innovations this far out is chance once in two million tests"),
 }
 

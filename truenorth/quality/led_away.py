@@ -1,0 +1,69 @@
+"""Whether a receiver is led away: a spoofer that moves position and velocity alike, which nothing but the INS contradicts.
+
+Its velocity steps as it begins. The filter follows within some rows, and innovations keep ``s e^{-k / m}`` of the step, ``k`` rows
+after the first. The likelihood ratio of a step at each row, for fast and for slow filters, is ``|T|^2 / W`` with
+``T = sum e^{-k/m} z_k`` and ``W = sum e^{-2k/m}`` over the normalised innovations ``z``: a chi-square of two degrees of freedom
+where nothing steps, of which ``2 ln(N / p)`` is exceeded by one of N with probability p at most.
+
+Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
+systems", IEEE Trans. Autom. Control 21 (1976); the memory of the filter by a few exponentials is ours.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from truenorth.quality.whiteness import FEWEST, whiteness
+from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals
+
+Array = NDArray[np.float64]
+
+LED = ("GNSS velocity",)
+MEMORIES = (3.0, 10.0, 30.0)  # rows, within which filters follow a step
+
+OUTLIER = 6.0  # sigmas: counts no more than this, which is less than a step has to
+
+
+def led_away_evidence(source: Residuals) -> list[Evidence]:
+    """The step of a receiver's level velocity that is likelier than chance, and where it has led the answer by the end."""
+    if source.name not in LED:
+        return []
+    rows = (source.rows > 0) & np.isfinite(source.innovation[:, :2]).all(axis=1)
+    z, time = source.innovation[rows, :2] / source.sigma[rows, :2], source.time[rows]
+    # The gate may have taken the first rows of a step for outliers, and one outlier is no step.
+    z /= np.maximum(1.0, np.linalg.norm(z, axis=1, keepdims=True) / OUTLIER)
+    if z.size < FEWEST:
+        return []
+    chance = 2.0 * math.log(len(MEMORIES) * len(z) / limit("step"))
+    steps = [_largest_step(z, memory) for memory in MEMORIES]
+    ratio, row, step = max(steps, key=lambda found: found[0])
+    ratio /= whiteness(z).growth ** 2
+    if ratio <= chance:
+        return []
+    size = float(np.linalg.norm(step * source.sigma[rows][row, :2]))
+    away = size * float(time[-1] - time[row])
+    figures: dict[str, Figure] = {
+        "name": source.name,
+        "size": size,
+        "onset": float(time[row]),
+        "ratio": ratio,
+        "chance": chance,
+        "distance": away,
+    }
+    return [Evidence("innovations.step", figures, "bounded", Effect(velocity=size, position=away), ("source",))]
+
+
+def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:
+    """Likelihood ratio, row, and size in sigmas (2,) of the likeliest step that a filter of this memory follows."""
+    keep = math.exp(-1.0 / memory)
+    T = lfilter([1.0], [1.0, -keep], z[::-1], axis=0)[::-1]  # from each row to the last
+    W = lfilter([1.0], [1.0, -(keep**2)], np.ones(len(z)))[::-1]
+    ratio = np.sum(T**2, axis=1) / W
+    row = int(np.argmax(ratio))
+    return float(ratio[row]), row, T[row] / W[row]
