@@ -32,7 +32,8 @@ ONCE_SILENT = {
         "gyro bias step",
         "late gyros",
     ),
-    "navigate": ("accel bias step", "grid north", "damaged start", "late GNSS"),
+    "navigate": ("accel bias step", "grid north", "damaged start", "late GNSS", "slowly spoofed"),
+    "odometer": ("gyro bias step",),
     "still": ("accel bias step", "dead sensor", "clipped gyro"),
 }
 
@@ -42,7 +43,7 @@ def silent(trials: list[Trial]) -> list[Trial]:
 
 
 @few_and_all(4, few=1)
-@pytest.mark.parametrize("procedure", some(["swaying", "transfer", "navigate", "still"], ["rotary", "gnss"]))
+@pytest.mark.parametrize("procedure", some(["swaying", "transfer", "navigate", "still"], ["rotary", "gnss", "odometer"]))
 def test_nothing_that_passed_in_silence_does_so_again(procedure, runs):
     assert silent(run_faults([procedure], ONCE_SILENT[procedure], runs=runs, seed=SEED)) == []
 

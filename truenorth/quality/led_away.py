@@ -3,7 +3,8 @@
 Its velocity steps as it begins. The filter follows within some rows, and innovations keep ``s e^{-k / m}`` of the step, ``k`` rows
 after the first. The likelihood ratio of a step at each row, for fast and for slow filters, is ``|T|^2 / W`` with
 ``T = sum e^{-k/m} z_k`` and ``W = sum e^{-2k/m}`` over the normalised innovations ``z``: a chi-square of two degrees of freedom
-where nothing steps, of which ``2 ln(N / p)`` is exceeded by one of N with probability p at most.
+where nothing steps, of which ``2 ln(N / p)`` is exceeded by one of N with probability p at most. A receiver that is off in every
+turn has large ratios all over the log: one counts by how far it stands out.
 
 Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
 systems", IEEE Trans. Autom. Control 21 (1976); the memory of the filter by a few exponentials is ours.
@@ -28,6 +29,7 @@ LED = ("GNSS velocity",)
 MEMORIES = (3.0, 10.0, 30.0)  # rows, within which filters follow a step
 
 OUTLIER = 6.0  # sigmas: counts no more than this, which is less than a step has to
+USUAL = 0.75  # of the rows: what the ratio there is larger than of white innovations, it is at any step
 
 
 def led_away_evidence(source: Residuals) -> list[Evidence]:
@@ -66,4 +68,5 @@ def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:
     W = lfilter([1.0], [1.0, -(keep**2)], np.ones(len(z)))[::-1]
     ratio = np.sum(T**2, axis=1) / W
     row = int(np.argmax(ratio))
-    return float(ratio[row]), row, T[row] / W[row]
+    usual = float(np.quantile(ratio, USUAL)) / (-2.0 * math.log(1.0 - USUAL))
+    return float(ratio[row]) / max(1.0, usual), row, T[row] / W[row]
