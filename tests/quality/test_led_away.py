@@ -31,7 +31,7 @@ def test_chance_shows_a_step_no_more_often_than_its_limit():
     assert alarms <= expected + 4.0 * np.sqrt(expected)
 
 
-@pytest.mark.parametrize("memory", [3.0, 8.0, 20.0])
+@pytest.mark.parametrize("memory", [3.0, 8.0, 15.0])
 def test_a_step_is_seen_where_it_begins(memory):
     rng = np.random.default_rng(1)
     step = np.array([6.0, -4.0, 0.0]) / np.sqrt(min(memory, 10.0) / 3.0)

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from itertools import product
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -127,21 +126,11 @@ def wandering_evidence(
     if not any(int(np.sum(r.rows > 0)) >= FEWEST for r in first.residuals):
         return []
     found: list[tuple[float, str, float, Effect]] = []
-    for of_other, (sensor, ladder) in product((run, *without), LADDERS.items()):
-        sigma, name = math.sqrt(float(spec.bias_variance[0 if sensor == "gyro" else 3])), f"{sensor}_rate_walk"
-        before = 0.0 if of_other is run else -math.inf  # of no walk at all, which without a slow error may be ruled out
-        for size in ladder:
-            walk = math.hypot(getattr(model, name), size * sigma / math.sqrt(span))
-            try:
-                rival = of_other(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
-            except DataError:  # the filter broke down: no explanation
-                break
-            ratio = likelihood_ratio(first.residuals, rival.residuals)
-            if ratio > limit("rival"):
-                found.append((ratio, sensor, size * sigma, _effect(first, rival)))
-            elif ratio < min(RULED_OUT, before):
-                break
-            before = ratio
+    for of_other in (run, *without):
+        # Without a slow error a log may fit worse, or better: neither is the walk's.
+        least = 0.0 if of_other is run else likelihood_ratio(first.residuals, of_other(model).residuals)
+        for sensor, ladder in LADDERS.items():
+            found += _climb(of_other, first, model, spec, span, sensor, ladder, least)
     if not found:
         return []
     ratio, sensor, size, _ = max(found, key=lambda item: item[0])
@@ -157,6 +146,38 @@ def wandering_evidence(
     }
     kind: Kind = "hint" if may_be_chance(ratio) else "known"
     return [Evidence(f"rival.{sensor}_wanders", figures, kind, effect, ("specification",))]
+
+
+def _climb(
+    run: Callable[[M], Along],
+    first: Along,
+    model: M,
+    spec: ImuSpec,
+    span: float,
+    sensor: str,
+    ladder: Sequence[float],
+    least: float,
+) -> list[tuple[float, str, float, Effect]]:
+    """Walks of a sensor's biases that the log fits better than the model, and than the same without a walk: its ratio is `least`.
+
+    Ratio, sensor, size of the walk and effect of each.
+    """
+    sigma, name = math.sqrt(float(spec.bias_variance[0 if sensor == "gyro" else 3])), f"{sensor}_rate_walk"
+    found, before = [], least
+    for size in ladder:
+        walk = math.hypot(getattr(model, name), size * sigma / math.sqrt(span))
+        try:
+            rival = run(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
+        except DataError:  # the filter broke down: no explanation
+            break
+        ratio = likelihood_ratio(first.residuals, rival.residuals)
+        gained = ratio - max(least, 0.0)
+        if gained > limit("rival"):
+            found.append((gained, sensor, size * sigma, _effect(first, rival)))
+        elif ratio < before + RULED_OUT:
+            break
+        before = max(ratio, before)
+    return found
 
 
 def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRecord) -> list[Evidence]:
