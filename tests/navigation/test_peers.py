@@ -17,7 +17,7 @@ SWAP = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED and ENU, FRD and RF
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:The copy keyword is deprecated")  # of pandas, by that project
+@pytest.mark.filterwarnings("ignore::pandas.errors.Pandas4Warning")  # that project calls what pandas drops
 @pytest.mark.parametrize("kind", ["increment", "rate"])
 def test_no_farther_from_the_truth_than_python_ins(kind):
     """Ours deviates less in every state: from increments by 50 times and more, from rates (their trapezoid) by 7."""
