@@ -94,7 +94,7 @@ def _track(ax: Axes, truth: MotionStates) -> None:
         ax.plot(east[-1] * factor, north[-1] * factor, "s", color=COLOURS[1], label="end")
         ax.legend()
         ax.margins(0.08)
-    ax.set_aspect("equal", adjustable="datalim")
+        ax.set_aspect("equal", adjustable="datalim")
     place = f"{abs(np.degrees(truth.lat[0])):.4f} {'N' if truth.lat[0] >= 0 else 'S'}, "
     place += f"{abs(np.degrees(truth.lon[0])):.4f} {'E' if truth.lon[0] >= 0 else 'W'}"
     ax.set(title=f"Track of the IMU, from {place}", xlabel=f"east, {unit}", ylabel=f"north, {unit}")

@@ -228,15 +228,12 @@ def _check(system: LinearSystem) -> None:
 
 
 def _of_prior(system: LinearSystem) -> InformationState:
-    size = np.sqrt(np.diagonal(system.P0, axis1=-2, axis2=-1))
-    scale = size[..., :, None] * size[..., None, :]
     try:
-        if not np.all(size > 0.0):
-            raise np.linalg.LinAlgError
-        Y = np.linalg.inv(np.linalg.cholesky(system.P0 / scale))
+        size, L = scaled_cholesky(system.P0)
     except np.linalg.LinAlgError:
         raise DataError("information filter: P0 is singular; use the Kalman filter") from None
-    Y = np.swapaxes(Y, -1, -2) @ Y / scale
+    back = np.linalg.inv(L) / size[..., None, :]
+    Y = np.swapaxes(back, -1, -2) @ back
     return InformationState(times(Y, system.x0), Y)
 
 
