@@ -33,7 +33,7 @@ TABLE = "truenorth.results"
 ARCHIVE = "result.npz"
 REPORT = "report.html"
 PICTURE_DPI = 75
-PICTURE_COLOURS = 128  # a drawing's few hues and the edges of its lines
+PICTURE_COLOURS = 256, 96  # those of a drawing, edges of its lines and all; of one that is full of lines
 PICTURE_SIZE = 72_000  # bytes: a notebook keeps every picture, a third larger as text
 NO_FIGURES = "figures need matplotlib: pip install 'truenorth[plot]'"
 
@@ -128,11 +128,10 @@ def _png(figure: Figure) -> bytes:
     figure.savefig(drawn, format="png", dpi=PICTURE_DPI)
     with Image.open(drawn) as opened:
         picture = opened.convert("RGB")
-    # The first palette keeps pale grounds exactly; the second, of fewer colours in use, is for a picture full of lines.
-    for palette in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE):
+    # The first palette keeps pale grounds and thin lines as they are, the second covers all hues with fewer colours.
+    for colours, palette in zip(PICTURE_COLOURS, (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE), strict=True):
         small = io.BytesIO()
-        colours = picture.quantize(PICTURE_COLOURS, palette, kmeans=1, dither=Image.Dither.NONE)
-        colours.save(small, "png", optimize=True)
+        picture.quantize(colours, palette, kmeans=1, dither=Image.Dither.NONE).save(small, "png", optimize=True)
         if small.tell() <= PICTURE_SIZE:
             break
     return small.getvalue()
