@@ -13,11 +13,12 @@ systems", IEEE Trans. Autom. Control 21 (1976); the memory of the filter by a fe
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from truenorth.core.compiled import compiled
 from truenorth.quality.whiteness import FEWEST, whiteness
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit
@@ -63,10 +64,19 @@ def led_away_evidence(source: Residuals) -> list[Evidence]:
 
 def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:
     """Likelihood ratio, row, and size in sigmas (2,) of the likeliest step that a filter of this memory follows."""
-    keep = math.exp(-1.0 / memory)
-    T = lfilter([1.0], [1.0, -keep], z[::-1], axis=0)[::-1]  # from each row to the last
-    W = lfilter([1.0], [1.0, -(keep**2)], np.ones(len(z)))[::-1]
+    T, W = np.empty((len(z), 2)), np.empty(len(z))
+    _sum_up(np.ascontiguousarray(z), math.exp(-1.0 / memory), T, W)
     ratio = np.sum(T**2, axis=1) / W
     row = int(np.argmax(ratio))
     usual = float(np.quantile(ratio, USUAL)) / (-2.0 * math.log(1.0 - USUAL))
     return float(ratio[row]) / max(1.0, usual), row, T[row] / W[row]
+
+
+@compiled
+def _sum_up(z: Any, keep: Any, T: Any, W: Any) -> None:
+    """``T`` (K, 2) and ``W`` (K,) from each row to the last."""
+    east, north, weight = 0.0, 0.0, 0.0
+    for k in range(len(z) - 1, -1, -1):
+        east, north = z[k, 0] + keep * east, z[k, 1] + keep * north
+        weight = 1.0 + keep * keep * weight
+        T[k, 0], T[k, 1], W[k] = east, north, weight
