@@ -18,7 +18,7 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.records import OdometerRecord
-from truenorth.state.layout import BA, BG, PHI
+from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.track import Track
 
 
@@ -51,7 +51,12 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
         if (found := delay_of(track, name)) is not None and found[1] < NOT_ESTIMATED * found[2]
     }
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
-    moving = moving.less_sure(covariance[2, 2] - history.phi_covariance[-1][2, 2]) if spread else moving
+    less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]
+    if task.gnss is None and not task.more:
+        moving = moving.turned(less_sure)
+        position = replace(position, horizontal_sigma=float(np.sqrt(np.diag(moving.P)[DP][:2].max())))
+    elif spread:
+        moving = moving.less_sure(less_sure)
     moving = replace(moving, delays=delays)
     return Alignment(
         status="not_converged",

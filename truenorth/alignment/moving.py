@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
+from truenorth.core.earth import radii
 from truenorth.state.layout import BA, BG, DP, DV, PHI, SLOW_ACCEL, SLOW_GYRO, STATES
 
 if TYPE_CHECKING:
@@ -86,6 +87,37 @@ class Moving:
         P = factor[:, None] * self.P * factor
         P[PHI, PHI] += np.diag([level, level, heading])
         return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
+
+    def turned(self, heading: float) -> Moving:
+        """The same state, heading less sure by this variance (rad^2), where no sensor shows velocity or place in n.
+
+        A wheel shows neither which way it rolls nor which way it came. A heading error ``h`` turns velocity, and the way since
+        the beginning, about the vertical: by ``sin h`` of them sideways, by ``1 - cos h`` backwards. Of a Gaussian of variance s^2
+
+            E sin^2 h = (1 - exp(-2 s^2)) / 2,    E (1 - cos h)^2 = 3/2 - 2 exp(-s^2 / 2) + exp(-2 s^2) / 2
+
+        of which the filter has the first in its own, ``s^2`` for small ones.
+        """
+        own = float(self.P[PHI, PHI][2, 2])
+        whole = own + heading
+        sideways = max(0.5 * (1.0 - math.exp(-2.0 * whole)) - own, 0.0)
+        back = max(1.5 - 2.0 * math.exp(-0.5 * whole) + 0.5 * math.exp(-2.0 * whole), 0.0)
+        along = np.zeros(len(self.P))
+        along[DV][:2], along[DP][:2] = self.v_n[:2], self.gone
+        across = np.zeros(len(self.P))
+        for part in (DV, DP):
+            across[part][:2] = along[part][1], -along[part][0]
+        across *= math.sqrt(sideways)
+        across[PHI.stop - 1] = math.sqrt(heading)
+        P = self.P + np.outer(across, across) + back * np.outer(along, along)
+        return replace(self, P=P, vehicle_heading_sigma=math.sqrt(self.vehicle_heading_sigma**2 + heading))
+
+    @property
+    def gone(self) -> Array:
+        """(2,) m; east and north, from the beginning of the track to its end."""
+        (lat, lon, alt), (lat0, lon0, _) = self.track.position[-1], self.track.position[0]
+        R_M, R_N = radii(0.5 * (lat + lat0))
+        return np.array([(R_N + alt) * math.cos(lat) * (lon - lon0), (R_M + alt) * (lat - lat0)])
 
     def summary(self) -> dict[str, Any]:
         """In datasheet units, ready for JSON."""
