@@ -36,16 +36,24 @@ def van(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 2, 3])
-def test_a_van_with_poor_gyros_and_a_wheel_of_pulses(seed):
-    """Gyros of 100 deg/h; as every pass began from zero biases and 4 deg of level: 23, 11 and -7 deg off, sigma 2.3 to 3.6."""
-    record, odometer, heading, place = van(seed)
-    answer = align(record, place, POOR, aid=Odometer(odometer))
-    sigma = float(answer.euler_sigma[0])
-    off = (answer.heading - heading + np.pi) % (2.0 * np.pi) - np.pi
-    assert answer.status == "aligned", answer.reasons
-    assert sigma < np.radians(5.0)
-    assert abs(off) < 3.0 * sigma
+def test_vans_with_poor_gyros_and_wheels_of_pulses():
+    """Gyros of 100 deg/h; as every pass began from zero biases and 4 deg of level: 23, 11 and -7 deg off, sigma 2.3 to 3.6.
+
+    Eight drives, none left out: squares within the 99 % quantile of chi-square, none beyond four sigmas, heading of most of use.
+    """
+    misses, aligned = [], 0
+    for seed in range(8):
+        record, odometer, heading, place = van(seed)
+        answer = align(record, place, POOR, aid=Odometer(odometer))
+        sigma = float(answer.euler_sigma[0])
+        off = (answer.heading - heading + np.pi) % (2.0 * np.pi) - np.pi
+        assert answer.status in ("aligned", "level_only"), answer.reasons
+        assert sigma < np.radians(8.0)
+        aligned += answer.status == "aligned"
+        misses.append(off / sigma)
+    assert aligned >= 4
+    assert np.abs(misses).max() < 4.0
+    assert np.sum(np.square(misses)) < 20.1
 
 
 def test_what_is_used_twice_is_taken_off():
