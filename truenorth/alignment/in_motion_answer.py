@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from truenorth.alignment.in_motion_learnt import delay_of
 from truenorth.alignment.in_motion_start import departures
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.alignment.moving import fifteen, moving_of
@@ -17,6 +16,7 @@ from truenorth.core.earth import normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
+from truenorth.estimate.latency import delay_of
 from truenorth.records import OdometerRecord
 from truenorth.state.layout import BA, BG, DP, PHI
 from truenorth.state.track import Track

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from truenorth.alignment.in_motion_learnt import SHOWN_DELAY, delay_of
 from truenorth.alignment.in_motion_start import Guess, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
+from truenorth.estimate.latency import SHOWN_DELAY, as_late_as_found, delay_of
 from truenorth.estimate.rivals import likelihood_ratio, moved
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.second_look import wrong_lag
@@ -49,6 +49,10 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
                 key, mounting = shut[name]
                 found.append(replace(wrong_lag(name, key, mounting, lag[0], lag[1]), kind=kind, effect=share))
         task, track = open_, late
+        antenna = as_late_as_found(task.antenna, track, "GNSS")
+        if antenna is not task.antenna:
+            task = replace(task, antenna=antenna)
+            track = task.run(guess, gated=gated)
 
     def other(record: ImuRecord) -> Track:
         rival = replace(task, record=record)

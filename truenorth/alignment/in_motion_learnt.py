@@ -5,9 +5,6 @@ the mean square of the *difference* of innovations that follow each other is the
 large as the variances ``S = H P H' + R`` say, R is ``1 + (q - 1) S / R`` times too small, and the next pass takes it as large. What
 is slow is left to the verdict (:mod:`truenorth.quality.innovations`).
 
-A delay acts as its first derivative as long as it is short against manoeuvres, and on an arm against the tremble of the vehicle;
-the next pass begins with the delay found.
-
 Source: R. Mehra, "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Autom. Control 15 (1970).
 """
 
@@ -21,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
+from truenorth.estimate.latency import SHOWN_DELAY
 from truenorth.quality.whiteness import FEWEST
 from truenorth.state.evidence import Evidence, note
 from truenorth.state.limits import limit
@@ -31,8 +29,6 @@ Array = NDArray[np.float64]
 LEAST_FACTOR = 1.15  # of sigma: less is what a usual value is worth
 MEDIAN = 0.4549  # of chi-square with one degree of freedom
 SPREAD = 3.0  # of that median, times the root of the count: 2.3, and differences share a row
-LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
-SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word
 
 
 def noise_factors(track: Track, aiding: Sequence[Aiding], before: Mapping[str, Array]) -> dict[str, Array]:
@@ -86,15 +82,6 @@ def changed(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
     one = np.ones(3)
     names = before.keys() | after.keys()
     return any(np.abs(np.log(after.get(n, one) / before.get(n, one))).max() > math.log(LEAST_FACTOR) for n in names)
-
-
-def delay_of(track: Track, name: str) -> tuple[float, float, float] | None:
-    """Delay of a sensor as found beyond the assumed one, its sigma, and its prior, s."""
-    where = track.layout.slice_of(f"{name} lag")
-    if where is None:
-        return None
-    prior = dict(zip(track.layout.names, track.layout.priors, strict=True))[f"{name} lag"][0]
-    return float(track.sensors[-1, where.start]), float(track.sigma[-1, where.start]), prior
 
 
 def learnt_evidence(factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:

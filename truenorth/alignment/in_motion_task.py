@@ -14,10 +14,7 @@ from truenorth.aiding.aids import BASELINE
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import (
-    LEAST_DELAY,
-    SHOWN_DELAY,
     changed,
-    delay_of,
     louder,
     noise_factors,
 )
@@ -32,6 +29,7 @@ from truenorth.core.position import Position
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
@@ -94,9 +92,7 @@ class MovingTask:
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
         """The task with what a pass has taught of its sensors, and whether that is much."""
         factors = noise_factors(track, self.aiding(gated=False), self.factors)
-        antenna, late = self.antenna, delay_of(track, "GNSS")
-        if late is not None and abs(late[0]) > max(LEAST_DELAY, SHOWN_DELAY * late[1]):
-            antenna = replace(antenna, latency=antenna.latency + late[0])
+        antenna = as_late_as_found(self.antenna, track, "GNSS")
         much = antenna is not self.antenna or changed(self.factors, factors)
         return (replace(self, factors=factors, antenna=antenna), True) if much else (self, False)
 

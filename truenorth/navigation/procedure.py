@@ -22,11 +22,13 @@ from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.latency import counted_from
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
+from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.given import by_key, kept_altitude, looked_at, mounted_as, record_of, sits_as_found
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
-from truenorth.navigation.second_look import second_look
+from truenorth.navigation.second_look import SENSORS, as_found, on_any_clock, second_look
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
@@ -58,6 +60,7 @@ FINE, COARSE = 0.2, 1.0
 AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
 SHORTEST_AXES = 20.0  # s
 DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
+MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 NEVER = Late(0, 0.0)
 PLUMB_LINE = Deflection()
 
@@ -156,7 +159,7 @@ def navigate(
         plan = replace(plan, always=[*zero_updates(record, zupt, plan.interval, *seen), *disturbances])
     _check_axes(plan, given)
     tell("navigating")
-    plan, track, wanders = _filtered(plan, given, smooth)
+    plan, given, track, wanders = _filtered(plan, given, smooth)
     evidence = [*_seen(plan, track, given, found), *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
@@ -230,10 +233,15 @@ def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> l
     return evidence
 
 
-def _filtered(plan: _Plan, given: Mapping[str, Any], smooth: bool) -> tuple[_Plan, Track, list[Evidence]]:
-    """The plan with slow errors of aids that innovations show, its track, and what is to be said of them."""
+def _filtered(plan: _Plan, given: dict[str, Any], smooth: bool) -> tuple[_Plan, dict[str, Any], Track, list[Evidence]]:
+    """The plan with slow errors of aids that innovations show, aids as late as found, the track, and what is to be said."""
     said: list[Evidence] = []
+    asked = given
     track = plan.run(plan.sources(given), smooth=smooth)
+    later = _as_late_as_found(plan, given, track)
+    if later is not given:
+        given = later
+        track = plan.run(plan.sources(given), smooth=smooth)
     for _ in range(2):  # one sensor's may hide another's
         slow, shown = slow_errors(track, plan.sources(given))
         if not slow:
@@ -242,7 +250,24 @@ def _filtered(plan: _Plan, given: Mapping[str, Any], smooth: bool) -> tuple[_Pla
         said += shown
         aiding = plan.sources(given)
         track = as_lasting(plan.run(aiding, smooth=smooth), aiding)
-    return plan, track, said
+    for key, (name, _) in SENSORS.items():
+        if given.get(key) is not asked.get(key):
+            track = counted_from(track, name, given[key].mounting.latency - asked[key].mounting.latency)
+    return plan, given, track, said
+
+
+def _as_late_as_found(plan: _Plan, given: dict[str, Any], track: Track) -> dict[str, Any]:
+    """The aids as late as passes over the log have found them, one after the other; the same mapping where none is late."""
+    found = given
+    for _ in range(MOST_DELAYS):
+        later = as_found(found, track)
+        if later is found:
+            break
+        found = later
+        # No gates: a delay that is wrong rejects what would show the right one.
+        free = {key: replace(m, gate=0.0) for key, m in looked_at(found).items()}
+        track = plan.run(plan.sources(mounted_as(found, free)))
+    return found
 
 
 def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
@@ -258,7 +283,35 @@ def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, 
     found = noise_evidence(usual, track, plan.model, plan.record)
     found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
+    found += _gyros_of_another_moment(plan, given)
     return found + second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
+
+
+def _gyros_of_another_moment(plan: _Plan, given: Mapping[str, Any]) -> list[Evidence]:
+    """Whether gyros that are earlier or later than the accelerometers explain the measurements better, over the log's first part.
+
+    Sensors that are late look like gyros that are early: their clocks are left open first.
+    """
+    own = looked_at(given)
+    seen = {key: on_any_clock(own[key]) for key, a in given.items() if isinstance(a, Gnss | Odometer | VelocityLog)}
+    if not seen:
+        return []
+    open_ = mounted_as(given, own | seen)
+    aiding = plan.sources(open_)
+
+    def run(record: ImuRecord) -> Track:
+        return replace(plan, record=record).run(aiding)
+
+    part = plan.record.between(None, plan.record.time[0] + AXES_TIME)
+    try:
+        track = run(part)
+        later = _as_late_as_found(replace(plan, record=part), open_, track)
+        if later is not open_:
+            aiding = plan.sources(later)
+            track = run(part)
+    except DataError:  # the filter broke down: no explanation
+        return []
+    return gyro_delay_evidence(run, track, part)
 
 
 def _intervals(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.source import Role
 from truenorth.core.errors import DataError
+from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.rivals import moved
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.mounting import FALSE_REJECTION, Mounting
@@ -116,6 +117,21 @@ def _contradicted(track: Track) -> float:
 def _beyond(track: Track, name: str, role: Role) -> bool:
     where = track.layout.slice_of(f"{name} {role}")
     return where is not None and bool(np.any(np.abs(track.sensors[-1, where]) > SMALL * OPEN[role].prior))
+
+
+def on_any_clock(mounting: Mounting) -> Mounting:
+    """The same sensor, its clock left open where it was taken for known."""
+    return mounting if mounting.latency_sigma > 0.0 else replace(mounting, latency_sigma=OPEN["lag"].prior)
+
+
+def as_found(given: dict[str, Any], track: Track) -> dict[str, Any]:
+    """The aids as late as a track has found them, where that was left open; the same mapping where nothing has changed."""
+    found = {}
+    for key, (name, _) in SENSORS.items():
+        mounting = getattr(given.get(key), "mounting", None)
+        if mounting is not None and (later := as_late_as_found(mounting, track, name)) is not mounting:
+            found[key] = given[key].mounted(later)
+    return given | found if found else given
 
 
 def _loosened(name: str, mounting: Mounting) -> Mounting:

@@ -1,0 +1,90 @@
+"""Gyros of another moment, and a receiver whose clock is left open, in navigation."""
+
+import numpy as np
+import pytest
+
+from tests.navigation.test_navigate import SPEC, drive, fixes
+from truenorth.aiding.aids import Gnss
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.earth import earth_rate_n, normal_gravity
+from truenorth.estimate.sensor_delay import gyros_later
+from truenorth.navigation import Mounting, navigate
+from truenorth.records import GnssRecord, ImuRecord
+from truenorth.records.specs import ImuSpec
+from truenorth.state.state import Start
+
+__all__ = ["drive"]  # the fixture of a car that turns twice
+
+
+@pytest.mark.parametrize(("late", "key"), [(0, None), (10, "delay.gyros_late"), (-20, "delay.gyros_early")])
+def test_gyros_of_another_moment_are_found(drive, late, key):
+    """By a tenth of a second and more, to 30 ms; sound ones are left alone."""
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.3)
+    result = navigate(gyros_later(record, late), start, aid=Gnss(gnss), imu=SPEC)
+    found = [item for item in result.evidence if item.key.startswith("delay.gyros_")]
+    if key is None:
+        assert result.status == "navigated"
+        assert not found
+    else:
+        assert [item.key for item in found] == [key]
+        assert found[0].figures["delay"] == pytest.approx(abs(late) * record.interval, abs=0.03)
+
+
+def test_a_late_antenna_that_the_road_swings():
+    """1.8 Hz, three metres off, .08 s late: as a derivative alone it is not found within .05 s, and looks like early gyros."""
+    dt, lat, late = 0.01, 0.7, 0.08
+    rng = np.random.default_rng(3)
+    t = dt * np.arange(12_001)
+    beats = [(0.02, 1.8, 0.3), (0.02, 1.3, 2.0), (0.6, 0.05, 0.0)]  # rad, Hz, rad
+
+    def turned(t):
+        return sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in beats)
+
+    def axes(t):
+        return dcm_from_euler(turned(t), 0.0 * t, 0.0 * t)
+
+    C = axes(t)
+    dtheta = dt * np.einsum("kji,j->ki", 0.5 * (C[1:] + C[:-1]), earth_rate_n(lat))
+    dtheta[:, 2] -= np.diff(turned(t))
+    fast, slowly = (
+        4.0,
+        2.0 * np.pi * 0.05,
+    )  # m/s northwards and back, rad/s: without it nothing but the arm would show a delay
+    middle = t[1:] - 0.5 * dt
+    force = np.array([0.0, 0.0, float(normal_gravity(lat, 0.0))]) + np.outer(
+        fast * slowly * np.cos(slowly * middle), [0.0, 1.0, 0.0]
+    )
+    dvel = dt * np.einsum("kji,kj->ki", axes(middle), force)
+    spec = ImuSpec(gyro_random_walk=2e-5, accel_random_walk=2e-4, gyro_bias=1e-6, accel_bias=1e-3)
+    record = ImuRecord(
+        t[1:],
+        dtheta + spec.gyro_random_walk * np.sqrt(dt) * rng.standard_normal(dtheta.shape),
+        dvel + spec.accel_random_walk * np.sqrt(dt) * rng.standard_normal(dvel.shape),
+        kind="increments",
+    )
+    arm, at = np.array([0.5, 3.0, 1.0]), np.arange(1.0, 119.0, 0.5)
+    then = at - late
+    rate = sum(a * 2.0 * np.pi * f * np.cos(2.0 * np.pi * f * then + p) for a, f, p in beats)
+    v_n = np.einsum("kij,kj->ki", axes(then), np.cross(rate[:, None] * [0.0, 0.0, -1.0], arm))
+    out = np.einsum("kij,j->ki", axes(then), arm)
+    off = 0.3 * rng.standard_normal((len(at), 3))
+    v_n[:, 1] += fast * np.sin(slowly * then)
+    out[:, 1] += fast / slowly * (1.0 - np.cos(slowly * then))
+    place = out + off
+    gnss = GnssRecord(
+        at,
+        lat + place[:, 1] / 6_363_000.0,
+        0.1 + place[:, 0] / (6_387_000.0 * np.cos(lat)),
+        place[:, 2],
+        v_n + 0.03 * rng.standard_normal((len(at), 3)),
+        np.full((len(at), 3), 0.3),
+        np.full((len(at), 3), 0.03),
+    )
+    P = np.diag(np.repeat([1e-3, 0.05, 1.0, 1e-6, 1e-3], 3) ** 2)
+    start = Start(0.0, C[0], np.zeros(3), lat, 0.1, 0.0, np.zeros(3), np.zeros(3), P)
+    result = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=arm, latency_sigma=0.2)), imu=spec)
+    assert result.status == "navigated"
+    assert not [item for item in result.evidence if item.key.startswith("delay.")]
+    lag = result.estimated()["GNSS lag"]
+    assert lag["value"][0] == pytest.approx(late, abs=0.01)

@@ -1,0 +1,43 @@
+"""How late a sensor is, as a track has found it: what a further pass over the log begins with.
+
+A delay acts as its first derivative as long as it is short against manoeuvres, and of a sensor on an arm against the tremble of the
+vehicle: .08 s of an antenna that the road swings at two hertz are a radian of its phase, and look like gyros that are early. So a
+pass ends with the delay that it has found, and the next one begins with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from truenorth.state.mounting import Mounting
+from truenorth.state.track import Track
+
+LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
+SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
+
+
+def delay_of(track: Track, name: str) -> tuple[float, float, float] | None:
+    """Delay of a sensor as found beyond the assumed one, its sigma, and its prior, s."""
+    where = track.layout.slice_of(f"{name} lag")
+    if where is None:
+        return None
+    prior = dict(zip(track.layout.names, track.layout.priors, strict=True))[f"{name} lag"][0]
+    return float(track.sensors[-1, where.start]), float(track.sigma[-1, where.start]), prior
+
+
+def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
+    """The mounting of a sensor with the delay that a track has found; the same object where that is too short to matter."""
+    late = delay_of(track, name)
+    if late is None or abs(late[0]) <= max(LEAST_DELAY, SHOWN_DELAY * late[1]):
+        return mounting
+    return replace(mounting, latency=mounting.latency + late[0])
+
+
+def counted_from(track: Track, name: str, before: float) -> Track:
+    """The track with a sensor's delay counted from another latency, `before` (s) less than the one it was run with."""
+    where = track.layout.slice_of(f"{name} lag")
+    if where is None or before == 0.0:
+        return track
+    sensors = track.sensors.copy()
+    sensors[:, where] += before
+    return replace(track, sensors=sensors)
