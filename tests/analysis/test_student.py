@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy.special import ndtri, stdtr, stdtrit
 
-from truenorth.analysis.student import as_normal, student_limit, tail
+from truenorth.analysis.student import as_normal, below, student_limit, tail
 
 FREEDOM = (0.5, 1, 2, 3.3, 9, 30, 100, 999, 1000, 1e4, 1e7, 1e12)
 
@@ -25,6 +25,8 @@ def test_without_a_degree_of_freedom_nothing_is_beyond_the_limit():
 def test_tail_and_normal_are_as_scipy_has_them(dof, t):
     chance = stdtr(dof, -t)
     assert tail(t, dof) == pytest.approx(chance, rel=1e-9)
+    assert below(-t, dof) == pytest.approx(chance, rel=1e-9)
+    assert below(t, dof) == pytest.approx(1.0 - chance, rel=1e-12)
     assert as_normal(-t, dof) == pytest.approx(-ndtri(chance), rel=1e-10, abs=1e-12)
 
 

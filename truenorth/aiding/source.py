@@ -16,6 +16,7 @@ from truenorth.aiding.position import POSITION
 from truenorth.aiding.rest import ROTATION
 from truenorth.aiding.row import Row
 from truenorth.aiding.velocity import VELOCITY
+from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.group import Group
 from truenorth.state.mounting import FALSE_REJECTION
@@ -135,9 +136,7 @@ class Aiding:
         """(3,) limits of the normalised innovation squared of one, two and three rows."""
         if self.gate <= 0.0:
             return np.full(3, NO_GATE)
-        from scipy.special import chdtri
-
-        return np.asarray(chdtri([1.0, 2.0, 3.0], self.gate), dtype=np.float64)
+        return np.array([chi_square_limit(float(self.gate), dof) for dof in (1, 2, 3)])
 
 
 def state(

@@ -31,6 +31,11 @@ def tail(t: float, dof: float) -> float:
     return 0.5 - 0.5 * front * _fraction(b, a, y) / b
 
 
+def below(t: float, dof: float) -> float:
+    """Probability that a Student's t variable is less than `t`."""
+    return 1.0 - tail(t, dof) if t > 0.0 else tail(-t, dof)
+
+
 def student_limit(chance: float, dof: float) -> float:
     """What the size of a Student's t variable exceeds with the given probability: of a mean over its own estimated sigma."""
     if dof <= 0:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Role
+from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.rivals import moved
@@ -104,13 +105,12 @@ def second_look(
 
 def _contradicted(track: Track) -> float:
     """Largest share of a sensor's measurements whose innovations no sound one has."""
-    from scipy.special import chdtri
-
     shares = [0.0]
     for r in track.residuals:
         there = r.rows > 0
         if there.any():
-            shares.append(float(np.mean(r.nis[there] > chdtri(r.rows[there], FALSE_REJECTION))))
+            limits = np.array([chi_square_limit(FALSE_REJECTION, dof) for dof in range(int(r.rows.max()) + 1)])
+            shares.append(float(np.mean(r.nis[there] > limits[r.rows[there]])))
     return max(shares)
 
 

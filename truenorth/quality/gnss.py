@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.student import below
 from truenorth.core.earth import radii
 from truenorth.records import GnssRecord, MasterRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, contradiction
@@ -203,9 +204,8 @@ def _turn(
     sigma = math.sqrt(float(weights @ (sigmas**2 + (angles - angle) ** 2)))
     if abs(angle) < 3.0 * sigma:
         return Turn(angle, sigma, 0.5)
-    from scipy.special import stdtr
-
-    return Turn(angle, sigma, float(weights @ stdtr(dof, -math.copysign(1.0, angle) * angles / sigmas)))
+    other = [below(-math.copysign(1.0, angle) * float(t), dof) for t in angles / sigmas]
+    return Turn(angle, sigma, float(weights @ other))
 
 
 def _walk(time: Array, stretch: NDArray[np.intp], lasts: float) -> Array:
