@@ -122,12 +122,12 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     measured_course = np.concatenate([bank.measured_course for bank in banks], axis=2)
     (n, courses), right, gains = state_course.shape, seen.white.shape[2], seen.gains
     behind = np.unique(np.concatenate([bank.epoch for bank in banks]))
-    energies = np.empty((len(behind), n + courses, n + courses))
-    matches, ends = np.empty((len(behind), n + courses, right)), np.empty((len(behind), n, n + courses))
+    forms = np.empty((len(behind), n + courses, n + courses + right))
+    ends = np.empty((len(behind), n, n + courses))
     arrays = (gains.step, gains.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
     whole = tuple(np.ascontiguousarray(a) for a in arrays)
-    states = padded(n)
-    _sum_back(states, padded(len(states) + courses), *whole, behind.astype(np.int64), energies, matches, ends)
+    _sum_back(padded(n), len(padded(n + courses + right)), *whole, behind.astype(np.int64), forms, ends)
+    energies, matches = forms[:, :, : n + courses], forms[:, :, n + courses :]
 
     found, first = [], n
     for bank in banks:
@@ -159,7 +159,7 @@ def _match(seen: Innovations, bank: Signatures, energies: Array, matches: Array,
 @compiled
 def _sum_back(
     states: Size,
-    size: Size,
+    wide: int,
     step: Any,
     H_Phi: Any,
     gain: Any,
@@ -168,41 +168,39 @@ def _sum_back(
     U: Any,
     seen: Any,
     behind: Any,
-    energies: Any,
-    matches: Any,
+    forms: Any,
     ends: Any,
 ) -> None:
     """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last error of it.
 
-    Forms are squares of `size`, with zeros at their ends; of the states there are as many as `states` says, the last of them
-    zero.
+    The quadratic form comes first, the linear ones of the innovations are columns behind it. All are `wide`, with zeros at their
+    ends; of the states there are as many as `states` says, the last of them zero.
     """
-    N, n, m, right = len(size), step.shape[1], gain.shape[2], matches.shape[2]
-    energy, match, end = np.zeros((N, N)), np.zeros((N, right)), np.zeros((n, N))
+    n, m, used, right = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
+    form, end = np.zeros((used, wide)), np.zeros((n, wide))
     for i in range(n):
         end[i, i] = 1.0
-    # e goes on as F (e, w), and is seen, made white, as G (e, w).
-    F, G, T = np.zeros((len(states), N)), np.zeros((m, N)), np.zeros((N, N))
-    before, match_before, end_before = np.zeros_like(energy), np.zeros_like(match), np.zeros_like(end)
+    # e goes on as F (e, w), and is seen, made white, as G (e, w); behind G stand the innovations.
+    F, G, T = np.zeros((len(states), wide)), np.zeros((m, wide)), np.zeros((used, wide))
+    form_before, end_before, work = np.zeros_like(form), np.zeros_like(end), np.zeros((len(states), U.shape[1]))
     row = len(behind) - 1
     for k in range(step.shape[0] - 1, -1, -1):
         while row >= 0 and behind[row] == k:
-            _keep(energy, energies[row])
-            _keep(match, matches[row])
+            _keep(form, forms[row])
             _keep(end, ends[row])
             row -= 1
         if row < 0:
             break
-        _go_on(step[k], H_Phi[k], gain[k], A[k], U, F, G)
-        _whiten(size, L[k], G)
-        _times_course(states, size, n, energy, F, T)
-        _course_times(states, size, n, F, T, before)
-        _add_square(size, G, before)
-        energy, before = before, energy
-        _few_course_times(n, F, match, match_before)
-        _add_few(G, seen[k], match_before)
-        match, match_before = match_before, match
-        _times_course(states, size, n, end, F, end_before)
+        _go_on(step[k], H_Phi[k], gain[k], A[k], U, F, G, work)
+        _whiten(L[k], used, G)
+        for i in range(m):
+            for j in range(right):
+                G[i, used + j] = seen[k, i, j]
+        _times_course(states, n, form, F, T)
+        _course_times(states, n, F, T, form_before)
+        _add_square(G, form_before)
+        form, form_before = form_before, form
+        _times_course(states, n, end, F, end_before)
         end, end_before = end_before, end
 
 
@@ -215,19 +213,15 @@ def _keep(values: Any, place: Any) -> None:
 
 
 @compiled
-def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any) -> None:
-    """``F = [step, step U - gain A]`` and ``G = [H Phi, H Phi U + A]``."""
+def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any, work: Any) -> None:
+    """``F = [step, step U - gain A]`` and ``G = [H Phi, H Phi U + A]``; `work` is as wide as U."""
     n, m = len(step), len(G)
+    _times_and_add(step, U, gain, A, -1.0, work)
     for i in range(n):
         for j in range(n):
             F[i, j] = step[i, j]
         for j in range(U.shape[1]):
-            total = 0.0
-            for r in range(n):
-                total += step[i, r] * U[r, j]
-            for r in range(m):
-                total -= gain[i, r] * A[r, j]
-            F[i, n + j] = total
+            F[i, n + j] = work[i, j]
     for i in range(m):
         for j in range(n):
             G[i, j] = H_Phi[i, j]
@@ -238,66 +232,62 @@ def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any) -> 
             G[i, n + j] = total
 
 
+@compiled
+def _times_and_add(A: Any, B: Any, C: Any, D: Any, sign: float, X: Any) -> None:
+    """``X = A B + sign C D``, as many rows as A has."""
+    for i in range(A.shape[0]):
+        for j in range(X.shape[1]):
+            X[i, j] = 0.0
+        for r in range(A.shape[1]):
+            for j in range(X.shape[1]):
+                X[i, j] += A[i, r] * B[r, j]
+        for r in range(C.shape[1]):
+            for j in range(X.shape[1]):
+                X[i, j] += sign * C[i, r] * D[r, j]
+
+
 @borrowing(forceinline=True)
-def _whiten(size: Size, L: Any, G: Any) -> None:
-    """``G = L^-1 G``, L lower triangular."""
+def _whiten(L: Any, used: int, G: Any) -> None:
+    """``G = L^-1 G`` of the columns used, L lower triangular."""
     for i in range(G.shape[0]):
         for r in range(i):
-            for j in range(len(size)):
+            for j in range(used):
                 G[i, j] -= L[i, r] * G[r, j]
-        for j in range(len(size)):
+        for j in range(used):
             G[i, j] /= L[i, i]
 
 
 @borrowing(forceinline=True)
-def _times_course(states: Size, size: Size, n: int, X: Any, F: Any, Y: Any) -> None:
+def _times_course(states: Size, n: int, X: Any, F: Any, Y: Any) -> None:
     """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n."""
     for i in range(X.shape[0]):
-        for j in range(len(size)):
+        for j in range(Y.shape[1]):
             total = 0.0
             for r in range(len(states)):
                 total += X[i, r] * F[r, j]
             Y[i, j] = total
-        for j in range(n, len(size)):
+        for j in range(n, Y.shape[1]):
             Y[i, j] += X[i, j]
 
 
 @borrowing(forceinline=True)
-def _course_times(states: Size, size: Size, n: int, F: Any, X: Any, Y: Any) -> None:
+def _course_times(states: Size, n: int, F: Any, X: Any, Y: Any) -> None:
     """``Y = M' X`` with ``M = [F; 0 I]``, the identity behind the first n."""
     for i in range(X.shape[0]):
-        for j in range(len(size)):
+        for j in range(Y.shape[1]):
             total = 0.0
             for r in range(len(states)):
                 total += F[r, i] * X[r, j]
             Y[i, j] = total
         if i >= n:
-            for j in range(len(size)):
+            for j in range(Y.shape[1]):
                 Y[i, j] += X[i, j]
 
 
 @borrowing(forceinline=True)
-def _add_square(size: Size, G: Any, C: Any) -> None:
+def _add_square(G: Any, C: Any) -> None:
     """``C += G' G``, of the rows that C has."""
     for i in range(C.shape[0]):
         for k in range(G.shape[0]):
-            for j in range(len(size)):
+            for j in range(C.shape[1]):
                 C[i, j] += G[k, i] * G[k, j]
-
-
-@compiled
-def _few_course_times(n: int, F: Any, X: Any, Y: Any) -> None:
-    """``Y = M' X`` with ``M = [F; 0 I]``, the identity behind the first n, of few columns."""
-    for i in range(X.shape[0]):
-        for j in range(X.shape[1]):
-            Y[i, j] = X[i, j] if i >= n else 0.0
-    _add_few(F, X, Y)
-
-
-@compiled
-def _add_few(A: Any, B: Any, C: Any) -> None:
-    """``C += A' B``, of the rows that A and C have."""
-    for k in range(A.shape[0]):
-        for i in range(C.shape[0]):
-            for j in range(B.shape[1]):
-                C[i, j] += A[k, i] * B[k, j]

@@ -13,7 +13,6 @@ import threading
 
 LAST = "truenorth.alignment.matched._sum_back"  # where it is on the disk, no first alignment waits any more
 SWAY_STATES = 39  # of a base with two oscillations along each axis; what is padded to the same size shares its kernel
-COURSES = 11  # of what may begin in a log: a drift, a step of a bias, the gravity of the other hemisphere
 CODE = "from truenorth.cli.ahead import compile_last; compile_last()"
 
 
@@ -64,8 +63,7 @@ def call_last() -> None:
     system = LinearSystem(Phi, Phi, H, R, np.zeros((K, m)), np.zeros(n), np.eye(n), S=S)
     nothing = SimpleNamespace(innovation=np.zeros((K, m)), innovation_covariance=R, P=Phi)
     fine = SimpleNamespace(system=system, estimates=nothing, gains=filter_gains(system, nothing))  # type: ignore[arg-type]
-    state, measured = np.zeros((n, 1)), np.zeros((m, 1))
-    courses = np.zeros((COURSES, 1)), np.zeros((n, COURSES)), np.zeros((K, m, COURSES))
-    one = Signatures(np.zeros(1, dtype=np.int64), state, measured, *courses)
+    state, measured, course = np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((K, m, 1))
+    one = Signatures(np.zeros(1, dtype=np.int64), state, measured, np.zeros((1, 1)), state, course)
     matched(innovations_of(fine), one)  # type: ignore[arg-type]
     kalman(system, history="full")

@@ -4,7 +4,8 @@ A matrix of n rows lives in the corner of an N x N array with zeros beyond n; N 
 The zeros change no bit of a result. Each function takes `size`, a tuple of N nothings, first: its length is part of its
 *type*, so that Numba compiles every function once for each N with loops of constant length, and one source serves all.
 With the innermost loop of constant length summing into a scalar, LLVM unrolls it and turns the loop around it into
-vector instructions.
+vector instructions. That one has the length of an array, as long but not known when it is compiled: one of constant length up to 12
+LLVM unrolls as well, and has no loop left for vectors (a product of 12 rows took .44 us, and takes .14).
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def dot(size: Size, a: Array, b: Array) -> float:
 @borrowing(forceinline=True)
 def transposed_times(size: Size, A: Array, x: Array, y: Array) -> None:
     """``y = A' x``: for a symmetric `A` the product itself; the transpose runs along rows."""
-    for j in range(len(size)):
+    for j in range(A.shape[1]):
         total = 0.0
         for k in range(len(size)):
             total += A[k, j] * x[k]
@@ -67,7 +68,7 @@ def transposed_times(size: Size, A: Array, x: Array, y: Array) -> None:
 def multiply(size: Size, A: Array, B: Array, C: Array) -> None:
     """``C = A B``; `C` is neither `A` nor `B`."""
     for i in range(len(size)):
-        for j in range(len(size)):
+        for j in range(C.shape[1]):
             total = 0.0
             for k in range(len(size)):
                 total += A[i, k] * B[k, j]
@@ -79,7 +80,7 @@ def propagate_covariance(size: Size, Phi: Array, Phi_t: Array, Q: Array, P: Arra
     """``P = Phi P Phi' + Q``, symmetric to the bit; `Phi_t` is the transpose of `Phi`."""
     multiply(size, Phi, P, work)
     for i in range(len(size)):
-        for j in range(len(size)):
+        for j in range(P.shape[1]):
             total = 0.0
             for k in range(len(size)):
                 total += work[i, k] * Phi_t[k, j]
@@ -99,7 +100,7 @@ def mirror(size: Size, P: Array) -> None:
 def take_off(size: Size, P: Array, a: Array, scale: float) -> None:
     """``P = P - scale a a'``, symmetric to the bit."""
     for i in range(len(size)):
-        for j in range(len(size)):
+        for j in range(P.shape[1]):
             P[i, j] -= scale * (a[i] * a[j])
 
 
@@ -107,7 +108,7 @@ def take_off(size: Size, P: Array, a: Array, scale: float) -> None:
 def take_off_pair(size: Size, P: Array, a: Array, b: Array) -> None:
     """``P = P - (a b' + b a') / 2``, symmetric to the bit."""
     for i in range(len(size)):
-        for j in range(len(size)):
+        for j in range(P.shape[1]):
             P[i, j] -= 0.5 * (a[i] * b[j] + b[i] * a[j])
 
 

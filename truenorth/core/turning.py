@@ -60,12 +60,12 @@ def fit_turning(interval: float, rates: Array) -> Turning:
     up = rates[3:] / size
     usual = np.abs(size / np.median(size) - 1.0) < 0.1
     good = usual[1:] & usual[:-1]
-    angle = rates[:3] - rates[:3].mean(axis=1, keepdims=True)  # bias and earth rate; a sway keeps its swing
-    theta = 0.5 * interval * (angle[:, 1:] + angle[:, :-1])
-    middle = np.where(good, 0.5 * (up[:, 1:] + up[:, :-1]), 0.0)
     turn = _smooth(np.where(good, np.diff(up, axis=1), 0.0), cells)
     if np.sqrt(np.mean(np.sum(turn**2, axis=0))) < LEAST_TURN * interval / TURN_STEP:
         return nothing
+    angle = rates[:3] - rates[:3].mean(axis=1, keepdims=True)  # bias and earth rate; a sway keeps its swing
+    theta = 0.5 * interval * (angle[:, 1:] + angle[:, :-1])
+    middle = np.where(good, 0.5 * (up[:, 1:] + up[:, :-1]), 0.0)
 
     # Turn if axis i holds column j, for all i and j: each reading is a sum of three of the nine.
     basis = np.stack(

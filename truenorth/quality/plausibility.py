@@ -79,11 +79,11 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     """Judge the accelerometers' unit by the size of the median specific force."""
     dt = record.interval
     unit = dt if record.kind == "increments" else 1.0
-    size = np.sqrt(np.einsum("ki,ki->k", record.accel, record.accel))
+    square = np.einsum("ki,ki->k", record.accel, record.accel)
     # Where all of them are near gravity the median is.
-    if abs(size.min() / unit / G - 1.0) < LEVEL_TOLERANCE and abs(size.max() / unit / G - 1.0) < LEVEL_TOLERANCE:
+    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < LEVEL_TOLERANCE for extreme in (square.min(), square.max())):
         return True
-    level = float(np.median(size)) / unit
+    level = float(np.median(np.sqrt(square))) / unit
     if abs(level / G - 1.0) < LEVEL_TOLERANCE:
         return True
     readings = [

@@ -11,6 +11,7 @@ Source: Y. Qin, G. Yan et al., "Strapdown initial alignment on a swaying base us
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ from truenorth.records import ImuRecord
 from truenorth.strapdown.level import increments, inertial_integrals
 
 Array = NDArray[np.float64]
+MOST_REMEMBERED = 10_000  # epochs: an alignment has 5000 at the most
 SUB_EPOCHS = 5  # points within a filter interval at which the mean attitude is sampled
 
 
@@ -41,8 +43,24 @@ def gravity_position(t: ArrayLike, lat: float, alt: float) -> Array:
 
 
 def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
-    """Integrate ``exp([w_ie t x])`` `order` times from 0 to t: ``I a + K b + K^2 c`` with ``K = [w_ie x]/|w_ie|``."""
-    t = np.asarray(t, dtype=np.float64)[..., None, None]
+    """Integrate ``exp([w_ie t x])`` `order` times from 0 to t; nobody writes to it."""
+    t = np.asarray(t, dtype=np.float64)
+    if t.ndim == 1 and t.size <= MOST_REMEMBERED:
+        return _of_epochs(t.tobytes(), float(lat), order)
+    return _integrated_rotation(t, lat, order)
+
+
+@lru_cache(maxsize=16)
+def _of_epochs(times: bytes, lat: float, order: int) -> Array:
+    """The same of times (of doubles) that come again: in each pass over a log, and in each run of a campaign."""
+    found = _integrated_rotation(np.frombuffer(times), lat, order)
+    found.flags.writeable = False
+    return found
+
+
+def _integrated_rotation(t: Array, lat: float, order: int) -> Array:
+    """``I a + K b + K^2 c`` with ``K = [w_ie x]/|w_ie|``."""
+    t = t[..., None, None]
     K = skew(np.asarray(earth_rate_n(lat))) / EARTH_RATE
     w = EARTH_RATE
     half = np.sin(w * t / 2)
@@ -52,7 +70,7 @@ def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
         a, b, c = t, 2 * half**2 / w, t - np.sin(w * t) / w
     else:
         a, b, c = t**2 / 2, (t - np.sin(w * t) / w) / w, t**2 / 2 - 2 * half**2 / w**2
-    return a * np.eye(3) + b * K + c * (K @ K)
+    return np.asarray(a * np.eye(3) + b * K + c * (K @ K))
 
 
 @dataclass(frozen=True)
