@@ -62,7 +62,7 @@ def received(motion: Moving, duration: float, every: float, rng: np.random.Gener
         position_sigma=np.full_like(off, PLACE),
         velocity_sigma=np.full_like(off, SPEED),
     )
-    return Gnss(record, Mounting(lever_arm=ARM))
+    return Gnss(record, Mounting(lever_arm=ARM, bias_sigma=0.0))
 
 
 def compared(result: Any, motion: Moving, times: tuple[float, ...]) -> Outcome:

@@ -37,7 +37,7 @@ def fixes(ship: Voyage, every: float = 60.0) -> Gnss:
     e, n, u = 3.0 * ship.rng.standard_normal((3, len(k)))
     sigma = np.full((len(k), 3), 3.0)
     record = GnssRecord(ship.truth.time[k], lat + n / R_M, lon + e / (R_N * np.cos(lat)), alt + u, position_sigma=sigma)
-    return Gnss(record, Mounting())
+    return Gnss(record, Mounting(bias_sigma=0.0))
 
 
 def navigated(true: Deflection, assumed: Deflection, aided: str = "", hours: float = 12.0) -> Any:

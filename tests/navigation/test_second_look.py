@@ -144,8 +144,8 @@ def test_fixes_that_wander_are_said_and_white_ones_are_not(drive):
         lon=white.lon + drift[:, 0] / 4.27e6,
         alt=white.alt + drift[:, 2],
     )
-    antenna = Mounting(bias_sigma=1.5, bias_time=60.0)
-    for gnss, mounting, said in ((white, None, False), (wandering, None, True), (wandering, antenna, False)):
+    antenna, none = Mounting(bias_sigma=1.5, bias_time=60.0), Mounting(bias_sigma=0.0)
+    for gnss, mounting, said in ((white, none, False), (wandering, none, True), (wandering, antenna, False)):
         result = navigate(record, start, aid=Gnss(gnss, mounting), imu=SPEC)
         assert any(item.key == "innovations.wander" for item in result.evidence) is said
         sigma = result.position_sigma[-1]

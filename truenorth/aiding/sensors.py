@@ -81,10 +81,8 @@ def from_gnss(record: GnssRecord, mounting: Mounting, *, heights: bool = True) -
         if not heights:
             measured[:, 2] = np.nan
         states = states_of(mounting, "GNSS", "lever arm", "lag")
-        if mounting.bias_sigma > 0.0:
-            # Heights err more than places, and so do their slow errors.
-            axes = np.array([1.0, 1.0, _vertical(sigma[place])])
-            states |= state("GNSS", "bias", mounting.bias_sigma * axes, mounting.bias_time)
+        if mounting.slow > 0.0:
+            states |= state("GNSS", "bias", mounting.slow * _axes(sigma[place]), mounting.bias_time)
         found.append(rows_of("position", place, measured, sigma, states))
     moving = record.has_velocity & sound
     if moving.any() and record.v_n is not None:
@@ -183,11 +181,11 @@ def from_velocity(record: VelocityRecord, mounting: Mounting, errors: LogErrors)
         mounting,
         scale_sigma=max(mounting.scale_sigma, errors.scale),
         angle_sigma=max(mounting.angle_sigma, errors.mounting),
-        bias_sigma=max(mounting.bias_sigma, errors.bias),
+        bias_sigma=max(mounting.slow, errors.bias),
     )
     states = states_of(known, NAME, "lever arm", *(("scale", "mounting") if body else ()), "lag")
-    if body and known.bias_sigma > 0.0:
-        states |= state(NAME, "bias", np.full(3, known.bias_sigma), known.bias_time)
+    if body and known.slow > 0.0:
+        states |= state(NAME, "bias", np.full(3, known.slow), known.bias_time)
     if errors.drift > 0.0:
         time = DRIFT_TIME if errors.drift_time is None else errors.drift_time
         states["own"] = Group(DRIFT, np.full(2, errors.drift), time, unit="m/s")
@@ -227,8 +225,8 @@ def from_height(record: HeightRecord, mounting: Mounting, loop: float = 0.0) -> 
     noise = BARO_SIGMA if mounting.noise is None else mounting.noise
     sigma[:, 0] = noise if record.sigma is None else np.where(np.isfinite(record.sigma), record.sigma, noise)
     states: dict[Role, Group] = {}
-    if mounting.bias_sigma > 0.0:
-        states = state("barometer", "bias", mounting.bias_sigma, mounting.bias_time)
+    if mounting.slow > 0.0:
+        states = state("barometer", "bias", mounting.slow, mounting.bias_time)
     return [
         Aiding(
             "barometer",
@@ -248,6 +246,16 @@ def place_sigma(record: GnssRecord) -> float:
     """What a receiver says of its fixes, east and north alike, m; usual where it says nothing."""
     sigma = _position_sigma(record, POSITION_SIGMA)[record.has_position, :2]
     return float(np.median(sigma)) if sigma.size else float(POSITION_SIGMA[0])
+
+
+def place_axes(record: GnssRecord) -> Array:
+    """(3,) sigma of a receiver's slow errors east, north, up by that of its places."""
+    return _axes(_position_sigma(record, POSITION_SIGMA)[record.has_position])
+
+
+def _axes(sigma: Array) -> Array:
+    """Heights err more than places, and so do their slow errors; of sigmas (M, 3)."""
+    return np.array([1.0, 1.0, _vertical(sigma)])
 
 
 def _vertical(sigma: Array) -> float:

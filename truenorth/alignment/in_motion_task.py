@@ -33,6 +33,7 @@ from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.navigation.stops import seconds_at_rest, updates_at
 from truenorth.navigation.whereabouts import check_fixes
+from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.regimes import motion_summary
 from truenorth.quality.slow_aids import (
     FIXES,
@@ -115,7 +116,8 @@ class MovingTask:
 
     def with_lasting_fixes(self, track: Track) -> Track:
         """A track of this task with position known no better than fixes whose slow error nobody spoke of."""
-        return as_lasting(track, self.aiding(gated=True)) if self.usual_fixes else track
+        known = known_as_fixes(track, self.gnss, self.antenna.bias_sigma)
+        return as_lasting(known, self.aiding(gated=True)) if self.usual_fixes else known
 
     def aiding(self, *, gated: bool) -> list[Aiding]:
         """Of all sensors; without gates as long as the filter may be wrong itself."""

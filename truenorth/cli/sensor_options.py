@@ -92,9 +92,9 @@ class Sensors:
         antenna = self._mounted(self.lever_arm, "--lever-arm", None, self.parts & {"lever_arm", "latency"})
         if self.gnss_drift is not None:
             sigma, time = numbers_of(self.gnss_drift, "--gnss-drift", 2, "one sigma in metres, time in seconds")
-            if not (sigma > 0.0 and time > 0.0):
+            if not (sigma >= 0.0 and time > 0.0):
                 raise UsageError(
-                    f"--gnss-drift {self.gnss_drift}: expected metres and seconds above zero, such as 2,60"
+                    f"--gnss-drift {self.gnss_drift}: expected metres (0: there is none) and seconds above zero, such as 2,60"
                 )
             antenna = replace(antenna, bias_sigma=sigma, bias_time=time)
         return on_baseline(replace(antenna, latency=self.latency), self.baseline)

@@ -34,6 +34,7 @@ from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_axes
 from truenorth.navigation.whereabouts import check_fixes, check_heights
+from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
@@ -250,6 +251,10 @@ def _filtered(plan: _Plan, given: dict[str, Any], smooth: bool) -> tuple[_Plan, 
         said += shown
         aiding = plan.sources(given)
         track = as_lasting(plan.run(aiding, smooth=smooth), aiding)
+    receiver = given.get(Gnss.key)
+    if isinstance(receiver, Gnss):
+        said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
+        track = known_as_fixes(track, receiver.record, said_of)
     for key, (name, _) in SENSORS.items():
         if given.get(key) is not asked.get(key):
             track = counted_from(track, name, given[key].mounting.latency - asked[key].mounting.latency)

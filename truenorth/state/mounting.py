@@ -34,8 +34,9 @@ class Mounting:
         Of pitch and yaw of that; 0: known.
     scale_sigma : float
         Of an odometer's or a log's scale factor; 0: known.
-    bias_sigma : float, m/s or m
+    bias_sigma : float or None, m/s or m
         Of a slow error of a velocity log, a barometer or a receiver's places (of its heights in proportion to sigma); 0: none.
+        None: nothing is said of it; places are then known no better than a fix, since no data show an error of all of them.
     bias_time : float, s
         Its correlation time.
     latency : float, s
@@ -55,13 +56,18 @@ class Mounting:
     C_mb: Array = field(default_factory=lambda: np.eye(3))
     angle_sigma: float = 0.0
     scale_sigma: float = 0.0
-    bias_sigma: float = 0.0
+    bias_sigma: float | None = None
     bias_time: float = math.inf
     latency: float = 0.0
     latency_sigma: float = 0.0
     gate: float = FALSE_REJECTION
     noise: float | None = None
     slip: float = SLIP_SIGMA
+
+    @property
+    def slow(self) -> float:
+        """Sigma of its slow error; 0 where nothing is said of one."""
+        return self.bias_sigma or 0.0
 
     def __post_init__(self) -> None:
         arm = np.asarray(self.lever_arm, dtype=np.float64)

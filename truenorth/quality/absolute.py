@@ -1,0 +1,49 @@
+"""How well fixes can be known to lie: an error that all of them share is in the position found, and nowhere to be seen.
+
+Of fixes with a constant error b the innovations are ``z = dp - b``, and b is in no velocity: the filter ends at ``dp = b``, and an
+hour of fixes is as far off as one of them. Orbits, clocks, atmosphere and a reference station's own place err so for minutes to
+hours. So where nobody says how large slow errors are (``Mounting.bias_sigma`` None), position is known no better than by a fix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.sensors import place_axes
+from truenorth.quality.slow_aids import usual_bias
+from truenorth.records import GnssRecord
+from truenorth.state.layout import DP
+from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
+
+# m, along the level, of a receiver that says nothing but the kind of its fixes (NMEA 0183): differential, fixed and floating phase
+BY_QUALITY = {2: 1.0, 4: 0.05, 5: 0.5}
+
+
+def accuracy_of(record: GnssRecord) -> Array:
+    """(3,) m: one sigma east, north, up of a fix, by what its receiver says of it, else by its kind, else the usual one."""
+    level = usual_bias(record)
+    if record.position_sigma is None and record.dop is None and record.quality is not None:
+        kinds, counts = np.unique(record.quality[record.has_position], return_counts=True)
+        level = BY_QUALITY.get(int(kinds[np.argmax(counts)]), level)
+    return level * place_axes(record)
+
+
+def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None) -> Track:
+    """The track with position known no better than by a fix of this receiver; `bias`: what was said of its slow error.
+
+    Of heights, too, where the receiver has them.
+    """
+    if bias is not None or record is None or not record.has_position.any() or not len(track.P):
+        return track
+    sigma = accuracy_of(record)
+    if not np.isfinite(record.alt[record.has_position]).any():
+        sigma[2] = 0.0
+    P, at = track.P.copy(), np.arange(DP.start, DP.stop)
+    known = P[:, at, at] > 0.0  # a height that is held has no sigma
+    P[:, at, at] = np.where(known, np.maximum(P[:, at, at], sigma**2), P[:, at, at])
+    return replace(track, P=P)
