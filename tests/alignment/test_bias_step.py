@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.runs import some
+from tests.runs import few_and_all, some
 from truenorth import align
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
+from truenorth.records.specs import imu_spec
+from truenorth.simulation import rest, simulate
 from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(45.0, 10.0)
@@ -55,3 +58,32 @@ def test_a_step_is_found(run):
     answer = align(replace(record, gyro=gyro), PLACE, spec)
     assert answer.status == "inconsistent"
     assert any(item.key.startswith("bias.") for item in answer.evidence)
+
+
+def quay(run, ramp=0.0):
+    """A still base, and the same with an accelerometer whose bias grows by so many m/s^2 over the log."""
+    heading = np.random.default_rng([92, run]).uniform(0.0, 6.28)
+    spec = imu_spec("navigation")
+    sim = simulate(rest(PLACE, heading), rate=50.0, duration=240.0, imu=spec, seed=8, run=run)
+    assert sim.record.kind == "increments"
+    course = ramp * sim.record.interval * np.arange(len(sim.record)) / len(sim.record)
+    record = replace(sim.record, accel=sim.record.accel + np.outer(course, [1.0, 0.0, 0.0]))
+    answer = align(record, PLACE, spec)
+    return answer, next((item for item in answer.evidence if item.key == "bias.gravity_drifts"), None)
+
+
+@pytest.mark.parametrize("run", [0, *some([], [1, 2, 3])])
+def test_an_accelerometer_that_drifts_on_a_still_base_is_found_with_what_it_does(run):
+    """As a tilt rate it turns heading by degrees, which no step of a bias shows: it is what another heading would show."""
+    answer, found = quay(run, 0.009)
+    assert answer.status == "inconsistent"
+    sound = quay(run)[0].C_nb
+    moved = rotation_vector_from_dcm(answer.C_nb @ sound.T)
+    assert found.effect.level == pytest.approx(0.009 / 9.81, rel=0.05)
+    assert 0.4 < np.linalg.norm(moved[:2]) / found.effect.level < 1.05  # heading has taken its part
+    assert found.effect.heading == pytest.approx(abs(moved[2]), rel=0.3, abs=np.radians(0.5))
+
+
+@few_and_all(60, few=4)
+def test_gravity_of_a_sound_still_base_does_not_drift(runs):
+    assert all(quay(run)[1] is None for run in range(runs))

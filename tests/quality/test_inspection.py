@@ -294,3 +294,14 @@ def test_without_any_specific_force_there_is_no_attitude():
     assert codes(inspect(without([0, 1, 2]), LAT), "error")
     with pytest.raises(AlignmentError, match="no attitude: are sensors dead"):
         tn.align(without([0, 1, 2]), Position(LAT, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(0.01, "multiplied by the interval twice"), (0.5, "unit, range or scale factor")]
+)
+def test_gravity_of_another_size_is_no_bias_of_an_unknown_imu(factor, words):
+    """Without a specification a bias of that size was inferred, and the answer `aligned`."""
+    record = as_increments(base(duration=120.0))
+    answer = tn.align(replace(record, accel=factor * record.accel), Position(LAT, 0.0))
+    assert answer.status == "inconsistent"
+    assert words in " ".join(answer.reasons)

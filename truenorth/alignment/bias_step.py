@@ -7,6 +7,7 @@ is the error of the answer.
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from typing import Any
 
@@ -20,6 +21,7 @@ from truenorth.alignment.task import Task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
+from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import BA, BG, PHI
 from truenorth.filters.gains import times
 from truenorth.quality.regimes import KINDS
@@ -31,6 +33,7 @@ Array = NDArray[np.float64]
 
 AWAY = 5  # seconds from a turn: it begins and ends slowly
 WANDERS = 3.0  # times its instability, that an accelerometer's bias is off by at some time
+DRIFT_BLOCK, FEWEST_BLOCKS = 10, 6  # seconds of still base, whose means show a drift, and how many of them
 FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
 SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
@@ -143,6 +146,34 @@ def turn_evidence(task: Task) -> list[Evidence]:
     turned, step = max(((item.size * max(0.0, last - item.time), item) for item in found), key=lambda pair: pair[0])
     figures: dict[str, Figure] = {"onset": step.time, "size": step.size, "heading": turned}
     return [Evidence("bias.vertical_steps", figures, "bounded", Effect(heading=turned), ("still_part",))]
+
+
+def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
+    """On a still base: gravity that moves steadily in the IMU's axes. The base tilts, or an accelerometer drifts.
+
+    A tilt rate ``b / g`` about east looks like a heading that is off by ``b / (g w_ie cos L)``: filters that let the base move
+    take a drift for a tilt. No log of gyros and accelerometers tells them apart, and a base that is still hardly tilts.
+    """
+    motion = task.motion
+    count = len(motion.time) // DRIFT_BLOCK
+    if motion.overall != "still" or count < FEWEST_BLOCKS:
+        return []
+    force = (motion.specific_force @ C_nb.T)[: count * DRIFT_BLOCK, :2].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
+    time = DRIFT_BLOCK * (np.arange(count) - 0.5 * (count - 1.0))  # s
+    b = time @ force / (time @ time)
+    left = force - force.mean(axis=0) - np.outer(time, b)
+    variance = np.sum(left**2, axis=0) / ((count - 2.0) * (time @ time))
+    span = float(motion.time[-1] - motion.time[0])
+    instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
+    # Two values of a bias that wanders, far apart, differ by its instability times sqrt(2).
+    ratio = float(np.sum((span * b) ** 2 / (span**2 * variance + 2.0 * instability**2)))
+    moved = span * float(np.linalg.norm(b))  # m/s^2
+    if ratio <= limit("drift"):
+        return []
+    heading = abs(float(b[1])) / (task.gravity * EARTH_RATE * math.cos(task.position.lat))
+    effect = Effect(heading=heading, level=moved / task.gravity)
+    figures: dict[str, Figure] = {"moved": moved, "tilt": effect.level, "ratio": ratio, "heading": heading}
+    return [Evidence("bias.gravity_drifts", figures, "known", effect, ("still_part",))]
 
 
 def _stays(step: Touch, time: Array, rate: Array) -> bool:

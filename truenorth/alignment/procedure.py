@@ -16,7 +16,7 @@ from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, 
 from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
-from truenorth.alignment.bias_step import matrix_signatures, turn_evidence
+from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, sharper
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
@@ -149,7 +149,7 @@ def align_base(
     moves = None if chosen == "swaying" and _explained(task.motion, found) else _moves_from(task.motion)
     evidence = record_evidence(task.record, task.motion, sound=sound) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
-    evidence += turn_evidence(task)
+    evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)

@@ -170,6 +170,7 @@ class _Draw:
             isinstance(answer, Alignment)
             and answer.method == "swaying"
             and inputs["record"] is not self.inputs["record"]
+            and np.array_equal(inputs["record"].time, self.inputs["record"].time)
         ):
             return ratio_on_sway(inputs["record"], self.inputs["record"], answer)
         if self.sound is None or not answer.residuals or not self.sound.residuals:

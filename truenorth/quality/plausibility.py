@@ -99,6 +99,7 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     else:
         readings.append((1.0 / dt, "specific force, not increments", "read them as rates (accel_x ..)"))
         readings.append((1.0 / (dt * G), "specific force in g, not increments", "read them as rates in g"))
+        readings.append((dt, "multiplied by the interval twice", "remove one conversion"))
     found = f"the accelerometers show {level:.4g} m/s^2 (median of the norm); expected about 9.8"
     distance = np.abs([level / (G * factor) - 1.0 for factor, _, _ in readings])
     likely = [readings[i] for i in np.argsort(distance) if distance[i] < LEVEL_TOLERANCE / 2.0]

@@ -46,6 +46,8 @@ def record_evidence(
     quiet = motion.overall in QUIET  # elsewhere an arm makes gravity swing as if the gyros counted in another unit
     codes = {*ALWAYS} - (set() if quiet else {"gyro_unit"})
     found += [_error(doubt) for doubt in doubts if doubt.code in codes and doubt.severity == "error"]
+    # What is no unit may be a push, but not of a base that stays; and no accelerometer has a bias of that size.
+    found += [_error(doubt) for doubt in doubts if doubt.code == "accel_level"]
     if quiet:
         return found
     tilt = check_tilt(record, C_sb)

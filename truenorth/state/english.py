@@ -109,6 +109,7 @@ SENTENCES = {
     "record.constant_channel": "{text}",
     "record.gyro_unit": "{text}",
     "record.accel_unit": "{text}",
+    "record.accel_level": "{text}",
     "record.no_gravity": "{text}",
     "record.repeated_rows": "{text}",
     "record.frozen": "{text}",
@@ -191,6 +192,10 @@ SENTENCES = {
     "bias.vertical_steps": (
         "near {onset:.0f} s the rate about the vertical changes by {size:deg/h|} deg/h and stays so: heading moves by "
         "{heading:angle}"
+    ),
+    "bias.gravity_drifts": (
+        "gravity moves by {tilt:angle} in the axes of the IMU (likelihood ratio {ratio:.3g}), and the base is still: an "
+        "accelerometer drifts by {moved:ug|.3g} ug, which moves heading by {heading:angle}, or the base tilts as steadily"
     ),
     "base.fast": "a base that stays would move with {speed:.3g} m/s RMS",
     "encoder.turns": (
