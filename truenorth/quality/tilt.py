@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from truenorth.analysis.student import student_limit
 from truenorth.core.attitude import dcm_from_quaternion, skew
 from truenorth.records import ImuRecord
-from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
+from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, Kind
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -39,6 +39,7 @@ EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may l
 # Of a small delay and of a scale factor of sound gyros: sigma is estimated from few pieces, and the base's own motion is alike in
 # them. Of eight pieces 10 and 7 sigmas.
 SURE, CLEAR = 2e-5, 2e-4
+HINT = 1e-3  # of a delay: its tilt is added to sigma, no more
 LEAST_SCALE = 0.005  # no gyro of a specification has a larger error of scale, or misalignment in rad
 LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
 IDENTITY = "+x +y +z"
@@ -99,9 +100,10 @@ class Tilt:
         if explains:
             return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
         found = []
-        sure, clear = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR))
-        if abs(self.delay) >= max(LEAST_DELAY, sure * self.delay_sigma):
-            found.append(Evidence(late, figures, "bounded", Effect(level=self.tilt), ("common_clock",)))
+        sure, clear, hint = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR, HINT))
+        if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma):
+            kind: Kind = "bounded" if abs(self.delay) >= sure * self.delay_sigma else "hint"
+            found.append(Evidence(late, figures, kind, Effect(level=self.tilt), ("common_clock",)))
         off = np.abs(self.scale)
         for i in np.flatnonzero(off >= np.maximum(least_scale(self.turned), clear * self.scale_sigma)):
             size = float(off[i] * self.turned[i])
