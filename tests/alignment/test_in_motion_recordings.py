@@ -52,9 +52,10 @@ def test_cart_gets_its_heading_from_motion():
     answer = align_in_motion(imu, "industrial", gnss=gnss, antenna=antenna)
     assert answer.status == "aligned", answer.reasons
     assert answer.moving.heading_from == "motion"
-    # Its stamps are nearly a second late; a receiver said to be on time is contradicted.
+    # Its stamps are about a second late, .95 to 1.1 by the interval of the filter once passes begin with what the one before found
+    # (.88 where they ended at a change of .1 s); a receiver said to be on time is contradicted.
     late, sigma = answer.moving.delays["GNSS"]
-    assert abs(late - 0.9) < 0.15
+    assert abs(late - 1.0) < 0.15
     assert sigma < 0.05
     said = align_in_motion(imu, "industrial", gnss=gnss, antenna=on_time)
     assert any(item.key == "second_look.late" for item in said.evidence)

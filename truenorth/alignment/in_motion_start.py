@@ -101,6 +101,7 @@ def start_at(
         v_n, sigma = guess.C_nb @ v_b, math.hypot(ODOMETER_START, wheel.angle_sigma * float(np.linalg.norm(v_b)))
     elif gnss is not None:
         v_n, sigma = _by_gnss(gnss, antenna, time, float(record.time[-1]))
+        sigma = math.hypot(sigma, _swing(record, antenna))
     # Slow parts of the biases are states of their own.
     angles = guess.level_sigma, guess.level_sigma, guess.heading_sigma
     P = prior_covariance(angles, sigma, position.sigma, spec.constant_variance)
@@ -121,6 +122,14 @@ def _by_gnss(gnss: GnssRecord, antenna: Mounting, time: float, end: float) -> tu
     if not gnss.has_velocity.any() and len(fixes) > 1:
         by_places = math.sqrt(2.0) * place_sigma(gnss) / float(np.median(np.diff(fixes)))
     return v[0], math.sqrt(GNSS_START**2 + by_places**2 + change**2)
+
+
+def _swing(record: ImuRecord, antenna: Mounting) -> float:
+    """RMS velocity of an antenna on its arm in the first seconds, m/s: the IMU does not have it."""
+    rows = max(2, round(LEVEL_TIME / record.interval))
+    rate = increments(record)[0][:rows] / record.steps[:rows, None]
+    arm = math.hypot(float(np.linalg.norm(antenna.lever_arm)), math.sqrt(3.0) * antenna.lever_arm_sigma)
+    return arm * math.sqrt(float(np.mean(np.sum(rate**2, axis=1))))
 
 
 def _velocity_b(log: OdometerRecord | VelocityRecord, mounting: Mounting, at: Array) -> Array:

@@ -55,7 +55,8 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 SHORTEST = 10.0  # s
-INTERVAL = 0.5  # s, of the filter's prediction
+# s, of the filter's prediction: the column of a delay takes the mean acceleration since the last event
+INTERVAL = 0.2
 OUTPUT = 1.0  # s, of the history
 NO_LOG_ERRORS = LogErrors()
 WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
