@@ -3,8 +3,8 @@
 Its velocity steps as it begins. The filter follows within some rows, and innovations keep ``s e^{-k / m}`` of the step, ``k`` rows
 after the first. The likelihood ratio of a step at each row, for fast and for slow filters, is ``|T|^2 / W`` with
 ``T = sum e^{-k/m} z_k`` and ``W = sum e^{-2k/m}`` over the normalised innovations ``z``: a chi-square of two degrees of freedom
-where nothing steps, of which ``2 ln(N / p)`` is exceeded by one of N with probability p at most. A receiver that is off in every
-turn has large ratios all over the log: one counts by how far it stands out.
+where nothing steps, of which ``2 ln(N / p)`` is exceeded by one of N with probability p at most. Of a receiver that
+is off in every turn many ratios are large, and a step counts by how far it stands out.
 
 Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
 systems", IEEE Trans. Autom. Control 21 (1976); the memory of the filter by a few exponentials is ours.
@@ -30,7 +30,9 @@ LED = ("GNSS velocity",)
 MEMORIES = (3.0, 10.0, 30.0)  # rows, within which filters follow a step
 
 OUTLIER = 6.0  # sigmas: counts no more than this, which is less than a step has to
-USUAL = 0.75  # of the rows: what the ratio there is larger than of white innovations, it is at any step
+BEGINS = 10  # rows, of which a step is the filter's own start
+# Parts of the rows: what ratios and squares there are larger than of white innovations, any step's is.
+USUAL, LARGE = 0.9, 0.975
 
 
 def led_away_evidence(source: Residuals) -> list[Evidence]:
@@ -44,9 +46,7 @@ def led_away_evidence(source: Residuals) -> list[Evidence]:
     if z.size < FEWEST:
         return []
     chance = 2.0 * math.log(len(MEMORIES) * len(z) / limit("step"))
-    steps = [_largest_step(z, memory) for memory in MEMORIES]
-    ratio, row, step = max(steps, key=lambda found: found[0])
-    ratio /= whiteness(z).growth ** 2
+    ratio, row, step = max((_largest_step(z, memory) for memory in MEMORIES), key=lambda found: found[0])
     if ratio <= chance:
         return []
     size = float(np.linalg.norm(step * source.sigma[rows][row, :2]))
@@ -63,13 +63,29 @@ def led_away_evidence(source: Residuals) -> list[Evidence]:
 
 
 def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:
-    """Likelihood ratio, row, and size in sigmas (2,) of the likeliest step that a filter of this memory follows."""
+    """Likelihood ratio, row, and size in sigmas (2,) of the likeliest step that a filter of this memory follows.
+
+    The ratio counts as far as what the step leaves is white, and no larger than it should be.
+    """
+    keep = math.exp(-1.0 / memory)
+    ratio, steps = _ratios(z, keep)
+    row = BEGINS + int(np.argmax(ratio[BEGINS:]))
+    left = z.copy()
+    left[row:] -= np.outer(keep ** np.arange(len(z) - row), steps[row])
+    over = max(_over(_ratios(left, keep)[0], USUAL), _over(np.sum(left**2, axis=1), LARGE))
+    return float(ratio[row]) / (max(1.0, over) * whiteness(left).growth ** 2), row, steps[row]
+
+
+def _ratios(z: Array, keep: float) -> tuple[Array, Array]:
+    """Of a step at each row: its likelihood ratio (K,) and its size (K, 2)."""
     T, W = np.empty((len(z), 2)), np.empty(len(z))
-    _sum_up(np.ascontiguousarray(z), math.exp(-1.0 / memory), T, W)
-    ratio = np.sum(T**2, axis=1) / W
-    row = int(np.argmax(ratio))
-    usual = float(np.quantile(ratio, USUAL)) / (-2.0 * math.log(1.0 - USUAL))
-    return float(ratio[row]) / max(1.0, usual), row, T[row] / W[row]
+    _sum_up(np.ascontiguousarray(z), keep, T, W)
+    return np.sum(T**2, axis=1) / W, T / W[:, None]
+
+
+def _over(squares: Array, part: float) -> float:
+    """By how much a quantile of squares is larger than that of a chi-square of two degrees of freedom."""
+    return float(np.quantile(squares, part)) / (-2.0 * math.log(1.0 - part))
 
 
 @compiled
