@@ -37,13 +37,12 @@ from truenorth.alignment.in_motion_task import (
 )
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.suspect import name_specification
+from truenorth.alignment.suspect import name_specification, poorer_evidence
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.core.units import significant
-from truenorth.errors.axes import standing
-from truenorth.errors.group import Group, groups_of
+from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.rivals import jump_evidence, misfit, noise_evidence, wandering_evidence
@@ -144,14 +143,8 @@ def align_in_motion(
     """
     tell = progress or (lambda stage: None)
     body = in_body_axes(odometer, velocity)
-
-    def model_of(spec: ImuSpec) -> InsModel:
-        # A gate that begins with any heading must bear what constants do not hold: without noise in turns the filter loses a cart
-        # (`stim300_cart_chicago`) whose axes are not constants.
-        return InsModel.from_spec(spec, standing=standing(), unsteady=True, groups=groups_of(errors, spec))
-
     task = moving_task(record, imu, body, gnss, position, wheel, antenna, sources, zupt, calibration, offset)
-    task = replace(task, model=model_of(task.spec), slow=velocity_errors)
+    task = replace(task, slow=velocity_errors, errors=errors).with_spec(task.spec)
     if method not in (choices := (*get_args(Method), *AZIMUTH_METHODS)):
         refuse(method, choices)
     if not heading_limit > 0.0 or passes < 1:
@@ -164,7 +157,7 @@ def align_in_motion(
         return _published(task, method, heading_limit, unknown, tell)
 
     def aligned(spec: ImuSpec) -> Alignment:
-        return _aligned(replace(task, spec=spec, model=model_of(spec)), method, heading_limit, passes, unknown, tell)
+        return _aligned(task.with_spec(spec), method, heading_limit, passes, unknown, tell)
 
     answer = _aligned(task, method, heading_limit, passes, unknown, tell)
     return name_specification(answer, aligned)
@@ -243,6 +236,7 @@ def _seen(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: 
     again = partial(_of_model, task, guess, gated)
     without = [partial(_of_model, less, guess, gated) for less in task.without_slow_errors()]
     found += noise_evidence(again, track, task.model, task.record)
+    found += poorer_evidence(lambda spec: task.with_spec(spec).run(guess, gated=gated), track, task.spec)
     return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration, without)
 
 

@@ -26,6 +26,8 @@ from truenorth.alignment.in_motion_start import (
 from truenorth.core.earth import radii
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.axes import standing
+from truenorth.errors.group import Group, groups_of
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
@@ -84,6 +86,7 @@ class MovingTask:
     stops: Sequence[Aiding]  # and gaps of the log
     more: Sequence[Aiding]
     slow: LogErrors = NO_LOG_ERRORS
+    errors: Sequence[Group | str] = ()  # further ones of the INS
     factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
     waited: float = 0.0  # s, that the vehicle drove before anything aided: left out of the record
     # The slow error of fixes is the usual one, or innovations have shown it: nobody spoke of it
@@ -110,6 +113,13 @@ class MovingTask:
             lasting=lasting,
             wanders=(*self.wanders, *wanders),
         )
+
+    def with_spec(self, spec: ImuSpec) -> MovingTask:
+        """The task with another specification of the IMU."""
+        # A gate that begins with any heading must bear what constants do not hold: without noise in turns the filter loses a cart
+        # (`stim300_cart_chicago`) whose axes are not constants.
+        model = InsModel.from_spec(spec, standing=standing(), unsteady=True, groups=groups_of(self.errors, spec))
+        return replace(self, spec=spec, model=model)
 
     def without_slow_errors(self) -> list[MovingTask]:
         """The task without each of the slow errors that innovations have shown."""
