@@ -109,7 +109,8 @@ def run_case(case: Case, seed: int, runs: int, verbose: bool = False) -> Line:
         if verbose:
             shown = ", ".join(f"{name} {np.round(r, 2)}" for name, r in outcome.ratios.items())
             print(f"    run {run}: {shown} {outcome.refused} {outcome.said}", flush=True)
-    rms = {name: float(np.sqrt(np.nanmean(np.concatenate(r) ** 2))) for name, r in found.items()}
+    seen = {name: np.concatenate(r) for name, r in found.items()}  # NaN: what a log does not show is not said
+    rms = {name: float(np.sqrt(np.nanmean(r**2))) for name, r in seen.items() if np.isfinite(r).any()}
     return Line(case, runs, rms, tuple(refused), *worst, (time.perf_counter() - begun) / max(runs, 1))
 
 
