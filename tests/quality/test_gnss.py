@@ -1,10 +1,13 @@
 """Velocities against positions: an honest sigma whatever the noise, no turn in a sound log, and none taken for a delay."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.earth import radii
-from truenorth.quality.gnss import turn_evidence
+from truenorth.quality.gnss import master_evidence, turn_evidence
 
 RUNS = 40
 
@@ -62,3 +65,15 @@ def test_a_long_way_at_a_high_latitude_shows_no_turn():
     noise = np.random.default_rng(4).standard_normal((2, len(t))) / 6.4e6
     found = turn_evidence("master", t, lat + noise[0], lon + noise[1] / np.cos(lat), v + 0.02, 0.05)
     assert not found
+
+
+@pytest.mark.parametrize("run", [5, 6])
+def test_a_turned_master_that_flies_straight_for_a_while_is_found(run):
+    """A straight part leaves rounding alone of positions without noise: its sigma was 1e-149 deg, which no other part was alike."""
+    inputs, _ = BENCHES["transfer"].draw(12, run)
+    master = inputs["master"]
+    v = (master.v_n[:, 0] + 1j * master.v_n[:, 1]) * np.exp(1j * np.radians(0.7))
+    turned = replace(master, v_n=np.stack([v.real, v.imag, master.v_n[:, 2]], axis=1))
+    assert master_evidence(master) == []
+    (found,) = master_evidence(turned)
+    assert found.effect.heading == pytest.approx(np.radians(0.7), rel=0.03)

@@ -43,6 +43,7 @@ LASTING = (
 )  # s, for which errors of velocities are correlated: noise, a receiver's filter, a master's jump
 PARTS, DIFFERENT = 4, 4.0  # of a log, and sigmas by which one of them may differ from the mean of all
 SINGULAR = 1e-12  # of the largest power of a column
+ROUNDING = 1e-14  # of the squares of the places about their mean: of two numbers that are taken from each other
 CHANCE = 1e-4  # that a sound log shows a turn, of either sign
 LATE = 0.1  # s, one sigma: of velocities against the positions of the same receiver
 LEAST = math.radians(0.15)  # rad: a smaller turn is the drift of a receiver's positions
@@ -184,7 +185,9 @@ def _turn(
         C = np.eye(count) + walk
         A, b, c = (np.concatenate([np.linalg.solve(C, half) for half in np.split(x, 2)]) for x in (X, y, slow))
         N = X.T @ A
-        squares = max(float(b @ (y - X @ (np.linalg.pinv(N, rcond=SINGULAR, hermitian=True) @ (X.T @ b)))), 1e-300)
+        squares = float(b @ (y - X @ (np.linalg.pinv(N, rcond=SINGULAR, hermitian=True) @ (X.T @ b))))
+        if squares <= ROUNDING * float(b @ y):
+            continue  # a straight way at an even speed: nothing is left but rounding
         known = np.zeros(len(N))
         known[2] = squares / dof / (LATE * size[2]) ** 2
         inverse = np.linalg.pinv(N + np.diag(known), rcond=SINGULAR, hermitian=True)
@@ -197,6 +200,8 @@ def _turn(
             + 0.5 * dof * math.log(squares)
         )
         found.append((-about - float(x[1]) / size[1], math.sqrt(max(variance, 1e-300)) / size[1], -logs))
+    if not found:
+        return None
     angles, sigmas, likely = np.array(found).T
     weights = np.exp(likely - likely.max())
     weights /= weights.sum()
