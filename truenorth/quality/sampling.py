@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Severity = Literal["error", "warning", "note"]
 
 JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
+SLIGHT = 0.05  # the same, from which what a stamp may be off by is looked at
 EXCHANGED_SHARE = 0.01  # of the rows that have changed places, from which they are an error
 REPEATED_SHARE = 0.002  # of the rows, beyond chance
 HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
@@ -117,6 +118,9 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
                 "computer stamped the rows, give the sensor's rate instead (`rate`)",
             )
         )
+    elif rms > SLIGHT * record.interval:
+        text = f"the time steps scatter by {rms * 1e3:.3g} ms RMS about {record.interval * 1e3:.4g} ms"
+        findings.append(Finding("note", "jitter", text))
     if record.interval >= 1.0 or record.interval < 2e-5:
         guess = "milliseconds or ticks" if record.interval >= 1.0 else "another unit"
         findings.append(
