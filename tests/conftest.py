@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from tests.sizes import compiled_only
+
+# A shell that runs the tests in the background lets them ignore interrupts, and programs that they start inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Files that take the most time, longest first: no worker begins one of them when the others are done.
 LONGEST = [
