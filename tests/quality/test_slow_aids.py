@@ -73,3 +73,11 @@ def test_a_wheel_slips_once_its_scale_and_mounting_are_estimated():
     assert seen("odometer", innovation, 0.05)[0] == {}
     known = state("odometer", "scale", 0.03) | state("odometer", "mounting", np.full(2, 0.05))
     assert set(seen("odometer", innovation, 0.05, known)[0]) == {"odometer"}
+
+
+def test_heights_that_are_left_out_say_nothing():
+    rng = np.random.default_rng(8)
+    e = 0.5 * rng.standard_normal((ROWS, 3)) + markov(rng, 2.0, 60.0)
+    e[:, 2] = np.nan
+    found, _ = seen("GNSS position", e, 0.5)
+    assert found["GNSS position"].sigma[2] < 1e-2 * found["GNSS position"].sigma[0]

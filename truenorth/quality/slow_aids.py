@@ -101,12 +101,14 @@ def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
     """Mean correlation over the first lags, and the root of what rows that follow each other have in common; None: chance."""
     rows = residuals.rows > 0
     e, sigma = residuals.innovation[rows, :axes], residuals.sigma[rows, :axes]
-    # Rows that were rejected may be the slow error itself; outliers count as its largest.
-    most = MOST * np.nanmedian(np.abs(e), axis=0)
-    e = np.clip(e, -most, most)
-    there = np.isfinite(e).all(axis=0)
+    there = np.isfinite(e).all(axis=0)  # heights are left out where height is held
     e, sigma = e[:, there], sigma[:, there]
-    if len(e) < LEAST_ROWS or not e.size or whiteness(e / sigma).growth <= 1.0:  # white, or no more than sigma says
+    if len(e) < LEAST_ROWS or not e.size:
+        return None
+    # Rows that were rejected may be the slow error itself; outliers count as its largest.
+    most = MOST * np.median(np.abs(e), axis=0)
+    e = np.clip(e, -most, most)
+    if whiteness(e / sigma).growth <= 1.0:  # white, or no more than sigma says
         return None
     alike = np.mean([np.sum(e[lag:] * e[:-lag], axis=0) for lag in range(1, LAGS + 1)], axis=0)
     correlation = float(np.mean(alike / np.sum(e**2, axis=0)))
