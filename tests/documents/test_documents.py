@@ -17,7 +17,6 @@ from pathlib import Path
 import pytest
 
 import truenorth
-from tests.runs import some
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -84,7 +83,6 @@ CODE = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", CODE)
 def test_the_code_of_a_page_runs(page, tmp_path):
     code = python_of(ROOT / page)
@@ -118,7 +116,7 @@ def test_calls_in_passing_are_calls_that_exist(page):
                 assert anything or keywords <= set(known), f"{page.name}: {ast.unparse(node)}"
 
 
-@pytest.mark.parametrize("page", some(TUTORIALS[:1], TUTORIALS[1:]))
+@pytest.mark.parametrize("page", TUTORIALS)
 def test_a_newcomer_can_follow_the_page(page, tmp_path):
     """The commands of the page, then its code, in one empty folder."""
     blocks = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import Size, padded
-from truenorth.filters.gains import Gains, through
+from truenorth.filters.gains import Gains, through, times
 
 Array = NDArray[np.float64]
 
@@ -216,7 +216,8 @@ def _keep(values: Any, place: Any) -> None:
 def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any, work: Any) -> None:
     """``F = [step, step U - gain A]`` and ``G = [H Phi, H Phi U + A]``; `work` is as wide as U."""
     n, m = len(step), len(G)
-    _times_and_add(step, U, gain, A, -1.0, work)
+    times(step, U, work)
+    _less_product(gain, A, work)
     for i in range(n):
         for j in range(n):
             F[i, j] = step[i, j]
@@ -233,17 +234,12 @@ def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any, wor
 
 
 @compiled
-def _times_and_add(A: Any, B: Any, C: Any, D: Any, sign: float, X: Any) -> None:
-    """``X = A B + sign C D``, as many rows as A has."""
+def _less_product(A: Any, B: Any, X: Any) -> None:
+    """``X -= A B``."""
     for i in range(A.shape[0]):
-        for j in range(X.shape[1]):
-            X[i, j] = 0.0
         for r in range(A.shape[1]):
             for j in range(X.shape[1]):
-                X[i, j] += A[i, r] * B[r, j]
-        for r in range(C.shape[1]):
-            for j in range(X.shape[1]):
-                X[i, j] += sign * C[i, r] * D[r, j]
+                X[i, j] -= A[i, r] * B[r, j]
 
 
 @borrowing(forceinline=True)
