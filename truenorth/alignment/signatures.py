@@ -10,6 +10,7 @@ from truenorth.alignment.drift import Drift, detect_drift, drift_signatures
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
 from truenorth.alignment.matched import innovations_of, matched
+from truenorth.alignment.swaying import SwayAlignment
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
@@ -31,4 +32,5 @@ def what_begins(
     drift, bias, gravity = matched(
         seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     )
-    return detect_drift(fine, drift), bias_step_evidence(fine, spec, bias), hemisphere_evidence(gravity)
+    begun = fine.begun if isinstance(fine, SwayAlignment) else ()
+    return detect_drift(fine, drift), [*bias_step_evidence(fine, spec, bias), *begun], hemisphere_evidence(gravity)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
+from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import normal_gravity
@@ -27,6 +28,7 @@ from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
 from truenorth.strapdown.inertial import InertialIntegrals, gravity_position
 
 Array = NDArray[np.float64]
@@ -61,6 +63,7 @@ class SwayAlignment(FineAlignment):
     motion: tuple[AxisMotion, ...]  # along E, N, U
     arm: Array  # (3,) m
     arm_sigma: Array  # (3,) m
+    begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     arm = log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
     seen = np.sqrt(np.mean(base_velocity(log.integrals, log.C_n0_i, position.lat, position.alt) ** 2, axis=0))
-    return SwayAlignment.of(
+    fine = SwayAlignment.of(
         log,
         last,
         log.prior.sensors,
@@ -115,6 +118,7 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
     )
+    return replace(fine, begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion)))
 
 
 def farthest(fine: FineAlignment, position: Position) -> float:

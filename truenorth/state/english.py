@@ -85,6 +85,11 @@ SENTENCES = {
         "the base drifts {axis:term}: from about {onset:.0f} s on its velocity grows to {velocity:.2g} m/s (likelihood "
         "ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
     ),
+    "sway.slow": (
+        "the base moves slowly as well, and the log does not show that it comes back: something that began at about {onset:.0f} s, "
+        "such as a base that leaves or a bias that changes, explains the log as well (likelihood ratio {ratio:.0f}); heading moves "
+        "by {heading:angle}, level by {level:angle}"
+    ),
     "place.hemisphere": (
         "gravity turns as in the other hemisphere (likelihood ratio {ratio:.0f}): the latitude has the wrong sign"
     ),

@@ -1,0 +1,168 @@
+"""Is a slow sway one at all? A base that leaves, and a bias that changes, look like it.
+
+The fit of the base's motion may take up what begins within the log as an oscillator that goes round a few times, or is
+damped within one period; then innovations show nothing any more. So the log is filtered again with such oscillators made
+smaller, and what is left is matched with signatures of what may begin: a velocity that is taken up within some seconds and
+stays, drifts, biases that step or grow. Twice the logarithm of the likelihood ratio against the motion as fitted decides; a
+cause that the log does not rule out moves the answer by what is added to sigma.
+
+The comparison is ours; the ratios are those of :mod:`truenorth.alignment.matched`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias_step import SIGNATURES, bias_signatures
+from truenorth.alignment.drift import AXES, ONSETS, drift_signatures
+from truenorth.alignment.drift import KINDS as COURSES
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.matched import Innovations, innovations_of, matched
+from truenorth.errors.staying import PHI
+from truenorth.errors.sway import AXIS_STATES, AxisMotion, Oscillator
+from truenorth.estimate.rivals import RULED_OUT
+from truenorth.filters import LinearSystem, kalman
+from truenorth.filters.gains import filter_gains, through
+from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.limits import limit, may_be_chance
+
+Array = NDArray[np.float64]
+F = TypeVar("F", bound=FineAlignment)
+
+FEW = 6.0  # periods in a log, of which fewer are no oscillation that anybody has seen repeat itself
+BROAD = 0.2  # damping: wind waves have up to .26 by Fossen (sec. 8.2.6), swell less
+SMALLER = (1.0, 0.3, 0.1, 0.0)  # times its size
+PARTS = 32  # of a log: onsets of a departure, refined about the best by quarters
+TAKES = (0.25, 1.0, 2.0, 4.0)  # parts, within which a departure takes up its velocity
+
+
+class Cause(NamedTuple):
+    """What may have begun."""
+
+    cost: float  # minus twice the logarithm of its likelihood
+    key: str
+    axis: str
+    onset: float  # s, since the beginning of the log
+    size: float  # m/s of a velocity, rad/s or m/s^2 of a bias
+    phi: Array  # (3,) rad: misalignment at the last epoch, if it did
+
+
+def is_slow(item: Oscillator, duration: float) -> bool:
+    """Whether a log of that length, s, does not show that an oscillator goes to and fro."""
+    return item.frequency * duration / (2.0 * math.pi) < FEW or item.damping > BROAD
+
+
+def slow_sway_evidence(fine: F, system: LinearSystem, motion: Sequence[AxisMotion]) -> list[Evidence]:
+    """What else may have made the slow part of a base's motion, and what it would do to the answer.
+
+    Parameters
+    ----------
+    fine : SwayAlignment
+    system : LinearSystem
+        Of its last pass, with all its noise.
+    motion : three AxisMotion
+        Along E, N, U; in the last states of `system`.
+    """
+    duration = float(fine.integrals.time[-1])
+    if not any(is_slow(item, duration) for axis in motion[:2] for item in axis.oscillators):
+        return []
+    as_fitted = fine.estimates
+    lowest = -2.0 * float(as_fitted.log_likelihood)
+    found = []
+    for share in SMALLER:
+        less = _smaller(system, motion, duration, share)
+        estimates = kalman(less, history="full")
+        lowest = min(lowest, -2.0 * float(estimates.log_likelihood))
+        other = replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
+        # With the motion as fitted chance finds something in every log: there the usual limit decides.
+        found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in _causes(other)]
+    likely = [cause for least, cause in found if lowest - cause.cost > least]
+    if not likely:
+        return []
+    best = min(likely, key=lambda cause: cause.cost)
+    ratio = lowest - best.cost
+    end = as_fitted.x[-1][PHI]
+    moved = np.array([best.phi if not may_be_chance(ratio) else cause.phi for cause in likely]) - end
+    heading, level = float(np.abs(moved[:, 2]).max()), float(np.hypot(moved[:, 0], moved[:, 1]).max())
+    figures: dict[str, Figure] = {
+        "axis": best.axis,
+        "onset": best.onset,
+        "ratio": ratio,
+        "chance": limit("drift"),
+        "heading": heading,
+        "level": level,
+        ("velocity" if best.key.startswith("drift") else "size"): abs(best.size),
+    }
+    effect = Effect(heading, level)
+    if may_be_chance(ratio):
+        return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
+    return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
+
+
+def _smaller(system: LinearSystem, motion: Sequence[AxisMotion], duration: float, share: float) -> LinearSystem:
+    """The system with the slow oscillators of its base so many times as large."""
+    Q, P0 = system.Q.copy(), system.P0.copy()
+    first = system.states - 3 * AXIS_STATES
+    for axis, item in enumerate(motion):
+        at = first + axis * AXIS_STATES
+        for part in item.oscillators:
+            states = slice(at, at + part.states)
+            if is_slow(part, duration):
+                Q[:, states, states] *= share**2
+                P0[states, states] *= share**2
+            at += part.states
+    return system.with_arrays(Q=Q, P0=P0)
+
+
+def _causes(fine: FineAlignment) -> Iterator[Cause]:
+    """The best of each bank, by a filter of which all innovations are at hand."""
+    seen = innovations_of(fine)
+    cost, end = -2.0 * float(fine.estimates.log_likelihood), fine.estimates.x[-1][PHI]
+    duration = float(fine.integrals.time[-1])
+    drift, bias = matched(seen, drift_signatures(fine), bias_signatures(fine))
+    k = int(np.argmax(drift.ratio))
+    (onset, course, axis) = [(o, c, a) for o in ONSETS for c in COURSES for a in AXES][k]
+    size = float(drift.size[k])
+    yield Cause(
+        cost - float(drift.ratio[k]), f"drift.{course}", axis, onset * duration, size, end - size * drift.left[PHI, k]
+    )
+    k = int(np.argmax(bias.ratio))
+    size, onset = float(bias.size[k]), SIGNATURES[k // 6][1]
+    key = "bias.gyro_steps" if k % 6 < 3 else "bias.accel_steps"
+    yield Cause(cost - float(bias.ratio[k]), key, "xyz"[k % 3], onset * duration, size, end - size * bias.left[PHI, k])
+    part = duration / PARTS
+    coarse = _departure(fine, seen, [part * k for k in range(1, PARTS)])
+    around = [coarse.onset + 0.25 * part * k for k in range(-3, 4)]
+    fine_onset = _departure(fine, seen, [onset for onset in around if 0.0 < onset < duration])
+    yield min(coarse, fine_onset, key=lambda cause: cause.cost)
+
+
+def _departure(fine: FineAlignment, seen: Innovations, onsets: Sequence[float]) -> Cause:
+    """The best of departures that begin then: a level velocity is taken up smoothly, and stays."""
+    t, duration = fine.integrals.time, float(fine.integrals.time[-1])
+    middle = 0.5 * (t[1:] + t[:-1])
+    when = [(onset, take * duration / PARTS) for onset in onsets for take in TAKES]
+    signature = np.zeros((len(middle), 3, 2 * len(when)))
+    for k, (onset, take) in enumerate(when):
+        s = np.clip((middle - onset) / take, 0.0, 1.0)
+        v = s**2 * (3.0 - 2.0 * s)
+        for axis in (0, 1):
+            signature[:, axis, 2 * k + axis] = v if fine.form == "velocity" else np.diff(v, prepend=0.0)
+    through_filter, left = through(fine.gains, signature)
+    white = np.linalg.solve(seen.L, through_filter).reshape(-1, len(when), 2)
+    nu = seen.white[:, :, 0].ravel()
+    energy = np.einsum("ika,ikb->kab", white, white) + 1e-300 * np.eye(2)
+    match = np.einsum("ika,i->ka", white, nu)
+    size = np.linalg.solve(energy, match[..., None])[..., 0]
+    ratio = np.sum(size * match, axis=1)
+    best = int(np.argmax(ratio))
+    v = size[best]
+    phi = fine.estimates.x[-1][PHI] - left[PHI].reshape(3, len(when), 2)[:, best] @ v
+    cost = -2.0 * float(fine.estimates.log_likelihood) - float(ratio[best])
+    return Cause(cost, "drift.step", AXES[int(np.argmax(np.abs(v)))], when[best][0], float(np.hypot(*v)), phi)
