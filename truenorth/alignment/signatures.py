@@ -10,6 +10,7 @@ from truenorth.alignment.drift import Drift, detect_drift, drift_signatures
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
 from truenorth.alignment.matched import innovations_of, matched
+from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec
@@ -32,5 +33,7 @@ def what_begins(
     drift, bias, gravity = matched(
         seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     )
-    begun = fine.begun if isinstance(fine, SwayAlignment) else ()
-    return detect_drift(fine, drift), [*bias_step_evidence(fine, spec, bias), *begun], hemisphere_evidence(gravity)
+    steps = bias_step_evidence(fine, spec, bias)
+    if isinstance(fine, SwayAlignment):
+        steps += [*fine.begun, *sway_noise_evidence(fine.noisier, spec, position.lat)]
+    return detect_drift(fine, drift), steps, hemisphere_evidence(gravity)

@@ -8,7 +8,8 @@ attitude, biases, lever arm and motion together, twice: the second time about th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +19,7 @@ from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
+from truenorth.alignment.sway_noise import noisier_sensors
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import normal_gravity
@@ -64,6 +66,7 @@ class SwayAlignment(FineAlignment):
     arm: Array  # (3,) m
     arm_sigma: Array  # (3,) m
     begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
+    noisier: Mapping[str, float] = field(default_factory=dict)  # times its specification, by sensor
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,11 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
     )
-    return replace(fine, begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion)))
+    return replace(
+        fine,
+        begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion)),
+        noisier=noisier_sensors(log, estimator.motion, step),
+    )
 
 
 def farthest(fine: FineAlignment, position: Position) -> float:

@@ -139,18 +139,31 @@ def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSp
     said_noise = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3)
     if np.any(noise > LOUD * said_noise):
         noise = np.nan_to_num(walk_density(record))
-    bias = np.sqrt(spec.bias_variance)
     found = []
     for name, channels, said in (
         ("gyro", slice(0, 3), spec.gyro_random_walk),
         ("accel", slice(3, 6), spec.accel_random_walk),
     ):
         loud = float(noise[channels].max())
-        if said > 0.0 and loud > LOUD * said:  # what the specification says of biases is not theirs, either
-            size = loud / said * float(bias[channels.start])
-            effect = Effect(level=size / GRAVITY_EQUATOR)
-            if name == "gyro":
-                effect = Effect(heading=size / max(EARTH_RATE * math.cos(lat), 1e-12))
-            said_of: dict[str, Figure] = {"noise": loud, "said": said, "imu": spec.name}
-            found.append(Evidence(f"specification.{name}_noise", said_of, "bounded", effect, ("specification",)))
+        if said > 0.0 and loud > LOUD * said:
+            found.append(noise_evidence(name, loud, spec, lat))
     return found
+
+
+def noise_evidence(name: str, loud: float, spec: ImuSpec, lat: float) -> Evidence:
+    """That a sensor is so loud: what its specification says of biases is not theirs, either.
+
+    Parameters
+    ----------
+    name : {"gyro", "accel"}
+    loud : float, rad/sqrt(s) or m/s/sqrt(s)
+    spec : ImuSpec
+    lat : float, rad
+    """
+    said = float(getattr(spec, f"{name}_random_walk"))
+    size = loud / said * math.sqrt(float(spec.bias_variance[0 if name == "gyro" else 3]))
+    effect = Effect(level=size / GRAVITY_EQUATOR)
+    if name == "gyro":
+        effect = Effect(heading=size / max(EARTH_RATE * math.cos(lat), 1e-12))
+    figures: dict[str, Figure] = {"noise": loud, "said": said, "imu": spec.name}
+    return Evidence(f"specification.{name}_noise", figures, "bounded", effect, ("specification",))

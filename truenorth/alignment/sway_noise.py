@@ -1,0 +1,79 @@
+"""Are the sensors on a swaying base as quiet as their specification? By the likelihood of the whole log.
+
+Their white noise is under the sway, and the fit of the base's motion takes up what it makes of the velocity: white motion, or
+a slow oscillator. So the log is filtered again with noisier sensors, with the motion as fitted and with what remains of it
+without these. Velocity that wanders as ``t^(1/2)`` and ``g t^(3/2)`` is no motion of a base that stays.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+
+from truenorth.alignment.slow_sway import is_slow
+from truenorth.errors.staying import QUIETEST_BASE
+from truenorth.errors.sway import AxisMotion, with_motion
+from truenorth.estimate.staying import StayingLog
+from truenorth.filters import kalman
+from truenorth.quality.density import LOUD, noise_evidence
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Evidence
+from truenorth.state.limits import limit
+
+FACTORS = (0.5 * LOUD, LOUD, 2.0 * LOUD, 4.0 * LOUD, 8.0 * LOUD)  # of the specification's random walks
+SENSORS = ("accel", "gyro")
+
+
+def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: float) -> dict[str, float]:
+    """How many times noisier than specified a sensor is, where the log rules out less than `LOUD` times.
+
+    Parameters
+    ----------
+    log : StayingLog
+        About the last estimate; its noise is that of the specification.
+    motion : three AxisMotion
+        Of the base, as fitted with that noise.
+    interval : float, s
+        Of the filter.
+    """
+    duration = float(log.integrals.time[-1])
+    steady = [
+        AxisMotion(QUIETEST_BASE, tuple(item for item in axis.oscillators if not is_slow(item, duration)))
+        for axis in motion
+    ]
+    if all(axis == other for axis, other in zip(motion, steady, strict=True)):
+        return {}  # no motion that noise could hide in
+
+    def likelihood(sensor: str, factor: float) -> float:
+        """Twice its logarithm, of the better of both motions."""
+        other = copy.copy(log)
+        walks = {name: factor * value for name, value in asdict(log.noise).items() if name.startswith(sensor)}
+        other.noise = replace(log.noise, **walks)
+        system = other.linearise()
+        both = (motion,) if factor == 1.0 else (motion, steady)
+        return max(2.0 * float(kalman(with_motion(system, interval, m)).log_likelihood) for m in both)
+
+    as_said = likelihood(SENSORS[0], 1.0)
+    found = {}
+    for sensor in SENSORS:
+        below = max(as_said, likelihood(sensor, FACTORS[0]))
+        factor = FACTORS[1]
+        best = likelihood(sensor, factor)
+        if best - below <= limit("drift"):
+            continue
+        for more in FACTORS[2:]:
+            better = likelihood(sensor, more)
+            if better < best:
+                break
+            best, factor = better, more
+        found[sensor] = factor
+    return found
+
+
+def sway_noise_evidence(noisier: Mapping[str, float], spec: ImuSpec, lat: float) -> list[Evidence]:
+    """That it is another sensor's specification, and what that does to heading and level."""
+    return [
+        noise_evidence(name, factor * getattr(spec, f"{name}_random_walk"), spec, lat)
+        for name, factor in noisier.items()
+    ]
