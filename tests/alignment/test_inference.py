@@ -1,12 +1,16 @@
 """The inferred size of an unseen bias, against the distribution it claims."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from truenorth.alignment import align
 from truenorth.alignment.inference import predictive_sigma, usual
+from truenorth.core.position import Position
 from truenorth.records.specs import PRESETS, imu_spec
+from truenorth.simulation.scenario import read_scenario
 
 
 def test_the_prior_alone_gives_the_standard_deviation_of_a_scale_mixture():
@@ -51,3 +55,17 @@ def test_the_usual_bias_is_that_of_the_presets(sensor):
         spec = imu_spec(name)
         walk, bias = getattr(spec, f"{sensor}_random_walk"), getattr(spec, f"{sensor}_bias")
         assert math.isclose(usual(sensor, "bias", walk), bias, rel_tol=1e-9)
+
+
+def test_accelerometers_that_miss_gravity_leave_level_unknown():
+    """60 mg along the vertical: as much may be along the level, 3.4 deg of tilt, and no longer log shows less."""
+    scenario = {"duration": "60 s", "position": {"lat": "45 deg", "lon": "10 deg"}, "motion": {"kind": "rest"}}
+    record = read_scenario({"name": "rest", "imu": "consumer", **scenario}).simulate(seed=2).record
+    step = record.interval if record.kind == "increments" else 1.0
+    missing = 1.06 * 9.806 - np.linalg.norm(record.accel.mean(axis=0)) / step
+    biased = replace(record, accel=record.accel + np.array([0.0, 0.0, missing * step]))
+    answer = align(biased, Position.from_degrees(45.0, 10.0))
+    assert answer.status == "not_converged"
+    assert np.degrees(np.sqrt(answer.phi_covariance[0, 0])) == pytest.approx(np.degrees(0.06), rel=0.05)
+    assert "however long the log is" in answer.reasons[0]
+    assert "a specification of the IMU" in answer.reasons[0]

@@ -107,6 +107,19 @@ def test_gyros_that_see_the_earth_turned_on_a_table(positions, duration, runs):
     assert low < np.mean(squares) < high, squares
 
 
+def test_a_gyro_of_three_sigmas_on_a_turned_table_refuses_no_log():
+    """Two positions show the biases: what a bias that is large by chance does to heading is in sigma, and is little."""
+    scenario = turned(HEADINGS[:2], 200)
+    made = scenario.simulate(seed=21, run=20)
+    answer = align(made.record, PLACE, scenario.imu, at=100.0)
+    # by 2.9 sigmas of the specification, along what is north then
+    assert any(item.key == "rate.doubtful" for item in answer.evidence)
+    assert answer.status == "aligned", answer.reasons
+    assert np.degrees(answer.euler_sigma[0]) < 3.0
+    phi = misalignment(answer.C_nb, made.motion.states(np.array([answer.time])).C_nb[0])
+    assert np.all(np.abs(phi) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
+
+
 @pytest.mark.slow
 def test_a_turned_table_without_a_specification():
     scenario = turned(HEADINGS[:3], 300, "navigation")

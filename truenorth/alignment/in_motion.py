@@ -209,7 +209,7 @@ def _aligned(
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
     more += [note("aids.late", waited=task.waited)] if task.waited else []
-    more += learnt_evidence(task.factors, answer.moving.delays) if answer.moving is not None else []
+    more += learnt_evidence(task.factors, answer.moving.delays, task.scatter) if answer.moving is not None else []
     more += task.wanders
     more += _seen(task, track, guess, first, gated=passes > 1)
     return judge_moving(answer, track, heading_limit, more)

@@ -84,9 +84,19 @@ def changed(before: Mapping[str, Array], after: Mapping[str, Array]) -> bool:
     return any(np.abs(np.log(after.get(n, one) / before.get(n, one))).max() > math.log(LEAST_FACTOR) for n in names)
 
 
-def learnt_evidence(factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]]) -> list[Evidence]:
+def differs(before: float, after: float) -> bool:
+    """Whether a scatter of stamps has changed by what matters."""
+    both = min(before, after), max(before, after)
+    return both[1] > 0.0 and (both[0] == 0.0 or math.log(both[1] / both[0]) > math.log(LEAST_FACTOR))
+
+
+def learnt_evidence(
+    factors: Mapping[str, Array], delays: Mapping[str, tuple[float, float]], scatter: float = 0.0
+) -> list[Evidence]:
     """What was learnt, for the reader: it is in sigma already."""
     found = [note("noise.estimated", name=name, factor=float(factor.max())) for name, factor in factors.items()]
+    if scatter > 0.0:
+        found.append(note("noise.stamps", name="GNSS", size=scatter))
     for name, (delay, sigma) in delays.items():
         if abs(delay) > max(SHOWN_DELAY * sigma, 0.02):
             late = "late" if delay > 0.0 else "early"

@@ -15,6 +15,7 @@ from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import (
     changed,
+    differs,
     louder,
     noise_factors,
 )
@@ -47,6 +48,7 @@ from truenorth.quality.slow_aids import (
     usual_bias,
     with_slow,
 )
+from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -88,6 +90,8 @@ class MovingTask:
     slow: LogErrors = NO_LOG_ERRORS
     errors: Sequence[Group | str] = ()  # further ones of the INS
     factors: Mapping[str, Array] = field(default_factory=dict)  # of noise, as learnt from the pass before
+    scatter: float = 0.0  # s, one sigma of the receiver's stamps, so learnt
+    scattered: Mapping[str, Array] = field(default_factory=dict)  # what it adds to the sigmas
     waited: float = 0.0  # s, that the vehicle drove before anything aided: left out of the record
     # The slow error of fixes is the usual one, or innovations have shown it: nobody spoke of it
     usual_fixes: bool = False
@@ -96,10 +100,15 @@ class MovingTask:
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
         """The task with what a pass has taught of its sensors, and whether that is much."""
-        factors = noise_factors(track, self.aiding(gated=False), self.factors)
+        aiding = self.aiding(gated=False)
+        factors = noise_factors(track, aiding, self.factors)
         antenna = as_late_as_found(self.antenna, track, "GNSS")
-        much = antenna is not self.antenna or changed(self.factors, factors)
-        return (replace(self, factors=factors, antenna=antenna), True) if much else (self, False)
+        scatter = stamp_scatter(track, aiding, self.scatter)
+        much = antenna is not self.antenna or changed(self.factors, factors) or differs(self.scatter, scatter)
+        if not much:
+            return self, False
+        added = scattered(aiding, track, scatter)
+        return replace(self, factors=factors, antenna=antenna, scatter=scatter, scattered=added), True
 
     def with_slow_errors(self, track: Track) -> MovingTask:
         """The task with slow errors of its aids that a pass has shown: the same one where there are none."""
@@ -142,7 +151,7 @@ class MovingTask:
         if self.gnss is not None:
             found += from_gnss(self.gnss, antenna)
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
-        return louder(with_slow(found, self.lasting), self.factors)
+        return with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""

@@ -142,10 +142,11 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     """What contradicts a base that stays where it is, and the specification of the IMU on it.
 
     A gyro that misses along north by more than its specification may miss along east as much, where nobody sees it:
-    that turns heading by ``residual / (w_ie cos L)``. So do accelerometers, which tilt by ``residual / g``.
+    that turns heading by ``residual / (w_ie cos L)``. So do accelerometers, which tilt by ``residual / g``. Biases that are k
+    times as large make k times as much of heading's floor at the most: of an IMU that was turned, next to nothing.
     """
     found = []
-    place = answer.position
+    place, (_, floor) = answer.position, azimuth_sigmas(answer)
     bias = float(np.max(answer.gyro_bias_prior))
     horizontal = EARTH_RATE * math.cos(place.lat)
     for axis, residual, misses in zip(("north", "up"), check.rate_residual, check.rate_misses(bias), strict=True):
@@ -160,7 +161,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
             remedies = ("latitude", "imu_axes", "units", "specification", "base_stays")
             found.append(Evidence("rate.misses", figures, "bounded", Effect(heading=turned), remedies))
         elif misses > limit("doubt"):
-            found.append(Evidence("rate.doubtful", figures, "known", Effect(heading=turned)))
+            found.append(Evidence("rate.doubtful", figures, "known", Effect(heading=min(turned, misses * floor))))
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
     g = float(normal_gravity(place.lat, place.alt))
     accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)
@@ -245,6 +246,15 @@ def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple
     sigma, floor = azimuth_sigmas(answer)
     level = level_sigma(answer)
     if level > limit("level"):
+        if answer.moving is None and float(np.linalg.eigvalsh(answer.phi_floor[:2, :2]).max()) > limit("level") ** 2:
+            bias = float(np.max(answer.accel_bias_prior))
+            figures: dict[str, Figure] = {
+                "level": level,
+                "bias": bias,
+                "imu": answer.imu_source,
+                "limit": limit("level"),
+            }
+            return [Evidence("level.biased", figures, remedies=("level_specification",))]
         calmer = "record_calmer" if answer.moving is None else "record_longer"
         return [note("level.unknown", *(remedies or (calmer,)), level=level, limit=limit("level"))]
     coarse = level > math.radians(0.5)
@@ -262,7 +272,7 @@ def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple
         needed = horizontal * math.tan(min(wanted, 1.0))
         source = answer.imu_source
         return [note("heading.bias", bias=bias, imu=source, limit=wanted, lat=lat, needed=needed), good_level]
-    figures: dict[str, Figure] = {"sigma": sigma, "duration": answer.duration, "limit": wanted, "floor": floor}
+    figures = {"sigma": sigma, "duration": answer.duration, "limit": wanted, "floor": floor}
     key = "heading.short"
     if answer.pays_until is not None:
         key, figures = "heading.short_until", figures | {"pays_until": answer.pays_until}

@@ -7,6 +7,7 @@ sways, an indexer, a turntable, and the filters of the rotary paper (whose measu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 CONVERGED = 0.02  # a pass that moves no angle by more than this part of its sigma is the last
 ROUGHLY = 0.3  # the same part, above which the answer is not to be trusted
+LITTLE = 0.7  # a pass that moves back by more than this part of the one before comes to rest late or never
+BACK = -0.5  # likeness of two steps, from 1 (the same) to -1 (opposite), that go to and fro
 
 
 class Log(Protocol):
@@ -89,6 +92,10 @@ def settle(
 ) -> Settled[E]:
     """Linearise and estimate, and correct the nominal solution, until a pass moves nothing.
 
+    Where the passes go to and fro, each about as far as the one before, half of a step is taken from there on (damped
+    Gauss-Newton: J. Nocedal and S. Wright, Numerical Optimization, 2nd ed., section 10.3; how we see it is ours): the heading of
+    a cheap IMU that turns is a convention, and what shows it bends within the tens of degrees that a pass moves it by.
+
     Parameters
     ----------
     log : Log
@@ -102,7 +109,7 @@ def settle(
     most, least : int
         Passes.
     """
-    passes = 0
+    passes, share, before, last = 0, 1.0, math.inf, np.zeros(0)
     while True:
         passes += 1
         found = estimate(log.linearise())
@@ -110,5 +117,14 @@ def settle(
         if passes >= most or (passes >= least and by < enough):
             return Settled(found, passes, by)
         end = np.array(found.end)
+        if by > LITTLE * before and _likeness(end, last) < BACK:
+            share *= 0.5
+        before, last, end = by, end, share * end
         del found  # a pass takes memory: none of it stays for the next
         log.correct(end)
+
+
+def _likeness(a: Array, b: Array) -> float:
+    """Of two steps, each state by itself, whatever its unit: 1 where they are the same, -1 where they are opposite."""
+    squares = a**2 + b**2
+    return float(np.mean(2.0 * (a * b)[squares > 0.0] / squares[squares > 0.0]))

@@ -64,6 +64,10 @@ SENTENCES = {
     "level.unknown": (
         "level is known to {level:deg|.2f} deg only; {limit:deg|.0f} deg is the most that passes for level"
     ),
+    "level.biased": (
+        "level is known to {level:deg|.2f} deg only, however long the log is: an accelerometer's bias can be {bias:mg|.2g} mg "
+        "({imu:imu}); {limit:deg|.0f} deg is the most that passes for level"
+    ),
     "latitude.found": (
         "the latitude was not given: found from the log, {lat:deg|.2f} deg, to {sigma:deg|.2g} deg (one sigma)"
     ),
@@ -259,6 +263,10 @@ SENTENCES = {
         "{name}: at {onset:.0f} s it steps by {size:.2g} m/s, and the IMU does not (likelihood ratio {ratio:.3g}; chance gives "
         "{chance:.3g}): the receiver may be led away, by {distance:.2g} m until the end"
     ),
+    "noise.stamps": (
+        "{name}: its stamps scatter by {size:.2g} s about their delay (one sigma): what that makes of speed and acceleration is "
+        "in the noise of each row"
+    ),
     "noise.estimated": "{name}: its noise is {factor:.2g} times as large as was said; so it is taken",
     "delay.late": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s late, which is estimated and in sigma",
     "delay.early": "{name}: its stamps are {size:.3f} ± {sigma:.2g} s early, which is estimated and in sigma",
@@ -373,6 +381,7 @@ REMEDIES = {
     "transfer.delay": "check the delay",
     "transfer.lever_arm": "check the lever arm",
     "transfer.mounting": "check the mounting",
+    "level_specification": "give a specification of the IMU, or its calibration",
     "slave_specification": "give the right specification",
     "without_jump": "align a part without the jump, which may be an error of the master",
     "match_velocity": (

@@ -1,0 +1,104 @@
+"""Stamps that scatter: measurements of a moment that is a little off the one they are stamped with, by another time in each row.
+
+A stamp that is off by ``tau`` makes a velocity wrong by ``a tau`` and a position by ``v tau``, and nothing at a steady velocity or
+at rest. So the noise of such a sensor is larger in manoeuvres alone, where the filter learns attitude, and looks like an IMU whose
+errors grow with turns. The latter last from row to row, the former do not: of the *difference* of innovations that follow each
+other, along acceleration or velocity, the variance is ``q (S_1 + S_2) + sigma^2 (a_1^2 + a_2^2)``. Whether there is a sigma beyond
+the factor q says the ratio of the largest likelihoods with and without it. Differences share their rows: half of it counts.
+
+The rule is ours; differences of innovations as in :mod:`truenorth.alignment.in_motion_learnt`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.source import Aiding
+from truenorth.quality.whiteness import FEWEST
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals, Track
+
+Array = NDArray[np.float64]
+
+SOURCES = {"GNSS velocity": 1, "GNSS position": 0}  # and which derivative of the velocity a stamp multiplies
+LONGEST = 0.5  # s, one sigma: more is no scatter of stamps
+TRIES = np.concatenate([[0.0], np.geomspace(2e-3, LONGEST, 60)])  # s, one sigma
+SLOW = 1e-9  # m/s or m/s^2: rates that have no direction, and are looked at along ..
+ANYWHERE = np.array([1.0, 0.0, 0.0])
+STEP = 0.5  # s, over which the motion of a vehicle is steady
+MOST = 25.0  # square of a normalised difference, that is an outlier beyond
+
+
+def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float) -> float:
+    """One sigma of the stamps of a receiver, s, as its innovations show it; 0 where chance explains them.
+
+    Parameters
+    ----------
+    track : Track
+        Of a pass with these sources.
+    aiding : iterable of Aiding
+    had : float, s
+        The scatter that is in their sigmas already.
+    """
+    names = {source.name for source in aiding}
+    sources = [r for r in track.residuals if r.name in SOURCES and r.name in names]
+    seen = [pair for pair in (_pairs(track, r, had) for r in sources) if len(pair[0]) >= FEWEST]
+    if not seen:
+        return 0.0
+    likelihood = np.sum([_likelihood(*pair) for pair in seen], axis=0)
+    best = int(np.argmax(likelihood))
+    return float(TRIES[best]) if likelihood[best] - likelihood[0] > limit("rival") else 0.0
+
+
+def scattered(aiding: Sequence[Aiding], track: Track, sigma: float) -> dict[str, Array]:
+    """What stamps that scatter by so much (s) add to the sigmas of a receiver, (M, 3) by name."""
+    if sigma == 0.0:
+        return {}
+    return {s.name: sigma * np.abs(_rate_of(track, s.name, s.time)) for s in aiding if s.name in SOURCES}
+
+
+def with_scatter(aiding: Sequence[Aiding], added: Mapping[str, Array]) -> list[Aiding]:
+    """The same sources with these sigmas added to theirs."""
+    return [replace(s, sigma=np.hypot(s.sigma, added[s.name])) if s.name in added else s for s in aiding]
+
+
+def _rate_of(track: Track, name: str, time: Array) -> Array:
+    """(M, 3) what a stamp multiplies: velocity (m/s) of a position, acceleration (m/s^2) of a velocity."""
+    before, after = (
+        np.stack([np.interp(time + dt, track.time, v) for v in track.v_n.T], axis=1) for dt in (-STEP, STEP)
+    )
+    return (after - before) / (2.0 * STEP) if SOURCES[name] else 0.5 * (after + before)
+
+
+def _pairs(track: Track, r: Residuals, had: float) -> tuple[Array, Array, Array]:
+    """Of innovations that follow each other, along the rate of their stamps: square of the difference, variance, square of rates.
+
+    The variance is without the scatter that the sigmas have already.
+    """
+    rate = _rate_of(track, r.name, r.time)
+    there, some = np.isfinite(r.innovation), r.rows > 0
+    e, sigma, rate = (np.where(there, values, 0.0)[some] for values in (r.innovation, r.sigma, rate))
+    pairs = rate[1:] + rate[:-1]  # of rows that follow each other alike, or the two say little
+    size = np.linalg.norm(pairs, axis=1)[:, None]
+    along = np.where(size > SLOW, pairs / np.maximum(size, SLOW), ANYWHERE)
+    variance = np.maximum(sigma**2 - (had * rate) ** 2, 0.0)
+    difference = np.einsum("ki,ki->k", np.diff(e, axis=0), along)
+    squares = np.einsum("ki,ki->k", rate[1:], along) ** 2 + np.einsum("ki,ki->k", rate[:-1], along) ** 2
+    S = np.einsum("ki,ki->k", variance[1:] + variance[:-1], along**2)
+    return difference**2, S, squares
+
+
+def _likelihood(squares: Array, variance: Array, rates: Array) -> Array:
+    """(T,) twice the log-likelihood of differences with each scatter that is tried, the factor of the variance the best, halved."""
+    found = np.full(len(TRIES), -math.inf)
+    quiet = variance > 0.0
+    squares, variance, rates = squares[quiet], variance[quiet], rates[quiet]
+    for factor in np.geomspace(0.25, 16.0, 25):
+        v = factor * variance + TRIES[:, None] ** 2 * rates
+        found = np.maximum(found, -0.5 * np.sum(np.minimum(squares / v, MOST) + np.log(v), axis=1))
+    return found
