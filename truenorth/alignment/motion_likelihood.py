@@ -123,6 +123,8 @@ def _deviances(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q:
     for m in range(len(values)):
         Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
         first = fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, Phi, Q, P, h)
-        Phi[first:, first:], Q[first:, first:] = walk_Phi, walk_Q
+        for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
+            for j in range(2):
+                Phi[first + i, first + j], Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
         h[first] = 1.0
         found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first)

@@ -103,12 +103,13 @@ def fill_blocks(orders: Any, values: Any, interval: float, Phi: Any, Q: Any, P: 
         Zero on entry.
     h : (n,) array
     """
-    first = 0
+    end = 0
     for m in range(len(orders)):
-        _fill(orders[m], values[m, 0], values[m, 1], values[m, 2], interval, first, Phi, Q, P)
-        first += 2 * orders[m]
-        h[first - 1] = 1.0
-    return first
+        end += 2 * orders[m]
+        # A first place of 0 would be a type of its own to Numba, which compiles for it apart.
+        _fill(orders[m], values[m, 0], values[m, 1], values[m, 2], interval, end - 2 * orders[m], Phi, Q, P)
+        h[end - 1] = 1.0
+    return end
 
 
 @compiled
