@@ -97,10 +97,10 @@ def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:
     for i, j in product(range(3), range(3)):
         bias[:, i, 3 * i + j] = gyro[i, j] * (rate[:, j] - rate[:, j].mean())
         bias[:, 3 + i, 9 + 3 * i + j] = accel[i, j] * (force[:, j] - force[:, j].mean())
-    return _seen(fine, bias)
+    return seen_of(fine, bias)
 
 
-def _seen(fine: FineAlignment, bias: Array) -> Array:
+def seen_of(fine: FineAlignment, bias: Array) -> Array:
     """Measurements (K, 3, S) of errors of the six sensors (K, 6, S)."""
     Phi, H = (np.ascontiguousarray(x) for x in (fine.system.Phi, fine.system.H))
     d = np.zeros((fine.system.states, bias.shape[2]))

@@ -1,7 +1,8 @@
 """The first alignment on a computer: a second process compiles what comes last, while this one compiles what comes first.
 
-An alignment of a base waits for its kernels one after the other. Two of the longest, the Kalman filter with the states of a
-sway and the match of signatures, come at the end; they depend on nothing that comes before.
+An alignment of a base waits for its kernels one after the other. Those of its end, the Kalman filter with the states of a
+sway among them, depend on nothing that comes before. Where the two processes meet, one waits for the other's kernel
+(:mod:`truenorth.core.kernel_lock`).
 """
 
 from __future__ import annotations
@@ -10,24 +11,32 @@ import os
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
+from typing import Any
 
 LAST = "truenorth.alignment.matched._sum_back"  # where it is on the disk, no first alignment waits any more
 SWAY_STATES = 39  # of a base with two oscillations along each axis; what is padded to the same size shares its kernel
+STATES = 12  # of a base that stays
+NAME = "ahead"  # of the lock that a second process holds
+EPOCHS, ROWS = 2, 3  # of nothing
 CODE = "from truenorth.cli.ahead import compile_last; compile_last()"
 
 
 def compile_ahead() -> None:
     """Start the second process, where the kernels are not on the disk and there is a second processor for it.
 
-    It ends with this process: it reads a pipe that nobody writes to. A process that has been started by another of its kind starts
-    none: `truenorth warm` has one for each processor as it is.
+    It ends with this process, but for the kernel that it is at: it reads a pipe that nobody writes to. A process that has been
+    started by another of its kind starts none: `truenorth warm` has one for each processor as it is.
     """
+    from truenorth.core.kernel_lock import KernelLock
     from truenorth.core.kernel_store import write_folder
 
     if "multiprocessing" in sys.modules and sys.modules["multiprocessing"].parent_process() is not None:
         return
     folder = write_folder()
-    if folder is None or (os.cpu_count() or 1) < 2 or next(folder.glob(f"{LAST}-*"), None) is not None:
+    if folder is None or (os.cpu_count() or 1) < 2 or next(folder.glob(f"{LAST}-*.kernel"), None) is not None:
+        return
+    if KernelLock(folder / NAME).taken():  # of another first command
         return
     silent = subprocess.DEVNULL
     process = subprocess.Popen([sys.executable, "-c", CODE], stdin=subprocess.PIPE, stdout=silent, stderr=silent)
@@ -38,32 +47,87 @@ _running: list[subprocess.Popen[bytes]] = []  # held: the pipe would be closed w
 
 
 def compile_last() -> None:
-    """What runs in the second process; ends it where the first one is gone."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    call_last()
+    """What runs in the second process; ends it behind the kernel in which the first one ends."""
+    from truenorth.core.kernel_lock import KernelLock
+    from truenorth.core.kernel_store import write_folder
+
+    left_alone = threading.Event()
+    threading.Thread(target=_wait_for_end, args=(left_alone,), daemon=True).start()
+    folder = write_folder()
+    lock = None if folder is None else KernelLock(folder / NAME)
+    if lock is not None:
+        lock.take()
+    try:
+        for job in JOBS:
+            if left_alone.is_set():
+                break
+            job()
+    finally:
+        if lock is not None:
+            lock.release()
 
 
-def _end_with_parent() -> None:
+def _wait_for_end(left_alone: threading.Event) -> None:
     sys.stdin.buffer.read()
-    os._exit(0)
+    left_alone.set()
 
 
-def call_last() -> None:
-    """Call the kernels on two epochs of nothing, with the types that an alignment gives them."""
+def _filtered(states: int) -> tuple[Any, Any]:
+    """A system without information, and what the filter makes of it."""
+    import numpy as np
+
+    from truenorth.filters import LinearSystem, kalman
+
+    K, n, m = EPOCHS, states, ROWS
+    Phi, R = np.tile(np.eye(n), (K, 1, 1)), np.tile(np.eye(m), (K, 1, 1))
+    H, S = np.zeros((K, m, n)), np.zeros((K, n, m))
+    system = LinearSystem(Phi, Phi, H, R, np.zeros((K, m)), np.zeros(n), np.eye(n), S=S)
+    return system, kalman(system, history="full")
+
+
+def filter_sway() -> None:
+    """The filter; a base that stays takes the same kernel where its own is not there."""
+    _filtered(SWAY_STATES)
+
+
+def match() -> None:
+    """Gains, and what begins in the log."""
     from types import SimpleNamespace
 
     import numpy as np
 
+    from truenorth.alignment.bias_step import seen_of
     from truenorth.alignment.matched import Signatures, innovations_of, matched
-    from truenorth.filters import LinearSystem, filter_gains, kalman
+    from truenorth.filters import filter_gains
+    from truenorth.filters.gains import initial_part, through
 
-    K, n, m = 2, SWAY_STATES, 3
-    Phi, R = np.tile(np.eye(n), (K, 1, 1)), np.tile(np.eye(m), (K, 1, 1))
-    H, S = np.zeros((K, m, n)), np.zeros((K, n, m))
-    system = LinearSystem(Phi, Phi, H, R, np.zeros((K, m)), np.zeros(n), np.eye(n), S=S)
-    nothing = SimpleNamespace(innovation=np.zeros((K, m)), innovation_covariance=R, P=Phi)
-    fine = SimpleNamespace(system=system, estimates=nothing, gains=filter_gains(system, nothing))  # type: ignore[arg-type]
+    system, estimates = _filtered(SWAY_STATES)
+    K, n, m = EPOCHS, SWAY_STATES, ROWS
+    gains = filter_gains(system, estimates)
+    fine: Any = SimpleNamespace(system=system, estimates=estimates, gains=gains)
     state, measured, course = np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((K, m, 1))
     one = Signatures(np.zeros(1, dtype=np.int64), state, measured, np.zeros((1, 1)), state, course)
-    matched(innovations_of(fine), one)  # type: ignore[arg-type]
-    kalman(system, history="full")
+    matched(innovations_of(fine), one)
+    through(gains, course)
+    seen_of(fine, np.zeros((K, 6, 1)))
+    initial_part(gains.step, system.P0)
+
+
+def turn() -> None:
+    """Attitude by the gyros alone, held against gravity."""
+    import numpy as np
+
+    from truenorth.strapdown.inertial_integration import integrate_attitude
+
+    integrate_attitude(np.zeros((EPOCHS, 3)))
+
+
+def filter_own() -> None:
+    """The filter of a base that stays, for the alignments that follow."""
+    from truenorth.filters.linear import always_own_size
+
+    always_own_size()
+    _filtered(STATES)
+
+
+JOBS: tuple[Callable[[], None], ...] = (filter_sway, match, turn, filter_own)

@@ -84,6 +84,11 @@ def align(
     pointing: OfAttitude,
 ) -> None:
     """Find pitch, roll and true heading of an IMU: still, swaying, turned on purpose, on the move, or against a master."""
+    check_options(context)
+    aided = (moving.given, pointing.given, master.master, table.positions, indexer.indexer)
+    if not any(aided):
+        compile_ahead()  # before what takes time to import
+
     from dataclasses import replace
 
     from truenorth.alignment import align as align_record
@@ -92,7 +97,6 @@ def align(
     from truenorth.quality import inspect
     from truenorth.records.calibration import Calibration
 
-    check_options(context)
     place = where.position()
     if place is None and not moving.given and master.master is None:
         raise UsageError(
@@ -117,8 +121,6 @@ def align(
             *table.aids(),
             *indexer.aids(),
         ]
-        if not aids:
-            compile_ahead()
         if indexer.indexer is None:  # which turns its IMU on its head, and fast
             free = any_attitude or table.positions is not None
             _refuse_implausible(record, _latitude(place, aids), free, units_given=reading.units is not None)

@@ -120,7 +120,9 @@ def run_task(name: str) -> None:
         A command failed; that the data cannot be aligned is no failure here.
     """
     from truenorth.cli import app
+    from truenorth.filters.linear import always_own_size
 
+    always_own_size()
     before = Path.cwd()
     silent = io.StringIO()
     with (

@@ -52,7 +52,14 @@ class Kernel(KernelSource):
 
         dispatcher: Any = numba.jit(pipeline_class=compiler, **options)(self.py_func)
         dispatcher._cache = KernelStore(self.py_func, options | compiler.kept_as)
+        dispatcher.compile = dispatcher._cache.guarded(dispatcher.compile)
         return dispatcher
+
+    def at_hand(self, *arguments: Any) -> bool:
+        """Whether a call need not compile: the kernel is there for such arguments, or another process compiles it now."""
+        types = tuple(self.dispatcher.typeof_pyval(argument) for argument in arguments)
+        codegen = self.dispatcher.targetctx.codegen
+        return types in self.dispatcher.overloads or self.dispatcher._cache.at_hand(types, codegen())
 
     @property
     def stats(self) -> Any:

@@ -19,7 +19,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from numba.core.serialize import dumps
 
 from truenorth.core.fingerprint import UnknownValueError, fingerprint
 from truenorth.core.inner_library import KIND, InnerLibrary, ReadyLibrary
+from truenorth.core.kernel_lock import SUFFIX, KernelLock
 
 PACKAGE = Path(__file__).parents[1]
 BOUND = 512 * 2**20  # bytes that the kernels of all versions may take, before the longest unused go
@@ -52,6 +53,7 @@ class KernelStore:
         self.function = function
         self.options = options
         self.files: dict[Any, str | None] = {}  # the name of the file of a signature, as it was when first asked for
+        self.locks: dict[Any, KernelLock | None] = {}  # of the signatures that are asked for now
 
     @property
     def cache_path(self) -> str:
@@ -65,15 +67,47 @@ class KernelStore:
         """
         rtsys.initialize(target)
         name = self._file(signature, target.codegen())
-        for folder in folders() if name else ():
-            payload = _read(folder / str(name))
-            if payload is not None:
-                return _rebuilt(target, "callback" in self.options, *payload)
+        kernel = self._found(name, target)
+        if kernel is None and name and signature in self.locks and (folder := write_folder()) is not None:
+            self.locks[signature] = lock = KernelLock(folder / name)
+            lock.take()
+            kernel = self._found(name, target)  # another process has compiled it meanwhile
+        if kernel is not None:
+            return kernel
         if name and "<locals>" in self.function.__code__.co_qualname:
             # The linker takes what has one name for one function, and a function made anew has the name of the last.
             self.function.__qualname__ = f"{self.function.__code__.co_qualname}.{Path(name).stem[-16:]}"
         LOG.info("compiling %s", self.function.__qualname__)
         return None
+
+    def _found(self, name: str | None, target: Any) -> Any:
+        for folder in folders() if name else ():
+            payload = _read(folder / str(name))
+            if payload is not None:
+                return _rebuilt(target, "callback" in self.options, *payload)
+        return None
+
+    def guarded(self, compile: Callable[..., Any]) -> Callable[..., Any]:
+        """Numba's call that finds or compiles a kernel and keeps it; no other process compiles the same one meanwhile."""
+
+        @wraps(compile)
+        def alone(signature: Any) -> Any:
+            self.locks[signature] = None
+            try:
+                return compile(signature)
+            finally:
+                lock = self.locks.pop(signature, None)
+                if lock is not None:
+                    lock.release()
+
+        return alone
+
+    def at_hand(self, signature: Any, codegen: Any) -> bool:
+        """Whether a kernel is on the disk, or another process compiles it now."""
+        name = self._file(signature, codegen)
+        return name is not None and any(
+            (folder / name).exists() or KernelLock(folder / name).taken() for folder in folders()
+        )
 
     def save_overload(self, signature: Any, kernel: Any) -> None:
         """Keep a kernel; one that holds an address of this process is not kept."""
@@ -247,7 +281,7 @@ def prune(folder: Path, bound: int) -> None:
     room = bound * 3 // 4 if total > bound else total
     for used, size, path in kept:
         room -= size
-        if room < 0 or (path.suffix == ".aside" and time.time() - used > DAY):
+        if room < 0 or (path.suffix in (".aside", SUFFIX) and time.time() - used > DAY):
             path.unlink(missing_ok=True)
 
 

@@ -7,13 +7,14 @@ both. The type is known when the kernel is compiled, so that the choice costs no
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Unpack
 
 from truenorth.core.compiled import OPTIONS, compiled
 from truenorth.core.kernel_source import STEPS
-from truenorth.core.linalg import Array, Size
+from truenorth.core.linalg import Array, Size, padded
 from truenorth.filters import recursion
 from truenorth.filters.drive import Running, drive
 from truenorth.filters.recursion import (
@@ -30,6 +31,8 @@ from truenorth.filters.recursion import (
     workspace,
 )
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
+
+LARGEST_SIZE = 40  # of the kernels that smaller systems take: that of a swaying base
 
 
 def room(size: Size, rows: int, options: Any) -> Any:
@@ -108,6 +111,42 @@ def linear_runs(size: Size, system: Runs, epochs: int, options: Any, out: Histor
             keep(out, run, epoch, epochs - 1, w)
 
 
+class _Sizes:
+    """Sizes of the kernels that calls take: the own one, or for few epochs a larger one that is there where the own is not.
+
+    What is padded stays zero, so that the bits are the same; a step of 40 states takes some us more than one of 12, the
+    kernel of 12 takes seconds to compile.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.most = most  # epochs that go through larger kernels before the own one is compiled
+        self.taken: dict[tuple[int, type], Size] = {}
+        self.epochs: Counter[tuple[int, type]] = Counter()
+
+    def for_call(self, size: Size, runs: Runs, epochs: int, options: Any, out: Histories) -> Size:
+        """The size with which :func:`linear_runs` is called."""
+        key = (len(size), type(options))
+        taken = self.taken.get(key)
+        if taken is not None and len(taken) == len(size):
+            return size
+        self.epochs[key] += epochs * len(out.x)
+        if self.epochs[key] > self.most or linear_runs.at_hand(size, runs, epochs, options, out):
+            taken = size
+        elif taken is None:
+            larger = (padded(n) for n in range(len(size) + 1, LARGEST_SIZE + 1) if n % 8 == 0)
+            taken = next((s for s in larger if linear_runs.at_hand(s, runs, epochs, options, out)), size)
+        self.taken[key] = taken
+        return taken
+
+
+_sizes = _Sizes(100_000)
+
+
+def always_own_size() -> None:
+    """Compile for each size from now on, however few epochs there are."""
+    _sizes.most = 0
+
+
 def run_linear(
     options: Any,
     system: LinearSystem,
@@ -121,6 +160,6 @@ def run_linear(
     _choose_by_type()
 
     def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
-        linear_runs(size, runs, epochs, options, out)
+        linear_runs(_sizes.for_call(size, runs, epochs, options, out), runs, epochs, options, out)
 
     return drive(kernel, system, state, memory=memory, adaptation=adaptation, **running)
