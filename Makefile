@@ -41,7 +41,7 @@ bench: $(WARM)
 
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build -q
-	@echo "build/site/index.html; with a search: python3 -m http.server -d build/site"
+	@echo "build/site/index.html"
 
 notebooks: $(READY)
 	$(BIN)/python docs/notebooks/build.py

@@ -294,7 +294,7 @@ def compared(job: Job) -> list[str]:
 
 def main() -> None:
     lines = [
-        "| work | by | ours, us a step | theirs | theirs over ours (spread) | |",
+        "| work | by | ours, us a step | theirs | theirs over ours (spread) | same result? |",
         "| --- | --- | ---: | ---: | ---: | --- |",
     ]
     for job in jobs():

@@ -79,6 +79,8 @@ class Line:
     def cells(self) -> list[str]:
         """Of the table."""
         rms = ", ".join(f"{name} {value:.2f}" for name, value in self.rms.items())
+        if not rms and not self.refused:  # of a case whose flags count as right
+            rms = "none: each run was flagged, as it may be"
         worst = f"{self.worst:.1f}" if self.worst else ""
         return [self.case.procedure, self.case.name, str(self.runs), rms, str(len(self.refused)), worst, self.mark]
 
