@@ -38,7 +38,7 @@ def test_what_a_person_reads(logs):
     assert result.exit_code == 0, result.output
     assert "mounting, deg: heading 0.3" in result.stdout
     assert "right 0 (as given)" in result.stdout
-    assert "does not separate all" in result.stdout
+    assert "left open by this motion" in result.stdout
 
 
 @pytest.mark.slow

@@ -52,3 +52,12 @@ def test_defaults_are_those_of_the_model(command, model, names):
     usual = {name: p.default for name, p in inspect.signature(model).parameters.items()}
     given = {p.name: p.default for p in COMMANDS[command].params}
     assert {option: given[option] for option in names} == {option: usual[name] for option, name in names.items()}
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_lines_to_copy_fit_a_terminal_of_eighty_columns(name):
+    """What is kept as it is written (``\\b``) is broken where it is longer, and a command is then no line to copy."""
+    text = f"{COMMANDS[name].help}\n\n{COMMANDS[name].epilog or ''}"
+    kept = [part for part in text.split("\n\n") if "\b" in part]
+    assert kept
+    assert [line for part in kept for line in part.splitlines() if len(line) > 78] == []

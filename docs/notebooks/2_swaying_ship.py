@@ -23,12 +23,13 @@ tn.plot(run)
 # %%
 record = run.record.between(None, 300.0)
 truth = np.degrees(np.ravel(euler_from_dcm(run.motion.states(record.time[-1]).C_nb)))
+print(f"{'error, arcmin':25} {'heading':>18} {'pitch':>18} {'roll':>18}")
 for method in ("analytic", "oba", "swaying"):
     answer = tn.align(record, place, "navigation", method=method)
     error = (np.degrees(answer.euler) - truth + 180.0) % 360.0 - 180.0
     sigma = np.degrees(answer.euler_sigma)
-    words = ", ".join(f"{60 * e:+9.2f} ± {60 * s:6.2f}" for e, s in zip(error, sigma, strict=True))
-    print(f"{method:9} {answer.status:14} heading, pitch, roll error, arcmin: {words}")
+    words = " ".join(f"{60 * e:+8.2f} ± {60 * s:7.2f}" for e, s in zip(error, sigma, strict=True))
+    print(f"{method:9} {answer.status:15} {words}")
 
 # %% [markdown]
 # How does the heading converge? The band is one sigma, the dark band its floor.

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
+from truenorth.alignment.table import TablePosition, TurntableErrors
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.quality import inspect
@@ -99,6 +100,28 @@ def test_near_the_vertical_the_combination_comes_first(tmp_path):
     assert page.index("Heading minus roll") < page.index('<th scope="row">Heading</th>')
     assert f"{np.degrees(result.azimuth[1]):.4f}°" in page
     assert "belong together" in page
+
+
+def test_biases_and_motion_have_units_that_fit(aligned, levelled, tmp_path):
+    """Tens of micro-g of a navigation grade, tens of milli-g of a consumer's; a base that moves by metres a second."""
+    pages = [write_report(result, tmp_path / "report.html").read_text() for result in (aligned, levelled)]
+    assert [re.search(r"Accelerometer x</th>.*?([µm]g)</td></tr>", page, re.DOTALL)[1] for page in pages] == [
+        "µg",
+        "mg",
+    ]
+    moved = replace(aligned, disturbance=np.array([13.0, 12.0, 0.2]))
+    assert "13, 12, 0.2 m/s RMS" in write_report(moved, tmp_path / "report.html").read_text()
+
+
+def test_positions_of_a_turntable_are_a_table(aligned, tmp_path):
+    stops = tuple(
+        TablePosition(60.0 * k, 60.0 * k + 50.0, aligned.C_nb, np.array([0.0, 0.0, 0.5 * np.pi * (k > 0)]))
+        for k in (0, 1)
+    )
+    table = TurntableErrors(stops, None, *(np.zeros((3, 3)),) * 4, np.zeros(3), np.zeros(3))
+    page = write_report(replace(aligned, table=table), tmp_path / "report.html").read_text()
+    assert page.count("Positions of the turntable") == 2  # contents and heading
+    assert re.search(r"<td[^>]*>60</td><td[^>]*>110</td><td[^>]*>90.000</td>", page)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ EXAMPLES = """
 \b
 Examples:
   truenorth advise --lat 45 --imu navigation --heading 0.05
-  truenorth advise --lat 45 --imu my_imu.yaml --heading 0.02 --longest 7200 -o advice
+  truenorth advise --lat 45 --imu my_imu.yaml --heading 0.02 -o advice
   truenorth advise --lat 34 --imu tactical --heading 0.2 --speed 200
 \b
 Exit codes: 0 within reach; 2 wrong usage; 4 out of reach.

@@ -35,13 +35,13 @@ Examples:
   truenorth align bag/ --lat 48.1 --axes FLU --from 10 --to 310 --json
   truenorth align old.csv --lat -33.9 --units deg/s,g --rate 100
   truenorth align log.csv --lat 34.246 --imu my_imu.yaml --method oba
-  truenorth align slave.csv --master master.csv --imu tactical --lever-arm 0.5,1.2,0 --delay '30 ms'
+  truenorth align slave.csv --master master.csv --imu tactical --delay '30 ms'
   truenorth align turntable.csv --lat 39.98 --imu tactical --positions auto
-  truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv --indexer-axes z,x
-  truenorth align drive.csv --odometer odo.csv --lat 39.9 --imu navigation -o start
+  truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv
+  truenorth align drive.csv --odometer odo.csv --lat 39.9 --imu navigation
   truenorth align drive.csv --gnss gnss.csv --imu industrial -o start
   truenorth align boat.csv --velocity dvl.csv --lat 59.4 --imu navigation
-  truenorth align drive.csv --gnss gnss.csv --magnetometer mag.csv --date 2025-06-01 --imu consumer
+  truenorth align car.csv --gnss gnss.csv --imu consumer --magnetometer m.csv
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.
 """

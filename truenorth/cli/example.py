@@ -12,13 +12,13 @@ from truenorth.cli.options import argument, command, option
 EXAMPLES = """
 \b
 Samples:
-  rlg        ring-laser IMU on a parked vehicle that people and its engine move
+  rlg        ring-laser IMU on a parked vehicle, people and engine moving it
   fog        fibre-optic IMU with GNSS, vehicle with its engine idling
   transfer   fibre-optic master INS and a MEMS IMU on one car
 \b
 Examples:
   truenorth example rlg -o .
-  truenorth align log.csv --lat 34.246 --lon 108.910 --alt 380 --imu navigation
+  truenorth align log.csv --lat 34.246 --lon 108.910 --imu navigation
 """
 
 

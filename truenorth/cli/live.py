@@ -28,15 +28,15 @@ EXAMPLES = """
 \b
 Examples:
   truenorth live replay:log.csv@10x --lat 34.246 --imu navigation
-  truenorth live udp://:9000 --lat 48.1 --imu tactical --until "0.1 deg" -o quay
+  truenorth live udp://:9000 --lat 48.1 --imu tactical --until "0.1 deg"
   cat /dev/ttyUSB0 | truenorth live - --lat 48.1 --units deg/s,g --json
-  truenorth live serial:/dev/ttyUSB0?baud=921600 --lat 48.1 --nmea > heading.nmea
+  truenorth live serial:/dev/ttyUSB0?baud=921600 --lat 48.1 --nmea > hdt
   truenorth live tcp://192.0.2.7:5000 --lat 48.1 --page :8080
   truenorth live replay:log.csv@max --lat 34.246 -o quay --resume
-  truenorth live udp://:9000 --gnss udp://:9001 --imu industrial --until "0.5 deg" --navigate -o trip
-  truenorth live replay:log.csv@20x --gnss replay:gnss.csv --odometer replay:odo.csv --imu tactical
-  truenorth live udp://:9000 --indexer udp://:9003 --indexer-axes z,x --lat 40 --imu navigation
-  truenorth live bag:rosbag2_today?topic=/imu --gnss bag:rosbag2_today --imu tactical
+  truenorth live udp://:9000 --gnss udp://:9001 --imu industrial --navigate
+  truenorth live replay:log.csv@20x --odometer replay:odo.csv --imu tactical
+  truenorth live udp://:9000 --indexer udp://:9003 --lat 40 --imu navigation
+  truenorth live bag:today?topic=/imu --gnss bag:today --imu tactical
   truenorth live "zenoh:imu/data?type=sensor_msgs/msg/Imu" --lat 48.1
 
 Rows are CSV lines (a header with our names, or time and six numbers), binary rows or the messages of a device, see docs/live.md.

@@ -31,19 +31,21 @@ if TYPE_CHECKING:
 EXAMPLES = """
 \b
 Examples:
-  truenorth align log.csv --lat 34.246 --lon 108.910 --alt 380 --imu navigation --to 300 -o start
+  truenorth align log.csv --lat 34.2 --lon 108.9 --to 300 -o start
   truenorth navigate log.csv --start start -o track
-  truenorth navigate log.csv --start start --gnss gnss.csv --lever-arm 0.3,1.2,0.8 --smooth -o track
-  truenorth navigate log.csv --start start --odometer odo.csv --estimate scale,mounting --zupt auto
-  truenorth navigate log.csv --start start --velocity dvl.csv --altitude fixed --json
-  truenorth navigate log.csv --start start --baro baro.csv --altitude baro --offset baro=-0.35
-  truenorth navigate log.csv --master ins.csv --master-sigma 0.1,0.02 --imu tactical --gnss gnss.csv
-  truenorth navigate log.csv --start start --attitude ahrs.csv --attitude-sigma 0.1,0.3,300
-  truenorth navigate log.csv --heading 123,1 --position 48.1,11.5,520 --imu consumer --gnss gnss.csv
-  truenorth navigate log.csv --start start --damping augmented --velocity log.csv -o damped
+  truenorth navigate log.csv --start start --gnss gnss.csv --smooth -o track
+  truenorth navigate log.csv --start start --odometer odo.csv --zupt auto
+  truenorth navigate log.csv --start start --velocity dvl.csv --json
+  truenorth navigate log.csv --start start --baro baro.csv --altitude baro
+  truenorth navigate log.csv --master ins.csv --imu tactical --gnss gnss.csv
+  truenorth navigate log.csv --start start --attitude ahrs.csv \\
+    --attitude-sigma 0.1,0.3,300
+  truenorth navigate log.csv --heading 123,1 --position 48.1,11.5,520 \\
+    --imu consumer --gnss gnss.csv
+  truenorth navigate log.csv --start start --damping augmented \\
+    --velocity log.csv -o damped
 
-Exit codes: 0 navigated; 2 wrong usage; 3 bad data; 4 the alignment has no usable heading, or the measurements contradict
-the track (the result is written all the same).
+Exit codes: 0 navigated; 2 wrong usage; 3 bad data; 4 no usable heading, or a track that is contradicted (and written).
 """
 
 

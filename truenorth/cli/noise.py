@@ -22,8 +22,9 @@ Examples:
   truenorth noise still.csv
   truenorth noise still.csv --like tactical -o noise
   truenorth align log.csv --lat 48.1 --imu noise/imu.yaml
-\b
-Writes imu.yaml (the specification), kalibr.yaml (Kalibr's form of it), noise.svg (Allan deviation and fit).
+
+Writes imu.yaml (the specification), kalibr.yaml (Kalibr's form of it) and noise.svg (Allan deviation and fit).
+
 Exit codes: 0 done; 2 wrong usage; 3 bad data; 4 the base moved, so that the log does not show the sensors' noise.
 """
 WIDTH = 96  # columns, also where the output is no terminal

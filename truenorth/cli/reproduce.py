@@ -12,16 +12,16 @@ from truenorth.cli.options import argument, command, option
 EXAMPLES = """
 \b
 Studies:
-  rotary    Self-alignment of a rotary SINS on a swaying ship
-  transfer  Transfer alignment with residual time delay and lever arm
-  damping   Double-filter external damping of a marine INS over 48 h
-  static    Kalman filters for static alignment, with ten and with eight states
-  odometer  Odometer-aided alignment on the move, from azimuth errors of 1 to 60 deg
-  networks  Internal damping networks by design, and a fuzzy damping ratio (related work)
-  gyro_free Angular rate from twelve accelerometers (related work)
-  in_flight A slave calibrated in the air, and its flight after the release (related work)
-  lag_fusion  Late, asynchronous sensors in one filter (related work)
-  all       All of them, and index.html: which claims hold, in part, or not
+  rotary     Self-alignment of a rotary SINS on a swaying ship
+  transfer   Transfer alignment with residual time delay and lever arm
+  damping    Double-filter external damping of a marine INS over 48 h
+  static     Kalman filters for static alignment, ten and eight states
+  odometer   Odometer-aided alignment on the move, azimuth off by 1 to 60 deg
+  networks   Damping networks by design, fuzzy damping (related work)
+  gyro_free  Angular rate from twelve accelerometers (related work)
+  in_flight  A slave calibrated in the air, then released (related work)
+  lag_fusion Late, asynchronous sensors in one filter (related work)
+  all        All of them, and index.html: which claims hold, in part, or not
 \b
 Examples:
   truenorth reproduce static -o static

@@ -22,7 +22,7 @@ A search:
 Examples:
   truenorth tune harbour.yaml -o harbour
   truenorth align ship.csv --lat 53.5 --imu harbour/tuned.yaml
-\b
+
 Exit codes: 0 done; 2 wrong usage; 3 a search with a mistake, or one without an answer.
 """
 

@@ -53,10 +53,10 @@ def plot_convergence(campaign: Campaign) -> Figure:
     figure = new_figure(4.6 * columns + 0.4, 3.4 * rows + 0.6)
     axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for ax, (case, name) in zip(axes.flat, cases, strict=False):
-        for colour, method in zip(COLOURS, campaign.plan.method_names, strict=False):
+        for at, method in enumerate(campaign.plan.method_names):
             rows_of = _rows(campaign.table, case, method, "phi_u")
             if len(rows_of):
-                _fan(ax, rows_of, method, colour)
+                _fan(ax, rows_of, method, *_look(at))
         _bound(ax, campaign.summary, case)
         if not ax.lines:
             _no_answer(ax)
@@ -89,7 +89,12 @@ def _no_answer(ax: Axes) -> None:
     ax.tick_params(axis="x", labelbottom=False)
 
 
-def _fan(ax: Axes, rows: pd.DataFrame, method: str, colour: str) -> None:
+def _look(at: int) -> tuple[str, str]:
+    """Colour and marker of a method: the palette's colours again with another marker."""
+    return COLOURS[at % len(COLOURS)], "os^D"[at // len(COLOURS) % 4]
+
+
+def _fan(ax: Axes, rows: pd.DataFrame, method: str, colour: str, marker: str) -> None:
     groups = [(float(str(time)), group) for time, group in rows.groupby("time_s")]
     times = np.array([time for time, _ in groups])
     errors = [np.maximum(np.abs(group["value"].to_numpy(float)), SMALL) for _, group in groups]
@@ -97,7 +102,7 @@ def _fan(ax: Axes, rows: pd.DataFrame, method: str, colour: str) -> None:
     for low, high in FANS:
         below, above = (np.array([np.percentile(e, q) for e in errors]) for q in (low, high))
         ax.fill_between(times, below, above, color=colour, alpha=0.16, linewidth=0)
-    ax.plot(times, [np.median(e) for e in errors], "o-", color=colour, markersize=3, label=method)
+    ax.plot(times, [np.median(e) for e in errors], "-", marker=marker, color=colour, markersize=3, label=method)
     ax.plot(times, sigma, "--", color=colour, linewidth=1.0)
 
 
@@ -116,13 +121,13 @@ def plot_distribution(campaign: Campaign) -> Figure:
                     ax, at, rows["value"].to_numpy(float), rows["sigma"].to_numpy(float), COLOURS[at % len(COLOURS)]
                 )
             ax.axhline(0.0, color=REFERENCE, linewidth=0.8)
-            ax.set(xlim=(-0.6, len(methods) - 0.4), xticks=[])
+            ax.set(xlim=(-0.6, len(methods) - 0.4))
+            ax.set_xticks(range(len(methods)), methods, rotation=30, ha="right")
+            ax.tick_params(axis="x", labelbottom=row == 1)
             if row == 0:
                 ax.set_title(_folded(name), fontsize=9)
         axes[row, 0].set_ylabel(f"{label} error, arcmin")
     key = axes[0, 0]
-    for colour, method in zip(COLOURS, methods, strict=False):
-        key.plot([], [], color=colour, linewidth=6, alpha=0.5, label=method)
     key.plot([], [], color="black", marker="_", linestyle="none", markersize=12, label="± claimed sigma")
     figure.legend(*key.get_legend_handles_labels(), loc="outside lower left", ncols=4)
     _title(figure, campaign, "errors at the end of the log, estimated minus true; each panel to its own scale")
@@ -185,8 +190,9 @@ def plot_requirement(campaign: Campaign, found: Requirement) -> Figure:
     values, lines = found.values, found.lines
     figure = new_figure(7.5, 5.0)
     ax = figure.subplots()
-    for colour, line in zip(COLOURS * (1 + len(lines) // len(COLOURS)), lines, strict=False):
-        ax.errorbar(values, line.rms, line.bars, fmt="o-", color=colour, capsize=3, label=line.name)
+    for at, line in enumerate(lines):
+        colour, marker = _look(at)
+        ax.errorbar(values, line.rms, line.bars, fmt=f"{marker}-", color=colour, capsize=3, label=line.name)
         ax.plot(values, line.sigma, "--", color=colour, linewidth=1.0)
     wanted = np.degrees(campaign.plan.converged)
     ax.axhline(60 * wanted, color=REFERENCE, linestyle=":", linewidth=1.2, label=f"wanted: {wanted:g} deg")

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.units import MICRO_G
+
 Array = NDArray[np.float64]
 
 HOURS_FROM = 7200.0  # s: longer spans are drawn in hours
@@ -47,6 +49,11 @@ def angle_unit(values: ArrayLike) -> tuple[float, str]:
     return _fitting(
         values, ((degree, "deg", degree), (degree / 60, "arcmin", degree / 60), (degree / 3600, "arcsec", 0.0))
     )
+
+
+def accel_unit(values: ArrayLike) -> tuple[float, str]:
+    """Accelerations (m/s^2) in the part of g that fits these values, and its name."""
+    return _fitting(values, ((1e3 * MICRO_G, "mg", 1e4 * MICRO_G), (MICRO_G, "µg", 0.0)))
 
 
 def unit_of(unit: str, values: ArrayLike) -> tuple[float, str]:

@@ -10,6 +10,7 @@ from truenorth.core.language import translated as _
 from truenorth.core.shown import Write
 from truenorth.report.campaign_charts import campaign_panels, findings
 from truenorth.report.document import Table, render
+from truenorth.report.numbers import short
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -120,24 +121,24 @@ def _tables(campaign: Campaign, tables: dict[str, pd.DataFrame]) -> list[Table]:
             _("Among the times of the plan."),
             text,
         ),
-        Table(
-            _("How the runs ended"),
-            [_("case"), _("method"), _("log, s"), _("status"), _("runs"), _("commonest reason")],
-            [
-                [
-                    str(r["name"]),
-                    str(r["method"]),
-                    f"{r['time_s']:g}",
-                    str(r["status"]),
-                    str(r["runs"]),
-                    str(r["reason"]),
-                ]
-                for r in _at_the_end(outcomes).to_dict("records")
-            ],
-            words=frozenset({0, 1, 3, 5}),
-        ),
+        _endings(_at_the_end(outcomes)),
     ]
     return [table for table in found if table.rows]
+
+
+def _endings(outcomes: pd.DataFrame) -> Table:
+    """How many runs ended how, and why; what is said of aligned runs are the figures of one of them, and is left out."""
+    headings = [_("case"), _("method"), _("log, s"), _("status"), _("runs"), _("commonest reason")]
+    rows = [
+        [
+            *(str(r["name"]), str(r["method"]), f"{r['time_s']:g}", str(r["status"]), str(r["runs"])),
+            "" if r["status"] == "aligned" else str(r["reason"]),
+        ]
+        for r in outcomes.to_dict("records")
+    ]
+    if not any(row[-1] for row in rows):
+        headings, rows = headings[:-1], [row[:-1] for row in rows]
+    return Table(_("How the runs ended"), headings, rows, words=frozenset({0, 1, 3, 5}))
 
 
 def _at_the_end(rows: pd.DataFrame) -> pd.DataFrame:
@@ -151,9 +152,9 @@ def _accuracy(summary: pd.DataFrame, quantity: str) -> tuple[list[str], list[lis
     last = _at_the_end(chosen)
     rows = []
     for row in last.to_dict("records"):
-        row["interval"] = f"{row['rms_low']:.3g} - {row['rms_high']:.3g}" if row["runs"] > 1 else ""
+        row["interval"] = f"{short(row['rms_low'])} to {short(row['rms_high'])}" if row["runs"] > 1 else ""
         ratio = row.get("rms_over_sigma")
-        row["band"] = f"{row['ratio_low']:.2f} - {row['ratio_high']:.2f}" if ratio == ratio else ""
+        row["band"] = f"{row['ratio_low']:.2f} to {row['ratio_high']:.2f}" if ratio == ratio else ""
         rows.append([_text(row.get(column)) for column in COLUMNS])
     filled = [i for i, cells in enumerate(zip(*rows, strict=True)) if any(cells)]
     headings = [_(words) for words in COLUMNS.values()]
@@ -173,7 +174,7 @@ def _consistency(summary: pd.DataFrame) -> list[list[str]]:
             cells += (
                 ["–", ""]
                 if row is None
-                else [f"{row['mean']:.3g}", f"{row['ratio_low']:.2f} - {row['ratio_high']:.2f}"]
+                else [f"{row['mean']:.3g}", f"{row['ratio_low']:.2f} to {row['ratio_high']:.2f}"]
             )
         rows.append(cells)
     return rows

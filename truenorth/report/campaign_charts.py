@@ -33,7 +33,7 @@ def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
     last = heading_at_end(campaign)
     lines = [
         _(
-            "{cases} case(s), {methods} method(s), {runs} runs of each, seed {seed}. Every method meets the same data."
+            "Cases: {cases}; methods: {methods}; runs of each: {runs}; seed: {seed}. Every method meets the same data."
         ).format(
             cases=len(plan.cases), methods=len(plan.methods), runs=int(campaign.table["run"].nunique()), seed=plan.seed
         )
@@ -74,7 +74,7 @@ def findings(campaign: Campaign) -> tuple[str, str, list[str]]:
     lines.append(honesty)
     failed = int(last["failed"].sum())
     if failed:
-        lines.append(_("{count} run(s) gave no answer; the last table says why.").format(count=failed))
+        lines.append(_("Runs without an answer: {count}; the last table says why.").format(count=failed))
         mood = "fair" if mood == "good" else mood
     return mood, finding, lines
 
@@ -137,7 +137,7 @@ def _convergence(campaign: Campaign) -> list[Panel]:
         for number, method in enumerate(campaign.plan.method_names):
             rows = _rows(campaign.table, case, method)
             if len(rows):
-                _fan(chart, rows, method, f"c{number % 6}")
+                _fan(chart, rows, method, *_look(number))
         bound = campaign.summary
         bound = bound[(bound["case"] == case) & (bound["quantity"] == "phi_u") & bound["bound"].notna()]
         bound = bound.drop_duplicates("time_s").sort_values("time_s")
@@ -148,14 +148,19 @@ def _convergence(campaign: Campaign) -> list[Panel]:
     return panels
 
 
-def _fan(chart: Chart, rows: pd.DataFrame, method: str, colour: str) -> None:
+def _look(number: int) -> tuple[str, str]:
+    """Colour and marker of a method: the six colours again with another marker."""
+    return f"c{number % 6}", ("circle", "square", "triangle-up", "x")[number // 6 % 4]
+
+
+def _fan(chart: Chart, rows: pd.DataFrame, method: str, colour: str, symbol: str) -> None:
     groups = [(float(str(time)), group) for time, group in rows.groupby("time_s")]
     times = np.array([time for time, _group in groups])
     errors = [np.maximum(np.abs(group["value"].to_numpy(float)), SMALL) for _time, group in groups]
     sigma = np.array([np.sqrt(np.mean(group["sigma"].to_numpy(float) ** 2)) for _time, group in groups])
     low, high = (np.array([np.percentile(e, q) for e in errors]) for q in FAN)
     chart.band(0, times, low, high, colour)
-    chart.points(0, times, [np.median(e) for e in errors], colour, method, size=5, key=True, joined=True)
+    chart.points(0, times, [np.median(e) for e in errors], colour, method, size=6, symbol=symbol, key=True, joined=True)
     chart.line(0, times, sigma, colour, _("{method}, claimed sigma").format(method=method), dash="dash")
 
 
@@ -184,8 +189,10 @@ def _requirement(campaign: Campaign, found: Requirement) -> Panel:
     path, values = found.path, found.values
     chart = Chart([_("heading RMS, arcmin")], found.words, height=400)
     for number, line in enumerate(found.lines):
-        colour = f"c{number % 6}"
-        chart.points(0, values, line.rms, colour, line.name, size=6, key=True, error=line.bars, joined=True)
+        colour, symbol = _look(number)
+        chart.points(
+            0, values, line.rms, colour, line.name, size=6, symbol=symbol, key=True, error=line.bars, joined=True
+        )
         chart.line(0, values, line.sigma, colour, _("{method}, claimed sigma").format(method=line.name), dash="dash")
     wanted = 60.0 * float(np.degrees(campaign.plan.converged))
     chart.line(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truenorth.core.language import translated as _
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.convergence import NIS_BLOCK, Course, averaged_nis, courses, settled_limits
-from truenorth.figures.units import Clock, unit_of
+from truenorth.figures.units import Clock, accel_unit, unit_of
 from truenorth.report.chart import Chart
 from truenorth.report.document import Panel
 
@@ -60,7 +60,7 @@ def _of_history(result: Alignment) -> list[Panel]:
         Panel(
             _("Accelerometer bias"),
             not_estimated,
-            _biases(h.time, h.accel_bias, h.accel_bias_sigma, MICRO_G, "µg", clock),
+            _biases(h.time, h.accel_bias, h.accel_bias_sigma, *accel_unit(h.accel_bias_sigma[-1]), clock),
         ),
         Panel(
             _("Innovations"),
@@ -186,6 +186,6 @@ def _allan(chart: Chart, row: int, noise: NoiseCoefficients, scale: float) -> No
     deviation, sigma = noise.allan.deviation / scale, noise.allan.sigma / scale
     for i, axis in enumerate("xyz"):
         bars = (np.minimum(sigma[:, i], 0.9 * deviation[:, i]), sigma[:, i])
-        chart.points(row, tau, deviation[:, i], f"c{i}", axis, error=bars, key=row == 0)
+        chart.points(row, tau, deviation[:, i], f"c{i}", axis, error=bars, key=row == 0, size=6.0)
         chart.line(row, tau, np.where(model[:, i] > 0.0, model[:, i], np.nan), f"c{i}", "", dash="dash")
     chart.axis(row, type="log")

@@ -9,9 +9,10 @@ import numpy as np
 
 from truenorth.core.attitude import angle_text
 from truenorth.core.language import translated as _
-from truenorth.core.units import DEG_PER_HOUR, MICRO_G
+from truenorth.core.units import DEG_PER_HOUR
+from truenorth.figures.units import accel_unit, speed_unit
 from truenorth.report.charts import panels
-from truenorth.report.document import render, verdict_lines
+from truenorth.report.document import Table, render, verdict_lines
 from truenorth.report.estimated import relation_table
 from truenorth.report.numbers import quantity, short
 from truenorth.report.transfer import transfer_panels
@@ -39,10 +40,12 @@ def alignment_page(result: Alignment) -> str:
     shown, health = panels(result), _health(result)
     shown += transfer_panels(result.transfer, "" if result.history is None else result.history.innovation_of)
     relation = relation_table(result.transfer, result.moving)
+    tables = [relation] if relation else []
+    tables += [_positions(result.table, result.heading_known)] if result.table is not None else []
     findings = () if result.inspection is None else result.inspection.findings
     doubts = [finding for finding in findings if finding.severity != "note"]
     contents = [_("Verdict"), _("Attitude"), _("How it was found")]
-    contents += [relation.title] if relation else []
+    contents += [table.title for table in tables]
     contents += [panel.title for panel in shown] or [_("Convergence")]
     return render(
         "alignment.html",
@@ -51,7 +54,7 @@ def alignment_page(result: Alignment) -> str:
         numbers=_numbers(result),
         facts=_facts(result),
         biases=_biases(result),
-        relation=relation,
+        tables=tables,
         panels=shown,
         health=health,
         contents=contents + ([_("Health of the log")] if health else []),
@@ -106,8 +109,9 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
         ),
     ]
     if np.all(np.isfinite(result.disturbance)):
-        east, north, up = (short(x) for x in 1e3 * result.disturbance)
-        words = _("{east}, {north}, {up} mm/s RMS (east, north, up)").format(east=east, north=north, up=up)
+        scale, unit = speed_unit(result.disturbance)
+        east, north, up = (short(x) for x in result.disturbance / scale)
+        words = _("{east}, {north}, {up} {unit} RMS (east, north, up)").format(east=east, north=north, up=up, unit=unit)
         facts.append((_("Base's own motion"), words))
     if result.table is not None:
         facts += _table_facts(result.table, result.heading_known)
@@ -124,12 +128,7 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
 
 def _table_facts(table: TurntableErrors, heading_known: bool) -> list[tuple[str, str]]:
     s = table.summary(heading_known)
-    stops = [
-        _("{start:.0f} to {stop:.0f} s").format(start=p["start_s"], stop=p["stop_s"])
-        + (_(", turned {angle:.3f}°").format(angle=p["turned_deg"]) if number else "")
-        for number, p in enumerate(s["positions"])
-    ]
-    facts = [(_("Positions"), f"{len(stops)}: {'; '.join(stops)}")]
+    facts = []
     for key, name in (("gyro", _("Scale factors, gyros")), ("accel", _("Scale factors, accelerometers"))):
         values = zip("xyz", s[f"{key}_scale_factor_ppm"], s[f"{key}_scale_factor_sigma_ppm"], strict=True)
         facts.append((name, ", ".join(f"{axis} {value:.0f} ± {sigma:.0f}" for axis, value, sigma in values) + " ppm"))
@@ -138,8 +137,29 @@ def _table_facts(table: TurntableErrors, heading_known: bool) -> list[tuple[str,
     return facts
 
 
+def _positions(table: TurntableErrors, heading_known: bool) -> Table:
+    """When the IMU stood how, and by how much it had been turned."""
+    return Table(
+        _("Positions of the turntable"),
+        [_("position"), _("from, s"), _("to, s"), _("turned, deg"), _("heading, deg"), _("pitch, deg"), _("roll, deg")],
+        [
+            [
+                str(number),
+                f"{p['start_s']:.0f}",
+                f"{p['stop_s']:.0f}",
+                "–" if number == 1 else f"{p['turned_deg']:.3f}",
+                _("refused") if p["heading_deg"] is None else f"{p['heading_deg']:.3f}",
+                f"{p['pitch_deg']:.3f}",
+                f"{p['roll_deg']:.3f}",
+            ]
+            for number, p in enumerate(table.summary(heading_known)["positions"], start=1)
+        ],
+    )
+
+
 def _biases(result: Alignment) -> list[tuple[str, str, str]]:
     rows = []
+    accel_scale, accel_name = accel_unit(result.accel_bias_sigma)
     for name, unit, scale, values, sigmas, known in (
         (
             _("Gyro {axis}"),
@@ -151,8 +171,8 @@ def _biases(result: Alignment) -> list[tuple[str, str, str]]:
         ),
         (
             _("Accelerometer {axis}"),
-            "µg",
-            MICRO_G,
+            accel_name,
+            accel_scale,
             result.accel_bias,
             result.accel_bias_sigma,
             result.accel_bias_estimated,

@@ -40,7 +40,7 @@ SENTENCES = {
     "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
     "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
     "heading.vertical": (
-        "pitch is near +-90 deg: only a combination of heading and roll is known (see the combination)"
+        "pitch is near ±90 deg: only a combination of heading and roll is known (see the combination)"
     ),
     "heading.hidden": (
         "at latitude {lat:deg|.3f} deg the earth turns by {horizontal:deg/h|.3f} deg/h about the horizontal; gyro biases of "
@@ -301,7 +301,7 @@ SENTENCES = {
         "to {level:angle}"
     ),
     "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
-    "transfer.open": "this motion does not separate all that is estimated; {states}",
+    "transfer.open": "left open by this motion: {states}",
     # ---- clocks, arms, scales and mountings left open
     "second_look.late": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s late",
     "second_look.early": "the clock of the {name} seems {size:.3f} ± {sigma:.3f} s early",

@@ -49,10 +49,11 @@
       font: { family: "system-ui, 'Noto Sans', 'Noto Sans CJK SC', sans-serif", size, color: ink },
       margin: paper ? { l: 40, r: 6, t: 14, b: 26 } : { l: 70, r: 14, t: named ? 58 : 40, b: 50 },  // buttons above the names
       hovermode: layout.hovermode || "x unified", hoverlabel: { bgcolor: read("--paper"), font: { color: ink } },
-      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, ...(layout.legend || {}) } };
+      legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, itemsizing: "constant", ...(layout.legend || {}) } };
     for (const key of Object.keys(found)) if (/^[xy]axis/.test(key)) {
       found[key] = { ...axis, ...(found[key].type === "log" ? { tickformat: "~g" } : {}), ...found[key] };  // 0.2, not a small 2
-      if (found[key].title) found[key].title = { ...found[key].title, font: { size } };
+      // With a standoff the title keeps clear of the widest figure, and the margin grows with it.
+      if (found[key].title) found[key].title = { ...found[key].title, font: { size }, ...(key[0] === "y" ? { standoff: paper ? 2 : 8 } : {}) };
     }
     if (paper) { found.height = Math.max(190, PRINT.row * rows + PRINT.rest); found.width = PRINT.width; }
     return found;
