@@ -34,7 +34,9 @@ answer
 found = answer.moving.summary()
 print(f"scale {100 * found['odometer_scale']:+.3f} ± {100 * found['odometer_scale_sigma']:.3f} %")
 print("mounting, heading, pitch, roll:", np.round(found["mounting_deg"], 3), "deg")
-print("wheel, right, forward, up:", np.round(found["wheel_arm_m"], 2), "±", np.round(found["wheel_arm_sigma_m"], 2), "m")
+print(
+    "wheel, right, forward, up:", np.round(found["wheel_arm_m"], 2), "±", np.round(found["wheel_arm_sigma_m"], 2), "m"
+)
 
 # %% [markdown]
 # Now navigate on, through 40 s without GNSS (200 to 240 s). With the odometer the position stays within metres.

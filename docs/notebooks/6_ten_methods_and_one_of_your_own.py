@@ -37,6 +37,7 @@ heading.sort_values("rms").reset_index(drop=True).round(2)
 
 # %% [markdown]
 # RMS in arcmin. `rms_over_sigma` should be near 1: a method that claims too little is worse than one that is merely wide.
+# `analytic` and `states10` ask for a base that is still: they refuse heading here, and have no row.
 
 # %%
 tn.plot(campaign)["distribution"]

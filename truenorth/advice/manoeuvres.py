@@ -117,7 +117,7 @@ class ManoeuvreAdvice(Shown):
 
 def advise_manoeuvre(
     imu: ImuSpec | str,
-    position: Position,
+    position: Position | Sequence[float],
     speed: float,
     wanted: float,
     *,
@@ -137,7 +137,7 @@ def advise_manoeuvre(
     ----------
     imu : ImuSpec, or a preset's or a file's name
         Of the slave.
-    position : Position
+    position : Position, or (lat, lon[, alt]) in degrees and metres
     speed : float, m/s
     wanted : float, rad
         One-sigma of heading.
@@ -159,7 +159,7 @@ def advise_manoeuvre(
     for name, value in (("speed", speed), ("wanted", wanted), ("longest", longest), ("rate", rate)):
         if not 0.0 < value < math.inf:
             raise UsageError(f"{name} is {value}; expected a positive number")
-    spec, flights = imu_spec(imu), standard_manoeuvres(position, speed)
+    spec, flights = imu_spec(imu), standard_manoeuvres(Position.of(position), speed)
     unknown = [name for name in manoeuvres if name not in flights]
     if unknown:
         raise UsageError(f"manoeuvre {unknown[0]!r} is not known; choose of {', '.join(flights)}")

@@ -181,7 +181,7 @@ class Advice(Shown):
 
 def advise(
     imu: ImuSpec | str | PathLike[str] | dict[str, Any],
-    position: Position,
+    position: Position | Sequence[float],
     heading_sigma: float,
     *,
     disturbance: float = DISTURBANCE,
@@ -195,7 +195,7 @@ def advise(
     Parameters
     ----------
     imu : ImuSpec, str, path or mapping
-    position : Position
+    position : Position, or (lat, lon[, alt]) in degrees and metres
     heading_sigma : float, rad
         Wanted one-sigma.
     disturbance : float, m/s
@@ -225,7 +225,7 @@ def advise(
             raise UsageError(f"advise: {name} is {shown}; expected a number above {least:g}")
     if not schemes:
         raise UsageError("advise: no schemes; expected one at least, such as {'two positions': (180,)}")
-    spec = imu_spec(imu).with_random_walks(1.0 / rate)
+    spec, position = imu_spec(imu).with_random_walks(1.0 / rate), Position.of(position)
     found = []
     for name, turns in schemes.items():
         time = np.geomspace(SHORTEST, longest, TIMES)

@@ -84,6 +84,7 @@ MEANT = {
     **dict.fromkeys(("spec", "specification", "imu_spec", "sensor"), IMU),
     **dict.fromkeys(("epoch", "time"), AT),
     **dict.fromkeys(("aids", "aiding", "sources"), "aid=[...]"),
+    **dict.fromkeys(("axes", "units", "columns"), "record=read_imu(path, axes=..., units=..., columns=...)"),
     "gnss": "aid=Gnss(record)",
     "odometer": "aid=Odometer(record)",
     "velocity": "aid=VelocityLog(record)",

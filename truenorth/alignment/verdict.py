@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 WALKING = 2.0  # m/s: nobody takes what moves faster for a base that stays
 FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
 HEIGHTS = (-500.0, 9000.0)  # m, at which bases stay
+UPSIDE_DOWN = -0.5  # cosine between z and up, below which z points down
 
 
 def no_attitude(source: str) -> AlignmentError:
@@ -279,6 +280,9 @@ def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple
     return [Evidence(key, figures, remedies=("record_longer",)), good_level]
 
 
+UPSIDE_DOWN = -0.5  # cosine between z and up, below which z points down for certain
+
+
 def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[Evidence]:
     if answer.transfer is not None:
         return [note("heading.known_with_level", sigma=sigma, level=level)]
@@ -290,4 +294,6 @@ def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[E
         found.append(note(key, pays_until=answer.pays_until, duration=answer.duration))
     if answer.near_vertical:
         found.append(note("heading.vertical"))
+    if answer.C_nb[2, 2] < UPSIDE_DOWN:
+        found.append(note("level.upside_down"))
     return found

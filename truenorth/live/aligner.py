@@ -71,7 +71,7 @@ class Aligner:
 
     Parameters
     ----------
-    place : Position, optional
+    place : Position, or (lat, lon[, alt]) in degrees and metres, optional
         Not needed with GNSS positions.
     imu : ImuSpec, str, path or mapping, optional
         Specification; on a base that stays it is inferred from the rows when left out.
@@ -94,7 +94,7 @@ class Aligner:
 
     def __init__(
         self,
-        place: Position | None = None,
+        place: Position | Sequence[float] | None = None,
         imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
         *,
         aid: Sequence[Feed | Turner] = (),
@@ -106,7 +106,8 @@ class Aligner:
     ) -> None:
         if not 0.0 < share <= 1.0:
             raise UsageError(f"share {share}; expected a part of one core above 0, at most 1")
-        self.place, self.imu, self.method, self.share = place, None if imu is None else imu_spec(imu), method, share
+        self.place = None if place is None else Position.of(place)
+        self.imu, self.method, self.share = None if imu is None else imu_spec(imu), method, share
         self.feeds = {feed.key: feed for feed in aid if isinstance(feed, Feed)}
         self.turner = next((a for a in aid if isinstance(a, Turner)), None)
         self.log = Log(kind, most_rows)
@@ -125,6 +126,9 @@ class Aligner:
         self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
         self._due = self._then_due = -np.inf  # s: of the next solution, and of the one after the one that runs
         self._lock = threading.Lock()
+
+    def __repr__(self) -> str:
+        return f"Aligner({self.duration:.1f} s of rows, {self.solutions} solutions so far)"
 
     def push(self, time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
         """Take rows in; any order within a second, any chunks.

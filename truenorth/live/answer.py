@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
-from truenorth.core.attitude import euler_from_dcm
+from truenorth.core.attitude import angle_text, euler_from_dcm
 from truenorth.live.intake import Counts
 from truenorth.live.remaining import seconds_to
 from truenorth.state.layout import DP, DV
@@ -91,6 +91,15 @@ class Answer:
     counts: Counts
     left: float | None = None
     motion: Motion | None = None
+
+    def __repr__(self) -> str:
+        angles = zip(("heading", "pitch", "roll"), np.degrees(self.euler), self.sigma, strict=True)
+        shown = [
+            f"{name}: {angle:.4f}° ± {angle_text(float(sigma))}"
+            for name, angle, sigma in angles
+            if name != "heading" or self.heading_known
+        ]
+        return f"Answer(status: {self.status}, time: {self.time:.3f} s, {', '.join(shown)})"
 
     @property
     def euler(self) -> Array:

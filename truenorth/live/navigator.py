@@ -115,6 +115,9 @@ class Navigator:
         self._gaps: list[tuple[float, float]] = []
         self._lock = threading.Lock()
 
+    def __repr__(self) -> str:
+        return f"Navigator({self.duration:.1f} s of rows since the start)"
+
     def push(self, time: ArrayLike, gyro: ArrayLike, accel: ArrayLike) -> None:
         """Take rows in; any order within a second, any chunks. See :meth:`Aligner.push`.
 

@@ -116,7 +116,7 @@ class ImuRecord(Record):
         return density * gyro, density * accel
 
     @classmethod
-    def of(cls, table: Any) -> ImuRecord:
+    def of(cls, table: Any, axes: str = "RFU") -> ImuRecord:
         """A record as it is, or a pandas table or an xarray data set as one.
 
         Parameters
@@ -124,14 +124,18 @@ class ImuRecord(Record):
         table : ImuRecord, DataFrame or xarray.Dataset
             Columns ``gyro_x .. accel_z`` of rates (rad/s, m/s^2) or ``dtheta_x .. dvel_z`` of increments (rad, m/s), named as
             `to_frame` names them; ``time`` (s) as a column or the index, which may hold dates too.
+        axes : str
+            Where x, y and z point, such as ``"FRD"``, see :func:`truenorth.read_imu`.
 
         Raises
         ------
         UsageError
-            Something else, or a table without these columns.
+            Something else, a table without these columns, or axes that are none.
         """
+        from truenorth.core.attitude import body_axes
+
         if isinstance(table, cls):
-            return table
+            return table if axes == "RFU" else table.rotated(body_axes(axes))
         if hasattr(table, "to_dataframe"):
             table = table.to_dataframe()
         if not hasattr(table, "columns"):
@@ -142,7 +146,8 @@ class ImuRecord(Record):
         if kind is None:
             raise UsageError(
                 f"record: a table with columns {', '.join(map(str, table.columns))}; expected {', '.join(COLUMNS['rates'])}, or "
-                f"{', '.join(COLUMNS['increments'])}, and time"
+                f"{', '.join(COLUMNS['increments'])}, and time, in rad and m: rename and convert them, or let read_imu read the "
+                "file, which finds names and units"
             )
         time = table["time"] if "time" in table.columns else table.index
         if getattr(time.dtype, "kind", "") == "M":
@@ -152,7 +157,8 @@ class ImuRecord(Record):
                 else (time - time.iloc[0]).dt.total_seconds()
             )
         values = np.array(table[list(COLUMNS[kind])], dtype=np.float64)
-        return cls(np.array(time, dtype=np.float64), values[:, :3], values[:, 3:], kind, "table")
+        record = cls(np.array(time, dtype=np.float64), values[:, :3], values[:, 3:], kind, "table")
+        return record if axes == "RFU" else record.rotated(body_axes(axes))
 
     def rotated(self, C_new_old: ArrayLike) -> ImuRecord:
         """The same measurements in other body axes: ``v_new = C_new_old @ v_old``."""

@@ -42,6 +42,10 @@ SENTENCES = {
     "heading.vertical": (
         "pitch is near ±90 deg: only a combination of heading and roll is known (see the combination)"
     ),
+    "level.upside_down": (
+        "z points down: this is the attitude of an IMU that lies upside down; a log whose axes are forward, right, down needs "
+        "to be read as such, and has another heading"
+    ),
     "heading.hidden": (
         "at latitude {lat:deg|.3f} deg the earth turns by {horizontal:deg/h|.3f} deg/h about the horizontal; gyro biases of "
         "{bias:deg/h|} deg/h hide true north there"
