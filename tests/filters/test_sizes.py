@@ -19,7 +19,15 @@ ONE_RUN = SimpleNamespace(x=np.zeros((1, 1, 12)))
 def there(monkeypatch):
     """Sizes of the kernels that are there."""
     sizes = set()
-    monkeypatch.setattr(linear.linear_runs, "at_hand", lambda size, *rest: len(size) in sizes)
+    monkeypatch.setattr(linear.linear_runs, "is_there", lambda size, *rest: len(size) in sizes)
+    return sizes
+
+
+@pytest.fixture
+def under_way(monkeypatch):
+    """Sizes of the kernels that another process compiles."""
+    sizes = set()
+    monkeypatch.setattr(linear.linear_runs, "is_under_way", lambda size, *rest: len(size) in sizes)
     return sizes
 
 
@@ -27,13 +35,13 @@ def taken(sizes, epochs=100):
     return len(sizes.for_call(padded(12), None, epochs, Kalman(True), ONE_RUN))
 
 
-def test_the_own_size_is_taken_where_it_is_there_or_no_other(there):
+def test_the_own_size_is_taken_where_it_is_there_or_no_other(there, under_way):
     assert taken(linear._Sizes(1000)) == 12
     there |= {12, 40}
     assert taken(linear._Sizes(1000)) == 12
 
 
-def test_a_larger_one_is_taken_for_so_many_epochs(there):
+def test_a_larger_one_is_taken_for_so_many_epochs(there, under_way):
     there |= {40}
     sizes = linear._Sizes(1000)
     assert [taken(sizes) for _ in range(12)] == 10 * [40] + 2 * [12]
@@ -41,6 +49,15 @@ def test_a_larger_one_is_taken_for_so_many_epochs(there):
     assert taken(sizes) == 40
     there |= {12}
     assert taken(sizes) == 12
+
+
+def test_nobody_waits_for_the_own_one_where_a_larger_one_is_there(there, under_way):
+    under_way |= {40}
+    assert taken(linear._Sizes(1000)) == 40
+    under_way |= {12}
+    assert taken(linear._Sizes(1000)) == 12
+    there |= {40}
+    assert taken(linear._Sizes(1000)) == 40
 
 
 def test_the_bits_are_the_same(there, monkeypatch):

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 LAST = "truenorth.alignment.matched._sum_back"  # where it is on the disk, no first alignment waits any more
@@ -70,6 +71,8 @@ def compile_last() -> None:
 def _wait_for_end(left_alone: threading.Event) -> None:
     sys.stdin.buffer.read()
     left_alone.set()
+    with suppress(AttributeError, OSError):  # not a Unix
+        os.setpriority(os.PRIO_PROCESS, os.getpid(), 10)  # not of this thread alone
 
 
 def _filtered(states: int) -> tuple[Any, Any]:

@@ -55,11 +55,21 @@ class Kernel(KernelSource):
         dispatcher.compile = dispatcher._cache.guarded(dispatcher.compile)
         return dispatcher
 
-    def at_hand(self, *arguments: Any) -> bool:
-        """Whether a call need not compile: the kernel is there for such arguments, or another process compiles it now."""
-        types = tuple(self.dispatcher.typeof_pyval(argument) for argument in arguments)
-        codegen = self.dispatcher.targetctx.codegen
-        return types in self.dispatcher.overloads or self.dispatcher._cache.at_hand(types, codegen())
+    def is_there(self, *arguments: Any) -> bool:
+        """Whether a call with such arguments compiles nothing."""
+        types = self._types(arguments)
+        return types in self.dispatcher.overloads or self.dispatcher._cache.is_there(types, self._codegen)
+
+    def is_under_way(self, *arguments: Any) -> bool:
+        """Whether another process compiles the kernel for such arguments now."""
+        return bool(self.dispatcher._cache.is_under_way(self._types(arguments), self._codegen))
+
+    def _types(self, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(self.dispatcher.typeof_pyval(argument) for argument in arguments)
+
+    @property
+    def _codegen(self) -> Any:
+        return self.dispatcher.targetctx.codegen()
 
     @property
     def stats(self) -> Any:

@@ -102,12 +102,15 @@ class KernelStore:
 
         return alone
 
-    def at_hand(self, signature: Any, codegen: Any) -> bool:
-        """Whether a kernel is on the disk, or another process compiles it now."""
+    def is_there(self, signature: Any, codegen: Any) -> bool:
+        """Whether the kernel of a signature is on the disk."""
         name = self._file(signature, codegen)
-        return name is not None and any(
-            (folder / name).exists() or KernelLock(folder / name).taken() for folder in folders()
-        )
+        return name is not None and any((folder / name).exists() for folder in folders())
+
+    def is_under_way(self, signature: Any, codegen: Any) -> bool:
+        """Whether another process compiles it now."""
+        name = self._file(signature, codegen)
+        return name is not None and any(KernelLock(folder / name).taken() for folder in folders())
 
     def save_overload(self, signature: Any, kernel: Any) -> None:
         """Keep a kernel; one that holds an address of this process is not kept."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
+from itertools import chain
 from typing import Any, Unpack
 
 from truenorth.core.compiled import OPTIONS, compiled
@@ -130,11 +131,14 @@ class _Sizes:
         if taken is not None and len(taken) == len(size):
             return size
         self.epochs[key] += epochs * len(out.x)
-        if self.epochs[key] > self.most or linear_runs.at_hand(size, runs, epochs, options, out):
+        rest = (runs, epochs, options, out)
+        if self.epochs[key] > self.most or linear_runs.is_there(size, *rest):
             taken = size
-        elif taken is None:
-            larger = (padded(n) for n in range(len(size) + 1, LARGEST_SIZE + 1) if n % 8 == 0)
-            taken = next((s for s in larger if linear_runs.at_hand(s, runs, epochs, options, out)), size)
+        elif taken is None:  # those on the disk before those that another process compiles now
+            larger = [padded(n) for n in range(len(size) + 1, LARGEST_SIZE + 1) if n % 8 == 0]
+            there = (s for s in larger if linear_runs.is_there(s, *rest))
+            under_way = (s for s in [size, *larger] if linear_runs.is_under_way(s, *rest))
+            taken = next(chain(there, under_way), size)
         self.taken[key] = taken
         return taken
 
