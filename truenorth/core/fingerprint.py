@@ -26,6 +26,7 @@ from numba.core.extending import _Intrinsic
 
 from truenorth.core.kernel_source import STEPS, KernelSource
 from truenorth.core.pointers import Pointer
+from truenorth.core.vectors import VectorStep
 
 FOREIGN = ("numpy", "numba", "math", "cmath", "builtins", "operator")  # of one version, and named by it
 STARS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS  # the other flags change under a profiler
@@ -119,7 +120,7 @@ class _Sources:
             return f"compiled({self.see(value.py_func)}, {_of_options(value.options)})"
         if isinstance(value, Dispatcher):  # a user's own, by numba.jit
             return f"jit({self.see(value.py_func)}, {_of_options(value.targetoptions)})"
-        if isinstance(value, Pointer):
+        if isinstance(value, (Pointer, VectorStep)):
             return self.of(value.intrinsic, names)
         if isinstance(value, CFunc):  # a user's own, by numba.cfunc
             return f"callback({self.see(value.__wrapped__)})"

@@ -31,10 +31,10 @@ from truenorth.core.linalg import (
     Array,
     Size,
     load,
-    load_transposed,
     mirror,
     propagate_covariance,
     take_off,
+    transpose,
 )
 from truenorth.filters.nonlinear_system import Functions, NonlinearRuns
 from truenorth.filters.quadrature import QuadratureRule
@@ -242,7 +242,7 @@ def predict_tangent(size: Size, functions: Functions, w: Workspace, s: Points) -
     s.J[0][:] = 0.0
     functions.transition_jacobian(s.X, s.p, s.J[0])
     load(size, s.J[0], w.Phi)
-    load_transposed(size, s.J[0], w.Phi_t)
+    transpose(size, w.Phi, w.Phi_t)
     for i in range(len(s.X)):
         s.X[i] = s.x[i]
     propagate_covariance(size, w.Phi, w.Phi_t, s.nothing, w.P, w.temporary)

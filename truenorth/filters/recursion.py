@@ -11,12 +11,17 @@ from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import (
     Array,
     Size,
+    add_difference,
+    add_times,
+    copy_corner,
+    divide,
     dot,
     load,
-    load_transposed,
     propagate_covariance,
     take_off,
+    take_off_and_see,
     take_off_pair,
+    transpose,
     transposed_times,
 )
 from truenorth.filters.system import Runs
@@ -49,6 +54,7 @@ class Workspace(NamedTuple):
     t: Array
     largest: Array  # variance of each state so far
     temporary: Array
+    tied: NDArray[np.bool_]  # (1,): whether the noise of a row is correlated, with another's or with the process noise
 
 
 class Histories(NamedTuple):
@@ -88,6 +94,7 @@ def workspace(size: Size, rows: int) -> Workspace:
         np.zeros(N),
         np.zeros(N),
         np.zeros((N, N)),
+        np.zeros(1, dtype=np.bool_),
     )
 
 
@@ -109,7 +116,7 @@ def load_process(size: Size, system: Runs, run: int, epoch: int, w: Workspace) -
     if epoch == 0 or system.Phi.shape[1] > 1:
         b = run if system.Phi.shape[0] > 1 else 0
         load(size, system.Phi[b, epoch], w.Phi)
-        load_transposed(size, system.Phi[b, epoch], w.Phi_t)
+        transpose(size, w.Phi, w.Phi_t)
     if epoch == 0 or system.Q.shape[1] > 1:
         b = run if system.Q.shape[0] > 1 else 0
         load(size, system.Q[b, epoch], w.Q)
@@ -148,12 +155,15 @@ def load_measurement(size: Size, system: Runs, run: int, epoch: int, w: Workspac
         for j in range(rows):
             w.R[i, j] = system.R[b, k, i, j]
             correlated |= i != j and w.R[i, j] != 0.0
-    b = run if system.S.shape[0] > 1 else 0
-    k = epoch if system.S.shape[1] > 1 else 0
-    for i in range(system.S.shape[2]):
-        for j in range(rows):
-            w.S_t[j, i] = system.S[b, k, i, j]
-            correlated |= w.S_t[j, i] != 0.0
+    # Updates by rows that are tied change S; else it is zero, and stays.
+    if epoch == 0 or system.S.shape[1] > 1 or w.tied[0]:
+        b = run if system.S.shape[0] > 1 else 0
+        k = epoch if system.S.shape[1] > 1 else 0
+        for i in range(system.S.shape[2]):
+            for j in range(rows):
+                w.S_t[j, i] = system.S[b, k, i, j]
+                correlated |= w.S_t[j, i] != 0.0
+    w.tied[0] = correlated
     return present, correlated
 
 
@@ -179,9 +189,10 @@ def innovate(size: Size, w: Workspace, innovation: Array, covariance: Array) -> 
         innovation[i] = w.z[i] - dot(size, w.H[i], w.x)
         transposed_times(size, w.P, w.H[i], w.a)
         for j in range(i + 1):
-            covariance[i, j] = (
-                dot(size, w.a, w.H[j]) + dot(size, w.H[i], w.S_t[j]) + dot(size, w.S_t[i], w.H[j]) + w.R[i, j]
-            )
+            total = dot(size, w.a, w.H[j])
+            if w.tied[0]:
+                total = total + dot(size, w.H[i], w.S_t[j]) + dot(size, w.S_t[i], w.H[j])
+            covariance[i, j] = total + w.R[i, j]
             covariance[j, i] = covariance[i, j]
 
 
@@ -207,15 +218,13 @@ def update_by_row(
     ``k = a / variance``; ``x += k nu``; ``P -= k a'``, and for Joseph's form ``(I - k h') P (I - k h')' + ...`` the
     same factor once more from the right: ``t = P h + s - k (h' s + r)``, zero but for rounding, ``P -= t k'``.
     """
-    for i in range(len(size)):
-        w.k[i] = w.a[i] / variance
-        w.x[i] += w.k[i] * nu
-    take_off(size, w.P, w.a, 1.0 / variance)
-    if joseph:
-        transposed_times(size, w.P, w.H[row], w.t)
-        noise = h_s + w.R[row, row]
-        for i in range(len(size)):
-            w.t[i] += w.S_t[row, i] - w.k[i] * noise
+    divide(size, w.a, variance, w.k)
+    add_times(size, w.x, w.k, nu)
+    if not joseph:
+        take_off(size, w.P, w.a, 1.0 / variance)
+    else:
+        take_off_and_see(size, w.P, w.a, 1.0 / variance, w.H[row], w.t)
+        add_difference(size, w.t, w.S_t[row], w.k, h_s + w.R[row, row])
         take_off_pair(size, w.P, w.t, w.k)
     if correlated:
         rows = w.z.shape[0]
@@ -302,10 +311,7 @@ def keep(out: Histories, run: int, epoch: int, last: int, w: Workspace) -> None:
             out.x[run, k, i] = w.x[i]
             out.sigma[run, k, i] = np.sqrt(w.P[i, i])
     if out.P.shape[1] > epoch or epoch == last:
-        k = epoch if out.P.shape[1] > 1 else 0
-        for i in range(n):
-            for j in range(n):
-                out.P[run, k, i, j] = w.P[i, j]
+        copy_corner(w.P, out.P[run, epoch if out.P.shape[1] > 1 else 0], n, n)
 
 
 @borrowing(forceinline=True)

@@ -20,7 +20,8 @@ from truenorth.core.attitude import skew
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.core.errors import AlignmentError
 from truenorth.records import ImuRecord
-from truenorth.strapdown.level import increments, inertial_integrals
+from truenorth.strapdown.inertial_integration import inertial_integrals, interval_means
+from truenorth.strapdown.level import increments
 
 Array = NDArray[np.float64]
 MOST_REMEMBERED = 10_000  # epochs: an alignment has 5000 at the most
@@ -154,16 +155,7 @@ def integrate(
 
     on_grid, at = back[: len(epochs)], back[len(epochs) :]
     t, C = edges[epochs], C_all[on_grid]
-    # Trapezoid over the sub-epochs of each interval.
-    index = np.arange(count)[:, None] * sub + np.arange(sub + 1)
-    t_sub = t[index]
-    T = t_sub[:, -1] - t_sub[:, 0]
-    weight = np.zeros_like(t_sub)
-    weight[:, :-1] += np.diff(t_sub, axis=1) / 2
-    weight[:, 1:] += np.diff(t_sub, axis=1) / 2
-    weight /= T[:, None]
-    elapsed = (t_sub - t_sub[:, :1]) / T[:, None]
-    C_sub = C[index]
+    C_mean, C_late = interval_means(C, t, sub)
     ends = slice(None, None, sub)
     return InertialIntegrals(
         start=float(record.time[context] - steps[context]),
@@ -171,7 +163,7 @@ def integrate(
         C_ib=C[ends],
         velocity=v_all[on_grid][ends],
         position=p_all[on_grid][ends],
-        C_mean=np.einsum("ks,ksij->kij", weight, C_sub),
-        C_late=np.einsum("ks,ksij->kij", weight * elapsed, C_sub),
+        C_mean=C_mean,
+        C_late=C_late,
         C_ib_at=C_all[at],
     )

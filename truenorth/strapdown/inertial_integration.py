@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import (
-    dcm_from_quaternion,
     normalised,
     quaternion_from_rotation_vector,
     quaternion_product,
@@ -101,7 +100,9 @@ def inertial_integrals(
     bias = np.concatenate([gyro_bias, accel_bias]).astype(np.float64)
     out = np.empty((len(wanted), 10))
     _inertial_integrals(rows, read_only(dvel), read_only(steps), wanted, bias, k_before, out)
-    return dcm_from_quaternion(out[:, :4]), out[:, 4:7].copy(), out[:, 7:].copy()
+    C_ib = np.empty((len(wanted), 3, 3))
+    _directions(out, C_ib)
+    return C_ib, out[:, 4:7].copy(), out[:, 7:].copy()
 
 
 @compiled
@@ -133,3 +134,54 @@ def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, bias: A
         out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
         out[j, 4], out[j, 5], out[j, 6] = vx, vy, vz
         out[j, 7], out[j, 8], out[j, 9] = px, py, pz
+
+
+@compiled
+def _directions(q: Any, C: Any) -> None:
+    """``C = I + 2 w [v x] + 2 [v x]^2`` (M, 3, 3) of quaternions in the first four columns of rows (M, ..)."""
+    for k in range(len(C)):
+        w, x, y, z = 2.0 * q[k, 0], q[k, 1], q[k, 2], q[k, 3]
+        C[k, 0, 0] = 1.0 + 2.0 * (-z * z - y * y)
+        C[k, 1, 1] = 1.0 + 2.0 * (-z * z - x * x)
+        C[k, 2, 2] = 1.0 + 2.0 * (-y * y - x * x)
+        C[k, 0, 1], C[k, 1, 0] = -w * z + 2.0 * (x * y), w * z + 2.0 * (x * y)
+        C[k, 0, 2], C[k, 2, 0] = w * y + 2.0 * (x * z), -w * y + 2.0 * (x * z)
+        C[k, 1, 2], C[k, 2, 1] = -w * x + 2.0 * (y * z), w * x + 2.0 * (y * z)
+
+
+def interval_means(C: Array, time: Array, parts: int) -> tuple[Array, Array]:
+    """Means of a matrix over intervals, plain and weighted by the elapsed part: the trapezoid over the parts of each.
+
+    Parameters
+    ----------
+    C : (K * parts + 1, 3, 3) array
+        At the ends of the parts.
+    time : (K * parts + 1,) array, s
+    parts : int
+        Of each interval.
+
+    Returns
+    -------
+    mean, late : (K, 3, 3) arrays
+        ``(1/T) int C ds`` and ``(1/T^2) int s C ds``.
+    """
+    shape = (len(C) - 1) // parts, 3, 3
+    mean, late = np.zeros(shape), np.zeros(shape)
+    _interval_means(np.ascontiguousarray(C), np.ascontiguousarray(time), parts, mean, late)
+    return mean, late
+
+
+@compiled
+def _interval_means(C: Any, time: Any, parts: int, mean: Any, late: Any) -> None:
+    for k in range(len(mean)):
+        first = k * parts
+        T = time[first + parts] - time[first]
+        for s in range(first, first + parts + 1):
+            before = time[s] - time[s - 1] if s > first else 0.0
+            behind = time[s + 1] - time[s] if s < first + parts else 0.0
+            weight = (0.5 * before + 0.5 * behind) / T
+            elapsed = (time[s] - time[first]) / T
+            for i in range(3):
+                for j in range(3):
+                    mean[k, i, j] += weight * C[s, i, j]
+                    late[k, i, j] += weight * elapsed * C[s, i, j]
