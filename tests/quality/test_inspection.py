@@ -272,7 +272,7 @@ def test_a_log_without_any_noise_is_a_simulation_and_no_dead_sensor():
     record = base(duration=60.0)
     still = np.tile(np.median(record.accel, axis=0), (len(record), 1))
     assert "constant_channel" not in codes(inspect(ImuRecord(record.time, record.gyro, still)))
-    assert "no_noise" in codes(inspect(ImuRecord(record.time, record.gyro, still)), "note")
+    assert "no_noise" in codes(inspect(ImuRecord(record.time, record.gyro, still)), "warning")
     dead = np.zeros_like(record.gyro)
     assert "constant_channel" in codes(inspect(ImuRecord(record.time, dead, record.accel)), "error")
 
@@ -305,3 +305,26 @@ def test_gravity_of_another_size_is_no_bias_of_an_unknown_imu(factor, words):
     answer = tn.align(replace(record, accel=factor * record.accel), Position(LAT, 0.0))
     assert answer.status == "inconsistent"
     assert words in " ".join(answer.reasons)
+
+
+def test_rows_that_are_held_are_found_though_their_channels_repeat_by_themselves():
+    """A coarse quantum: each channel repeats in half of its rows anyhow; rows that are held do at once, in runs of one length."""
+    rng = np.random.default_rng(4)
+    count = 6000
+    time = 0.01 * np.arange(1, count + 1)
+    gyro, accel = (np.round(0.7 * rng.standard_normal((count, 3)))[5 * (np.arange(count) // 5)] for _ in range(2))
+    held = ImuRecord(time, 1e-4 * gyro, 1e-2 * accel + [0.0, 0.0, 9.8], "increments")
+    assert "repeated_rows" in codes(inspect(held), "warning")
+    gyro, accel = (np.round(0.25 * rng.standard_normal((count, 3))) for _ in range(2))
+    quiet = ImuRecord(time, 1e-4 * gyro, 1e-2 * accel + [0.0, 0.0, 9.8], "increments")
+    assert "repeated_rows" not in codes(inspect(quiet))
+
+
+def test_a_vibration_is_clipped_row_by_row():
+    """Of a vibration near half the rate of the log no two peaks follow each other."""
+    record = base(duration=30.0)
+    t = record.time
+    accel = record.accel + np.array([2.0, 0.0, 0.0]) * np.sin(2.0 * np.pi * 37.3 * t)[:, None]
+    assert "saturated" not in codes(inspect(ImuRecord(t, record.gyro, accel)))
+    accel[:, 0] = np.clip(accel[:, 0], -1.9, 1.9)
+    assert "saturated" in codes(inspect(ImuRecord(t, record.gyro, accel)))

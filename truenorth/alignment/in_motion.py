@@ -23,6 +23,7 @@ from truenorth.alignment.in_motion_learnt import (
     learnt_evidence,
 )
 from truenorth.alignment.in_motion_start import (
+    COARSE_HEADING,
     Guess,
     guesses_all_round,
     led_back,
@@ -36,6 +37,7 @@ from truenorth.alignment.in_motion_task import (
     moving_task,
 )
 from truenorth.alignment.in_motion_verdict import judge_moving
+from truenorth.alignment.rest_rate import rest_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.suspect import name_specification, poorer_evidence
 from truenorth.core.earth import EARTH_RATE
@@ -64,6 +66,7 @@ GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros ar
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
 PASSES, MORE_PASSES, SETTLED = 2, 6, 0.3
+LOUD = 3.0  # times its sigma, that an aid is so noisy that the first pass begins anew with what it is
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
 
@@ -178,16 +181,11 @@ def _aligned(
         )
     else:
         why = "asked for"
-    tell("coarse alignment")
-    spread = 0.0
-    if method == "gyrocompass":
-        guess = task.by_the_earth()
-        tell("first pass")
-        track = task.run(guess, gated=False)
-    else:
-        guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
-        best, track, spread = _best_of_bank(task, guesses, tell)
-        guess = guesses[best]
+    guess, track, spread = _begun(task, method, tell)
+    louder, _ = task.learnt(track)
+    if any(float(factor.max()) > LOUD for factor in louder.factors.values()):  # what it found was made of noise
+        task = replace(task, factors=louder.factors)
+        guess, track, spread = _begun(task, method, tell)
     first, number, much, moved = guess, 1, False, math.inf
     while number < passes or ((much or moved > SETTLED) and passes > 1 and number < passes + MORE_PASSES):
         task, much = task.learnt(track)
@@ -211,8 +209,22 @@ def _aligned(
     more += [note("aids.late", waited=task.waited)] if task.waited else []
     more += learnt_evidence(task.factors, answer.moving.delays, task.scatter) if answer.moving is not None else []
     more += task.wanders
-    more += _seen(task, track, guess, first, gated=passes > 1)
+    more += _seen(task, track, guess, first, gated=passes > 1, gyrocompassed=method == "gyrocompass")
     return judge_moving(answer, track, heading_limit, more)
+
+
+def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[Guess, Track, float]:
+    """The guess to begin with, the first pass from it, and how far guesses lie apart that explain the log as well, rad."""
+    tell("coarse alignment")
+    if method == "gyrocompass":
+        guess = task.by_the_earth()
+        # Where the earth's rate is lost in the noise of the aids at first, all headings compete.
+        if guess.heading_sigma <= COARSE_HEADING:
+            tell("first pass")
+            return guess, task.run(guess, gated=False), 0.0
+    guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
+    best, track, spread = _best_of_bank(task, guesses, tell)
+    return guesses[best], track, spread
 
 
 def _once_more(task: MovingTask, track: Track, first: Guess) -> tuple[Guess, Track, float]:
@@ -222,10 +234,13 @@ def _once_more(task: MovingTask, track: Track, first: Guess) -> tuple[Guess, Tra
     return guess, other, abs(_turn_between(other.C_nb[-1], track.C_nb[-1])) / float(other.sigma[-1, PHI][2])
 
 
-def _seen(task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool) -> list[Evidence]:
-    """What the receiver, the log itself and biases that wander say."""
+def _seen(
+    task: MovingTask, track: Track, guess: Guess, first: Guess, *, gated: bool, gyrocompassed: bool
+) -> list[Evidence]:
+    """What the receiver, the log itself, the earth's rate at rest and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
+    found += rest_evidence(task) if gyrocompassed else []
 
     def other(record: ImuRecord) -> Track:
         return replace(task, record=record).run(guess, gated=gated)

@@ -63,7 +63,7 @@ def coarse_guess(
     else:
         assert gnss is not None
         coarse = gnss_alignment(record, gnss, antenna)
-    return Guess(coarse.C_n0_i, COARSE_LEVEL, COARSE_HEADING)
+    return Guess(coarse.C_n0_i, COARSE_LEVEL, max(COARSE_HEADING, coarse.heading_sigma))
 
 
 def guesses_all_round(

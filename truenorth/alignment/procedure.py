@@ -38,6 +38,7 @@ from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.staying import BG, STATES, StaticModel, gained_velocity
 from truenorth.quality.density import specification_evidence
+from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.record_evidence import record_evidence
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
@@ -150,6 +151,7 @@ def align_base(
     evidence = record_evidence(task.record, task.motion, sound=sound) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
+    evidence += [] if sound else quantum_evidence(task.record, position.lat)
     if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)
@@ -277,7 +279,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     if sways:
-        fine = sway_align(start, turned=turned)
+        fine = sway_align(start, turned=turned, inferred=spec is None)
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:

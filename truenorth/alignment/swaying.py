@@ -92,7 +92,9 @@ class _MotionFilter:
         return Filtered(full, kalman(full, history="full"))
 
 
-def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
+def sway_align(
+    start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None, *, inferred: bool = False
+) -> SwayAlignment:
     """Estimate attitude, biases, lever arm and the base's motion from a whole log.
 
     Parameters
@@ -102,6 +104,8 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         Where the IMU sits.
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
+    inferred : bool
+        Whether the noise comes from the log itself: then it is not held against the log.
     """
     log, residual = _settled(start, mount, turned)
     step = float(np.mean(log.integrals.intervals))
@@ -124,7 +128,7 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     return replace(
         fine,
         begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion)),
-        noisier=noisier_sensors(log, estimator.motion, step),
+        noisier={} if inferred else noisier_sensors(log, estimator.motion, step),
     )
 
 

@@ -139,6 +139,21 @@ def grown(answer: Alignment, added: Effect) -> Alignment:
     )
 
 
+def rate_evidence(check: LogCheck, bias: float, lat: float, imu: str, floor: float) -> list[Evidence]:
+    """Mean rates that miss the earth's by more than gyros with this bias (rad/s) do; `floor` (rad) of heading is theirs."""
+    found = []
+    horizontal = EARTH_RATE * math.cos(lat)
+    for axis, residual, misses in zip(("north", "up"), check.rate_residual, check.rate_misses(bias), strict=True):
+        turned = min(abs(residual) / max(horizontal, 1e-12), UNIFORM_SIGMA)
+        figures: dict[str, Figure] = {"axis": axis, "residual": float(residual), "allowed": bias, "imu": imu}
+        if misses > limit("specification"):
+            remedies = ("latitude", "imu_axes", "units", "specification", "base_stays")
+            found.append(Evidence("rate.misses", figures, "bounded", Effect(heading=turned), remedies))
+        elif misses > limit("doubt"):
+            found.append(Evidence("rate.doubtful", figures, "known", Effect(heading=min(turned, misses * floor))))
+    return found
+
+
 def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, settled: bool = True) -> list[Evidence]:
     """What contradicts a base that stays where it is, and the specification of the IMU on it.
 
@@ -146,23 +161,8 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     that turns heading by ``residual / (w_ie cos L)``. So do accelerometers, which tilt by ``residual / g``. Biases that are k
     times as large make k times as much of heading's floor at the most: of an IMU that was turned, next to nothing.
     """
-    found = []
     place, (_, floor) = answer.position, azimuth_sigmas(answer)
-    bias = float(np.max(answer.gyro_bias_prior))
-    horizontal = EARTH_RATE * math.cos(place.lat)
-    for axis, residual, misses in zip(("north", "up"), check.rate_residual, check.rate_misses(bias), strict=True):
-        turned = min(abs(residual) / max(horizontal, 1e-12), UNIFORM_SIGMA)
-        figures: dict[str, Figure] = {
-            "axis": axis,
-            "residual": float(residual),
-            "allowed": bias,
-            "imu": answer.imu_source,
-        }
-        if misses > limit("specification"):
-            remedies = ("latitude", "imu_axes", "units", "specification", "base_stays")
-            found.append(Evidence("rate.misses", figures, "bounded", Effect(heading=turned), remedies))
-        elif misses > limit("doubt"):
-            found.append(Evidence("rate.doubtful", figures, "known", Effect(heading=min(turned, misses * floor))))
+    found = rate_evidence(check, float(np.max(answer.gyro_bias_prior)), place.lat, answer.imu_source, floor)
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
     g = float(normal_gravity(place.lat, place.alt))
     accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)

@@ -59,6 +59,7 @@ class MovingAttitude:
     C_n0_i: Array  # (3, 3): body to ENU at the beginning of the first sample
     history: Array  # (K, 3, 3): the same as known at each epoch but the first
     position: Array  # (K+1, 3): latitude, longitude (rad) and height (m) along the way
+    heading_sigma: float  # rad; by what the fit leaves
 
 
 def odometer_alignment(
@@ -227,4 +228,15 @@ def _solve(time: Array, b: Array, r: Array, form: Form, place: Array, first: flo
     db, dr = b[ends] - b[starts], r[ends] - r[starts]
     weights = np.ones(len(ends))
     history = rotation_from_davenport(np.cumsum(davenport_matrices(db, dr, weights), axis=0))
-    return MovingAttitude(time, history[-1], np.concatenate([history[:1], history]), place)
+    sigma = _heading_sigma(db @ history[-1].T, dr)
+    return MovingAttitude(time, history[-1], np.concatenate([history[:1], history]), place, sigma)
+
+
+def _heading_sigma(turned: Array, dr: Array) -> float:
+    """One sigma of the rotation about the vertical, rad, by what pairs of vectors (K, 3) leave of each other, as white noise.
+
+    Of ``r = C b`` with errors of size s the rotation vector has the covariance ``s^2 (sum (b'b E - b b'))^-1``, in the axes of r.
+    """
+    information = np.sum(turned**2) * np.eye(3) - turned.T @ turned
+    left = float(np.mean((dr - turned)[:, :2] ** 2))
+    return math.sqrt(left * float(np.linalg.pinv(information)[2, 2]))

@@ -65,12 +65,14 @@ def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     found = []
     for finding in findings:
         serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
-        if finding.code in ALWAYS or (turns and serious):
+        # What an increment counts is lost where another is written in its place; a rate at rest is held without harm.
+        lost = finding.code == "repeated_rows" and finding.severity == "warning" and record.kind == "increments"
+        if finding.code in ALWAYS or (turns and serious) or lost:
             found.append(_error(finding))
         elif finding.code == "jitter":
             found.append(_jitter(record, finding))
         elif finding.severity != "note":
-            found.append(note(f"record.{finding.code}", text=finding.message))
+            found.append(note(f"record.{finding.code}", urgent=finding.code == "no_noise", text=finding.message))
     return found
 
 

@@ -20,13 +20,15 @@ SLIGHT = 0.05  # the same, from which what a stamp may be off by is looked at
 EXCHANGED_SHARE = 0.01  # of the rows that have changed places, from which they are an error
 REPEATED_SHARE = 0.002  # of the rows, beyond chance
 HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
+FEWEST_RUNS, EVENLY = 200, 0.5  # runs of such rows, and of the variance that chance gives their lengths
 ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
 NOISELESS = 1e-7  # of the same: noise and quantum of every sensor are larger
 FEWEST = 20  # rows that say whether there is noise
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
 FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
-SATURATED_RUN = 3  # rows at the extreme, one after the other
+SATURATED_RUN = 3  # rows at the extreme, one after the other ...
+PILED = 10  # ... or so many times as many as at the next value: of a vibration's peaks each is a row
 RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off
 
 
@@ -139,7 +141,7 @@ def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding
     chance = float(np.prod(_chance_of_repeat(same))) * same.shape[1]
     # Samples that are held repeat in all channels at once; quiet ones of a coarse quantum repeat each by itself.
     share, least = repeated / same.shape[1], float(same.mean(axis=1).min())
-    held = share > HELD_SHARE and share > 0.98 * least and chance < 0.9 * repeated
+    held = share > HELD_SHARE and (share > 0.98 * least or _evenly(same)) and chance < 0.9 * repeated
     if held or repeated > 3 + 5.0 * chance + REPEATED_SHARE * same.shape[1]:
         share = 100.0 * repeated / len(record)
         findings.append(
@@ -151,6 +153,14 @@ def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding
             )
         )
     return repeated
+
+
+def _evenly(same: NDArray[np.bool_]) -> bool:
+    """Whether rows that repeat come in runs of one length: chance makes runs of all lengths, geometrically distributed."""
+    repeats = same.all(axis=0)
+    runs = np.diff(np.flatnonzero(~repeats)) - 1.0
+    share = float(repeats.mean())
+    return len(runs) > FEWEST_RUNS and float(np.var(runs)) < EVENLY * share / (1.0 - share) ** 2
 
 
 def _exchanged(record: ImuRecord, data: Array, findings: list[Finding]) -> None:
@@ -186,9 +196,11 @@ def _frozen(
         limit = max(10.0, FROZEN_TIME / record.interval, FROZEN_FACTOR * by_chance[channel])
         if runs[channel] == len(record):
             dead = _is_dead(data, channel)
+            # Where the other sensor has noise, no simulation without noise made the log.
+            coarse = not dead and float(np.ptp(data[3:] if channel < 3 else data[:3], axis=1).min()) > 0.0
             findings.append(
                 Finding(
-                    "error" if dead else "note",
+                    "error" if dead else "warning" if coarse else "note",
                     "constant_channel" if dead else "no_noise",
                     f"{name} is {data[channel, 0]:g} in all {len(record)} rows; expected a sensor's noise: the "
                     + ("channel is dead or not connected" if dead else "log is simulated without noise, or coarse"),
@@ -254,7 +266,10 @@ def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArr
             inside = int(np.count_nonzero(below == second))
             consecutive = np.convolve(at_top, np.ones(SATURATED_RUN), "valid").max() >= SATURATED_RUN
             spread = top - float(np.median(signed))
-            if count > 2 * inside and consecutive and spread > 5.0 * (top - second):
+            often = count > PILED * max(inside, 2)
+            piled = count > 2 * inside and (consecutive or often)
+            # Values that have many digits are never alike by chance, wherever the next ones stand.
+            if piled and (spread > 5.0 * (top - second) or (often and top - second > PILED * _finest(below))):
                 rows[channel] += count
                 findings.append(
                     Finding(
@@ -266,6 +281,11 @@ def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArr
                     )
                 )
     return rows
+
+
+def _finest(values: Array) -> float:
+    """The smallest step between two values."""
+    return float(np.min(np.diff(np.unique(values)), initial=np.inf))
 
 
 def _chance_of_repeat(same: NDArray[np.bool_]) -> Array:

@@ -125,6 +125,7 @@ SENTENCES = {
     "record.accel_level": "{text}",
     "record.no_gravity": "{text}",
     "record.repeated_rows": "{text}",
+    "record.no_noise": "{text}",
     "record.frozen": "{text}",
     "record.gaps": "{text}",
     "record.jitter": "{text}",
@@ -193,6 +194,10 @@ SENTENCES = {
     ),
     "noise.accel_stretch": (
         "the accelerometers are noisier than elsewhere between {begin:.0f} s and {end:.0f} s: heading errs by {heading:angle} more"
+    ),
+    "record.coarse": (
+        "{name} is written in steps of {step:.3g}, which hide its noise: its mean may be off by a part of a step; heading by "
+        "{heading:angle}, level by {level:angle}"
     ),
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
@@ -349,6 +354,7 @@ SENTENCES = {
 
 REMEDIES = {
     "record_longer": "record longer",
+    "more_digits": "log more digits",
     "record_calmer": "record longer, or with less motion",
     "end_before": "align a part in which the base stands",
     "still_part": "align a part in which the base stays",

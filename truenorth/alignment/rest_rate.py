@@ -1,0 +1,47 @@
+"""The earth's rate while a vehicle rests: what its gyros must see then, whatever else the log holds.
+
+An alignment under way follows the gyros from aid to aid, and in a minute two exchanged axes make it drift by no more than
+biases could. At rest they see the earth turn: the rate along north and along the vertical is known, whatever people and an
+engine shake.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.check import check_filter, check_means, sharper
+from truenorth.alignment.in_motion_task import MovingTask
+from truenorth.alignment.task import make_task
+from truenorth.alignment.verdict import rate_evidence
+from truenorth.coarse.inertial import oba
+from truenorth.core.earth import EARTH_RATE
+from truenorth.errors.staying import StaticModel
+from truenorth.navigation.stops import seconds_at_rest
+from truenorth.state.evidence import Evidence
+from truenorth.strapdown.inertial import integrate
+
+Array = NDArray[np.float64]
+
+LONG_ENOUGH = 30.0  # s: of fewer epochs a filter does not separate a base's motion from its rate
+APART = 1.5  # s: seconds further apart are two rests
+
+
+def rest_evidence(task: MovingTask) -> list[Evidence]:
+    """Rates that contradict the earth's in the longest rest of a log on the move, by the specification of the gyros."""
+    seconds = np.sort(np.concatenate(seconds_at_rest(task.record, task.odometer, task.gnss)))
+    rests = np.split(seconds, np.flatnonzero(np.diff(seconds) > APART) + 1)
+    longest = max(rests, key=len)
+    if len(longest) < LONG_ENOUGH:
+        return []
+    rest = make_task(task.record.between(longest[0] - 0.5, longest[-1] + 0.5), task.position, None)
+    lat, noise = task.position.lat, StaticModel.of(task.spec)
+    integrals = integrate(rest.record, rest.interval)
+    coarse = oba(integrals, lat, task.position.alt, history=False)
+    filtered, _ = check_filter(rest, integrals, coarse.C_n0_i, noise, noise)
+    check = sharper(filtered, check_means(rest.means, lat, rest.gravity), rest.motion)
+    bias = float(np.sqrt(task.spec.bias_variance[0]))
+    floor = bias / (EARTH_RATE * math.cos(lat))
+    return rate_evidence(check, bias, lat, f"specification {task.spec.name!r}", floor)
