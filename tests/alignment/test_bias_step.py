@@ -7,6 +7,7 @@ import pytest
 
 from tests.runs import few_and_all, some
 from truenorth import align
+from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.records.specs import imu_spec
@@ -87,3 +88,18 @@ def test_an_accelerometer_that_drifts_on_a_still_base_is_found_with_what_it_does
 @few_and_all(60, few=4)
 def test_gravity_of_a_sound_still_base_does_not_drift(runs):
     assert all(quay(run)[1] is None for run in range(runs))
+
+
+def test_a_ramp_of_the_east_gyro_on_a_still_base_shows_in_its_rate() -> None:
+    """.12 deg/h over three minutes: 5 sigmas of heading, and less than chance gives in the velocity of the base."""
+    inputs, truth = BENCHES["still"].draw(4401, 2)
+    record = inputs["record"]
+    ramp = 6.04e-7 * np.maximum(np.arange(len(record)) / len(record) - 0.18, 0.0) / 0.82 * record.interval
+    spoilt = replace(record, gyro=record.gyro + ramp[:, None] * [1.0, 0.0, 0.0])
+    answer = align(spoilt, inputs["place"], inputs["imu"])
+    assert answer.status == "inconsistent"
+    assert answer.evidence[0].key == "bias.gyro_steps"
+    sound = align(record, inputs["place"], inputs["imu"])
+    assert sound.status == "aligned"
+    assert not any(item.key == "bias.gyro_steps" for item in sound.evidence)
+    assert abs(float(misses(sound, truth)["heading"][0])) < 4.0

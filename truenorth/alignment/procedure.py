@@ -24,6 +24,7 @@ from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
+from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import farthest, sway_align
@@ -151,6 +152,7 @@ def align_base(
     evidence = record_evidence(task.record, task.motion, sound=sound) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
+    evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
     evidence += [] if sound else quantum_evidence(task.record, position.lat)
     if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)

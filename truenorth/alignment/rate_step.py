@@ -1,0 +1,72 @@
+"""Did a gyro's bias change while the base stood still? Its rate says so directly, and sooner than the velocity of the base does.
+
+On a base that is still the rate of each second is the earth's, the bias and white noise. A step or a ramp of it is matched with the
+rates of the whole log, their mean being free. The noise is that of neighbouring seconds; by the instability of its bias a
+sound gyro differs between two times as well.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.bias_step import SIGNATURES
+from truenorth.alignment.inference import usual
+from truenorth.alignment.task import Task
+from truenorth.core.earth import EARTH_RATE
+from truenorth.records.specs import ImuSpec
+from truenorth.state.evidence import Effect, Evidence, Figure, Kind
+from truenorth.state.limits import limit, may_be_chance
+
+Array = NDArray[np.float64]
+
+FEWEST = 60  # seconds
+
+
+def rate_step_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
+    """The step or ramp of a gyro's rate that is most likely, on a still base, and what it does to heading.
+
+    A rate about east turns heading as a bias does, one about the vertical by its angle.
+
+    Parameters
+    ----------
+    task : Task
+    C_nb : (3, 3) array
+    spec : ImuSpec
+    """
+    motion = task.motion
+    count = len(motion.time)
+    if motion.overall != "still" or count < FEWEST:
+        return []
+    shapes = np.stack([_shape(course, round(onset * count), count) for course, onset in SIGNATURES], axis=1)  # (K, S)
+    shapes -= shapes.mean(axis=0)
+    energy = np.sum(shapes**2, axis=0)[:, None]
+    size = shapes.T @ (motion.rate - motion.rate.mean(axis=0)) / energy  # (S, 3), rad/s
+    noise = 0.5 * np.mean(np.diff(motion.rate, axis=0) ** 2, axis=0)
+    instability = max(spec.gyro_bias_instability, usual("gyro", "bias_instability", spec.gyro_random_walk))
+    ratio = size**2 / (noise / energy + 2.0 * instability**2)
+    best, axis = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+    if ratio[best, axis] <= limit("hint"):
+        return []
+    rate = C_nb[:, axis] * float(size[best, axis])
+    span = float(motion.time[-1] - motion.time[0])
+    heading = abs(rate[0]) / (EARTH_RATE * math.cos(task.position.lat)) + 0.5 * span * abs(rate[2])
+    figures: dict[str, Figure] = {
+        "axis": "xyz"[axis],
+        "onset": SIGNATURES[best][1] * span,
+        "size": abs(float(size[best, axis])),
+        "ratio": float(ratio[best, axis]),
+        "chance": limit("hint"),
+        "heading": heading,
+        "level": 0.0,
+    }
+    kind: Kind = "hint" if may_be_chance(float(ratio[best, axis])) else "bounded"
+    return [Evidence("bias.gyro_steps", figures, kind, Effect(heading=heading), ("still_part",))]
+
+
+def _shape(course: str, begin: int, count: int) -> Array:
+    """(K,) of a step, or of a ramp to one at the end, from second `begin` on."""
+    after = np.arange(count) >= begin
+    return after.astype(float) if course == "step" else after * (np.arange(count) - begin) / (count - begin)
