@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import importlib.util
 import inspect
 import json
 import re
@@ -48,6 +49,52 @@ def test_links_lead_somewhere(page):
 def test_files_of_the_source_are_where_a_page_says(page):
     for path in re.findall(r"truenorth/[\w/]+\.(?:py|yaml)", page.read_text(encoding="utf-8")):
         assert (ROOT / path).exists(), f"{page.name}: {path}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_rows_stand_in_a_table_that_names_its_columns(page):
+    """A row after an empty line is shown as text with bars; a column without a name says nothing to those who hear the page."""
+    lines = ["", *re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL).splitlines(), ""]
+    for before, line, after in zip(lines, lines[1:], lines[2:], strict=False):
+        if line.startswith("|") and not before.startswith("|"):
+            assert re.fullmatch(r"[|:\s-]+", after), f"{page.name}: {line}"
+            assert all(cell.strip() for cell in line.strip("| ").split("|")), f"{page.name}: {line}"
+            assert not line.startswith("| |"), f"{page.name}: {line}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_steps_of_a_list_follow_each_other(page):
+    """A step after a table or a paragraph at the margin is part of that text: nothing counts on from it."""
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    outside = False
+    for before, line in zip(["", *text.splitlines()], text.splitlines(), strict=False):
+        number = re.match(r"(\d+)\. ", line)
+        if number and int(number[1]) > 1:
+            assert not outside, f"{page.name}: {line}"
+        if number:
+            outside = False
+        elif line and not line.startswith(" ") and not before:
+            outside = True  # a paragraph, a table or a heading of its own
+
+
+def test_references_of_docstrings_become_links():
+    hook = importlib.util.spec_from_file_location("site_hook", ROOT / "docs/site_hook.py")
+    module = importlib.util.module_from_spec(hook)
+    hook.loader.exec_module(module)
+    page = '<h3 id="truenorth.read_imu"></h3> As for :func:<code>truenorth.read_imu</code>, of :class:<code>Odometer</code>.'
+    shown = module.on_page_content(page, None, None, None)
+    assert shown.endswith('As for <a href="#truenorth.read_imu"><code>read_imu</code></a>, of <code>Odometer</code>.')
+
+
+def test_the_site_asks_nothing_of_the_network():
+    site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert re.search(r"^  - offline", site, re.MULTILINE)
+    assets = re.findall(r"assets/[\w./-]+\.(?:js|css)", site)
+    assert "assets/iframe-worker/shim.js" in assets  # which the search would fetch else
+    for name in assets:
+        assert not re.search(
+            r"(?:src|url|import)[^\n]{0,9}https?://", (ROOT / "docs" / name).read_text(encoding="utf-8")
+        )
 
 
 def test_the_site_has_every_page():
