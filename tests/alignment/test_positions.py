@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -204,7 +205,7 @@ class TestCommand:
         assert found["touched_at_s"] is None
         page = (tmp_path / "out" / "report.html").read_text()
         assert "Positions" in page
-        assert "turned 1" in page
+        assert re.search(r">turned, deg<.*?<td[^>]*>–</td>.*?<td[^>]*>1\d\d\.\d{3}</td>", page, re.DOTALL)
 
     @pytest.mark.parametrize(
         ("more", "text"),

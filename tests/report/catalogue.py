@@ -16,7 +16,7 @@ from babel.messages.pofile import read_po, write_po
 
 import truenorth
 from truenorth.core.language import FOLDER, FRAME, LANGUAGES
-from truenorth.report.words import WORDS
+from truenorth.report.words import WHY, WORDS
 from truenorth.state.english import REMEDIES, SENTENCES, TERMS, TITLES
 
 HOME = Path(truenorth.__file__).parent
@@ -39,7 +39,7 @@ def texts() -> set[str]:
     """Every English text that can reach a reader through the catalogue."""
     found = {text for _, _, text, *_ in extract_from_dir(HOME, METHODS, keywords=KEYWORDS) if isinstance(text, str)}
     tables = {text for table in (SENTENCES, REMEDIES, TERMS, TITLES) for text in table.values()}
-    return found | tables | set(WORDS) | messages() | {FRAME}
+    return found | tables | set(WORDS) | set(WHY) | messages() | {FRAME, "; "}
 
 
 @cache

@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
+from truenorth.alignment.assumptions import reason as assumed
+from truenorth.alignment.procedure import POSITIONS
 from truenorth.alignment.table import TablePosition, TurntableErrors
 from truenorth.core.errors import UsageError
+from truenorth.core.language import in_language
 from truenorth.core.position import Position
 from truenorth.quality import inspect
 from truenorth.records.specs import imu_spec
 from truenorth.report import write_report
 from truenorth.report.numbers import short
+from truenorth.report.words import clauses
 from truenorth.results import save
 from truenorth.simulation import rest, simulate
 
@@ -111,6 +115,34 @@ def test_biases_and_motion_have_units_that_fit(aligned, levelled, tmp_path):
     ]
     moved = replace(aligned, disturbance=np.array([13.0, 12.0, 0.2]))
     assert "13, 12, 0.2 m/s RMS" in write_report(moved, tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "why",
+    [
+        "the base is disturbed: mean rates would be off, the inertial frame is not; its own motion is fitted to the log",
+        f"the base is rotating: only the inertial frame follows it{POSITIONS}; its own motion is fitted to the log",
+        assumed("imakf", 0.25),
+        assumed("sgkf"),
+        "the IMU turns on an indexer (angles of 2 axes from enc.csv), the base may sway: its own motion is fitted to the log",
+        "25 states, closed loop over 1999 rows of m.csv",
+        "gyro biases of 100 deg/h hide the earth's rate: motion has to tell heading",
+        "specification 'navigation'",
+    ],
+)
+def test_why_a_method_was_taken_is_in_the_reader_s_language(why):
+    assert clauses(why) == why
+    with in_language("zh"):
+        rest = re.sub(r"Positions|deg/h|IMU|navigation|enc.csv|m.csv", "", clauses(why))
+    assert not re.search(r"[A-Za-z]", rest), rest
+
+
+def test_the_reason_on_the_page_is_in_its_language(aligned, levelled, tmp_path):
+    for result in (aligned, levelled):
+        with in_language("zh"):
+            page = write_report(result, tmp_path / "report.html").read_text(encoding="utf-8")
+        said = re.search(r"方法</th><td>\w+: (.*?)</td>", page)[1]
+        assert not re.search(r"[a-z]{4}", said.replace("Ljung-Box", "")), said
 
 
 def test_positions_of_a_turntable_are_a_table(aligned, tmp_path):

@@ -300,6 +300,7 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     from rich.text import Text
 
     from truenorth.report.estimated import estimated_rows
+    from truenorth.report.words import clauses
 
     console = make_console()
     s = result.summary()
@@ -334,6 +335,6 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
         )
     if result.damping is not None:
         console.print(_("damping: {how}").format(how=result.damping.in_words()), soft_wrap=True)
-    height = _("height: {how}; IMU: {source}").format(how=_(result.altitude), source=_(result.imu_source))
+    height = _("height: {how}; IMU: {source}").format(how=_(result.altitude), source=clauses(result.imu_source))
     console.print(height, soft_wrap=True)
     print_written(paths)

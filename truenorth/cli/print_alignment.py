@@ -22,6 +22,8 @@ def print_alignment(result: Alignment, paths: list[Path]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from truenorth.report.words import clauses
+
     console = make_console()
     s = result.summary()
     colour = {"aligned": "green", "level_only": "yellow"}.get(result.status, "red")
@@ -54,8 +56,8 @@ def print_alignment(result: Alignment, paths: list[Path]) -> None:
     if result.transfer is not None:
         print_transfer(console, result.transfer)
     how = _("attitude at {time:.3f} s, method {method}: {why}")
-    console.print(how.format(time=result.time, method=result.method, why=_(result.method_reason)), soft_wrap=True)
-    console.print(_("IMU: {source}").format(source=_(result.imu_source)), soft_wrap=True)
+    console.print(how.format(time=result.time, method=result.method, why=clauses(result.method_reason)), soft_wrap=True)
+    console.print(_("IMU: {source}").format(source=clauses(result.imu_source)), soft_wrap=True)
     if result.table is not None:
         print_table(console, result)
     print_moving(console, result)

@@ -19,6 +19,7 @@ from truenorth.report.numbers import short
 from truenorth.report.page import head_of
 from truenorth.report.residuals import innovation_panels
 from truenorth.report.track import track_panel
+from truenorth.report.words import clauses
 
 if TYPE_CHECKING:
     from truenorth.navigation.result import Navigation
@@ -78,7 +79,7 @@ def _facts(result: Navigation) -> list[tuple[str, str]]:
         (_("Smoothed"), _("yes, over the whole log") if result.smoothed else _("no")),
         (_("Gaps of the IMU"), gaps if result.gaps else _("none")),
         (_("Seconds at rest used"), str(result.stops)),
-        ("IMU", result.imu_source),
+        ("IMU", clauses(result.imu_source)),
         *([] if result.damping is None else damping_facts(result.damping)),
     ]
 

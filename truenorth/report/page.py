@@ -16,6 +16,7 @@ from truenorth.report.document import Table, render, verdict_lines
 from truenorth.report.estimated import relation_table
 from truenorth.report.numbers import quantity, short
 from truenorth.report.transfer import transfer_panels
+from truenorth.report.words import clauses
 from truenorth.state.wording import headline
 
 if TYPE_CHECKING:
@@ -93,14 +94,14 @@ def _facts(result: Alignment) -> list[tuple[str, str]]:
         (_("Log"), _("{source}, {duration:.1f} s used").format(source=result.source, duration=result.duration)),
         (_("Attitude at"), _("{time:.3f} s on the log's clock").format(time=result.time)),
         (_("Place"), f"{np.degrees(p.lat):.5f}°, {np.degrees(p.lon):.5f}°, {p.alt:.0f} m"),
-        (_("Method"), f"{result.method}: {result.method_reason}"),
+        (_("Method"), f"{result.method}: {clauses(result.method_reason)}"),
         (
             "IMU",
             _(
                 "{source}: gyro bias {gyro_bias}, random walk {gyro_walk}; accelerometer bias {accel_bias}, random walk "
                 "{accel_walk} (one sigma)"
             ).format(
-                source=result.imu_source,
+                source=clauses(result.imu_source),
                 gyro_bias=quantity(imu.gyro_bias, "deg/h"),
                 gyro_walk=quantity(imu.gyro_random_walk, "deg/sqrt(h)"),
                 accel_bias=quantity(imu.accel_bias, "ug"),
