@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
-from truenorth.core.linalg import Size, padded
-from truenorth.filters.gains import Gains, through, times
+from truenorth.core.linalg import Size, copy_corner, four_rows, padded, transpose_block
+from truenorth.filters.gains import Gains, through
 
 Array = NDArray[np.float64]
 
@@ -126,7 +126,8 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     ends = np.empty((len(behind), n, n + courses))
     arrays = (gains.step, gains.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
     whole = tuple(np.ascontiguousarray(a) for a in arrays)
-    _sum_back(padded(n), len(padded(n + courses + right)), *whole, behind.astype(np.int64), forms, ends)
+    sizes = padded(n), padded(n + seen.L.shape[1]), len(padded(n + courses + right))
+    _sum_back(*sizes, *whole, behind.astype(np.int64), forms, ends)
     energies, matches = forms[:, :, : n + courses], forms[:, :, n + courses :]
 
     found, first = [], n
@@ -159,6 +160,7 @@ def _match(seen: Innovations, bank: Signatures, energies: Array, matches: Array,
 @compiled
 def _sum_back(
     states: Size,
+    deep: Size,
     wide: int,
     step: Any,
     H_Phi: Any,
@@ -174,15 +176,22 @@ def _sum_back(
     """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last error of it.
 
     The quadratic form comes first, the linear ones of the innovations are columns behind it. All are `wide`, with zeros at their
-    ends; of the states there are as many as `states` says, the last of them zero.
+    ends; of the states there are as many as `states` says, of states and rows of a measurement as `deep` says, the last zero.
     """
     n, m, used, right = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
-    form, end = np.zeros((used, wide)), np.zeros((n, wide))
+    N, rows = len(states), 4 * ((used + 3) // 4)
+    form, end = np.zeros((rows, wide)), np.zeros((N, wide))
     for i in range(n):
         end[i, i] = 1.0
+    form_before, end_before, T = np.zeros_like(form), np.zeros_like(end), np.zeros_like(form)
     # e goes on as F (e, w), and is seen, made white, as G (e, w); behind G stand the innovations.
-    F, G, T = np.zeros((len(states), wide)), np.zeros((m, wide)), np.zeros((used, wide))
-    form_before, end_before, work = np.zeros_like(form), np.zeros_like(end), np.zeros((len(states), U.shape[1]))
+    whole, course = np.zeros((N, N)), np.zeros((N, wide))
+    for i in range(n):
+        course[i, i] = 1.0
+        for j in range(U.shape[1]):
+            course[i, n + j] = U[i, j]
+    F, G = np.zeros((N, wide)), np.zeros((m, wide))
+    above_t, below = np.zeros((rows, len(deep))), np.zeros((len(deep), wide))
     row = len(behind) - 1
     for k in range(step.shape[0] - 1, -1, -1):
         while row >= 0 and behind[row] == k:
@@ -191,14 +200,28 @@ def _sum_back(
             row -= 1
         if row < 0:
             break
-        _go_on(step[k], H_Phi[k], gain[k], A[k], U, F, G, work)
+        copy_corner(step[k], whole, n, n)
+        _go_on(states, whole, H_Phi[k], gain[k], A[k], course, F, G)
         _whiten(L[k], used, G)
         for i in range(m):
             for j in range(right):
                 G[i, used + j] = seen[k, i, j]
         _times_course(states, n, form, F, T)
-        _course_times(states, n, F, T, form_before)
-        _add_square(G, form_before)
+        # [F; G]' [T; G], and T itself of the courses: M' form M + G' G.
+        for i in range(0, rows, 4):
+            for j in range(0, N, 4):
+                transpose_block(F, j, i, above_t)
+        for i in range(m):
+            for j in range(used):
+                above_t[j, n + i] = G[i, j]
+        for i in range(n + m):
+            for j in range(wide):
+                below[i, j] = T[i, j] if i < n else G[i - n, j]
+        for i in range(0, rows, 4):
+            four_rows(deep, above_t, below, None, i, wide, form_before)
+        for i in range(n, rows):
+            for j in range(wide):
+                form_before[i, j] += T[i, j]
         form, form_before = form_before, form
         _times_course(states, n, end, F, end_before)
         end, end_before = end_before, end
@@ -212,34 +235,24 @@ def _keep(values: Any, place: Any) -> None:
             place[i, j] = values[i, j]
 
 
-@compiled
-def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, U: Any, F: Any, G: Any, work: Any) -> None:
-    """``F = [step, step U - gain A]`` and ``G = [H Phi, H Phi U + A]``; `work` is as wide as U."""
-    n, m = len(step), len(G)
-    times(step, U, work)
-    _less_product(gain, A, work)
+@borrowing(forceinline=True)
+def _go_on(states: Size, step: Any, H_Phi: Any, gain: Any, A: Any, course: Any, F: Any, G: Any) -> None:
+    """``F = step [I, U] - gain [0, A]`` and ``G = H Phi [I, U] + [0, A]``, with ``course = [I, U]``."""
+    n, m = gain.shape[0], gain.shape[1]
+    for i in range(0, len(states), 4):
+        four_rows(states, step, course, None, i, F.shape[1], F)
     for i in range(n):
-        for j in range(n):
-            F[i, j] = step[i, j]
-        for j in range(U.shape[1]):
-            F[i, n + j] = work[i, j]
+        for r in range(m):
+            for j in range(A.shape[1]):
+                F[i, n + j] -= gain[i, r] * A[r, j]
     for i in range(m):
-        for j in range(n):
-            G[i, j] = H_Phi[i, j]
-        for j in range(U.shape[1]):
-            total = A[i, j]
-            for r in range(n):
-                total += H_Phi[i, r] * U[r, j]
-            G[i, n + j] = total
-
-
-@compiled
-def _less_product(A: Any, B: Any, X: Any) -> None:
-    """``X -= A B``."""
-    for i in range(A.shape[0]):
-        for r in range(A.shape[1]):
-            for j in range(X.shape[1]):
-                X[i, j] -= A[i, r] * B[r, j]
+        for j in range(G.shape[1]):
+            G[i, j] = 0.0
+        for r in range(n):
+            for j in range(G.shape[1]):
+                G[i, j] += H_Phi[i, r] * course[r, j]
+        for j in range(A.shape[1]):
+            G[i, n + j] += A[i, j]
 
 
 @borrowing(forceinline=True)
@@ -256,34 +269,8 @@ def _whiten(L: Any, used: int, G: Any) -> None:
 @borrowing(forceinline=True)
 def _times_course(states: Size, n: int, X: Any, F: Any, Y: Any) -> None:
     """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n."""
+    for i in range(0, X.shape[0], 4):
+        four_rows(states, X, F, None, i, Y.shape[1], Y)
     for i in range(X.shape[0]):
-        for j in range(Y.shape[1]):
-            total = 0.0
-            for r in range(len(states)):
-                total += X[i, r] * F[r, j]
-            Y[i, j] = total
         for j in range(n, Y.shape[1]):
             Y[i, j] += X[i, j]
-
-
-@borrowing(forceinline=True)
-def _course_times(states: Size, n: int, F: Any, X: Any, Y: Any) -> None:
-    """``Y = M' X`` with ``M = [F; 0 I]``, the identity behind the first n."""
-    for i in range(X.shape[0]):
-        for j in range(Y.shape[1]):
-            total = 0.0
-            for r in range(len(states)):
-                total += F[r, i] * X[r, j]
-            Y[i, j] = total
-        if i >= n:
-            for j in range(Y.shape[1]):
-                Y[i, j] += X[i, j]
-
-
-@borrowing(forceinline=True)
-def _add_square(G: Any, C: Any) -> None:
-    """``C += G' G``, of the rows that C has."""
-    for i in range(C.shape[0]):
-        for k in range(G.shape[0]):
-            for j in range(C.shape[1]):
-                C[i, j] += G[k, i] * G[k, j]
