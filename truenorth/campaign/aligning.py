@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from truenorth.core.position import Position
 from truenorth.core.remembered import remembered
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records import ImuRecord
-from truenorth.records.motion import MotionStates
+from truenorth.records.motion import MotionStates, Moving
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation.indexer import Indexed
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from truenorth.simulation.scenario import Scenario
 
 ARCMIN = math.radians(1.0) / 60.0
+MOST_EPOCHS = 100  # of a motion, whose states are remembered
 KNOWN = ("aligned", "level_only", "not_converged", "not_observable", "inconsistent")
 
 
@@ -63,6 +65,12 @@ def _shared_ideal(scenario: Scenario) -> IdealLog:
     return scenario.ideal()
 
 
+@remembered
+def _truth_of(motion: Moving) -> Callable[[float], MotionStates]:
+    """States of a motion at a time (s), each worked out once: runs that share a motion ask for the same epochs."""
+    return lru_cache(maxsize=MOST_EPOCHS)(lambda time: motion.states(np.array(time)))
+
+
 def _is_sound(scenario: Scenario) -> bool:
     """Whether every log of a scenario is known to be without the faults that :func:`align` looks for.
 
@@ -84,7 +92,7 @@ def _aligned(
 ) -> list[Row]:
     try:
         record = simulated.record.between(None, case.built.start + time * (1 + 1e-12))
-        start = simulated.motion.states(np.array(case.built.start))
+        start = _truth_of(simulated.motion)(case.built.start)
         place = Position(float(start.lat), float(start.lon), float(start.alt))
         motion = simulated.motion
         if method.method in ("in_motion", *AZIMUTH_METHODS):
@@ -100,7 +108,7 @@ def _aligned(
             answer = align(record, place, spec, aid=aid, method=method.method, heading_limit=limit, **known)
         errors = [
             Row(case.number, method.name, run, time, quantity, value, sigma, unit, answer.status)
-            for quantity, value, sigma, unit in _errors(answer, simulated, motion.states(np.array(answer.time)))
+            for quantity, value, sigma, unit in _errors(answer, simulated, _truth_of(motion)(answer.time))
         ]
     except Exception as error:
         return [_failure(case, method.name, run, time, error)]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
+from truenorth.core.remembered import remembered
 from truenorth.errors.arm import arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
 from truenorth.errors.matrices import MATRICES, matrices_of, with_matrices, without_errors
@@ -214,6 +215,12 @@ class StayingLog:
         return integrate(self.record, self.interval, self.bias[:3], self.bias[3:], self.rows)
 
 
+@remembered
+def _about(integrals: InertialIntegrals) -> dict[tuple[object, ...], LinearSystem]:
+    """The last system of these integrals, by all else that decides it: the check of a log and its alignment begin with the same."""
+    return {}
+
+
 def core_system(
     noise: StaticModel,
     slow: InertialIntegrals,
@@ -231,5 +238,10 @@ def core_system(
         With the attitude by which biases act, and as they are.
     """
     lat, alt = position.lat, position.alt
-    system = noise.linearise(slow, C_n0_i, lat, alt, P0, np.full(3, QUIETEST_BASE**2))
+    about = _about(slow)
+    key = noise, C_n0_i.tobytes(), lat, alt
+    if key not in about:
+        about.clear()
+        about[key] = noise.linearise(slow, C_n0_i, lat, alt, P0, np.full(3, QUIETEST_BASE**2))
+    system = about[key].with_arrays(P0=P0)
     return force_system(system, integrals, C_n0_i, lat, alt) if form == "force" else system
