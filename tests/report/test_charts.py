@@ -27,6 +27,16 @@ def decoded(spec):
     return np.frombuffer(base64.b64decode(text), dtype=f"<{kind}")
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "tick"), [(2.0, 6.0, "D1"), (0.9, 11.0, "D2"), (0.1, 1e4, 1.0), (1e-3, 1e5, 2.0)]
+)
+def test_numbers_on_a_logarithmic_axis_do_not_run_into_each_other(low, high, tick):
+    chart = Chart(["sigma, m"], "time, s")
+    chart.line(0, T, np.geomspace(low, high, len(T)), "c0", "east")
+    chart.axis(0, type="log")
+    assert json.loads(chart.to_json())["layout"]["yaxis"]["dtick"] == tick
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_a_refused_heading_is_not_drawn(known):
     chart = _convergence(T, ANGLES, known, SECONDS)

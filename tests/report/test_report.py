@@ -19,7 +19,7 @@ from truenorth.core.position import Position
 from truenorth.quality import inspect
 from truenorth.records.specs import imu_spec
 from truenorth.report import write_report
-from truenorth.report.numbers import short
+from truenorth.report.numbers import of_sigma, short
 from truenorth.report.words import clauses
 from truenorth.results import save
 from truenorth.simulation import rest, simulate
@@ -163,6 +163,21 @@ def test_figures_have_no_exponent(value, shown):
     from truenorth.report.numbers import short
 
     assert short(value) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "shown"),
+    [
+        (-1.17e-5, 50.0, "0"),
+        (24.71, 35.6, "24.7"),
+        (30.0312, 0.949, "30.031"),
+        (-0.5274, 1.71, "-0.53"),
+        (219.91234, 0.101, "219.912"),
+        (3.0, 0.0, "3"),
+    ],
+)
+def test_a_value_has_the_digits_of_its_sigma(value, sigma, shown):
+    assert of_sigma(value, sigma) == shown
 
 
 def test_a_result_without_history_leaves_none_of_an_earlier_one(aligned, levelled, tmp_path):

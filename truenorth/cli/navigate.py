@@ -299,14 +299,18 @@ def print_navigation(result: Navigation, paths: list[Path]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from truenorth.figures.units import Clock, length_unit
     from truenorth.report.estimated import estimated_rows
     from truenorth.report.words import clauses
 
     console = make_console()
     s = result.summary()
     status = Text(in_reader_s_words(result.status), style=f"bold {'green' if result.status == 'navigated' else 'red'}")
-    duration = s["end_s"] - s["start_s"]
-    console.print(status, f" {result.source}, {duration:.1f} s, {s['distance_m']:.0f} m", soft_wrap=True)
+    clock, (metres, unit) = Clock.of(result.time), length_unit([s["distance_m"]])
+    duration = (s["end_s"] - s["start_s"]) / clock.scale
+    console.print(
+        status, f" {result.source}, {duration:.1f} {clock.unit}, {s['distance_m'] / metres:.4g} {unit}", soft_wrap=True
+    )
     for reason in reasons_of(result):
         console.print(f"  {reason}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, padding=(0, 3, 0, 0))

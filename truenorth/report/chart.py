@@ -21,6 +21,11 @@ Array = NDArray[np.float64]
 POINTS = 1500  # of a line; more than a screen shows
 LIMIT_POINTS = 300  # of a limit, which is smooth
 ROW = 170  # pixels a row of axes
+TICKS: tuple[tuple[float, str | float], ...] = (
+    (0.6, "D1"),
+    (2.0, "D2"),
+    (6.0, 1.0),
+)  # of an axis of at most these decades
 
 
 class Chart:
@@ -38,6 +43,7 @@ class Chart:
 
     def __init__(self, rows: Sequence[str], over: str, height: int | None = None) -> None:
         self.data: list[dict[str, Any]] = []
+        self._spans: dict[int, tuple[float, float]] = {}  # of the positive values on a row of axes
         self.layout: dict[str, Any] = {
             "height": height or max(300, ROW * len(rows) + 70),
             "xaxis": {"title": {"text": over}, "anchor": f"y{len(rows)}" if len(rows) > 1 else "y"},
@@ -67,6 +73,7 @@ class Chart:
             showlegend=key,
             hovertemplate="%{y:.5g}",
         )
+        self._saw(row, v)
 
     def band(self, row: int, x: ArrayLike, low: ArrayLike, high: ArrayLike, colour: str, alpha: float = 0.18) -> None:
         """Fill between two lines."""
@@ -134,6 +141,13 @@ class Chart:
             hovertemplate="%{y:.5g}",
             **extra,
         )
+        self._saw(row, np.asarray(y, dtype=np.float64))
+
+    def _saw(self, row: int, values: Array) -> None:
+        positive = values[np.isfinite(values) & (values > 0.0)]
+        if positive.size:
+            low, high = self._spans.get(row, (np.inf, 0.0))
+            self._spans[row] = min(low, float(positive.min())), max(high, float(positive.max()))
 
     def violin(self, row: int, name: str, values: ArrayLike, sigma: float, colour: str) -> None:
         """Draw the distribution of values over a name, with bars at plus and minus one claimed sigma."""
@@ -158,9 +172,22 @@ class Chart:
 
     def axis(self, row: int, **options: Any) -> None:
         """Set options of a vertical axis, in plotly's terms."""
-        if options.get("type") == "log":
-            options.setdefault("nticks", 5)  # with more the numbers between decades run into each other
         self.layout[f"yaxis{row + 1}" if row else "yaxis"] |= options
+
+    def _ticked(self) -> dict[str, Any]:
+        """The layout, with numbers on logarithmic vertical axes that do not run into each other."""
+        layout = dict(self.layout)
+        for row, (low, high) in self._spans.items():
+            name = f"yaxis{row + 1}" if row else "yaxis"
+            axis = dict(layout[name])
+            if axis.get("type") == "log" and "dtick" not in axis and "nticks" not in axis:
+                low, high = axis.get("range", (np.log10(low), np.log10(high)))
+                # Nine numbers a decade, three (1, 2, 5), one, or one in several.
+                axis["dtick"] = next(
+                    (tick for widest, tick in TICKS if high - low <= widest), float(np.ceil((high - low) / 6.0))
+                )
+                layout[name] = axis
+        return layout
 
     def across(self, **options: Any) -> None:
         """Set options of the horizontal axis."""
@@ -179,7 +206,7 @@ class Chart:
 
     def to_json(self) -> str:
         """Text for the page; no ``</`` in it can end the script element that holds it."""
-        text = json.dumps({"data": self.data, "layout": self.layout}, allow_nan=False, separators=(",", ":"))
+        text = json.dumps({"data": self.data, "layout": self._ticked()}, allow_nan=False, separators=(",", ":"))
         return text.replace("</", "<\\/")
 
 

@@ -110,7 +110,7 @@ def _sigmas(t: Array, angles: list[Course], clock: Clock) -> Chart:
             chart.line(0, since, 60 * np.degrees(values[1:]), f"c{number}", name, dash=dash, key=True)
     lowest = 0.5 * 60 * np.degrees(min(course.floor[-1] for course in angles))
     highest = 2.0 * 60 * np.degrees(max(course.sigma[1:].max() for course in angles))
-    chart.axis(0, type="log", dtick=1, range=[float(np.log10(max(lowest, 1e-6))), float(np.log10(highest))])
+    chart.axis(0, type="log", range=[float(np.log10(max(lowest, 1e-6))), float(np.log10(highest))])
     chart.across(type="log")
     return chart
 

@@ -9,7 +9,7 @@ import numpy as np
 from truenorth.core.language import translated as _
 from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.report.document import Table
-from truenorth.report.numbers import short
+from truenorth.report.numbers import of_sigma, short
 from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
 
 if TYPE_CHECKING:
@@ -47,7 +47,9 @@ def estimated_rows(result: Navigation) -> list[tuple[str, str, str]]:
             continue  # the slow parts of the IMU's biases, which the track holds; what is of earth or IMU and does not show
         name = SCALES.get(name, name)
         unit, factor = _unit(name)
-        value, sigma = (", ".join(short(factor * x) for x in found[key][own]) for key in ("value", "sigma"))
+        sigmas = [factor * x for x in found["sigma"][own]]
+        value = ", ".join(of_sigma(factor * x, s) for x, s in zip(found["value"][own], sigmas, strict=True))
+        sigma = ", ".join(map(short, sigmas))
         shown = _("not estimated") if open_ else f"{value} {_(unit)}"
         rows.append((_(name).capitalize().replace("Gnss", "GNSS"), shown, f"{sigma} {_(unit)}"))
     return rows
@@ -103,4 +105,4 @@ def relation_table(transfer: Transfer | None, moving: Moving | None) -> Table | 
 def _shown(value: float, sigma: float, unit: str, estimated: bool) -> tuple[str, str]:
     if sigma == 0.0:
         return f"{short(value)} {unit}", _("given")
-    return f"{short(value)} {unit}" if estimated else _("not estimated"), f"{short(sigma)} {unit}"
+    return f"{of_sigma(value, sigma)} {unit}" if estimated else _("not estimated"), f"{short(sigma)} {unit}"
