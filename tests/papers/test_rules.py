@@ -16,7 +16,7 @@ from truenorth.papers.study import STUDIES, Study, save_all
 from truenorth.papers.sweeps import Sweep, dependences, swept
 from truenorth.papers.table import OF_RUNS, STATISTICS, UNITS, Figure, Reference, Table
 from truenorth.papers.texts import read_texts
-from truenorth.report.study import across
+from truenorth.report.study import across, at_the_end
 
 RULES = [(name, rule) for name, module in STUDIES.items() for rule in import_module(module).RULES]
 IDS = [f"{name}: {rule.claim[:40]}" for name, rule in RULES]
@@ -233,6 +233,16 @@ def test_all_studies_on_one_page(tmp_path):
         < page.index("x of two is small")
     )
     assert 'href="one/report.html"' in page
+
+
+def test_the_page_of_a_study_has_each_figure_once():
+    """At its latest time, and those that hold at no time; a browser has no room for those of all times."""
+    table = pd.DataFrame(
+        [("a", "kf", t, q, t) for q in ("heading", "level") for t in (60.0, 300.0, 600.0)]
+        + [("a", "kf", np.nan, "rank", 7.0), ("b", "kf", 60.0, "heading", 1.0)],
+        columns=["case", "method", "time_s", "quantity", "value"],
+    )
+    assert at_the_end(table)["value"].tolist() == [600.0, 600.0, 7.0, 1.0]
 
 
 def test_words_of_the_table():

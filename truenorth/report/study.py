@@ -50,8 +50,8 @@ def study_page(
         compared="" if compared.empty else _html(across(compared)),
         of_paper=drawn(of_paper),
         more=drawn(more),
-        table=_html(table),
-        contents=[*contents, _("Every figure")],
+        table=_html(at_the_end(table)),
+        contents=[*contents, _("Figures at the end")],
     )
 
 
@@ -63,6 +63,15 @@ def index_page(studies: Mapping[str, Any]) -> str:
     return render(
         "studies.html", interactive=False, studies=studies, contents=contents, summary=every, summaries=summaries
     )
+
+
+def at_the_end(table: pd.DataFrame) -> pd.DataFrame:
+    """Figures of the latest time of each quantity: a browser has no room for those of all times, tens of thousands of rows."""
+    keys = [name for name in table.columns if name in ("case", "method", "noise", "quantity", "statistic")]
+    if "time_s" not in table.columns or not keys:
+        return table
+    latest = table.groupby(keys, dropna=False, sort=False)["time_s"].transform("max")
+    return table[table["time_s"].isna() | (table["time_s"] == latest)]
 
 
 def across(compared: pd.DataFrame) -> pd.DataFrame:
