@@ -12,6 +12,7 @@ from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
 from truenorth.simulation.scenario import read_scenario
+from truenorth.state.layout import DP
 from truenorth.state.state import Start
 
 DURATION = 120.0
@@ -138,6 +139,9 @@ def test_navigation_in_chunks_is_one_and_the_same_to_the_bit(van, chunks):
         np.testing.assert_allclose(past.C_nb, whole.C_nb[: len(past.time)], rtol=0, atol=1e-11)
         assert answer.time == record.time[-1]
         np.testing.assert_allclose(answer.motion.v_n, whole.v_n[-1], atol=0.02)
+        # Nobody spoke of slow errors of the fixes: neither knows the place better than one of them, which says .5 m.
+        np.testing.assert_allclose(answer.motion.position_sigma, whole.track.sigma[-1, DP], rtol=0.05)
+        assert answer.motion.position_sigma[:2].min() > 0.45
 
 
 @pytest.mark.slow

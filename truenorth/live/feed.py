@@ -131,6 +131,10 @@ class Feed(ABC):
         last = int(np.searchsorted(self.rows[:, 0], until, side="right"))
         return self._mounted(self.rows[:last].copy(), mounting) if last > 1 else None
 
+    def newest(self, count: int, mounting: Mounting | None = None) -> Aid | None:
+        """So many of the newest rows as an aid; None where there are fewer than two."""
+        return self._mounted(self.rows[-count:].copy(), mounting) if len(self.rows) > 1 else None
+
     def moves_from(self) -> float | None:
         """Time from which the vehicle moves, s; None as long as it stays."""
         if len(self.rows) < LASTING:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.aiding.aids import Aid
+from truenorth.aiding.aids import Aid, Gnss
 from truenorth.aiding.source import Aiding
 from truenorth.alignment import Alignment
 from truenorth.core.errors import DataError, UsageError
@@ -33,9 +33,10 @@ from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
-from truenorth.navigation.given import kept_altitude
+from truenorth.navigation.given import kept_altitude, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
+from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
 from truenorth.records.specs import ImuSpec
@@ -54,6 +55,7 @@ KEPT = (
 )  # fmt: skip
 FIRST = 20  # rows that show the interval of sampling
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
+NEWEST = 1000  # rows of a receiver that say how well a fix is known
 UNREST = 60.0  # s before a gap, whose motion says what may have happened in it
 
 
@@ -271,7 +273,8 @@ class Navigator:
             noise, standing=standing(self.start.C_nb), groups=PLUMB_LINE.groups, fixed_altitude=fixed
         )
         stride, every = max(1, round(FINE / self._interval)), max(1, round(self.output / FINE))
-        return Setting(with_states(model, sources), tuple(sources), stride, every)
+        turns = turns_velocity(self.altitude)
+        return Setting(with_states(model, sources), tuple(sources), stride, every, invariant=turns)
 
     def _advance(self, until: float) -> None:
         """Take the rows and measurements up to a time; rows that come for a time before it are too late."""
@@ -363,8 +366,14 @@ class Navigator:
         )
 
     def _judged(self, track: Track) -> Navigation:
-        """The verdict on the loop's track."""
+        """The verdict on the loop's track, position known no better than by a fix where nobody spoke of slow errors."""
         track = replace(track, residuals=self.past.residuals)
+        receiver = (
+            None if Gnss.key not in self.feeds else self.feeds[Gnss.key].newest(NEWEST, self._mountings.get(Gnss.key))
+        )
+        if isinstance(receiver, Gnss):
+            said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
+            track = known_as_fixes(track, receiver.record, said_of)
         evidence = [*innovation_evidence(track.residuals, last_sigma(track)), *self._why]
         result = Navigation(
             "navigated", (), track, self.altitude, False, tuple(self._gaps), 0, self._imu_source, "live"

@@ -26,7 +26,15 @@ from truenorth.estimate.latency import counted_from
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
-from truenorth.navigation.given import by_key, kept_altitude, looked_at, mounted_as, record_of, sits_as_found
+from truenorth.navigation.given import (
+    by_key,
+    kept_altitude,
+    looked_at,
+    mounted_as,
+    record_of,
+    sits_as_found,
+    turns_velocity,
+)
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
 from truenorth.navigation.second_look import SENSORS, as_found, on_any_clock, second_look
 from truenorth.navigation.start import read_start, start_from_alignment
@@ -214,8 +222,11 @@ class _Plan:
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
         used = [*sensors, *self.always]
-        model = with_states(self.model, used)
-        return navigate_track(self.record, self.start, model, used, interval=self.interval, every=self.every, **options)
+        model, every = with_states(self.model, used), self.every
+        turns = turns_velocity(self.altitude) and not options.get("smooth", False)
+        return navigate_track(
+            self.record, self.start, model, used, interval=self.interval, every=every, invariant=turns, **options
+        )
 
     def finest(self) -> Track:
         """Free, at every interval, without covariance."""
