@@ -1,11 +1,13 @@
 """Speed of the linear filters; other libraries on the same work: ``python -m benchmarks peers``.
 
-15 states, a 3-row measurement every tenth step, prediction at every step. Run: ``python -m benchmarks.bench_filters``.
+15 states, a 3-row measurement every tenth step, prediction at every step. Many runs share all but their measurements.
+Run: ``python -m benchmarks.bench_filters``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +16,12 @@ from truenorth.filters import LinearSystem, fading, feedback, innovation_adaptiv
 
 STATES, ROWS, EVERY = 15, 3, 10
 RUNS, REPEATS = 200, 15
-LIMIT_ONE, LIMIT_MANY, CORES = 1.2, 0.7, 2  # us: of the plain form, one run and 200 runs on two cores
+LIMIT_ONE, LIMIT_EIGHT, LIMIT_MANY, CORES = (
+    0.5,
+    0.15,
+    0.1,
+    2,
+)  # us: of the plain form, one run, 8 runs, and 200 on two cores
 
 
 def system(epochs: int, runs: tuple[int, ...] = (), every: int = EVERY, seed: int = 0) -> LinearSystem:
@@ -41,7 +48,8 @@ def best(call: Callable[[], object], steps: int, repeats: int = REPEATS) -> floa
 
 
 def main() -> None:
-    one, many = system(20_000), system(2_000, (RUNS,))
+    one, eight, many = system(20_000), system(20_000, (8,)), system(2_000, (RUNS,))
+    apart = replace(eight, Phi=np.tile(eight.Phi, (8, 1, 1, 1)))
 
     print(f"  {STATES} states, {ROWS} rows every {EVERY}th step; us a step (a run and step where there are many runs)")
     ours = {
@@ -62,6 +70,13 @@ def main() -> None:
     }
     show("one run, update at each step", update)
 
+    steps = 8 * eight.epochs
+    together = {
+        "plain": best(lambda: kalman(eight, joseph=False), steps, 5),
+        "Joseph": best(lambda: kalman(eight), steps, 5),
+        "Joseph, each with its own Phi": best(lambda: kalman(apart), steps, 5),
+    }
+    show("8 runs, 1 thread", together, LIMIT_EIGHT)
     steps = RUNS * many.epochs
     show(f"{RUNS} runs, 1 thread", {"plain": best(lambda: kalman(many, joseph=False), steps, 5)})
     shared = {
@@ -75,7 +90,7 @@ def show(title: str, figures: dict[str, float], limit: float | None = None) -> N
     """A line for each figure; the limit is that of the first."""
     for i, (name, figure) in enumerate(figures.items()):
         verdict = f"(limit {limit:g})" if limit is not None and i == 0 else ""
-        print(f"  {f'{title}, {name}':44s}{figure:8.3f}  {verdict}".rstrip())
+        print(f"  {f'{title}, {name}':48s}{figure:8.3f}  {verdict}".rstrip())
 
 
 if __name__ == "__main__":

@@ -59,4 +59,4 @@ def kalman(
         The variance of an innovation or of a state is not positive, or there is nothing but rounding left in P, naming run
         and epoch.
     """
-    return run_linear(Kalman(joseph), system, state, **running)
+    return run_linear(Kalman(joseph), system, state, joseph=joseph, **running)

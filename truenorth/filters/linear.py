@@ -31,6 +31,7 @@ from truenorth.filters.recursion import (
     update,
     workspace,
 )
+from truenorth.filters.shared import run_shared, shares
 from truenorth.filters.system import Estimates, FilterState, LinearSystem, Runs
 
 LARGEST_SIZE = 40  # of the kernels that smaller systems take: that of a swaying base
@@ -158,12 +159,19 @@ def run_linear(
     *,
     memory: Array | None = None,
     adaptation: int = 0,
+    joseph: bool | None = None,
     **running: Unpack[Running],
 ) -> Estimates:
-    """Run the linear filter that has options of this type; parameters as in :func:`truenorth.filters.drive.drive`."""
+    """Run the linear filter that has options of this type; parameters as in :func:`truenorth.filters.drive.drive`.
+
+    `joseph` is of the Kalman filter alone, by whose covariance runs that share a system can go together.
+    """
     _choose_by_type()
 
     def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
+        if joseph is not None and shares(runs, len(out.x), epochs):
+            run_shared(size, runs, epochs, joseph, out)
+            return
         linear_runs(_sizes.for_call(size, runs, epochs, options, out), runs, epochs, options, out)
 
     return drive(kernel, system, state, memory=memory, adaptation=adaptation, **running)

@@ -272,6 +272,27 @@ def still_positive(size: Size, w: Workspace) -> bool:
 
 
 @borrowing(forceinline=True)
+def fault_before(variance: float, noise: float, correlated: bool, joseph: bool) -> int:
+    """What is wrong with the variance of a row's innovation."""
+    if not variance > 0.0:
+        return NO_INNOVATION_VARIANCE
+    small = variance < (1.0 - ROUNDING) * noise
+    if not correlated and (small or (not joseph and variance > PLAIN_RANGE * noise > 0)):
+        return NOT_POSITIVE
+    return SOUND
+
+
+@borrowing(forceinline=True)
+def fault_after(size: Size, w: Workspace, row: int, variance: float, noise: float, correlated: bool) -> int:
+    """What is wrong with P after a row; what a row without noise shows is zero there."""
+    if noise == 0.0:
+        settle(size, w)
+    elif not correlated and variance > JOSEPH_RANGE * noise and not holds(size, w, row, variance, noise):
+        return NOT_POSITIVE
+    return SOUND
+
+
+@borrowing(forceinline=True)
 def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[int, float, float]:
     """Condition on all rows present; the failure if any, NIS and log-likelihood."""
     nis = 0.0
@@ -283,19 +304,15 @@ def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[in
             continue
         nu, variance, h_s = row_variance(size, w, row, correlated)
         noise = w.R[row, row]
-        if not variance > 0.0:
-            return NO_INNOVATION_VARIANCE, nis, log_likelihood
-        if not correlated and (
-            variance < (1.0 - ROUNDING) * noise or (not joseph and variance > PLAIN_RANGE * noise > 0)
-        ):
-            return NOT_POSITIVE, nis, log_likelihood
+        fault = fault_before(variance, noise, correlated, joseph)
+        if fault != SOUND:
+            return fault, nis, log_likelihood
         nis += nu * nu / variance
         log_likelihood -= 0.5 * (nu * nu / variance + np.log(variance) + LOG_2PI)
         update_by_row(size, w, row, nu, variance, h_s, correlated, joseph)
-        if noise == 0.0:
-            settle(size, w)
-        elif not correlated and variance > JOSEPH_RANGE * noise and not holds(size, w, row, variance, noise):
-            return NOT_POSITIVE, nis, log_likelihood
+        fault = fault_after(size, w, row, variance, noise, correlated)
+        if fault != SOUND:
+            return fault, nis, log_likelihood
     if not still_positive(size, w):
         return NOT_POSITIVE, nis, log_likelihood
     return SOUND, nis, log_likelihood
