@@ -91,12 +91,9 @@ def _likelier(
             rows = at + sign * max(1, round(size / record.interval))
             if 2 * abs(rows) >= len(record) or tried(rows) < RULED_OUT:
                 break
+    tried(_peak(ratios, max(ratios, key=ratios.__getitem__)))  # which may stand out where no rung of the ladder does
     best = max(ratios, key=ratios.__getitem__)
-    if ratios[best] <= limit("rival"):
-        return None
-    tried(_peak(ratios, best))
-    best = max(ratios, key=ratios.__getitem__)
-    return best, tracks[best], ratios[best]
+    return (best, tracks[best], ratios[best]) if ratios[best] > limit("rival") else None
 
 
 def _not_of_gyros(track: Along) -> list[Residuals]:
