@@ -15,6 +15,7 @@ from truenorth.core.position import Position
 from truenorth.core.units import parse
 from truenorth.errors.staying import StaticModel
 from truenorth.quality.noise import gauss_markov_variance, noise_from_log, with_terms_seen
+from truenorth.quality.signals import _lower_quartiles
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import rest, simulate
@@ -135,3 +136,9 @@ def test_a_file_holds_the_slow_terms_that_the_table_shows():
     assert (found.gyro_bias_instability, found.gyro_rate_random_walk, found.accel_bias_instability) == (0.0, 0.0, 0.0)
     assert found.accel_rate_random_walk == pytest.approx(KNOWN.accel_bias_instability / 20.0)
     assert with_terms_seen(spec, coefficients(1e-6, 0.0), coefficients(1e-6, 1e-6)) == spec
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 30])
+def test_lower_quartiles_are_numpys(count):
+    values = np.random.default_rng(count).standard_normal((count, 6))
+    np.testing.assert_allclose(_lower_quartiles(values), np.quantile(values, 0.25, axis=0), rtol=1e-15, atol=1e-15)

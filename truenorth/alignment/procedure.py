@@ -94,8 +94,8 @@ def align_base(
     at, calibration, heading_limit, progress
         As of :func:`truenorth.align`.
     sound : bool
-        Whether the log is known to be without faults of clock, logging and range, and its noise to be one all along, as a
-        simulated one is: then it is not looked at for them.
+        Whether the log is known to be without faults of clock, logging, range and the gyros' units and axes, and its noise to be
+        one all along, as a simulated one is: then it is not looked at for them.
 
     Raises
     ------

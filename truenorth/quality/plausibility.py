@@ -7,9 +7,12 @@ and axes; data at rest show the gyros' unit only if the gyros resolve the earth'
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.turning import AGREES, Turning, fit_turning
 from truenorth.core.units import STANDARD_GRAVITY as G
@@ -57,11 +60,12 @@ def check_plausibility(
     return _gyros(record, motion, lat, findings), findings
 
 
-def unit_findings(record: ImuRecord, motion: MotionSummary) -> list[Finding]:
-    """What :func:`check_plausibility` finds of units and of the gyros; which axis points up is left to it."""
+def unit_findings(record: ImuRecord, motion: MotionSummary, *, gyros: bool = True) -> list[Finding]:
+    """What :func:`check_plausibility` finds of units and, where asked, of the gyros; which axis points up is left to it."""
     findings: list[Finding] = []
     _force_level(record, findings)
-    _gyros(record, motion, None, findings)
+    if gyros:
+        _gyros(record, motion, None, findings)
     return findings
 
 
@@ -79,11 +83,10 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     """Judge the accelerometers' unit by the size of the median specific force."""
     dt = record.interval
     unit = dt if record.kind == "increments" else 1.0
-    square = np.einsum("ki,ki->k", record.accel, record.accel)
     # Where all of them are near gravity the median is.
-    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < LEVEL_TOLERANCE for extreme in (square.min(), square.max())):
+    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < LEVEL_TOLERANCE for extreme in _extremes(record.accel)):
         return True
-    level = float(np.median(np.sqrt(square))) / unit
+    level = float(np.median(np.linalg.norm(record.accel, axis=1))) / unit
     if abs(level / G - 1.0) < LEVEL_TOLERANCE:
         return True
     readings = [
@@ -114,6 +117,16 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
         text = f"{found}: unit, range or scale factor are wrong, or the base accelerates throughout"
         findings.append(Finding("warning", "accel_level", text))
     return False
+
+
+@compiled
+def _extremes(vectors: Any) -> Any:
+    """The smallest and the largest square of the lengths of vectors (N, 3)."""
+    least, most = np.inf, 0.0
+    for k in range(len(vectors)):
+        square = vectors[k, 0] ** 2 + vectors[k, 1] ** 2 + vectors[k, 2] ** 2
+        least, most = min(least, square), max(most, square)
+    return least, most
 
 
 def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:

@@ -39,10 +39,10 @@ def record_evidence(
     C_sb : callable, optional
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
     sound : bool
-        Whether clock, logging and range are known to be without fault.
+        Whether clock, logging and range are known to be without fault, and the units and axes of the gyros.
     """
     found = [] if sound else sampling_evidence(record, turns=motion.overall not in QUIET)
-    doubts = unit_findings(record, motion)
+    doubts = unit_findings(record, motion, gyros=not sound)
     quiet = motion.overall in QUIET  # elsewhere an arm makes gravity swing as if the gyros counted in another unit
     codes = {*ALWAYS} - (set() if quiet else {"gyro_unit"})
     found += [_error(doubt) for doubt in doubts if doubt.code in codes and doubt.severity == "error"]

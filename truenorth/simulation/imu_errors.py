@@ -74,13 +74,15 @@ def apply_errors(
         order = int(value("filter_order"))
         out = respond(out, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
         drift = _drift(own, dT, interval, value, draw, spec.correlation_time)
+        walk = value("random_walk") * math.sqrt(interval)
         if drift is None:
             out += own.constant_bias * interval
+            if walk > 0.0:
+                _make_noise(out, draw("random_walk"), walk)
         else:
-            _put_off(out, own.constant_bias * interval, drift, interval)
-        for term, size in (("random_walk", math.sqrt(interval)), ("sample_noise", interval)):
-            if value(term) > 0.0:
-                _make_noise(out, draw(term), value(term) * size)
+            _put_off(out, own.constant_bias * interval, drift, interval, draw("random_walk"), walk)
+        if value("sample_noise") > 0.0:
+            _make_noise(out, draw("sample_noise"), value("sample_noise") * interval)
         full_scale, step = value("range") * interval, value("quantisation")
         if step > 0.0 or math.isfinite(full_scale):
             _put_out(out, full_scale, step)
@@ -131,12 +133,14 @@ def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, as
 
 
 @compiled
-def _put_off(out: Any, bias: Any, drift: Any, interval: float) -> None:
-    """Add a bias (3,) and what has drifted in each interval; the drift becomes a rate."""
+def _put_off(out: Any, bias: Any, drift: Any, interval: float, rng: Any, walk: float) -> None:
+    """Add a bias (3,), what has drifted in each interval, and white noise, as below; the drift becomes a rate."""
     for k in range(len(out)):
         for i in range(3):
             out[k, i] = (out[k, i] + bias[i]) + drift[k, i]
             drift[k, i] /= interval
+            if walk > 0.0:
+                out[k, i] += rng.standard_normal() * walk
 
 
 @compiled
