@@ -1,12 +1,16 @@
 """Figures and page of a campaign with more methods than the palette has colours."""
 
+import io
+import re
 from types import SimpleNamespace
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
 
 from truenorth.figures.campaign import plot_convergence, plot_distribution
+from truenorth.figures.style import new_figure, style
 from truenorth.report.campaign import _endings
 from truenorth.report.campaign_charts import _convergence
 
@@ -54,3 +58,17 @@ def test_reasons_are_those_of_runs_without_an_answer():
     assert "commonest reason" not in _endings(pd.DataFrame([good])).headings
     both = _endings(pd.DataFrame([good, bad]))
     assert [row[-1] for row in both.rows] == ["", "the base moves"]
+
+
+def test_numbers_on_logarithmic_axes_are_written_out():
+    with style():
+        figure = new_figure(5.0, 3.0)
+        ax = figure.subplots()
+        ax.plot([1.0, 500.0], [20.0, 90.0])
+        ax.set(xscale="log", yscale="log")
+    drawn = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none"}):
+        figure.savefig(drawn, format="svg")  # outside of `style`
+    words = re.sub(r"<[^>]*>|\s", "", drawn.getvalue())
+    assert "60" in words
+    assert "×" not in words
