@@ -19,6 +19,7 @@ HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 400, 62, 16, 74, 44
 FRAMES, RUN, HOLD = 60, 9.0, 3.0  # pictures of the counter; seconds of the film, and of its end
 SPAN = 0.7  # deg above and below the answer that the axis shows
+FAR = 20.0  # spans, up to which a line goes on outside of the frame: a picture needs no larger figures
 KNOWN = 10.0  # deg of sigma, below which a heading is worth showing
 FOREVER = f'dur="{RUN + HOLD}s" repeatCount="indefinite"'
 
@@ -46,8 +47,8 @@ class Axes:
         return LEFT + (WIDTH - LEFT - RIGHT) * (np.asarray(t) - self.start) / (self.stop - self.start)
 
     def y(self, value: Array) -> Array:
-        """Pixels from the top; what lies outside stays at the edge."""
-        inside = np.clip(value, self.middle - SPAN, self.middle + SPAN)
+        """Pixels from the top; what lies outside is cut off, some spans away, by the frame."""
+        inside = np.clip(value, self.middle - FAR * SPAN, self.middle + FAR * SPAN)
         return TOP + (HEIGHT - TOP - BOTTOM) * (self.middle + SPAN - inside) / (2 * SPAN)
 
 
@@ -75,7 +76,7 @@ def film(answer: tn.Alignment, what: str) -> str:
             f'<text x="{LEFT}" y="26" class="title">Heading, as known after each second</text>',
             f'<text x="{LEFT}" y="50">{what}; band: one sigma</text>',
             *_scales(axes),
-            f'<clipPath id="seen"><rect x="{LEFT}" y="0" height="{HEIGHT}" width="{full}">{shown}</rect></clipPath>',
+            f'<clipPath id="seen"><rect x="{LEFT}" y="{TOP}" height="{HEIGHT - TOP - BOTTOM}" width="{full}">{shown}</rect></clipPath>',
             f'<g clip-path="url(#seen)"><polygon points="{band}" fill="#0072b2" fill-opacity="0.2"/>',
             f'<polyline points="{line}" fill="none" stroke="#0072b2" stroke-width="2"/></g>',
             *_counter(t, heading, sigma, share),
