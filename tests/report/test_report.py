@@ -235,7 +235,7 @@ def test_tables_name_their_rows_and_columns(aligned, tmp_path):
     """Every heading cell has a scope, every chart a name and a description, every entry of the contents its place."""
     page = write_report(aligned, tmp_path / "report.html").read_text()
     assert set(re.findall(r"<th(?! scope=)[^>]*>", page.split("<body>")[1])) <= {"<thead>"}
-    assert page.count('class="chart" role="img" aria-label=') == page.count('class="chart"') == 7
+    assert page.count('class="chart" role="figure" aria-label=') == page.count('class="chart"') == 7
     places = set(re.findall(r'id="([^"]+)"', page))
     for target in re.findall(r'<a href="#([^"]+)"', page):
         assert target in places
