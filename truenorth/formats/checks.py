@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.errors import DataError
 from truenorth.records.base import first_disorder
 
@@ -18,13 +19,14 @@ LARGEST = 1e100  # in whatever unit; squares of what is larger overflow
 
 def check_finite(values: Array, labels: Sequence[str], source: str, place: Callable[[int], str]) -> None:
     """Refuse NaN, inf and what no sensor writes in any unit among the columns (N, len(labels)) of a file, by place and column."""
-    finite = np.abs(values) < LARGEST
-    if not finite.all():
-        row, column = (int(i) for i in np.argwhere(~finite)[0])
-        raise DataError(
-            f"{source}: {place(row)}, column {labels[column]}: {values[row, column]}; expected a finite number: remove "
-            "the row or repair the log"
-        )
+    for rows in row_blocks(len(values)):
+        finite = np.abs(values[rows]) < LARGEST
+        if not finite.all():
+            row, column = (int(i) for i in np.argwhere(~finite)[0] + (rows.start, 0))
+            raise DataError(
+                f"{source}: {place(row)}, column {labels[column]}: {values[row, column]}; expected a finite number: remove "
+                "the row or repair the log"
+            )
 
 
 def check_order(time: Array, label: str, source: str, place: Callable[[int], str]) -> None:

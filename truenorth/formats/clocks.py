@@ -15,7 +15,7 @@ from truenorth.formats.checks import check_finite, check_order
 from truenorth.formats.choice import Choice
 from truenorth.formats.columns import Columns, missing_column
 from truenorth.formats.guesses import UnsureError, take
-from truenorth.formats.layout import Layout, unit_factor
+from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.records import Guess
 
 Array = NDArray[np.float64]
@@ -52,11 +52,11 @@ def clock_of_log(
         return raw, layout
     if "time" in layout.units:
         guesses.append(Guess("unit of time", layout.units["time"], "as the caller says", 1.0, {"units": layout.units}))
-        return raw * unit_factor("time", "rates", layout), layout
+        return times(raw, unit_factor("time", "rates", layout)), layout
     if stated is not None:
         guesses.append(Guess("unit of time", stated, "the heading", 1.0, {"units": {"time": stated}}))
-        return raw * size(stated), layout
-    return raw * size(_unit_of_time(raw, source, guesses)), layout
+        return times(raw, size(stated)), layout
+    return times(raw, size(_unit_of_time(raw, source, guesses))), layout
 
 
 def _unit_of_time(raw: Array, source: str, guesses: list[Guess]) -> str:

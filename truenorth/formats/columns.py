@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,8 @@ class Columns:
         Whether the names are the log's own; else ``1, 2, ...``.
     notes : tuple of str
         What was left out or mended, and how the log is written.
+    whole : mapping
+        Arrays of doubles that are there as they stand, in memory or on the disk, by the names of their columns.
     """
 
     path: Path
@@ -51,6 +53,7 @@ class Columns:
     named: bool = True
     notes: tuple[str, ...] = ()
     above: tuple[str, ...] = ()
+    whole: Mapping[tuple[str, ...], Array] = field(default_factory=dict)
 
     def clock(self, name: str) -> tuple[Array, str | None]:
         """A column of time, and what it holds: ``"dates"`` and ``"times of day"`` are in seconds, None is bare numbers.
@@ -60,6 +63,8 @@ class Columns:
         DataError
             A cell that is neither.
         """
+        if (name,) in self.whole:
+            return self.whole[name,], None
         import pyarrow as pa
 
         column = self.column(name)
@@ -119,6 +124,7 @@ def _unwrapped(time: Array) -> Array:
 def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
     """Columns of named arrays."""
     parts: dict[str, Any] = {}
+    whole: dict[tuple[str, ...], Array] = {}
     for name, value in variables.items():
         array = np.asarray(value)
         if array.dtype.kind not in "fiumM" or array.ndim > 2:
@@ -129,10 +135,15 @@ def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
             array = array.T  # MATLAB users keep time in either direction
         if array.ndim == 1:
             parts[name] = array
+            names: tuple[str, ...] = (name,)
         elif array.shape[1] == 3 and name in OURS:
-            parts |= {f"{name}_{axis}": array[:, i] for i, axis in enumerate("xyz")}
+            names = tuple(f"{name}_{axis}" for axis in "xyz")
+            parts |= {of: array[:, i] for i, of in enumerate(names)}
         else:
-            parts |= {f"{name}[{i}]": array[:, i] for i in range(array.shape[1])}
+            names = tuple(f"{name}[{i}]" for i in range(array.shape[1]))
+            parts |= {of: array[:, i] for i, of in enumerate(names)}
+        if array.dtype == np.float64 and array.dtype.isnative and array.flags.c_contiguous:
+            whole[names] = array
 
     def read(names: Sequence[str], gaps: bool = False) -> Array:
         if len({len(parts[name]) for name in names}) > 1:
@@ -148,7 +159,7 @@ def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
         part = parts[name]
         return pa.chunked_array([pa.array(part if part.dtype.kind in "mM" else part.astype(np.float64))])
 
-    return Columns(path, list(parts), read, column)
+    return Columns(path, list(parts), read, column, whole=whole)
 
 
 def missing_column(columns: Columns, ours: str, wanted: str) -> DataError:

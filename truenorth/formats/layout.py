@@ -8,11 +8,16 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import read_mapping, unknown_key
 from truenorth.records import COLUMNS
 from truenorth.records.imu import Kind
+
+Array = NDArray[np.float64]
 
 BLOCKS: dict[str, tuple[str, str]] = {"rates": ("gyro", "accel"), "increments": ("dtheta", "dvel")}
 ARRAY_ONLY = (*BLOCKS["rates"], *BLOCKS["increments"], "scale", "interval")
@@ -170,3 +175,8 @@ def unit_factor(sensor: str, kind: Kind, layout: Layout) -> float:
             f"{dimension.replace('_', ' ')}, such as {unit}"
         )
     return factor
+
+
+def times(values: Array, factor: float) -> Array:
+    """Values in another unit; as they are where it is the same."""
+    return values if factor == 1.0 else values * factor

@@ -1,4 +1,7 @@
-"""NumPy .npz: ``time``, ``gyro`` and ``accel`` (or ``dtheta`` and ``dvel``), or other arrays by name."""
+"""NumPy .npz: ``time``, ``gyro`` and ``accel`` (or ``dtheta`` and ``dvel``), or other arrays by name.
+
+Large arrays stay on the disk (:mod:`truenorth.core.mapped`): a log of days takes no memory by itself.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,9 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
-import numpy as np
-
 from truenorth.core.archive import check_size
 from truenorth.core.errors import DataError
+from truenorth.core.mapped import read_mapped, write_mappable
 from truenorth.formats.layout import BLOCKS
 from truenorth.records import ImuRecord, Record
 
@@ -25,8 +27,7 @@ def variables_of(path: Path) -> dict[str, Any]:
     """
     try:
         check_size(path)
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+        return read_mapped(path)
     except MemoryError:
         raise DataError(f"{path.name}: its arrays do not fit into memory; expected a smaller log") from None
     except (ValueError, OSError, EOFError, KeyError, NotImplementedError, BadZipFile, zlib.error) as error:
@@ -39,5 +40,4 @@ def write(record: Record, path: Path) -> None:
     if isinstance(record, ImuRecord):
         gyro, accel = BLOCKS[record.kind]
         columns = {gyro: record.gyro, accel: record.accel}
-    with path.open("wb") as file:
-        np.savez(file, **{"time": record.time, **columns})  # type: ignore[arg-type]
+    write_mappable(path, {"time": record.time, **columns})

@@ -23,7 +23,7 @@ from truenorth.formats.choice import Choice, choose
 from truenorth.formats.clocks import FEWEST, clock_of_log
 from truenorth.formats.columns import Columns
 from truenorth.formats.guesses import UnsureError, in_words, take
-from truenorth.formats.layout import Layout, unit_factor
+from truenorth.formats.layout import Layout, times, unit_factor
 from truenorth.records import COLUMNS, Guess, ImuRecord
 from truenorth.records.imu import Kind
 
@@ -54,12 +54,8 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
         guesses.insert(
             0, Guess("text", "; ".join(columns.notes), "the dialect in which most lines are rows of numbers")
         )
-    names = [name for name, _ in choice.sensors]
-    values = columns.read(names, False) * np.array([sign for _, sign in choice.sensors])
-    values = _scaled(columns, layout, names, values)
-    check_finite(values, choice.labels[1:], source, columns.place)
-    time, layout = clock_of_log(columns, layout, choice, len(values), guesses)
-    gyro, accel = values[:, :3], values[:, 3:]
+    gyro, accel = _sensors(columns, layout, choice)
+    time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, source, guesses)
     layout = replace(layout, units={**layout.units, **units, "time": "s"}, kind=kind)
     if layout.axes is None:
@@ -69,6 +65,21 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     return finish(
         time, gyro, accel, kind, layout, source, labels=choice.labels, place=columns.place, taken_for=tuple(guesses)
     )
+
+
+def _sensors(columns: Columns, layout: Layout, choice: Choice) -> tuple[Array, Array]:
+    """Columns (N, 3) of the gyros and the accelerometers, with signs and scale; the log's own arrays where these are so."""
+    names = tuple(name for name, _ in choice.sensors)
+    signs = np.array([sign for _, sign in choice.sensors])
+    gyro, accel = columns.whole.get(names[:3]), columns.whole.get(names[3:])
+    as_they_are = np.all(signs == 1.0) and "scale" not in layout.columns
+    if not as_they_are or gyro is None or accel is None or len(gyro) != len(accel):
+        values = _scaled(columns, layout, names, columns.read(names, False) * signs)
+        check_finite(values, choice.labels[1:], columns.path.name, columns.place)
+        return values[:, :3], values[:, 3:]
+    check_finite(gyro, choice.labels[1:4], columns.path.name, columns.place)
+    check_finite(accel, choice.labels[4:], columns.path.name, columns.place)
+    return gyro, accel
 
 
 def _scaled(columns: Columns, layout: Layout, names: Sequence[str], values: Array) -> Array:
@@ -188,7 +199,7 @@ def _check_claim(time: Array, gyro: Array, accel: Array, kind: Kind, source: str
 
 
 def _axes(columns: Columns, layout: Layout, choice: Choice, accel: Array, guesses: list[Guess]) -> Layout:
-    mean = np.median(accel, axis=0)
+    mean = np.array([np.median(a) for a in accel.T])
     size_ = float(np.linalg.norm(mean))
     up = mean / size_ if size_ > 0.0 else np.zeros(3)
     axis = int(np.argmax(np.abs(up)))
@@ -256,9 +267,9 @@ def finish(
         time = np.arange(1, len(gyro) + 1) / layout.rate
     else:
         check_order(time, labels[0], source, place)
-        time = time * unit_factor("time", kind, layout)
-    rates = gyro * unit_factor("gyro", kind, layout)
-    record = ImuRecord(time, rates, accel * unit_factor("accel", kind, layout), kind, source, taken_for)
+        time = times(time, unit_factor("time", kind, layout))
+    rates, forces = times(gyro, unit_factor("gyro", kind, layout)), times(accel, unit_factor("accel", kind, layout))
+    record = ImuRecord(time, rates, forces, kind, source, taken_for)
     axes = (layout.axes or axes).strip().upper()
     if axes == "RFU":
         return record

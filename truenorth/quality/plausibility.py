@@ -131,8 +131,8 @@ def _extremes(vectors: Any) -> Any:
 
 def _up_axis(record: ImuRecord, findings: list[Finding]) -> None:
     """Specific force at rest points up; with RFU axes that is +z. A log turned through many tilts has no such direction."""
-    mean = np.median(record.accel, axis=0)
-    if np.linalg.norm(mean) < ONE_DIRECTION * np.median(np.linalg.norm(record.accel, axis=1)):
+    mean = np.array([np.median(a) for a in record.accel.T])
+    if np.linalg.norm(mean) < ONE_DIRECTION * np.median(np.sqrt(np.einsum("ki,ki->k", record.accel, record.accel))):
         return
     up = mean / np.linalg.norm(mean)
     axis = int(np.argmax(np.abs(up)))

@@ -112,7 +112,7 @@ class ImuRecord(Record):
         if self.kind == "increments":
             return 0.0, 0.0
         density = self.jitter / math.sqrt(self.interval)
-        gyro, accel = (float(np.sqrt(np.mean(np.diff(x, axis=0) ** 2, axis=0)).max()) for x in (self.gyro, self.accel))
+        gyro, accel = (math.sqrt(max(float(np.mean(np.diff(a) ** 2)) for a in x.T)) for x in (self.gyro, self.accel))
         return density * gyro, density * accel
 
     @classmethod
