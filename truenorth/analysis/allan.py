@@ -6,6 +6,7 @@ of Frequency Stability Analysis*, NIST SP 1065, 2008 (overlapping estimator; deg
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -13,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
@@ -127,20 +129,29 @@ def overlapping_adev(
             f"none of the averaging times fits; choose between {interval:g} s and half the record, "
             f"{count * interval / 2:g} s"
         )
-    theta = np.zeros((*rows.shape[1:], count + 1))  # time last: contiguous differences
-    # The mean is removed first: the second difference does not see it, rounding does.
-    np.cumsum(np.moveaxis(rows - rows.mean(axis=0), 0, -1), axis=-1, out=theta[..., 1:])
-    if kind == "rates":
-        theta *= interval
-
     tau: Array = m.astype(np.float64) * interval
     deviation = np.empty((m.size, *rows.shape[1:]))
-    for i, step in enumerate(m.tolist()):
-        second = theta[..., 2 * step :] - 2.0 * theta[..., step:-step] + theta[..., : -2 * step]
-        deviation[i] = np.sqrt(np.mean(second**2, axis=-1) / 2.0) / tau[i]
+    mean = rows.mean(axis=0)
+    for axis in np.ndindex(rows.shape[1:]):  # one by one: of a long log all at once are much memory
+        theta = np.zeros(count + 1)
+        # The mean is removed first: the second difference does not see it, rounding does.
+        np.cumsum(rows[:, *axis] - mean[axis], out=theta[1:])
+        if kind == "rates":
+            theta *= interval
+        for i, step in enumerate(m.tolist()):
+            deviation[i, *axis] = math.sqrt(_mean_square(theta, step) / 2.0) / tau[i]
     relative: Array = np.sqrt(0.5 / _degrees_of_freedom(count, m))
     sigma: Array = deviation * relative.reshape(-1, *[1] * (rows.ndim - 1))
     return AllanDeviation(tau, deviation, sigma)
+
+
+def _mean_square(theta: Array, step: int) -> float:
+    """Of second differences over so many rows."""
+    count, total = len(theta) - 2 * step, 0.0
+    for part in row_blocks(count):
+        early, middle, late = (theta[part.start + shift : part.stop + shift] for shift in (0, step, 2 * step))
+        total += float(np.sum((late - 2.0 * middle + early) ** 2))
+    return total / count
 
 
 def fit_noise(data: ArrayLike, interval: float, kind: Literal["rates", "increments"]) -> NoiseCoefficients:

@@ -16,7 +16,7 @@ from truenorth.coarse.wahba import triad
 from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.records import ImuRecord
-from truenorth.strapdown.increments import increments, read_only
+from truenorth.strapdown.increments import in_blocks, read_only
 
 Array = NDArray[np.float64]
 BLOCKS = 10  # the scatter of this many block means shows how well the mean is known
@@ -43,11 +43,12 @@ class Means:
 
 def means(record: ImuRecord) -> Means:
     """Mean rate and specific force of a record."""
-    dtheta, dvel = increments(record)
     starts = np.linspace(0, len(record), min(BLOCKS, len(record)) + 1).astype(int)[:-1]
     blocks = len(starts)
-    sums = np.empty((blocks, 7))
-    _block_sums(read_only(record.steps), read_only(dtheta), read_only(dvel), np.append(starts, len(record)), sums)
+    sums, edges = np.zeros((blocks, 7)), np.append(starts, len(record))
+    for rows, dtheta, dvel in in_blocks(record):
+        inside = np.clip(edges, rows.start, rows.stop) - rows.start
+        _block_sums(read_only(record.steps[rows]), read_only(dtheta), read_only(dvel), inside, sums)
     T, total = sums[:, :1], sums.sum(axis=0)
     w, f = sums[:, 1:4] / T, sums[:, 4:] / T
     return Means(
@@ -60,10 +61,8 @@ def means(record: ImuRecord) -> Means:
 
 @compiled
 def _block_sums(steps: Any, dtheta: Any, dvel: Any, edges: Any, sums: Any) -> None:
-    """Sums (B, 7) of time, angle and velocity over the rows between edges (B + 1,)."""
+    """Add time, angle and velocity of the rows between edges (B + 1,) to sums (B, 7)."""
     for b in range(len(sums)):
-        for j in range(7):
-            sums[b, j] = 0.0
         for k in range(edges[b], edges[b + 1]):
             sums[b, 0] += steps[k]
             for i in range(3):

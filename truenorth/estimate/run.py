@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding import row
 from truenorth.aiding.source import Aiding
+from truenorth.core.blocks import row_blocks
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.linalg import padded
 from truenorth.errors.axes import known_as_bias
@@ -41,7 +42,7 @@ from truenorth.filters.recursion import NO_INNOVATION_VARIANCE, SOUND
 from truenorth.records import ImuRecord
 from truenorth.state.layout import ACCEL_AXES, BA, BG
 from truenorth.state.state import Start
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Residuals, Track, in_one
 from truenorth.strapdown import wander
 from truenorth.strapdown.increments import ImuRows, increments, interval_lengths, read_only
 
@@ -209,8 +210,12 @@ def navigate_track(
     time = float(record.time[0] - steps[0])
     stride = max(1, round(interval * len(record) / (record.time[-1] - time)))
     setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant)
-    state = begin(setting, start, time, record.interval, prior)
-    return go_on(setting, state, record, last=True)[1]
+    state, tracks = begin(setting, start, time, record.interval, prior), []
+    for rows in [slice(0, len(record))] if smooth else row_blocks(len(record)):
+        part = ImuRows(record.time[rows], record.gyro[rows], record.accel[rows], record.kind, record.source)
+        state, track = go_on(setting, state, part, last=rows.stop == len(record))
+        tracks.append(track)
+    return in_one(tracks)
 
 
 def with_states(model: InsModel, aiding: Sequence[Aiding]) -> InsModel:

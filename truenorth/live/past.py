@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import ARRAYS, RESIDUALS, Residuals, Track
 
 Array = NDArray[np.float64]
 
 MOST_EPOCHS = 4000  # of the track; beyond it every second one is dropped
 MOST_ROWS = 3000  # of a source's innovations: those that the judge looks at
 BATCH = 200  # tracks that are put together at once
-
-_ARRAYS = ("time", "C_nb", "v_n", "position", "sensors", "P")
-_RESIDUALS = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")
 
 
 class Past:
@@ -77,11 +74,11 @@ class Past:
 
 
 def _epochs(track: Track, rows: slice) -> Track:
-    return replace(track, residuals=(), **{name: getattr(track, name)[rows].copy() for name in _ARRAYS})
+    return replace(track, residuals=(), **{name: getattr(track, name)[rows].copy() for name in ARRAYS})
 
 
 def _together(tracks: list[Track]) -> Track:
-    arrays: dict[str, Any] = {name: np.concatenate([getattr(t, name) for t in tracks]) for name in _ARRAYS}
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(t, name) for t in tracks]) for name in ARRAYS}
     return replace(tracks[0], **arrays)
 
 
@@ -89,6 +86,6 @@ def _joined(first: Residuals | None, second: Residuals) -> Residuals:
     if first is None:
         return second
     parts: dict[str, Any] = {}
-    for name in _RESIDUALS:
+    for name in RESIDUALS:
         parts[name] = np.concatenate([getattr(first, name), getattr(second, name)])[-MOST_ROWS:]
     return replace(second, **parts)

@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.earth import EARTH_RATE, GRAVITY_EQUATOR
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.signals import white_noise
@@ -47,15 +48,15 @@ def _densities(record: ImuRecord) -> tuple[Array, Array, Array]:
     count = len(record) // max(rows, 1)
     if rows < (FEWEST + ORDER) * ROWS[-1] or count < 3 or record.gaps.size:
         return np.zeros(0), np.zeros((0, 6)), np.zeros((0, 6))
-    data = np.hstack([record.gyro, record.accel])[: count * rows].reshape(count, rows, 6)
-    if record.kind == "increments":
-        data = data / dt
-    found = []
-    for m in ROWS:
-        cells = data[:, : rows // m * m].reshape(count, rows // m, m, 6).mean(axis=2)
-        rough = np.diff(cells, n=ORDER, axis=1)
-        found.append(np.sqrt(np.mean(rough**2, axis=1) * m * dt / GAIN))
-    density = np.array(found)  # (len(ROWS), S, 6)
+    density = np.empty((len(ROWS), count, 6))
+    for part in row_blocks(count * rows, rows):
+        data = np.hstack([record.gyro[part], record.accel[part]]).reshape(-1, rows, 6)
+        if record.kind == "increments":
+            data = data / dt
+        for of_m, m in zip(density[:, part.start // rows : part.stop // rows], ROWS, strict=True):
+            cells = data[:, : rows // m * m].reshape(len(data), rows // m, m, 6).mean(axis=2)
+            rough = np.diff(cells, n=ORDER, axis=1)
+            of_m[:] = np.sqrt(np.mean(rough**2, axis=1) * m * dt / GAIN)
     low, high = density.min(axis=0), density.max(axis=0)
     start = float(record.time[0]) - dt
     edges = np.append(start, record.time[rows - 1 : count * rows : rows])

@@ -8,10 +8,13 @@ vibration jump as well, but no exchange of rows makes them smooth.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truenorth.core.blocks import row_blocks
 
 Array = NDArray[np.float64]
 
@@ -28,28 +31,31 @@ class Exchanged(NamedTuple):
     rows: NDArray[np.intp]  # first row of each pair
 
 
-def exchanged_packets(data: Array) -> Exchanged | None:
+def exchanged_packets(data: Sequence[Array]) -> Exchanged | None:
     """Pairs of packets of one length that have changed places, or None.
 
     Parameters
     ----------
-    data : (6, N) array
+    data : six arrays (N,)
         Gyros and accelerometers.
     """
-    count = data.shape[1]
+    count = len(data[0])
     if count < 2 * LONGEST + 6:
         return None
     jumps = np.zeros(count + 1, dtype=np.bool_)  # between row k - 1 and row k
     beyond, usual = np.zeros(count - 3), np.zeros(len(data))
     for i, x in enumerate(data):  # one after the other: of a long log all six at once are much memory
-        squares = _beyond(x[:-3], x[1:-2], x[2:-1], x[3:])
-        usual[i] = np.median(squares)
+        squares = np.empty(count - 3)
+        for part, jump in _in_blocks(x):
+            squares[part] = jump
+        usual[i] = np.median(squares, overwrite_input=True)
         if usual[i] > 0.0:
-            beyond += squares / usual[i]
+            for part, jump in _in_blocks(x):
+                beyond[part] += jump / usual[i]
     known = usual > 0.0
     if not known.any():
         return None
-    data, usual = data[known], usual[known]
+    data, usual = [x for x, there in zip(data, known, strict=True) if there], usual[known]
     jumps[2 : count - 1] = beyond > JUMP
     best: Exchanged | None = None
     for length in range(1, LONGEST + 1):
@@ -61,16 +67,23 @@ def exchanged_packets(data: Array) -> Exchanged | None:
     return best
 
 
-def _smooth_exchanged(data: Array, usual: Array, first: NDArray[np.intp], length: int) -> NDArray[np.bool_]:
+def _smooth_exchanged(data: Sequence[Array], usual: Array, first: NDArray[np.intp], length: int) -> NDArray[np.bool_]:
     """Whether all three edges are ordinary, with the packets from these rows on exchanged back."""
     offset = np.arange(-2, 2 * length + 2)
     inside = (offset >= 0) & (offset < 2 * length)
     offset[inside] = (offset[inside] + length) % (2 * length)
     smooth = np.ones(len(first), dtype=np.bool_)
     for edge in (2, 2 + length, 2 + 2 * length):
-        a, b, c, d = (data[:, first + offset[edge + k]] for k in (-2, -1, 0, 1))
+        a, b, c, d = (np.array([x[first + offset[edge + k]] for x in data]) for k in (-2, -1, 0, 1))
         smooth &= np.einsum("ik,i->k", _beyond(a, b, c, d), 1.0 / usual) < ORDINARY
     return smooth
+
+
+def _in_blocks(x: Array) -> Iterator[tuple[slice, Array]]:
+    """Squares of the jumps of a channel, of few rows at once."""
+    for part in row_blocks(len(x) - 3):
+        near = x[part.start : part.stop + 3]
+        yield part, _beyond(near[:-3], near[1:-2], near[2:-1], near[3:])
 
 
 def _beyond(a: Array, b: Array, c: Array, d: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,10 +77,11 @@ def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
     """
     findings: list[Finding] = []
     jitter_rms, jitter_max = _clock(record, findings)
-    data = np.ascontiguousarray(np.hstack([record.gyro, record.accel]).T)
-    same = data[:, 1:] == data[:, :-1]
+    data = [*record.gyro.T, *record.accel.T]  # one after the other: of a long log all six at once are much memory
+    exchanged = _exchanged(record, data)
+    same = np.array([x[1:] == x[:-1] for x in data])
     repeated = _repeated(record, same, findings)
-    _exchanged(record, data, findings)
+    findings += exchanged
     found: list[Finding] = []
     runs, at = _frozen(record, data, same, found)
     saturated = _saturated(record, data, found)
@@ -163,13 +165,13 @@ def _evenly(same: NDArray[np.bool_]) -> bool:
     return len(runs) > FEWEST_RUNS and float(np.var(runs)) < EVENLY * share / (1.0 - share) ** 2
 
 
-def _exchanged(record: ImuRecord, data: Array, findings: list[Finding]) -> None:
+def _exchanged(record: ImuRecord, data: Sequence[Array]) -> list[Finding]:
     packets = exchanged_packets(data)
     if packets is None:
-        return
+        return []
     length, first = packets.length, int(packets.rows[0])
     share = 2.0 * length * len(packets.rows) / len(record)
-    findings.append(
+    return [
         Finding(
             "error" if share > EXCHANGED_SHARE else "warning",
             "reordered_rows",
@@ -177,32 +179,29 @@ def _exchanged(record: ImuRecord, data: Array, findings: list[Finding]) -> None:
             f"before row {first + 1} (t = {record.time[first]:.3f} s): exchanged back the log is smooth there; expected rows in "
             "the order in which they were measured: order them by the sensor's own counter or clock",
         )
-    )
+    ]
 
 
 def _frozen(
-    record: ImuRecord, data: Array, same: NDArray[np.bool_], findings: list[Finding]
+    record: ImuRecord, data: Sequence[Array], same: NDArray[np.bool_], findings: list[Finding]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Longest run of each channel and where it begins; a finding where chance does not explain it."""
     chance = np.minimum(_chance_of_repeat(same), 0.98)
     by_chance = np.log(len(record)) / -np.log(np.maximum(chance, 1e-3))
     runs, at = np.empty(6, dtype=np.intp), np.empty(6, dtype=np.intp)
     for channel, name in enumerate(COLUMNS[record.kind]):
-        changes = np.concatenate([[0], np.flatnonzero(~same[channel]) + 1, [len(record)]])
-        lengths = np.diff(changes)
-        longest = int(np.argmax(lengths))
-        runs[channel] = lengths[longest]
-        first = at[channel] = int(changes[longest])
+        runs[channel], first = _longest_run(same[channel])
+        at[channel] = first
         limit = max(10.0, FROZEN_TIME / record.interval, FROZEN_FACTOR * by_chance[channel])
         if runs[channel] == len(record):
             dead = _is_dead(data, channel)
             # Where the other sensor has noise, no simulation without noise made the log.
-            coarse = not dead and float(np.ptp(data[3:] if channel < 3 else data[:3], axis=1).min()) > 0.0
+            coarse = not dead and min(map(np.ptp, data[3:] if channel < 3 else data[:3])) > 0.0
             findings.append(
                 Finding(
                     "error" if dead else "warning" if coarse else "note",
                     "constant_channel" if dead else "no_noise",
-                    f"{name} is {data[channel, 0]:g} in all {len(record)} rows; expected a sensor's noise: the "
+                    f"{name} is {data[channel][0]:g} in all {len(record)} rows; expected a sensor's noise: the "
                     + ("channel is dead or not connected" if dead else "log is simulated without noise, or coarse"),
                 )
             )
@@ -211,7 +210,7 @@ def _frozen(
                 Finding(
                     "warning",
                     "frozen",
-                    f"{name} stays at {data[channel, first]:g} for {runs[channel]} rows from row {first + 1} "
+                    f"{name} stays at {data[channel][first]:g} for {runs[channel]} rows from row {first + 1} "
                     f"(t = {record.time[first]:.3f} s); expected at most about {limit:.0f} equal values: the sensor "
                     "or the log was stuck; leave this stretch out",
                 )
@@ -219,7 +218,18 @@ def _frozen(
     return runs, at
 
 
-def _without_noise(data: Array, same: NDArray[np.bool_]) -> bool:
+def _longest_run(same: NDArray[np.bool_]) -> tuple[int, int]:
+    """How many rows the longest run of one value has, and its first row; `same`: of the rows that repeat the one before."""
+    repeats = np.flatnonzero(same)  # few, as a rule
+    if not repeats.size:
+        return 1, 0
+    starts = np.append(0, np.flatnonzero(np.diff(repeats) > 1) + 1)
+    lengths = np.diff(np.append(starts, len(repeats)))
+    longest = int(np.argmax(lengths))
+    return int(lengths[longest]) + 1, int(repeats[starts[longest]])
+
+
+def _without_noise(data: Sequence[Array], same: NDArray[np.bool_]) -> bool:
     """Whether a simulation without noise made the log: values that stay, and that follow a line where they do not.
 
     A sensor or a log that is stuck for a while has noise elsewhere, in these channels or in others; a coarse quantum, which may
@@ -229,24 +239,28 @@ def _without_noise(data: Array, same: NDArray[np.bool_]) -> bool:
     inside = changes[1:] & changes[:-1]
     if np.count_nonzero(inside) < FEWEST:
         return False
-    size = np.repeat([np.abs(data[:3]).max(), np.abs(data[3:]).max()], 3)
-    rough = np.median(np.abs(np.diff(data, n=2))[:, inside], axis=1)
-    steps = np.abs(np.diff(data))
-    finest = np.min(steps, axis=1, initial=np.inf, where=steps > 0.0)
+    size = np.repeat([_largest(data[:3]), _largest(data[3:])], 3)
+    rough = np.array([np.median(np.abs(np.diff(x, n=2))[inside]) for x in data])
+    steps = (np.abs(np.diff(x)) for x in data)
+    finest = np.array([np.min(step, initial=np.inf, where=step > 0.0) for step in steps])
     return bool(np.all(rough <= NOISELESS * size) and np.any(finest <= NOISELESS * size))
 
 
-def _is_dead(data: Array, channel: int) -> bool:
+def _is_dead(data: Sequence[Array], channel: int) -> bool:
     """Whether a constant channel is dead: its sensor's other channels have noise, or all three are zero.
 
     Where none of the three has noise beyond rounding, the log comes from a simulation without noise.
     """
     sensor = data[:3] if channel < 3 else data[3:]
-    size = float(np.abs(sensor).max())
-    return size == 0.0 or bool(np.ptp(sensor, axis=1).max() > ROUNDING * size)
+    size = _largest(sensor)
+    return size == 0.0 or bool(max(np.ptp(x) for x in sensor) > ROUNDING * size)
 
 
-def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArray[np.intp]:
+def _largest(sensor: Sequence[Array]) -> float:
+    return max(float(np.abs(x).max()) for x in sensor)
+
+
+def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]) -> NDArray[np.intp]:
     """Rows at an extreme that is piled up: clipping breaks the fall of the tail, a coarse quantum does not."""
     rows = np.zeros(6, dtype=np.intp)
     unit = ("rad/s", "m/s^2") if record.kind == "rates" else ("rad a row", "m/s a row")
@@ -261,15 +275,15 @@ def _saturated(record: ImuRecord, data: Array, findings: list[Finding]) -> NDArr
                 continue
             if -float(signed.min()) > RANGE_SLACK * abs(top):  # a range has two sides alike: this one is not its end
                 continue
-            below = signed[~at_top]
-            second = float(below.max())
-            inside = int(np.count_nonzero(below == second))
-            consecutive = np.convolve(at_top, np.ones(SATURATED_RUN), "valid").max() >= SATURATED_RUN
+            second = float(np.max(signed, where=~at_top, initial=-np.inf))
+            inside = int(np.count_nonzero(signed == second))
+            rows_at = np.flatnonzero(at_top)
+            consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
             spread = top - float(np.median(signed))
             often = count > PILED * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often)
             # Values that have many digits are never alike by chance, wherever the next ones stand.
-            if piled and (spread > 5.0 * (top - second) or (often and top - second > PILED * _finest(below))):
+            if piled and (spread > 5.0 * (top - second) or (often and top - second > PILED * _finest(signed[~at_top]))):
                 rows[channel] += count
                 findings.append(
                     Finding(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,10 @@ from numpy.typing import NDArray
 from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, Layout
 
 Array = NDArray[np.float64]
+
+
+ARRAYS = ("time", "C_nb", "v_n", "position", "sensors", "P")  # of a track, a row an epoch
+RESIDUALS = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")  # of residuals, a row a measurement
 
 
 @dataclass(frozen=True)
@@ -93,3 +99,17 @@ class Track:
     def sigma(self) -> Array:
         """(K, n) one-sigma of the errors."""
         return np.sqrt(np.maximum(np.einsum("kii->ki", self.P), 0.0))
+
+
+def in_one(tracks: Sequence[Track]) -> Track:
+    """Tracks that follow each other, of one model and the same sources, as one."""
+    if len(tracks) == 1:
+        return tracks[0]
+    together = zip(*(track.residuals for track in tracks), strict=True)
+    return _joined(tracks, ARRAYS, residuals=tuple(_joined(parts, RESIDUALS) for parts in together))
+
+
+def _joined(parts: Sequence[Any], names: Sequence[str], **more: Any) -> Any:
+    """What has the arrays of all, and the rest of the last."""
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[-1], **arrays, **more)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.core.blocks import row_blocks
 from truenorth.core.errors import DataError
 from truenorth.records import GAP_FACTOR, ImuRecord
 
@@ -71,6 +73,23 @@ def increments(
     third = np.flatnonzero(regular[2:] & regular[1:-1]) + 2
     result[third] = T[third] / 12.0 * (5.0 * rows[third] + 8.0 * rows[third - 1] - rows[third - 2])
     return np.ascontiguousarray(result[earlier:, :3]), np.ascontiguousarray(result[earlier:, 3:])
+
+
+def in_blocks(record: ImuRecord) -> Iterator[tuple[slice, Array, Array]]:
+    """Increments as :func:`increments` gives them, to the bit, but of few rows at once: slice of the rows, dtheta, dvel."""
+    if record.kind == "increments":
+        yield slice(0, len(record)), record.gyro, record.accel
+        return
+    for rows in row_blocks(len(record)):
+        yield rows, *increments(_rows(record, rows), _before(record, rows.start), record.interval)
+
+
+def _rows(record: ImuRecord, rows: slice) -> ImuRows:
+    return ImuRows(record.time[rows], record.gyro[rows], record.accel[rows], record.kind, record.source)
+
+
+def _before(record: ImuRecord, row: int) -> ImuRows | None:
+    return None if row == 0 else _rows(record, slice(row - 2, row))
 
 
 def across_gaps(record: ImuRecord) -> ImuRecord:

@@ -20,8 +20,8 @@ from truenorth.core.attitude import skew
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.core.errors import AlignmentError
 from truenorth.records import ImuRecord
-from truenorth.strapdown.inertial_integration import inertial_integrals, interval_means
-from truenorth.strapdown.level import increments
+from truenorth.strapdown.increments import in_blocks
+from truenorth.strapdown.inertial_integration import at_start, go_on, integrals_of, interval_means
 
 Array = NDArray[np.float64]
 MOST_REMEMBERED = 10_000  # epochs: an alignment has 5000 at the most
@@ -130,7 +130,6 @@ def integrate(
     AlignmentError
         The record is shorter than two filter intervals.
     """
-    dtheta, dvel = increments(record)
     steps = record.steps
     # Edges: edge r stands before row r, at the end of row r - 1.
     edges = np.concatenate(([0.0], np.cumsum(steps)))
@@ -146,9 +145,7 @@ def integrate(
     epochs = np.clip(np.searchsorted(edges, wanted - 0.5 * record.interval), 0, len(record))
     extra = np.asarray(rows_at, dtype=np.int64) + 1
     every, back = np.unique(np.concatenate((epochs, extra)), return_inverse=True)
-    none = np.zeros(3)
-    taken_off = (none if gyro_bias is None else gyro_bias, none if accel_bias is None else accel_bias)
-    C_all, v_all, p_all = inertial_integrals(dtheta, dvel, steps, every, *taken_off)
+    C_all, v_all, p_all = _integrals(record, every, gyro_bias, accel_bias)
     if context:  # every[0] is the edge after the context: epochs begin there
         C_0, v_0, since = C_all[0].T, v_all[0], (edges[every] - edges[every[0]])[:, None]
         C_all, v_all, p_all = C_0 @ C_all, (v_all - v_0) @ C_0.T, (p_all - p_all[0] - since * v_0) @ C_0.T
@@ -167,3 +164,19 @@ def integrate(
         C_late=C_late,
         C_ib_at=C_all[at],
     )
+
+
+def _integrals(
+    record: ImuRecord, every: NDArray[np.int64], gyro_bias: Array | None, accel_bias: Array | None
+) -> tuple[Array, Array, Array]:
+    """Attitude, velocity and position after so many rows each (ascending)."""
+    none = np.zeros(3)
+    bias = np.concatenate([none if gyro_bias is None else gyro_bias, none if accel_bias is None else accel_bias])
+    state, out, done = at_start(), np.empty((len(every), 10)), 0
+    for rows, dtheta, dvel in in_blocks(record):
+        last = rows.stop == len(record)
+        upto = len(every) if last else int(np.searchsorted(every, rows.stop, "right"))
+        epochs = every[done:upto] - rows.start
+        go_on(dtheta, dvel, record.steps[rows], epochs, bias, state, out[done:upto])
+        done = upto
+    return integrals_of(out)

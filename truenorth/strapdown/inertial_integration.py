@@ -6,6 +6,7 @@ design", J. Guid. Control Dyn. 21 (1998), parts 1 and 2.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -99,27 +100,64 @@ def inertial_integrals(
     _, k_before = coefficients("previous")
     bias = np.concatenate([gyro_bias, accel_bias]).astype(np.float64)
     out = np.empty((len(wanted), 10))
-    _inertial_integrals(rows, read_only(dvel), read_only(steps), wanted, bias, k_before, out)
-    C_ib = np.empty((len(wanted), 3, 3))
+    _inertial_integrals(rows, read_only(dvel), read_only(steps), wanted, bias, k_before, at_start(), out)
+    return integrals_of(out)
+
+
+def at_start() -> Array:
+    """(19,) quaternion, velocity, position, last increments of angle and velocity, both in the body, and last step of velocity.
+
+    A first step of velocity that is not known is NaN.
+    """
+    state = np.zeros(19)
+    state[0], state[16:19] = 1.0, np.nan
+    return state
+
+
+def integrals_of(out: Array) -> tuple[Array, Array, Array]:
+    """Attitude, velocity and position of rows (K, 10) that :func:`go_on` has written."""
+    C_ib = np.empty((len(out), 3, 3))
     _directions(out, C_ib)
     return C_ib, out[:, 4:7].copy(), out[:, 7:].copy()
 
 
+def go_on(dtheta: Array, dvel: Array, steps: Array, epochs: Array, bias: Array, state: Array, out: Array) -> None:
+    """:func:`inertial_integrals` of the next rows: from `state`, which is moved on, to the bits of one batch.
+
+    Parameters
+    ----------
+    epochs : (K,) int array
+        Ascending, counted from the first of these rows.
+    bias : (6,) array
+        Of gyros and accelerometers.
+    state : (19,) array
+        Of :func:`at_start`, or as the rows before left it.
+    out : (K, 10) array
+        Written.
+    """
+    _, k_before = coefficients("previous")
+    _inertial_integrals(read_only(dtheta), read_only(dvel), read_only(steps), epochs, bias, k_before, state, out)
+
+
 @compiled
-def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, bias: Any, k_before: float, out: Any) -> None:
-    q = (1.0, 0.0, 0.0, 0.0)
-    vx = vy = vz = px = py = pz = 0.0
-    a = b = before = (0.0, 0.0, 0.0)
+def _inertial_integrals(
+    dtheta: Any, dvel: Any, steps: Any, epochs: Any, bias: Any, k_before: float, state: Any, out: Any
+) -> None:
+    q = (state[0], state[1], state[2], state[3])
+    vx, vy, vz, px, py, pz = state[4], state[5], state[6], state[7], state[8], state[9]
+    a, b = (state[10], state[11], state[12]), (state[13], state[14], state[15])
+    before = (state[16], state[17], state[18])
     row = 0
-    for j in range(len(epochs)):
-        while row < epochs[j]:
+    for j in range(len(epochs) + 1):
+        end = epochs[j] if j < len(epochs) else len(dtheta)
+        while row < end:
             T = steps[row]
             K = (k_before * a[0], k_before * a[1], k_before * a[2])
             L = (k_before * b[0], k_before * b[1], k_before * b[2])
             a = (dtheta[row, 0] - T * bias[0], dtheta[row, 1] - T * bias[1], dtheta[row, 2] - T * bias[2])
             b = (dvel[row, 0] - T * bias[3], dvel[row, 1] - T * bias[4], dvel[row, 2] - T * bias[5])
             f = rotate(q, velocity_increment(K, a, a, L, b, b))
-            if row == 0:
+            if math.isnan(before[0]):
                 before = f
             px += (vx + 0.5 * f[0] - (f[0] - before[0]) / 12.0) * T
             py += (vy + 0.5 * f[1] - (f[1] - before[1]) / 12.0) * T
@@ -131,9 +169,15 @@ def _inertial_integrals(dtheta: Any, dvel: Any, steps: Any, epochs: Any, bias: A
             phi = rotation_vector(K, a, a)
             q = normalised(quaternion_product(q, quaternion_from_rotation_vector(phi)))
             row += 1
-        out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
-        out[j, 4], out[j, 5], out[j, 6] = vx, vy, vz
-        out[j, 7], out[j, 8], out[j, 9] = px, py, pz
+        if j < len(epochs):
+            out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
+            out[j, 4], out[j, 5], out[j, 6] = vx, vy, vz
+            out[j, 7], out[j, 8], out[j, 9] = px, py, pz
+    state[0], state[1], state[2], state[3] = q
+    state[4], state[5], state[6], state[7], state[8], state[9] = vx, vy, vz, px, py, pz
+    state[10], state[11], state[12] = a
+    state[13], state[14], state[15] = b
+    state[16], state[17], state[18] = before
 
 
 @compiled

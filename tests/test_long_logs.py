@@ -1,0 +1,163 @@
+"""Logs of days: what is read, aligned and navigated holds a part of them in memory at a time."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+
+from truenorth import Position, align, imu_spec, navigate, read_imu, write_imu
+from truenorth.core import blocks, mapped
+from truenorth.core.earth import earth_rate_n, normal_gravity
+from truenorth.core.mapped import read_mapped, write_mappable
+from truenorth.quality import sampling
+from truenorth.simulation import Sway, Tone, simulate
+from truenorth.strapdown.increments import in_blocks, increments
+from truenorth.strapdown.inertial import integrate
+
+PLACE = Position.from_degrees(45.0)
+RATE, HOURS = 200.0, 8.0
+
+
+@pytest.fixture(scope="module")
+def record():
+    ship = Sway(PLACE, pitch_tones=(Tone(0.05, 7.0),), roll_tones=(Tone(0.1, 9.0),), lever_arm=(1.0, 2.0, 1.0))
+    return simulate(ship, rate=20.0, duration=120.0, imu=imu_spec("navigation"), seed=1, kind="rates").record
+
+
+@pytest.fixture
+def short_blocks(monkeypatch):
+    """Blocks of few rows, so that a short log has many."""
+    for module in list(sys.modules.values()):
+        if getattr(module, "__name__", "").startswith("truenorth") and getattr(module, "BLOCK", None) == blocks.BLOCK:
+            monkeypatch.setattr(module, "BLOCK", 257)
+
+
+def test_a_large_array_stays_on_the_disk_and_nothing_copies_it(tmp_path, record, monkeypatch):
+    monkeypatch.setattr(mapped.read_mapped, "__defaults__", (1000,))
+    write_imu(record, tmp_path / "log.npz")
+    found = read_imu(tmp_path / "log.npz")
+    for name in ("time", "gyro", "accel"):
+        array = getattr(found, name)
+        np.testing.assert_array_equal(array, getattr(record, name))
+        while isinstance(array.base, np.ndarray):
+            array = array.base
+        assert type(array) is np.memmap
+        assert array.ctypes.data % 64 == 0
+
+
+def test_a_mappable_file_is_one_of_numpy(tmp_path):
+    arrays = {"a": np.arange(7.0), "longer name": np.arange(12).reshape(3, 4), "none": np.zeros((0, 3))}
+    write_mappable(tmp_path / "x.npz", arrays)
+    assert ZipFile(tmp_path / "x.npz").testzip() is None
+    with np.load(tmp_path / "x.npz") as archive:
+        for name, values in arrays.items():
+            np.testing.assert_array_equal(archive[name], values)
+    np.savez_compressed(tmp_path / "packed.npz", **arrays)
+    np.savez(tmp_path / "plain.npz", **arrays)
+    for file in ("x", "packed", "plain"):
+        found = read_mapped(tmp_path / f"{file}.npz", smallest=1)
+        assert list(found) == list(arrays)
+        for name, values in arrays.items():
+            np.testing.assert_array_equal(found[name], values)
+    assert type(read_mapped(tmp_path / "x.npz", smallest=1)["a"]) is np.memmap
+
+
+def test_a_file_that_is_cut_short_is_refused(tmp_path, record):
+    path = tmp_path / "log.npz"
+    write_imu(record, path)
+    path.write_bytes(path.read_bytes()[:-30_000])
+    with pytest.raises(Exception, match="damaged or cut short"):
+        read_imu(path)
+
+
+def test_blocks_have_the_bits_of_the_whole(record, short_blocks):
+    whole = increments(record)
+    parts = list(in_blocks(record))
+    assert len(parts) > 8
+    for i in range(2):
+        np.testing.assert_array_equal(np.concatenate([part[1 + i] for part in parts]), whole[i])
+
+
+def figures(record):
+    found = integrate(record, 1.0, np.full(3, 1e-6), np.full(3, 1e-4), rows_at=[3, 700, len(record) - 1])
+    return [*(getattr(found, name) for name in ("time", "C_ib", "velocity", "position", "C_mean", "C_ib_at"))]
+
+
+def test_the_inertial_frame_goes_on_from_block_to_block(record, request):
+    whole = figures(record)
+    request.getfixturevalue("short_blocks")
+    for part, one in zip(figures(record), whole, strict=True):
+        np.testing.assert_array_equal(part, one)
+
+
+def test_faults_of_a_log_are_the_same_in_blocks(record, request):
+    accel = np.array(record.accel)
+    accel[1000:1100, 2] = accel[1000, 2]
+    stuck = type(record)(record.time, record.gyro, accel, record.kind)
+    whole = sampling.check_sampling(stuck)
+    assert whole[0].longest_runs[5] == 100
+    assert whole[0].longest_at[5] == 1000
+    request.getfixturevalue("short_blocks")
+    again = sampling.check_sampling(type(record)(record.time, record.gyro, accel, record.kind))
+    assert again[1] == whole[1]
+
+
+def test_answers_are_the_same_in_blocks(record, request):
+    record = record.between(None, 60.0)
+    found = align(record, PLACE, "navigation", method="kalman", at=30.0)
+    track = navigate(record, found, check_clocks=False).track
+    request.getfixturevalue("short_blocks")
+    again = align(copy_of(record), PLACE, "navigation", method="kalman", at=30.0)
+    np.testing.assert_allclose(again.C_nb, found.C_nb, rtol=0.0, atol=1e-11)
+    in_blocks_ = navigate(record, found, check_clocks=False).track
+    for name in ("time", "C_nb", "v_n", "position", "P"):
+        np.testing.assert_array_equal(getattr(in_blocks_, name), getattr(track, name))
+
+
+def copy_of(record):
+    """The same log; nothing that was remembered of the other."""
+    return type(record)(record.time, record.gyro, record.accel, record.kind)
+
+
+LIMIT = 1 << 30  # bytes that a command may ask the system for, the log on the disk not among them
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="the limit counts memory that is mapped on Linux alone"
+)
+def test_a_log_of_a_night_takes_less_memory_than_its_rows(tmp_path):
+    rows = round(HOURS * 3600.0 * RATE)
+    log = tmp_path / "log.npz"
+    rest_for(rows, log)
+    assert log.stat().st_size > 300 << 20
+    start = ["align", str(log), "--lat", "45", "--imu", "navigation", "--to", "900", "-o", str(tmp_path / "start")]
+    for command in (start, start[:-4], ["navigate", str(log), "--start", str(tmp_path / "start")]):
+        done = subprocess.run(
+            [sys.executable, "-m", "truenorth", *command],
+            capture_output=True,
+            text=True,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (LIMIT, LIMIT)),
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+
+
+def rest_for(rows, path):
+    """A log at rest, its arrays on the disk while they are made."""
+    rng = np.random.default_rng(1)
+    arrays = {
+        name: np.lib.format.open_memmap(path.with_name(f"{name}.npy"), "w+", np.float64, (rows, *shape))
+        for name, shape in (("time", ()), ("gyro", (3,)), ("accel", (3,)))
+    }
+    gravity = np.array([0.0, 0.0, float(normal_gravity(PLACE.lat, 0.0))])
+    for part in blocks.row_blocks(rows):
+        k = np.arange(part.start, part.stop)
+        arrays["time"][part] = (k + 1) / RATE
+        arrays["gyro"][part] = earth_rate_n(PLACE.lat) + 4e-6 * rng.standard_normal((len(k), 3))
+        arrays["accel"][part] = gravity + 7e-4 * rng.standard_normal((len(k), 3))
+    write_mappable(path, arrays)
