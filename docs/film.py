@@ -64,7 +64,7 @@ def film(answer: tn.Alignment, what: str) -> str:
     line = _points(x, axes.y(heading[rows]))
     edges = axes.y(heading[rows] + sigma[rows]), axes.y(heading[rows] - sigma[rows])
     band = f"{_points(x, edges[0])} {_points(x[::-1], edges[1][::-1])}"
-    share, full = RUN / (RUN + HOLD), WIDTH - LEFT
+    share, full, inside = RUN / (RUN + HOLD), WIDTH - LEFT, HEIGHT - TOP - BOTTOM
     shown = f'<animate attributeName="width" {FOREVER} values="0;{full};{full}" keyTimes="0;{share:.4f};1"/>'
     final = f"{heading[-1] % 360:.2f} degrees, one sigma {sigma[-1]:.2f}"
     look = ".big{font-size:24px;font-weight:700;fill:#0072b2} .title{font-size:17px;font-weight:600}"
@@ -76,7 +76,7 @@ def film(answer: tn.Alignment, what: str) -> str:
             f'<text x="{LEFT}" y="26" class="title">Heading, as known after each second</text>',
             f'<text x="{LEFT}" y="50">{what}; band: one sigma</text>',
             *_scales(axes),
-            f'<clipPath id="seen"><rect x="{LEFT}" y="{TOP}" height="{HEIGHT - TOP - BOTTOM}" width="{full}">{shown}</rect></clipPath>',
+            f'<clipPath id="seen"><rect x="{LEFT}" y="{TOP}" height="{inside}" width="{full}">{shown}</rect></clipPath>',
             f'<g clip-path="url(#seen)"><polygon points="{band}" fill="#0072b2" fill-opacity="0.2"/>',
             f'<polyline points="{line}" fill="none" stroke="#0072b2" stroke-width="2"/></g>',
             *_counter(t, heading, sigma, share),
