@@ -10,9 +10,9 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
+from benchmarks.bench_days import RATE, at_rest
 from truenorth import Position, align, imu_spec, navigate, read_imu, write_imu
 from truenorth.core import blocks, mapped
-from truenorth.core.earth import earth_rate_n, normal_gravity
 from truenorth.core.mapped import read_mapped, write_mappable
 from truenorth.quality import sampling
 from truenorth.simulation import Sway, Tone, simulate
@@ -20,7 +20,7 @@ from truenorth.strapdown.increments import in_blocks, increments
 from truenorth.strapdown.inertial import integrate
 
 PLACE = Position.from_degrees(45.0)
-RATE, HOURS = 200.0, 8.0
+HOURS = 8.0
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +134,7 @@ LIMIT = 1 << 30  # bytes that a command may ask the system for, the log on the d
 def test_a_log_of_a_night_takes_less_memory_than_its_rows(tmp_path):
     rows = round(HOURS * 3600.0 * RATE)
     log = tmp_path / "log.npz"
-    rest_for(rows, log)
+    at_rest(log, rows)
     assert log.stat().st_size > 300 << 20
     start = ["align", str(log), "--lat", "45", "--imu", "navigation", "--to", "900", "-o", str(tmp_path / "start")]
     for command in (start, start[:-4], ["navigate", str(log), "--start", str(tmp_path / "start")]):
@@ -145,19 +145,3 @@ def test_a_log_of_a_night_takes_less_memory_than_its_rows(tmp_path):
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (LIMIT, LIMIT)),
         )
         assert done.returncode == 0, done.stderr[-2000:]
-
-
-def rest_for(rows, path):
-    """A log at rest, its arrays on the disk while they are made."""
-    rng = np.random.default_rng(1)
-    arrays = {
-        name: np.lib.format.open_memmap(path.with_name(f"{name}.npy"), "w+", np.float64, (rows, *shape))
-        for name, shape in (("time", ()), ("gyro", (3,)), ("accel", (3,)))
-    }
-    gravity = np.array([0.0, 0.0, float(normal_gravity(PLACE.lat, 0.0))])
-    for part in blocks.row_blocks(rows):
-        k = np.arange(part.start, part.stop)
-        arrays["time"][part] = (k + 1) / RATE
-        arrays["gyro"][part] = earth_rate_n(PLACE.lat) + 4e-6 * rng.standard_normal((len(k), 3))
-        arrays["accel"][part] = gravity + 7e-4 * rng.standard_normal((len(k), 3))
-    write_mappable(path, arrays)
