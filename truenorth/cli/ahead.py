@@ -93,6 +93,19 @@ def filter_sway() -> None:
     _filtered(SWAY_STATES)
 
 
+def sway() -> None:
+    """What a motion of the base looks like, but for its likelihood: the first process is at that meanwhile."""
+    import numpy as np
+
+    from truenorth.alignment.motion_likelihood import Series, Walks, parameters
+    from truenorth.errors.sway import AxisMotion, Oscillator
+
+    motion = AxisMotion(1.0, (Oscillator(1, 1.0, 1.0, 0.1),))
+    orders, logs = parameters(motion)
+    Series(np.zeros(16), 1.0, Walks(1.0, 1.0)).expected(orders, logs[None])
+    motion.blocks(1.0)
+
+
 def match() -> None:
     """Gains, and what begins in the log."""
     from types import SimpleNamespace
@@ -110,10 +123,10 @@ def match() -> None:
     fine: Any = SimpleNamespace(system=system, estimates=estimates, gains=gains)
     state, measured, course = np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((K, m, 1))
     one = Signatures(np.zeros(1, dtype=np.int64), state, measured, np.zeros((1, 1)), state, course)
+    initial_part(gains.step, system.P0)
     matched(innovations_of(fine), one)
     through(gains, course)
     seen_of(fine, np.zeros((K, 6, 1)))
-    initial_part(gains.step, system.P0)
 
 
 def turn() -> None:
@@ -133,4 +146,4 @@ def filter_own() -> None:
     _filtered(STATES)
 
 
-JOBS: tuple[Callable[[], None], ...] = (filter_sway, match, turn, filter_own)
+JOBS: tuple[Callable[[], None], ...] = (filter_sway, sway, match, turn, filter_own)
