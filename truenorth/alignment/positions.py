@@ -21,7 +21,7 @@ from truenorth.alignment.fine import FineAlignment, attitude_history
 from truenorth.alignment.inference import infer_spec
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.table import TablePosition, TurntableErrors
-from truenorth.alignment.task import Task, bridged, level_of, make_task
+from truenorth.alignment.task import Task, bridged, level_of, make_task, noise_in
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.alignment.verdict import base_evidence, judged, leaves
 from truenorth.coarse import Means, means, oba
@@ -100,7 +100,7 @@ def align_positions(
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
     if not arm_sigma >= 0.0:
         raise UsageError(f"arm_sigma {arm_sigma:g} m; expected zero or more")
-    spec = None if imu is None else imu_spec(imu).seen_in(record)
+    spec = None if imu is None else noise_in(record, imu_spec(imu))
     if calibration is not None:
         record = calibration.apply(record)
     task = make_task(bridged(record), position, None)

@@ -27,7 +27,7 @@ from truenorth.alignment.published import FADING, factor_share, faded_align, tur
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
-from truenorth.alignment.task import Task, bridged, make_task
+from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
@@ -113,7 +113,7 @@ def align_rotary(
         raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
     if not 0.0 <= offset_sigma < math.inf:
         raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
-    spec = imu_spec(imu).seen_in(record)
+    spec = noise_in(record, imu_spec(imu))
     record = bridged(record)
     if record.duration < SHORTEST:
         raise AlignmentError(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.matching import FIRST_NOISE, Matched, Translation, What, first_noise, matched
 from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.task import bridged
+from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
 from truenorth.alignment.transfer_filter import (
     TRANSLATIONS,
@@ -140,7 +140,7 @@ def align_transfer(
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and not what.attitude:
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
-    spec = imu_spec("industrial" if imu is None else imu).seen_in(slave)
+    spec = noise_in(slave, imu_spec("industrial" if imu is None else imu))
     where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
     if calibration is not None:
         slave = calibration.apply(slave)
