@@ -58,7 +58,7 @@ _RC: dict[Any, Any] = {
 PLAIN_BELOW = 4  # powers of ten, below which a number on a logarithmic axis is written out: 60, not 6 x 10^1
 
 
-class _Figure(Figure):
+class Drawing(Figure):
     """A figure whose logarithmic axes have plain numbers; matplotlib looks that up when it draws, after `style` has ended."""
 
     def draw(self, renderer: Any) -> None:
@@ -75,7 +75,7 @@ def style() -> Iterator[None]:
 
 def new_figure(width: float = 9.0, height: float = 6.0) -> Figure:
     """Make a figure of this size, inches, that belongs to no window; its `savefig` works without a display."""
-    return _Figure(figsize=(width, height), layout="constrained")
+    return Drawing(figsize=(width, height), layout="constrained")
 
 
 def band(
