@@ -62,6 +62,7 @@ class Drawing(Figure):
     """A figure whose logarithmic axes have plain numbers; matplotlib looks that up when it draws, after `style` has ended."""
 
     def draw(self, renderer: Any) -> None:
+        """Draw as matplotlib does, with plain numbers."""
         with mpl.rc_context({"axes.formatter.min_exponent": PLAIN_BELOW}):
             super().draw(renderer)
 
