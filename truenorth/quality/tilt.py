@@ -43,6 +43,7 @@ HINT = 1e-3  # of a delay: its tilt is added to sigma, no more
 LEAST_SCALE = 0.005  # no gyro of a specification has a larger error of scale, or misalignment in rad
 LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
 IDENTITY = "+x +y +z"
+AXES = np.eye(3)
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
 EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
 
@@ -71,6 +72,8 @@ class Tilt:
         RMS of the turns about each axis in a piece.
     pieces : int
         From whose scatter the sigmas are.
+    by_axis, by_axis_sigma : (3,) arrays, s
+        The delay by the turns about each axis alone, and its one-sigma.
     """
 
     given: float
@@ -84,6 +87,8 @@ class Tilt:
     scale_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turned: Array = field(default_factory=lambda: np.zeros(3))
     pieces: int = 2
+    by_axis: Array = field(default_factory=lambda: np.zeros(3))
+    by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -102,7 +107,8 @@ class Tilt:
         found = []
         sure, clear, hint = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR, HINT))
         if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma):
-            kind: Kind = "bounded" if abs(self.delay) >= sure * self.delay_sigma else "hint"
+            certain = abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
+            kind: Kind = "bounded" if certain else "hint"
             found.append(Evidence(late, figures, kind, Effect(level=self.tilt), ("common_clock",)))
         off = np.abs(self.scale)
         for i in np.flatnonzero(off >= np.maximum(least_scale(self.turned), clear * self.scale_sigma)):
@@ -110,6 +116,11 @@ class Tilt:
             figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
             found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
         return found
+
+    def _on_two_axes(self, sure: float) -> bool:
+        """Whether turns about two axes show it alike: a base that moves to and fro in the time of a sway looks like it by itself."""
+        shown = (self.by_axis * np.sign(self.delay) >= sure * self.by_axis_sigma) & (self.by_axis_sigma > 0.0)
+        return bool(np.count_nonzero(shown) > 1)
 
 
 def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) -> Tilt | None:
@@ -157,12 +168,14 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     # Scale factors are fitted on a straight line, and the base's motion along the sway may pass for them. With half of what was
     # found taken off, and with all, the gyros must turn better and better.
     clear = student_limit(CLEAR, len(theta) - 1)
-    wrong = np.where(np.abs(little[1:]) >= np.maximum(least_scale(turns), clear * sigma[1:]), little[1:], 0.0)
+    scale, sigma_scale = little[1:4], sigma[1:4]
+    wrong = np.where(np.abs(scale) >= np.maximum(least_scale(turns), clear * sigma_scale), scale, 0.0)
     if wrong.any():
         half, whole = (bench.left(theta / np.maximum(1.0 + part * wrong, 0.1)) for part in (0.5, 1.0))
         if not whole < half < given:
-            sigma[1:] = np.inf
-    return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, little[1:], sigma[1:], turns, len(theta))
+            sigma_scale = np.full(3, np.inf)
+    each = little[4:], sigma[4:]
+    return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, scale, sigma_scale, turns, len(theta), *each)
 
 
 def least_scale(turned: Array) -> Array:
@@ -220,36 +233,44 @@ class _Bench:
         return math.sqrt(_left(flat[:, 0], flat[:, 1:]) / len(flat))
 
     def small(self, theta: Array) -> tuple[Array, Array]:
-        """(4,) a small delay of the gyros, s, and errors of their scale factors, with one-sigmas by leaving out piece after piece.
+        """(7,) a small delay of the gyros, s, errors of their scale factors, delays by turns about each axis; and one-sigmas.
 
         The base's own motion is in these, and what a single piece alone shows has no small one.
         """
         flat, C = self._carried(theta)
         up = (C @ self.force[..., None])[..., 0]
         rate = (C @ (theta / self.interval)[..., None])[..., 0]
+        rate -= rate.mean(axis=1, keepdims=True)
         turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
         angle = np.cumsum(turns, axis=1) - 0.5 * turns
-        columns = [np.cross(rate - rate.mean(axis=1, keepdims=True), up)]
-        columns += [np.cross(angle[..., i], up) for i in range(3)]
-        A = np.column_stack([*(self._freed(column).ravel() for column in columns), flat[:, 1:]])
-        scale = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
-        pieces = len(theta)
-        parts = (A / scale).reshape(pieces, -1, len(scale))
-        squares, products = (np.swapaxes(parts, 1, 2) @ other for other in (parts, flat[:, 0].reshape(pieces, -1, 1)))
-
-        def solved(N: Array, b: Array) -> Array:
-            return np.asarray((np.linalg.pinv(N, rcond=1e-9, hermitian=True) @ b)[..., 0])
-
-        whole, right = squares.sum(axis=0), products.sum(axis=0)
-        without = solved(whole - squares, right - products)
-        variance = (pieces - 1) / pieces * np.sum((without - without.mean(axis=0)) ** 2, axis=0)
-        off = solved(whole, right)[:4] / scale[:4]
-        off[0] = -off[0]  # gyros that are late have not turned yet
-        return off, np.sqrt(variance[:4]) / scale[:4]
+        # Gyros that are late have not turned yet.
+        late = [self._freed(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
+        scale = [self._freed(np.cross(angle[..., i], up)).ravel() for i in range(3)]
+        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale])
+        of_each = _by_pieces(len(theta), flat, [*late, *scale])
+        off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
+        return off, sigma
 
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""
         return float(np.sqrt(np.mean(np.sum((theta / self.interval) ** 2, axis=-1))))
+
+
+def _by_pieces(pieces: int, flat: Array, columns: list[Array]) -> tuple[Array, Array]:
+    """Sizes of columns (P L 3,) that explain the force best, with the best arm, and one-sigmas by leaving out piece after piece."""
+    A = np.column_stack([*columns, flat[:, 1:]])
+    scale = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
+    parts = (A / scale).reshape(pieces, -1, len(scale))
+    squares, products = (np.swapaxes(parts, 1, 2) @ other for other in (parts, flat[:, 0].reshape(pieces, -1, 1)))
+
+    def solved(N: Array, b: Array) -> Array:
+        return np.asarray((np.linalg.pinv(N, rcond=1e-9, hermitian=True) @ b)[..., 0])
+
+    whole, right = squares.sum(axis=0), products.sum(axis=0)
+    without = solved(whole - squares, right - products)
+    variance = (pieces - 1) / pieces * np.sum((without - without.mean(axis=0)) ** 2, axis=0)
+    count = len(columns)
+    return solved(whole, right)[:count] / scale[:count], np.sqrt(variance[:count]) / scale[:count]
 
 
 def whole_cells(record: ImuRecord) -> tuple[Array, float, Array]:
