@@ -27,9 +27,17 @@ from truenorth.alignment.published import FADING, STATIONARY, Published, factor_
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
+from truenorth.alignment.sway_noise import louder_walks
 from truenorth.alignment.swaying import farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
-from truenorth.alignment.turning import infer_turning, turning_align, turning_noise, turns_blindly, with_usual
+from truenorth.alignment.turning import (
+    infer_turning,
+    sway_walks,
+    turning_align,
+    turning_noise,
+    turns_blindly,
+    with_usual,
+)
 from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
 from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
 from truenorth.coarse.analytic import static_covariance
@@ -255,8 +263,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
     coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt, history=False)
+    usual = usual_noise()
+    walks = sway_walks(task.record) if spec is None and task.motion.overall == "swaying" else None
+    if walks is not None:
+        usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     filtered, noise = check_filter(
-        task, integrals, coarse.C_n0_i, usual_noise(), None if spec is None else StaticModel.of(spec)
+        task, integrals, coarse.C_n0_i, usual, None if spec is None else StaticModel.of(spec)
     )
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     turns = task.motion.fraction("rotating") > 0.0
@@ -281,7 +293,15 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     if sways:
-        fine = sway_align(start, turned=turned, inferred=spec is None)
+        fine = sway_align(start, turned=turned)
+        if (
+            spec is None and turned is None and fine.noisier
+        ):  # what it took for the usual noise of sensors is not theirs
+            noise = louder_walks(noise, fine.noisier)
+            used, where = _specification(None, check, noise)
+            P = task.bias_prior(used, coarse.C_n0_i.T)
+            fine = sway_align(start._replace(model=StaticModel.of(used), P_bias=P))
+        fine = replace(fine, noisier={}) if spec is None else fine
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:

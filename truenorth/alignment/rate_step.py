@@ -38,7 +38,9 @@ def rate_step_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]
     """
     motion = task.motion
     count = len(motion.time)
-    if motion.overall != "still" or count < FEWEST:
+    if (
+        motion.overall != "still" or count < FEWEST or motion.fraction("rotating") > 0.0
+    ):  # a turn shares the earth's rate anew
         return []
     shapes = np.stack([_shape(course, round(onset * count), count) for course, onset in SIGNATURES], axis=1)  # (K, S)
     shapes -= shapes.mean(axis=0)

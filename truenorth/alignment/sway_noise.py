@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
 from truenorth.alignment.slow_sway import is_slow
-from truenorth.errors.staying import QUIETEST_BASE
+from truenorth.errors.staying import QUIETEST_BASE, StaticModel
 from truenorth.errors.sway import AxisMotion, with_motion
 from truenorth.estimate.staying import StayingLog
 from truenorth.filters import kalman
@@ -23,6 +23,12 @@ from truenorth.state.limits import limit
 
 FACTORS = (0.5 * LOUD, LOUD, 2.0 * LOUD, 4.0 * LOUD, 8.0 * LOUD)  # of the specification's random walks
 SENSORS = ("accel", "gyro")
+
+
+def louder_walks(noise: StaticModel, factors: Mapping[str, float]) -> StaticModel:
+    """Noise with the random walks of each sensor so many times as large."""
+    walks = {name: factors.get(name.split("_")[0], 1.0) * value for name, value in asdict(noise).items()}
+    return replace(noise, **walks)
 
 
 def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: float) -> dict[str, float]:
@@ -48,8 +54,7 @@ def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: flo
     def likelihood(sensor: str, factor: float) -> float:
         """Twice its logarithm, of the better of both motions."""
         other = copy.copy(log)
-        walks = {name: factor * value for name, value in asdict(log.noise).items() if name.startswith(sensor)}
-        other.noise = replace(log.noise, **walks)
+        other.noise = louder_walks(log.noise, {sensor: factor})
         system = other.linearise()
         both = (motion,) if factor == 1.0 else (motion, steady)
         return max(2.0 * float(kalman(with_motion(system, interval, m)).log_likelihood) for m in both)

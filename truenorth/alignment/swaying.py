@@ -92,9 +92,7 @@ class _MotionFilter:
         return Filtered(full, kalman(full, history="full"))
 
 
-def sway_align(
-    start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None, *, inferred: bool = False
-) -> SwayAlignment:
+def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
     """Estimate attitude, biases, lever arm and the base's motion from a whole log.
 
     Parameters
@@ -104,8 +102,6 @@ def sway_align(
         Where the IMU sits.
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
-    inferred : bool
-        Whether the noise comes from the log itself: then it is not held against the log.
     """
     log, residual = _settled(start, mount, turned)
     step = float(np.mean(log.integrals.intervals))
@@ -128,7 +124,7 @@ def sway_align(
     return replace(
         fine,
         begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion)),
-        noisier={} if inferred else noisier_sensors(log, estimator.motion, step),
+        noisier=noisier_sensors(log, estimator.motion, step),
     )
 
 

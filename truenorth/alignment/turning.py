@@ -1,4 +1,4 @@
-"""Level of an IMU that turns about in its own log, and whose gyros do not see the earth turn: a cheap one on a turntable.
+"""Level of an IMU that turns about in its own log, and whose gyros do not see the earth turn: a cheap one on a turntable or a ship.
 
 What a turn shows as motion is the gyros' scale factor and misalignment, the accelerometers', and the arm from the axis of the
 turns to the IMU: one per cent of a turn of 20 deg/s is a rate of .2 deg/s. So they are states, as an indexer's are. Gyros like
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import BLIND_RATE, LogCheck
 from truenorth.alignment.fine import MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, usual
+from truenorth.alignment.swaying import ARM_PRIOR
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import StaticModel, mean_velocity
@@ -26,6 +27,7 @@ from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
+from truenorth.quality.density import noise_densities
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -36,15 +38,21 @@ FIRST = 8.0  # s, the shortest part; gyros that are off by .3 deg/s have turned 
 LEVELLED = 1.0  # s, whose mean specific force levels to begin with
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
-ROUND, LAST = 4, 16  # passes over a part, and over the whole
+ROUND, LAST = 10, 40  # passes over a part, and over the whole: they come to rest slowly where an arm of metres sways
 
 
 def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
-    """Whether the IMU turns in its log, and its gyros are too poor to see the earth turn."""
-    if task.motion.overall != "rotating":
+    """Whether the IMU turns or sways in its log, and its gyros are too poor to see the earth turn."""
+    if task.motion.overall not in ("rotating", "swaying"):
         return False
-    bias = spec.gyro_bias if spec else usual("gyro", "bias", float(np.max(task.motion.angle_noise)))
-    return bias > BLIND_RATE
+    if spec is not None:
+        return spec.gyro_bias > BLIND_RATE
+    if task.motion.overall == "rotating":
+        walk: float | None = float(np.max(task.motion.angle_noise))
+    else:  # the quietest seconds of a sway are none: only what is faster than it is noise
+        walks = sway_walks(task.record)
+        walk = None if walks is None else walks.gyro_random_walk
+    return walk is not None and usual("gyro", "bias", walk) > BLIND_RATE
 
 
 def infer_turning(task: Task) -> ImuSpec:
@@ -58,8 +66,21 @@ def infer_turning(task: Task) -> ImuSpec:
     return with_usual(replace(inferred, gyro_bias=math.exp(GYRO_WIDTH) * usual("gyro", "bias", noise.gyro_random_walk)))
 
 
+def sway_walks(record: ImuRecord) -> StaticModel | None:
+    """Random walks of the worst axes under a smooth motion; None where a sensor does not look white."""
+    density = noise_densities(record)[1]
+    known = np.isfinite(density).sum(axis=0)
+    if len(density) == 0 or not (known > 0.5 * len(density)).all():
+        return None
+    walks = np.nanmedian(density, axis=0)
+    return StaticModel(float(walks[:3].max()), float(walks[3:].max()))
+
+
 def turning_noise(record: ImuRecord) -> StaticModel:
     """Random walks of the worst axes, from row to row: a filter that knows no scale factors takes turns for noise."""
+    swaying = sway_walks(record)
+    if swaying is not None:
+        return swaying
     walks = white_noise(record)
     return StaticModel(float(walks[:3].max()), float(walks[3:].max()))
 
@@ -84,7 +105,9 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
     """
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large
-    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=TURN_ARM, level_rate=rate)
+    sways = task.motion.overall == "swaying"
+    arm = ARM_PRIOR if sways else TURN_ARM
+    prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=arm, level_rate=rate)
     begin = record.time[0] - record.interval
     C, taken = level_of(record.between(None, begin + LEVELLED).accel.mean(axis=0)), prior.mean
     length = FIRST
@@ -99,6 +122,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
             prior,
             task.interval if whole else filter_interval(part),
             rows_at if whole else None,
+            sways=sways,
             taken=taken,
         )
         R = white_variance(mean_velocity(log.integrals, C, lat, alt))

@@ -118,7 +118,7 @@ class Tilt:
         return found
 
     def _on_two_axes(self, sure: float) -> bool:
-        """Whether turns about two axes show it alike: a base that moves to and fro in the time of a sway looks like it by itself."""
+        """Whether turns about two axes show it: a base that goes to and fro in the time of a sway looks like it about one."""
         shown = (self.by_axis * np.sign(self.delay) >= sure * self.by_axis_sigma) & (self.by_axis_sigma > 0.0)
         return bool(np.count_nonzero(shown) > 1)
 

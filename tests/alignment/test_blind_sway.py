@@ -1,0 +1,44 @@
+"""A ship whose IMU is too poor to see the earth turn, or of which nobody says how good it is."""
+
+import numpy as np
+import pytest
+
+from truenorth.alignment import align
+from truenorth.alignment.turning import sway_walks
+from truenorth.campaign.fault_benches import BENCHES, misses
+from truenorth.core.position import Position
+from truenorth.records.specs import imu_spec
+from truenorth.simulation.scenario import read_scenario
+
+
+def _ship(imu: str, seed: int, duration: float):
+    scenario = dict(BENCHES["swaying"].scenario(np.random.default_rng(seed)))
+    built = read_scenario(scenario | {"imu": imu, "duration": f"{duration:g} s"})
+    body = built.build_motion(seed, 0)
+    at = body.states(np.array(0.0))
+    place = Position(float(at.lat), float(at.lon), float(at.alt))
+    return built.simulate(seed=seed, run=0).record, place, lambda time: body.states(np.array(time))
+
+
+@pytest.mark.parametrize("imu", ["navigation", "tactical", "industrial", "consumer"])
+def test_noise_is_read_from_what_is_faster_than_the_sway(imu: str) -> None:
+    record, _, _ = _ship(imu, 3, 120.0)
+    walks, spec = sway_walks(record), imu_spec(imu)
+    assert walks.gyro_random_walk == pytest.approx(spec.gyro_random_walk, rel=0.3)
+    assert walks.accel_random_walk == pytest.approx(spec.accel_random_walk, rel=0.3)
+
+
+@pytest.mark.parametrize(("imu", "given"), [("industrial", True), ("consumer", True), ("industrial", False)])
+def test_level_of_a_ship_by_gyros_that_do_not_see_the_earth_turn(imu: str, given: bool) -> None:
+    """Carried through ten minutes, such gyros turn by degrees: of logs like these half were refused, or 16 sigmas off."""
+    record, place, truth = _ship(imu, 4, 180.0)
+    answer = align(record, place, imu if given else None)
+    assert answer.status == "level_only", answer.reasons
+    assert np.max(np.abs(misses(answer, truth)["level"])) < 4.0
+
+
+def test_a_good_imu_of_which_nothing_is_said_keeps_its_heading() -> None:
+    record, place, truth = _ship("navigation", 5, 240.0)
+    answer = align(record, place)
+    assert answer.status == "aligned", answer.reasons
+    assert max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 4.0
