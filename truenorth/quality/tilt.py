@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
 from truenorth.core.attitude import dcm_from_quaternion, skew
+from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.records import ImuRecord
-from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure, Kind
+from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -108,8 +109,9 @@ class Tilt:
         sure, clear, hint = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR, HINT))
         if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma):
             certain = abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
-            kind: Kind = "bounded" if certain else "hint"
-            found.append(Evidence(late, figures, kind, Effect(level=self.tilt), ("common_clock",)))
+            # What the gyros do not explain may be the base's own, and have hidden as much of a delay as it may have made.
+            effect = Effect(level=self.tilt if certain else math.hypot(self.tilt, self.given / GRAVITY_EQUATOR))
+            found.append(Evidence(late, figures, "bounded" if certain else "hint", effect, ("common_clock",)))
         off = np.abs(self.scale)
         for i in np.flatnonzero(off >= np.maximum(least_scale(self.turned), clear * self.scale_sigma)):
             size = float(off[i] * self.turned[i])
