@@ -19,23 +19,9 @@ from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
-from truenorth.alignment.in_motion_learnt import (
-    learnt_evidence,
-)
-from truenorth.alignment.in_motion_start import (
-    COARSE_HEADING,
-    Guess,
-    guesses_all_round,
-    led_back,
-    used_twice,
-)
-from truenorth.alignment.in_motion_task import (
-    NO_LOG_ERRORS,
-    MovingTask,
-    has_fixes,
-    in_body_axes,
-    moving_task,
-)
+from truenorth.alignment.in_motion_learnt import learnt_evidence
+from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round, led_back, used_twice
+from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.rest_rate import rest_evidence
 from truenorth.alignment.result import Alignment

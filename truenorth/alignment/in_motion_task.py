@@ -13,17 +13,8 @@ from numpy.typing import NDArray
 from truenorth.aiding.aids import BASELINE
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
-from truenorth.alignment.in_motion_learnt import (
-    changed,
-    differs,
-    louder,
-    noise_factors,
-)
-from truenorth.alignment.in_motion_start import (
-    Guess,
-    coarse_guess,
-    start_at,
-)
+from truenorth.alignment.in_motion_learnt import changed, differs, louder, noise_factors
+from truenorth.alignment.in_motion_start import Guess, coarse_guess, start_at
 from truenorth.core.earth import radii
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
