@@ -17,7 +17,8 @@ from babel.messages.pofile import read_po, write_po
 import truenorth
 from truenorth.core.language import FOLDER, FRAME, LANGUAGES
 from truenorth.report.words import WHY, WORDS
-from truenorth.state.english import REMEDIES, SENTENCES, TERMS, TITLES
+from truenorth.state.english import SENTENCES, TITLES
+from truenorth.state.remedies import REMEDIES, TERMS
 
 HOME = Path(truenorth.__file__).parent
 # Arrays and models of one's own code: their messages are for those who write Python, and stay English.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -40,7 +39,7 @@ from truenorth.navigation.second_look import SENSORS, as_found, on_any_clock, se
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
-from truenorth.navigation.velocity_axes import check_axes
+from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_fixes, check_heights
 from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.density import burst_evidence
@@ -48,11 +47,10 @@ from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.slow_aids import Slow, as_lasting, one_less, slow_errors, with_slow
-from truenorth.records import ImuRecord, Late, Trajectory
+from truenorth.records import ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import BA, BG, DP, PHI
-from truenorth.state.mounting import Mounting
+from truenorth.state.layout import DP
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -65,10 +63,8 @@ Array = NDArray[np.float64]
 
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
 FINE, COARSE = 0.2, 1.0
-# Of the log, what shows axes of velocities: at most this long, and until an INS without aiding has tilted or drifted so far.
-AXES_TIME, AXES_TILT, AXES_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
-SHORTEST_AXES = 20.0  # s
 DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
+MOMENT = 1800.0  # s of a log, that show whether gyros and accelerometers are of one moment
 MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 NEVER = Late(0, 0.0)
 PLUMB_LINE = Deflection()
@@ -166,7 +162,7 @@ def navigate(
         tell("looking for stops")
         seen = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
         plan = replace(plan, always=[*zero_updates(record, zupt, plan.interval, *seen), *disturbances])
-    _check_axes(plan, given)
+    check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
     plan, given, track, wanders = _filtered(plan, given, smooth)
     evidence = [*_seen(plan, track, given, found), *wanders, *why, *said]
@@ -318,7 +314,7 @@ def _gyros_of_another_moment(plan: _Plan, given: Mapping[str, Any]) -> list[Evid
     def run(record: ImuRecord) -> Track:
         return replace(plan, record=record).run(aiding)
 
-    part = plan.record.between(None, plan.record.time[0] + AXES_TIME)
+    part = plan.record.between(None, plan.record.time[0] + MOMENT)
     try:
         track = run(part)
         later = _as_late_as_found(replace(plan, record=part), open_, track)
@@ -385,25 +381,6 @@ def _check_places(given: Mapping[str, Aid], begin: Start, altitude: str) -> None
         check_fixes(gnss, place, begin.time, heights=altitude in ("gnss", "free"))
     if altitude == "baro" and (baro := record_of(given, Barometer)) is not None:
         check_heights(baro, place, begin.time)
-
-
-def _check_axes(plan: _Plan, given: Mapping[str, Any]) -> None:
-    """Refuse velocities in other axes, by the IMU's own changes of velocity over the log's first part."""
-    record, begin = plan.record, plan.start
-    seen = [a for a in given.values() if isinstance(a, Gnss | Odometer | VelocityLog)]
-    if not seen:
-        return
-    sigma = np.sqrt(np.diag(begin.P))
-    trusted = min(AXES_TIME, AXES_TILT / sigma[BG].max(), math.sqrt(2.0 * AXES_DRIFT / sigma[BA].max()))
-    if trusted < SHORTEST_AXES or sigma[PHI][:2].max() > AXES_TILT:
-        return
-    part = record.between(None, record.time[0] + trusted)
-    free = navigate_track(part, begin, plan.model, interval=FINE, every=1, covariance=False)
-    lat, lon, alt = free.position.T
-    own = Trajectory(free.time, free.C_nb, free.v_n, lat, lon, alt, source=record.source)
-    for a in seen:
-        mounting = a.mounting or Mounting()
-        check_axes(a.record, own, mounting.latency, mounting.C_mb)
 
 
 def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:

@@ -6,16 +6,28 @@ own change of it the next one follows. Where it does not, and does with other ax
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
 from truenorth.core.errors import DataError
-from truenorth.records import GnssRecord, OdometerRecord, Trajectory, VelocityRecord
+from truenorth.errors.model import InsModel
+from truenorth.estimate.run import navigate_track
+from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, Trajectory, VelocityRecord
+from truenorth.state.layout import BA, BG, PHI
+from truenorth.state.mounting import Mounting
+from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
 
+# Of the log, what shows axes: at most this long, and until an INS without aiding has tilted or drifted so far.
+LONGEST, MOST_TILT, MOST_DRIFT = 1800.0, 0.02, 5000.0  # s, rad, m
+SHORTEST = 20.0  # s
 STEP, VERTICAL_STEP = 2.0, 20.0  # s, from one velocity to the next; roads climb slowly
 LEAST_PAIRS = 20
 ALIKE = 1.5  # times the squares that the best axes leave: as good
@@ -141,3 +153,36 @@ def _squares(values: Array) -> float:
 def _rms(values: Array) -> float:
     """Of the lengths of rows."""
     return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
+
+
+def check_velocities(record: ImuRecord, start: Start, model: InsModel, given: Iterable[Any], interval: float) -> None:
+    """Refuse velocities in other axes, by the IMU's own changes of velocity over the log's first part.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    start : Start
+    model : InsModel
+    given : aids
+    interval : float, s
+        Of the INS that runs without them.
+
+    Raises
+    ------
+    DataError
+        As :func:`check_axes`.
+    """
+    seen = [a for a in given if isinstance(a, Gnss | Odometer | VelocityLog)]
+    if not seen:
+        return
+    sigma = np.sqrt(np.diag(start.P))
+    trusted = min(LONGEST, MOST_TILT / sigma[BG].max(), math.sqrt(2.0 * MOST_DRIFT / sigma[BA].max()))
+    if trusted < SHORTEST or sigma[PHI][:2].max() > MOST_TILT:
+        return
+    part = record.between(None, record.time[0] + trusted)
+    free = navigate_track(part, start, model, interval=interval, every=1, covariance=False)
+    lat, lon, alt = free.position.T
+    own = Trajectory(free.time, free.C_nb, free.v_n, lat, lon, alt, source=record.source)
+    for a in seen:
+        mounting = a.mounting or Mounting()
+        check_axes(a.record, own, mounting.latency, mounting.C_mb)

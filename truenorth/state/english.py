@@ -1,4 +1,4 @@
-"""English: a sentence for each piece of evidence, a remedy for each key, words for terms."""
+"""English: a title for each finding, and a sentence for each piece of evidence."""
 
 from __future__ import annotations
 
@@ -350,63 +350,4 @@ SENTENCES = {
     "height.free": "height is carried on by velocity alone: no sensor of height is given",
     "height.fixed": "height is held fixed, as at sea",
     "height.barometer_unused": "the barometer is not used: height is {altitude!r}",
-}
-
-REMEDIES = {
-    "record_longer": "record longer",
-    "more_digits": "log more digits",
-    "record_calmer": "record longer, or with less motion",
-    "end_before": "align a part in which the base stands",
-    "still_part": "align a part in which the base stays",
-    "begin_after": "align the part after it, or the part before it",
-    "latitude": "check the latitude",
-    "base_stays": "check that the base stays where it is",
-    "height": "check the height",
-    "place": "check the position at the start, or say how rough it is",
-    "units": "check the units",
-    "specification": "check the specification",
-    "source": "check axes, units, clock, lever arm and sigmas of that sensor",
-    "common_clock": "check that both come from one clock and one filter",
-    "grid_north": "check whether they count from grid north",
-    "encoder": "check the order, signs, zero and clock of the indexer's angles",
-    "sensor_axes": "check its axes and unit",
-    "imu_axes": "check the IMU's axes",
-    "mounting": "give the mounting",
-    "estimate.lag": "let it be estimated",
-    "estimate.scale": "let it be estimated",
-    "estimate.mounting": "let it be estimated",
-    "latency": "give it a latency of {latency:.3f} s",
-    "offset": "shift the times of that log by {offset:.3f} s",
-    "arm_unit": "was it given in {unit}?",
-    "arm.gnss": "check the arm; metres are expected",
-    "arm.odometer": "check the arm, to the axle that nothing steers; metres are expected",
-    "arm.velocity": "check the arm; metres are expected",
-    "height_sensor": "give a sensor of height, or let the height be free, where the vehicle climbs",
-    "use_barometer": "for its heights keep the height by the barometer",
-    "part_of_logs": "align a part of the logs",
-    "put_times_right": "correct the times",
-    "transfer_geometry": "check the axes, the lever arm, the mounting and the delay",
-    "flexure": "check whether both sit on one rigid body",
-    "slave_axes": "check the slave's axes",
-    "transfer.delay": "check the delay",
-    "transfer.lever_arm": "check the lever arm",
-    "transfer.mounting": "check the mounting",
-    "level_specification": "give a specification of the IMU, or its calibration",
-    "slave_specification": "give the right specification",
-    "without_jump": "align a part without the jump, which may be an error of the master",
-    "match_velocity": (
-        "attitude matching knows the slave only as well as its mounting on the master is known; match velocity too"
-    ),
-    "manoeuvre": "velocity shows heading by horizontal acceleration alone; make a turn, an S-turn, a change of speed",
-    "log": "check its units, axes, mounting, and whether it works",
-    "log_error": "check the error that was stated for it",
-    "manoeuvre_gnss": "the vehicle must accelerate and turn while GNSS sees it",
-    "north": "velocity along the vehicle does not show north; use gyros that see the earth turn, or GNSS",
-}
-
-TERMS = {
-    "inferred from the log": "inferred from the log",
-    "exchanged": "their axes exchanged",
-    "first_reversed": "the other sign of the first angle",
-    "last_reversed": "the other sign of the last angle",
 }

@@ -14,8 +14,9 @@ from typing import Any
 
 from truenorth.core.language import retold, translated
 from truenorth.core.units import parse_unit, significant
-from truenorth.state.english import REMEDIES, SENTENCES, TERMS, TITLES
+from truenorth.state.english import SENTENCES, TITLES
 from truenorth.state.evidence import Evidence
+from truenorth.state.remedies import REMEDIES, TERMS
 
 
 class _Figures(string.Formatter):
