@@ -6,6 +6,7 @@ from zlib import crc32
 import numpy as np
 import pytest
 
+from tests.runs import some
 from truenorth.alignment import align
 from truenorth.alignment.slow_sway import is_slow
 from truenorth.campaign.fault import Inputs
@@ -31,7 +32,7 @@ def _moored(seed: int, period: float, amplitude: float, duration: float) -> tupl
     return {"record": record, "place": place, "imu": built.imu_spec}, lambda time: body.states(np.array(time))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *some([], [2, 3])])
 def test_a_base_that_goes_slowly_to_and_fro_is_aligned_within_its_sigma(seed: int) -> None:
     inputs, truth = _moored(seed, period=70.0, amplitude=0.1, duration=600.0)
     answer = align(inputs["record"], inputs["place"], inputs["imu"])
@@ -58,7 +59,7 @@ def test_what_a_slow_oscillator_took_up_is_not_silent(fault: str, run: int) -> N
     assert answer.status == "inconsistent" or worst < 3.0, answer
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, *some([], [5])])
 def test_sound_sensors_are_not_called_noisy_on_a_slow_sway(seed: int) -> None:
     inputs, _ = _moored(seed, period=100.0, amplitude=0.2, duration=240.0)
     answer = align(inputs["record"], inputs["place"], inputs["imu"])

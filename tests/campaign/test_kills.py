@@ -75,6 +75,7 @@ def test_a_scheduler_that_goes_away_leaves_what_was_done(undisturbed, tmp_path):
     pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
 
 
+@pytest.mark.slow
 def test_no_cluster(tmp_path):
     with pytest.raises(UsageError, match="no Dask scheduler answers there"):
         run_campaign(PLAN, tmp_path, scheduler="tcp://127.0.0.1:1")

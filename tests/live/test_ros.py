@@ -15,6 +15,7 @@ pytest.importorskip("mcap")
 from rosbags.typesys import Stores, get_typestore
 
 from tests.formats.test_ros import FLU, STAMPS, N, write_bag
+from tests.runs import some
 from truenorth.core.errors import UsageError
 from truenorth.formats import read_imu
 from truenorth.formats.layout import Layout
@@ -38,7 +39,7 @@ def taken(source, enough, seconds=20.0):
     return np.vstack(found)
 
 
-@pytest.mark.parametrize("step", [1, 100, 10**6])
+@pytest.mark.parametrize("step", some([1, 10**6], [100]))
 def test_an_mcap_file_that_grows(step, tmp_path):
     whole = next(write_bag(tmp_path, "mcap").glob("*.mcap"))
     data, growing = whole.read_bytes(), tmp_path / "growing.mcap"

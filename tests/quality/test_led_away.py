@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.runs import few_and_all
 from truenorth.quality.led_away import led_away_evidence
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals
@@ -24,8 +25,9 @@ def followed(step, onset, memory):
     return np.outer(np.where(since >= 0, np.exp(-np.maximum(since, 0) / memory), 0.0), step)
 
 
-def test_chance_shows_a_step_no_more_often_than_its_limit():
-    rng, logs = np.random.default_rng(0), 3000
+@few_and_all(3000, few=500)
+def test_chance_shows_a_step_no_more_often_than_its_limit(runs):
+    rng, logs = np.random.default_rng(0), runs
     alarms = sum(bool(seen(rng.standard_normal((ROWS, 3)))) for _ in range(logs))
     expected = limit("step") * logs
     assert alarms <= expected + 4.0 * np.sqrt(expected)
