@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -27,3 +28,15 @@ def as_path(given: Any, what: str) -> Path:
     if any(len(part.encode("utf-8", "surrogateescape")) > LONGEST for part in path.parts):
         raise UsageError(f"{what} {str(path)[:60]!r}...: no file has so long a name")
     return path
+
+
+def unreadable(path: Path, error: OSError) -> UsageError:
+    """That a file cannot be read, why, and which one of its folder may have been meant."""
+    why = f"{path}: cannot be read ({error.strerror or error})"
+    if not isinstance(error, FileNotFoundError):
+        return UsageError(why)
+    try:
+        near = get_close_matches(path.name, [item.name for item in path.parent.iterdir()], n=1)
+    except OSError:
+        return UsageError(why)
+    return UsageError(f"{why}; {near[0]} is there: was it meant?" if near else why)

@@ -9,8 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from truenorth.core.errors import UsageError
-from truenorth.core.paths import as_path
+from truenorth.core.paths import as_path, unreadable
 from truenorth.core.plugins import plugin, plugins
 from truenorth.formats import devices
 from truenorth.formats.aiding import (
@@ -127,7 +126,7 @@ def read_imu(
         record: ImuRecord = reader(path, layout)
         return record
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise unreadable(path, error) from None
 
 
 def _plugged(path: Path, format: str | None) -> Callable[..., ImuRecord] | None:

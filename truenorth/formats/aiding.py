@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
-from truenorth.core.paths import as_path
+from truenorth.core.paths import as_path, unreadable
 from truenorth.formats import devices
 from truenorth.formats.detect import AIDING_SUFFIXES, format_of
 from truenorth.formats.guesses import UnsureError
@@ -278,7 +278,7 @@ def open_log(
             )
         return ordered(find(columns, quantities, options)), others
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise unreadable(path, error) from None
 
 
 def known(sigma: Array | None) -> Array | None:

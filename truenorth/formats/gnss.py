@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.core.paths import as_path
+from truenorth.core.paths import as_path, unreadable
 from truenorth.core.position import Position
 from truenorth.formats.aiding import NAVIGATION, PLACE, FilePath, Pairs, known, made, open_log, sigmas
 from truenorth.formats.nmea import NMEA_SUFFIXES, is_nmea, read_nmea
@@ -102,7 +102,7 @@ def read_gnss(
         if format == "nmea" or by_content:
             return read_nmea(path)
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise unreadable(path, error) from None
     given = {"columns": columns, "units": units, "topic": topic}
     found, _ = open_log(path, "csv" if format == "kf-gins" else format, QUANTITIES, given, "gnss")
     values = _geodetic(found) or _earth_fixed(found) or _local(found, origin)
