@@ -8,6 +8,7 @@ is the error of the answer.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -70,12 +71,12 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 
-def bias_signatures(fine: FineAlignment) -> Signatures:
-    """Of each course, in each of the six biases."""
+def bias_signatures(fine: FineAlignment, courses: Sequence[tuple[str, float]] = SIGNATURES) -> Signatures:
+    """Of each course, a step or a ramp from a part of the log on, in each of the six biases."""
     count, n, rows = len(fine.estimates.innovation), fine.system.states, fine.system.rows
-    begin = np.repeat([round(onset * count) for _, onset in SIGNATURES], 6)
-    steps = np.repeat([course == "step" for course, _ in SIGNATURES], 6)
-    every = np.tile(np.eye(6), len(SIGNATURES))
+    begin = np.repeat([round(onset * count) for _, onset in courses], 6)
+    steps = np.repeat([course == "step" for course, _ in courses], 6)
+    every = np.tile(np.eye(6), len(courses))
     state, course = np.zeros((n, len(begin))), np.zeros((n, 6))
     state[SENSORS] = every * steps
     course[SENSORS] = np.eye(6)

@@ -12,14 +12,14 @@ The comparison is ours; the ratios are those of :mod:`truenorth.alignment.matche
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.bias_step import SIGNATURES, bias_signatures
+from truenorth.alignment.bias_step import bias_signatures, seen_of
 from truenorth.alignment.drift import AXES, ONSETS, drift_signatures
 from truenorth.alignment.drift import KINDS as COURSES
 from truenorth.alignment.fine import FineAlignment
@@ -39,6 +39,7 @@ FEW = 6.0  # periods in a log, of which fewer are no oscillation that anybody ha
 BROAD = 0.2  # damping: wind waves have up to .26 by Fossen (sec. 8.2.6), swell less
 SMALLER = (1.0, 0.3, 0.1, 0.0)  # times its size
 PARTS = 32  # of a log: onsets of a departure, refined about the best by quarters
+BIASES = [(course, k / PARTS) for course in COURSES for k in range(1, PARTS)]
 TAKES = (0.25, 1.0, 2.0, 4.0)  # parts, within which a departure takes up its velocity
 
 
@@ -51,6 +52,7 @@ class Cause(NamedTuple):
     onset: float  # s, since the beginning of the log
     size: float  # m/s of a velocity, rad/s or m/s^2 of a bias
     phi: Array  # (3,) rad: misalignment at the last epoch, if it did
+    seen: Array  # (K, 3): what it makes of the measurements
 
 
 def is_slow(item: Oscillator, duration: float) -> bool:
@@ -58,7 +60,9 @@ def is_slow(item: Oscillator, duration: float) -> bool:
     return item.frequency * duration / (2.0 * math.pi) < FEW or item.damping > BROAD
 
 
-def slow_sway_evidence(fine: F, system: LinearSystem, motion: Sequence[AxisMotion]) -> list[Evidence]:
+def slow_sway_evidence(
+    fine: F, system: LinearSystem, motion: Sequence[AxisMotion], without: Callable[[Array], tuple[float, Array]]
+) -> list[Evidence]:
     """What else may have made the slow part of a base's motion, and what it would do to the answer.
 
     Parameters
@@ -68,6 +72,9 @@ def slow_sway_evidence(fine: F, system: LinearSystem, motion: Sequence[AxisMotio
         Of its last pass, with all its noise.
     motion : three AxisMotion
         Along E, N, U; in the last states of `system`.
+    without : callable
+        What is left if so much (K, 3) is taken off the measurements, and the motion fitted anew: minus twice the logarithm of the
+        likelihood, and the misalignment (3,) at the last epoch.
     """
     duration = float(fine.integrals.time[-1])
     if not any(is_slow(item, duration) for axis in motion[:2] for item in axis.oscillators):
@@ -82,13 +89,19 @@ def slow_sway_evidence(fine: F, system: LinearSystem, motion: Sequence[AxisMotio
         other = replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
         found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in _causes(other)]
+    # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
+    lowest = min(lowest, without(np.zeros_like(system.z))[0])
+    for kind in {_kind(cause) for _, cause in found}:
+        likeliest = min((cause for _, cause in found if _kind(cause) == kind), key=lambda cause: cause.cost)
+        cost, phi = without(likeliest.seen)
+        found.append((limit("drift"), likeliest._replace(cost=cost, phi=phi)))
     likely = [cause for least, cause in found if lowest - cause.cost > least]
     if not likely:
         return []
     best = min(likely, key=lambda cause: cause.cost)
     ratio = lowest - best.cost
     end = as_fitted.x[-1][PHI]
-    moved = np.array([best.phi if not may_be_chance(ratio) else cause.phi for cause in likely]) - end
+    moved = np.array([cause.phi for cause in likely]) - end
     heading, level = float(np.abs(moved[:, 2]).max()), float(np.hypot(moved[:, 0], moved[:, 1]).max())
     figures: dict[str, Figure] = {
         "axis": best.axis,
@@ -103,6 +116,10 @@ def slow_sway_evidence(fine: F, system: LinearSystem, motion: Sequence[AxisMotio
     if may_be_chance(ratio):
         return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
     return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
+
+
+def _kind(cause: Cause) -> str:
+    return "bias" if cause.key.startswith("bias") else cause.key
 
 
 def _smaller(system: LinearSystem, motion: Sequence[AxisMotion], duration: float, share: float) -> LinearSystem:
@@ -125,17 +142,28 @@ def _causes(fine: FineAlignment) -> Iterator[Cause]:
     seen = innovations_of(fine)
     cost, end = -2.0 * float(fine.estimates.log_likelihood), fine.estimates.x[-1][PHI]
     duration = float(fine.integrals.time[-1])
-    drift, bias = matched(seen, drift_signatures(fine), bias_signatures(fine))
+    drift, bias = matched(seen, drift_signatures(fine), bias_signatures(fine, BIASES))
+    t = fine.integrals.time
+    middle = 0.5 * (t[1:] + t[:-1])
+
+    def course_of(course: str, onset: float) -> Array:
+        """(K,) a step, or a ramp to one at the end, from so many seconds on."""
+        return np.where(middle > onset, 1.0 if course == "step" else (middle - onset) / (duration - onset), 0.0)
+
     k = int(np.argmax(drift.ratio))
-    (onset, course, axis) = [(o, c, a) for o in ONSETS for c in COURSES for a in AXES][k]
-    size = float(drift.size[k])
-    yield Cause(
-        cost - float(drift.ratio[k]), f"drift.{course}", axis, onset * duration, size, end - size * drift.left[PHI, k]
-    )
+    (part_of, course, axis) = [(o, c, a) for o in ONSETS for c in COURSES for a in AXES][k]
+    size, onset = float(drift.size[k]), part_of * duration
+    velocity = np.outer(course_of(course, onset), [float(axis == name) for name in (*AXES, "up")])
+    made = size * (velocity if fine.form == "velocity" else np.diff(velocity, axis=0, prepend=0.0))
+    phi = end - size * drift.left[PHI, k]
+    yield Cause(cost - float(drift.ratio[k]), f"drift.{course}", axis, onset, size, phi, made)
     k = int(np.argmax(bias.ratio))
-    size, onset = float(bias.size[k]), SIGNATURES[k // 6][1]
+    (course, part_of), size = BIASES[k // 6], float(bias.size[k])
     key = "bias.gyro_steps" if k % 6 < 3 else "bias.accel_steps"
-    yield Cause(cost - float(bias.ratio[k]), key, "xyz"[k % 3], onset * duration, size, end - size * bias.left[PHI, k])
+    of_sensors = np.outer(course_of(course, part_of * duration), np.eye(6)[k % 6])[..., None]
+    made = size * seen_of(fine, of_sensors)[..., 0]
+    phi = end - size * bias.left[PHI, k]
+    yield Cause(cost - float(bias.ratio[k]), key, "xyz"[k % 3], part_of * duration, size, phi, made)
     part = duration / PARTS
     coarse = _departure(fine, seen, [part * k for k in range(1, PARTS)])
     around = [coarse.onset + 0.25 * part * k for k in range(-3, 4)]
@@ -165,4 +193,6 @@ def _departure(fine: FineAlignment, seen: Innovations, onsets: Sequence[float]) 
     v = size[best]
     phi = fine.estimates.x[-1][PHI] - left[PHI].reshape(3, len(when), 2)[:, best] @ v
     cost = -2.0 * float(fine.estimates.log_likelihood) - float(ratio[best])
-    return Cause(cost, "drift.step", AXES[int(np.argmax(np.abs(v)))], when[best][0], float(np.hypot(*v)), phi)
+    axis_name = AXES[int(np.argmax(np.abs(v)))]
+    made = signature[:, :, 2 * best : 2 * best + 2] @ v
+    return Cause(cost, "drift.step", axis_name, when[best][0], float(np.hypot(*v)), phi, made)

@@ -85,11 +85,18 @@ class _MotionFilter:
         self.motion = _fit(residual, interval, walks)
 
     def __call__(self, system: LinearSystem) -> Filtered:
-        self.passes += 1
+        self.passes, self.base = self.passes + 1, system
         if self.passes == 2:  # about a good attitude: what was in the first residual besides the motion is gone
             self.motion = _fit(system.z, self.interval, self.walks, self.motion)
         full = with_motion(system, self.interval, self.motion)
         return Filtered(full, kalman(full, history="full"))
+
+    def without(self, seen: Array) -> tuple[float, Array]:
+        """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
+        left = self.base.with_arrays(z=self.base.z - seen)
+        motion = _fit(left.z, self.interval, self.walks, self.motion)
+        estimates = kalman(with_motion(left, self.interval, motion), history="full")
+        return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
 
 
 def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
@@ -123,7 +130,7 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     )
     return replace(
         fine,
-        begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion)),
+        begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion, estimator.without)),
         noisier=noisier_sensors(log, estimator.motion, step),
     )
 
