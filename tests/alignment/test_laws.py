@@ -171,7 +171,7 @@ def test_innovations_of_a_still_base_are_as_large_as_expected():
         assert abs(np.nansum(found.nis) / count - 1.0) < 0.1
 
 
-@few_and_all(24)
+@few_and_all(24, few=4)
 def test_swaying_base_sigma_is_honest(runs):
     """Runs on an unrotated base: heading is the gyro bias, levels the accelerometers' and the plumb line's sigma.
 
