@@ -114,6 +114,8 @@ def slow_sway_evidence(
     }
     effect = Effect(heading, level)
     if may_be_chance(ratio):
+        if np.all(np.abs(moved) < limit("negligible") * np.sqrt(np.diag(as_fitted.P[-1])[PHI])):
+            return []  # what nobody can rule out, and changes nothing
         return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
     return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
 
