@@ -18,10 +18,11 @@ RUN useradd --create-home --uid 1000 navigator \
  && chown navigator /data /var/cache/truenorth \
  && python -m compileall -q /opt/truenorth/lib
 USER navigator
-WORKDIR /tmp/warm
+# The user's own folder: one that WORKDIR made would be root's.
+WORKDIR /home/navigator
 RUN truenorth simulate static_kalman --no-plot --csv -o run \
  && truenorth align run/imu.csv --lat 45 --imu navigation -o result \
- && rm -rf /tmp/warm/*
+ && rm -r run result
 WORKDIR /data
 ENTRYPOINT ["truenorth"]
 CMD ["--help"]

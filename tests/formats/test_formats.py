@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from truenorth.core import mapped
 from truenorth.core.errors import DataError, UsageError
 from truenorth.formats import read_imu, write_imu
 from truenorth.records import ImuRecord
@@ -118,8 +119,11 @@ def test_text_under_a_binary_name(tmp_path, suffix):
         read_imu(path)
 
 
-def test_damaged_parquet(record, tmp_path):
-    path = tmp_path / "log.parquet"
+@pytest.mark.parametrize("suffix", ["parquet", "npz"])
+def test_a_file_that_is_cut_short(record, tmp_path, suffix, monkeypatch):
+    """An archive whose arrays stay on the disk, too: its end is what says where they are."""
+    monkeypatch.setattr(mapped.read_mapped, "__defaults__", (1000,))
+    path = tmp_path / f"log.{suffix}"
     write_imu(record, path)
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(DataError, match="damaged"):

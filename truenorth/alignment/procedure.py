@@ -294,14 +294,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
     if sways:
         fine = sway_align(start, turned=turned)
-        if (
-            spec is None and turned is None and fine.noisier
-        ):  # what it took for the usual noise of sensors is not theirs
+        # What the inference took for the usual noise of sensors is not theirs.
+        if spec is None and turned is None and fine.noisier:
             noise = louder_walks(noise, fine.noisier)
             used, where = _specification(None, check, noise)
             P = task.bias_prior(used, coarse.C_n0_i.T)
             fine = sway_align(start._replace(model=StaticModel.of(used), P_bias=P))
-        fine = replace(fine, noisier={}) if spec is None else fine
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:
@@ -313,7 +311,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    drift, steps, hemisphere = what_begins(fine, used, task.position, matrix_signatures(fine, used) if sways else None)
+    others = matrix_signatures(fine, used) if sways else None
+    drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     way = farthest(fine, task.position) if sways else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def what_begins(
-    fine: FineAlignment, spec: ImuSpec, position: Position, others: Array | None = None
+    fine: FineAlignment, spec: ImuSpec, position: Position, others: Array | None = None, *, given: bool = True
 ) -> tuple[Drift, list[Evidence], list[Evidence]]:
     """The drift that matches best, evidence of a bias that steps, and of the other hemisphere; `others` explain what they can.
 
@@ -28,6 +28,8 @@ def what_begins(
     ----------
     others : (K, m, M) array, optional
         As of :func:`truenorth.alignment.matched.innovations_of`.
+    given : bool
+        Whether somebody has given the specification: then its noise is held against the log.
     """
     seen = innovations_of(fine, others)
     drift, bias, gravity = matched(
@@ -35,5 +37,5 @@ def what_begins(
     )
     steps = bias_step_evidence(fine, spec, bias)
     if isinstance(fine, SwayAlignment):
-        steps += [*fine.begun, *sway_noise_evidence(fine.noisier, spec, position.lat)]
+        steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
     return detect_drift(fine, drift), steps, hemisphere_evidence(gravity)

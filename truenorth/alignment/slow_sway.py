@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,6 @@ from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit, may_be_chance
 
 Array = NDArray[np.float64]
-F = TypeVar("F", bound=FineAlignment)
 
 FEW = 6.0  # periods in a log, of which fewer are no oscillation that anybody has seen repeat itself
 BROAD = 0.2  # damping: wind waves have up to .26 by Fossen (sec. 8.2.6), swell less
@@ -61,7 +60,10 @@ def is_slow(item: Oscillator, duration: float) -> bool:
 
 
 def slow_sway_evidence(
-    fine: F, system: LinearSystem, motion: Sequence[AxisMotion], without: Callable[[Array], tuple[float, Array]]
+    fine: FineAlignment,
+    system: LinearSystem,
+    motion: Sequence[AxisMotion],
+    without: Callable[[Array], tuple[float, Array]],
 ) -> list[Evidence]:
     """What else may have made the slow part of a base's motion, and what it would do to the answer.
 

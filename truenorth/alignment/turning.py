@@ -78,9 +78,9 @@ def sway_walks(record: ImuRecord) -> StaticModel | None:
 
 def turning_noise(record: ImuRecord) -> StaticModel:
     """Random walks of the worst axes, from row to row: a filter that knows no scale factors takes turns for noise."""
-    swaying = sway_walks(record)
-    if swaying is not None:
-        return swaying
+    smooth = sway_walks(record)
+    if smooth is not None:
+        return smooth
     walks = white_noise(record)
     return StaticModel(float(walks[:3].max()), float(walks[3:].max()))
 

@@ -280,9 +280,6 @@ def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple
     return [Evidence(key, figures, remedies=("record_longer",)), good_level]
 
 
-UPSIDE_DOWN = -0.5  # cosine between z and up, below which z points down for certain
-
-
 def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[Evidence]:
     if answer.transfer is not None:
         return [note("heading.known_with_level", sigma=sigma, level=level)]

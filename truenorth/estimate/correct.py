@@ -17,6 +17,7 @@ from truenorth.filters.recursion import (
     NOT_POSITIVE,
     ROUNDING,
     SOUND,
+    remember_largest,
     row_variance,
     still_positive,
 )
@@ -84,8 +85,7 @@ def update_held(size: Any, w: Any, held: Any) -> int:
 
     Source: S. Schmidt, "Application of state-space methods to navigation problems", Adv. Control Syst. 3 (1966).
     """
-    for i in range(len(size)):
-        w.largest[i] = max(w.largest[i], w.P[i, i])
+    remember_largest(size, w)
     for row in range(w.z.shape[0]):
         if np.isnan(w.z[row]):
             continue

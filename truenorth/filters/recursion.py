@@ -293,12 +293,18 @@ def fault_after(size: Size, w: Workspace, row: int, variance: float, noise: floa
 
 
 @borrowing(forceinline=True)
+def remember_largest(size: Size, w: Workspace) -> None:
+    """The largest variance that each state has had: the measure of what rounding may take from it."""
+    for i in range(len(size)):
+        w.largest[i] = max(w.largest[i], w.P[i, i])
+
+
+@borrowing(forceinline=True)
 def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[int, float, float]:
     """Condition on all rows present; the failure if any, NIS and log-likelihood."""
     nis = 0.0
     log_likelihood = 0.0
-    for i in range(len(size)):
-        w.largest[i] = max(w.largest[i], w.P[i, i])
+    remember_largest(size, w)
     for row in range(w.z.shape[0]):
         if np.isnan(w.z[row]):
             continue

@@ -36,6 +36,7 @@ from truenorth.filters.recursion import (
     SOUND,
     Workspace,
     innovate,
+    remember_largest,
     row_variance,
     still_positive,
     update_by_row,
@@ -152,8 +153,7 @@ def judge_and_update(
     A weight given beforehand (0 or 1, by a gate for the epoch) stands; NaN asks for a judgement of the row.
     """
     log_likelihood = 0.0
-    for i in range(len(size)):
-        w.largest[i] = max(w.largest[i], w.P[i, i])
+    remember_largest(size, w)
     for row in range(w.z.shape[0]):
         if np.isnan(w.z[row]) or weights[row] == 0.0:
             continue

@@ -23,6 +23,7 @@ from truenorth.filters.recursion import (
     innovate,
     load_measurement,
     load_process,
+    remember_largest,
     row_variance,
     still_positive,
     update_by_row,
@@ -136,8 +137,7 @@ def _condition(
     of_runs: Array,
 ) -> int:
     """Condition on the rows present; innovations, NIS and log-likelihood of each run stand in `of_runs`. The fault, if any."""
-    for i in range(len(size)):
-        w.largest[i] = max(w.largest[i], w.P[i, i])
+    remember_largest(size, w)
     for row in range(w.z.shape[0]):
         if np.isnan(w.z[row]):
             continue
