@@ -33,6 +33,7 @@ from truenorth.core.units import significant
 from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
+from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import jump_evidence, misfit, noise_evidence, wandering_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
@@ -232,6 +233,9 @@ def _seen(
         return replace(task, record=record).run(guess, gated=gated)
 
     found += jump_evidence(other, track, task.record)
+    if task.gnss is not None:
+        led = [partial(_of_receiver, less, guess, gated) for less in (task, *task.without_slow_errors())]
+        found += led_by_evidence(led[0], track, task.gnss, led[1:])
     found += clock_evidence(task, track, guess, first, gated=gated)
 
     again = partial(_of_model, task, guess, gated)
@@ -243,6 +247,10 @@ def _seen(
 
 def _of_model(task: MovingTask, guess: Guess, gated: bool, model: InsModel) -> Track:
     return replace(task, model=model).run(guess, gated=gated)
+
+
+def _of_receiver(task: MovingTask, guess: Guess, gated: bool, log: GnssRecord) -> Track:
+    return replace(task, gnss=log).run(guess, gated=gated)
 
 
 def _published(

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import Aid, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError, UsageError
-from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import counted_from
+from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
@@ -40,17 +40,16 @@ from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
-from truenorth.navigation.whereabouts import check_fixes, check_heights
+from truenorth.navigation.whereabouts import check_places
 from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.slow_aids import Slow, as_lasting, one_less, slow_errors, with_slow
-from truenorth.records import ImuRecord, Late
+from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import DP
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -157,7 +156,7 @@ def navigate(
     plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
-    _check_places(given, begin, height)
+    check_places(given, begin, height)
     if zupt is not None:
         tell("looking for stops")
         seen = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
@@ -295,8 +294,23 @@ def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, 
     found = noise_evidence(usual, track, plan.model, plan.record)
     found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
+    found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)
     return found + second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
+
+
+def _led_away(plan: _Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
+    """Whether the receiver's velocity steps where the IMU's does not."""
+    receiver = given.get(Gnss.key)
+    if not isinstance(receiver, Gnss):
+        return []
+
+    def with_log(slow: Slow, log: GnssRecord) -> Track:
+        other = replace(plan, slow=slow)
+        return other.run(other.sources({**given, Gnss.key: replace(receiver, record=log)}), smooth=smooth)
+
+    without = [partial(with_log, less) for less in one_less(plan.slow)]
+    return led_by_evidence(partial(with_log, plan.slow), track, receiver.record, without)
 
 
 def _gyros_of_another_moment(plan: _Plan, given: Mapping[str, Any]) -> list[Evidence]:
@@ -371,16 +385,6 @@ def _from_start(record: ImuRecord, start: Start) -> ImuRecord:
         )
     first = int(np.searchsorted(record.time, start.time + slack))
     return record[first:]
-
-
-def _check_places(given: Mapping[str, Aid], begin: Start, altitude: str) -> None:
-    """Refuse fixes and heights that lie far from where the alignment stands."""
-    sigma = np.sqrt(np.diag(begin.P)[DP])
-    place = Position(begin.lat, begin.lon, begin.alt, float(sigma[:2].max()), float(sigma[2]))
-    if (gnss := record_of(given, Gnss)) is not None:
-        check_fixes(gnss, place, begin.time, heights=altitude in ("gnss", "free"))
-    if altitude == "baro" and (baro := record_of(given, Barometer)) is not None:
-        check_heights(baro, place, begin.time)
 
 
 def _check_overlap(record: ImuRecord, aiding: Sequence[Aiding]) -> None:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.aids import Aid, Barometer, Gnss
 from truenorth.core.earth import ecef_from_geodetic
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
+from truenorth.navigation.given import record_of
 from truenorth.records import GnssRecord, HeightRecord
+from truenorth.state.layout import DP
+from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
 
@@ -19,6 +24,16 @@ SIGMAS = 6.0
 FASTEST, STEEPEST = 400.0, 30.0  # m/s, of a vehicle between the alignment's epoch and the fix
 LEAST_FAR, LEAST_HIGH = 200.0, 50.0  # m
 CLOSER = 0.01  # of the distance is left where a mistake is undone
+
+
+def check_places(given: Mapping[str, Aid], begin: Start, altitude: str) -> None:
+    """Refuse fixes and heights that lie far from where the alignment stands; `altitude`: how height is kept."""
+    sigma = np.sqrt(np.diag(begin.P)[DP])
+    place = Position(begin.lat, begin.lon, begin.alt, float(sigma[:2].max()), float(sigma[2]))
+    if (gnss := record_of(given, Gnss)) is not None:
+        check_fixes(gnss, place, begin.time, heights=altitude in ("gnss", "free"))
+    if altitude == "baro" and (baro := record_of(given, Barometer)) is not None:
+        check_heights(baro, place, begin.time)
 
 
 def check_fixes(record: GnssRecord, place: Position, time: float, *, heights: bool = True) -> None:

@@ -6,6 +6,9 @@ after the first. The likelihood ratio of a step at each row, for fast and for sl
 where nothing steps, of which ``2 ln(N / p)`` is exceeded by one of N with probability p at most. Of a receiver that
 is off in every turn many ratios are large, and a step counts by how far it stands out.
 
+The exponential is an approximation: where it leaves a ratio below chance that few sound logs have, the filter itself says how it
+would follow a step from there (`truenorth/estimate/led_by.py`).
+
 Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
 systems", IEEE Trans. Autom. Control 21 (1976); the memory of the filter by a few exponentials is ours.
 """
@@ -31,35 +34,72 @@ MEMORIES = (3.0, 10.0, 30.0)  # rows, within which filters follow a step
 
 OUTLIER = 6.0  # sigmas: counts no more than this, which is less than a step has to
 BEGINS = 10  # rows, of which a step is the filter's own start
+DOUBTFUL = 0.2  # of sound logs have a ratio that is worth another look
+MOST_LOOKS = 4
 # Parts of the rows: what ratios and squares there are larger than of white innovations, any step's is.
 USUAL, LARGE = 0.9, 0.975
 
 
 def led_away_evidence(source: Residuals) -> list[Evidence]:
     """The step of a receiver's level velocity that is likelier than chance, and where it has led the answer by the end."""
-    if source.name not in LED:
+    found = _screened(source)
+    if found is None:
         return []
-    rows = (source.rows > 0) & np.isfinite(source.innovation[:, :2]).all(axis=1)
-    z, time = source.innovation[rows, :2] / source.sigma[rows, :2], source.time[rows]
-    # The gate may have taken the first rows of a step for outliers, and one outlier is no step.
-    z /= np.maximum(1.0, np.linalg.norm(z, axis=1, keepdims=True) / OUTLIER)
-    if z.size < FEWEST:
-        return []
+    z, time, sigma = found
     chance = 2.0 * math.log(len(MEMORIES) * len(z) / limit("step"))
     ratio, row, step = max((_largest_step(z, memory) for memory in MEMORIES), key=lambda found: found[0])
     if ratio <= chance:
         return []
-    size = float(np.linalg.norm(step * source.sigma[rows][row, :2]))
-    away = size * float(time[-1] - time[row])
+    return [led_by(source.name, step * sigma[row], float(time[row]), float(time[-1]), ratio, chance)]
+
+
+def led_by(name: str, step: Array, onset: float, end: float, ratio: float, chance: float) -> Evidence:
+    """What a step of velocity (2,) from a moment on does to the answer at the end."""
+    size = float(np.linalg.norm(step))
+    away = size * (end - onset)
     figures: dict[str, Figure] = {
-        "name": source.name,
+        "name": name,
         "size": size,
-        "onset": float(time[row]),
+        "onset": onset,
         "ratio": ratio,
         "chance": chance,
         "distance": away,
     }
-    return [Evidence("innovations.step", figures, "bounded", Effect(velocity=size, position=away), ("source",))]
+    return Evidence("innovations.step", figures, "bounded", Effect(velocity=size, position=away), ("source",))
+
+
+def doubtful_onsets(source: Residuals) -> list[float]:
+    """Times (s) from which a step is likelier than in most sound logs, the likeliest first."""
+    found = _screened(source)
+    if found is None:
+        return []
+    z, time, _ = found
+    ratio = np.max([_ratios(z, math.exp(-1.0 / memory))[0] for memory in MEMORIES], axis=0)
+    ratio[:BEGINS] = 0.0
+    onsets: list[float] = []
+    while len(onsets) < MOST_LOOKS and ratio.max() > 2.0 * math.log(len(MEMORIES) * len(z) / DOUBTFUL):
+        row = int(np.argmax(ratio))
+        onsets.append(float(time[row]))
+        ratio[max(row - 1, 0) : row + 2] = 0.0
+    return onsets
+
+
+def _screened(source: Residuals) -> tuple[Array, Array, Array] | None:
+    """Normalised innovations of level velocity (K, 2), their times and sigmas; None where there is nothing to look at."""
+    if source.name not in LED:
+        return None
+    rows = (source.rows > 0) & np.isfinite(source.innovation[:, :2]).all(axis=1)
+    sigma = source.sigma[rows, :2]
+    z = no_outlier(source.innovation[rows, :2] / sigma)
+    return None if z.size < FEWEST else (z, source.time[rows], sigma)
+
+
+def no_outlier(z: Array) -> Array:
+    """Normalised innovations (K, m), none of them larger than an outlier counts.
+
+    The gate may have taken the first rows of a step for outliers, and one outlier is no step.
+    """
+    return z / np.maximum(1.0, np.linalg.norm(z, axis=1, keepdims=True) / OUTLIER)
 
 
 def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:

@@ -1,0 +1,189 @@
+"""Whether a receiver is led away, by how the filter itself would follow it: the exact form of `truenorth/quality/led_away.py`.
+
+The same log with a receiver whose velocity steps at a moment, and whose place moves on with it: what that adds to the innovations
+of all sources is the signature ``s`` of a step of 1 m/s, east and north. Twice the logarithm of the likelihood ratio of the step
+that fits best is ``b^T A^-1 b``, ``A = sum s^T s``, ``b = sum s^T z``: a chi-square of two degrees of freedom where nothing steps.
+It is asked for where a simpler signature leaves doubt, and compared with the chance of all moments.
+
+Source: A. Willsky and H. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
+systems", IEEE Trans. Autom. Control 21 (1976); signatures by passes of the filter are ours.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.core.earth import radii
+from truenorth.core.errors import DataError
+from truenorth.estimate.rivals import Along, likelihood_ratio
+from truenorth.quality.led_away import doubtful_onsets, led_away_evidence, led_by, no_outlier
+from truenorth.quality.whiteness import whiteness
+from truenorth.records import GnssRecord
+from truenorth.state.evidence import Evidence
+from truenorth.state.limits import limit
+from truenorth.state.track import Residuals
+
+Array = NDArray[np.float64]
+
+STEP = 1e-3  # m/s, with which a pass asks: so small that no gate decides otherwise
+ROWS = 12  # earlier and later than a simpler signature finds it: the likeliest is asked for itself
+EARLIER = 1e-3  # s, by which a step begins before the row that shows it
+
+
+def led_by_evidence(
+    run: Callable[[GnssRecord], Along],
+    first: Along,
+    receiver: GnssRecord,
+    without: Sequence[Callable[[GnssRecord], Along]] = (),
+) -> list[Evidence]:
+    """The step of a receiver's velocity that is likelier than chance, by the filter's own response to it.
+
+    A step makes the errors of a receiver seem to last: where innovations have shown a slow error, a step without it is a rival.
+
+    Parameters
+    ----------
+    run : callable
+        The same filter with another record of the receiver.
+    first : track
+        With the record as it is.
+    receiver : GnssRecord
+        On the clock that `run` takes it on.
+    without : sequence of callable
+        As `run`, each without one of the slow errors that the innovations have shown.
+
+    Returns
+    -------
+    list of Evidence
+        None, or one.
+    """
+    if receiver.v_n is None or any(led_away_evidence(source) for source in first.residuals):
+        return []
+    found = _led(run, first, receiver, 0.0)
+    for less in without:
+        try:
+            track = less(receiver)
+        except DataError:  # the filter broke down: no explanation
+            continue
+        found += _led(less, track, receiver, likelihood_ratio(first.residuals, track.residuals))
+    return sorted(found, key=lambda item: -float(item.figures["ratio"]))[:1]
+
+
+def _led(run: Callable[[GnssRecord], Along], track: Along, receiver: GnssRecord, before: float) -> list[Evidence]:
+    """Steps that are likelier than chance; `before`: twice the logarithm of the likelihood ratio of this filter without one."""
+    found = []
+    for source in track.residuals:
+        chance = 2.0 * math.log(max(len(source.time), 2) / limit("step"))
+        asked: list[float] = []
+        for onset in doubtful_onsets(source):
+            if any(np.sum((source.time > min(at, onset)) & (source.time <= max(at, onset))) <= ROWS for at in asked):
+                continue
+            asked.append(onset)
+            try:
+                ratio, step, at = _asked(run, track.residuals, receiver, source, onset)
+            except DataError:
+                continue
+            if ratio + min(before, 0.0) > chance:
+                found.append(led_by(source.name, step, at, float(source.time[-1]), ratio, chance))
+    return found
+
+
+def _asked(
+    run: Callable[[GnssRecord], Along],
+    first: Sequence[Residuals],
+    receiver: GnssRecord,
+    source: Residuals,
+    onset: float,
+) -> tuple[float, Array, float]:
+    """Ratio and size (2,) of the likeliest step near a moment, and its own moment.
+
+    A response begun some rows earlier is the same response that much earlier, nearly: the likeliest is then asked for itself.
+    """
+
+    def signatures(moment: float) -> list[_Seen]:
+        passes = [run(_stepped(receiver, moment, axis)).residuals for axis in (0, 1)]
+        found = [_signature(r, [_same(r, others) for others in passes]) for r in first]
+        return [item for item in found if item is not None]
+
+    seen = signatures(onset)
+    row = int(np.searchsorted(source.time, onset))
+    near = source.time[max(row - ROWS, 0) : row + ROWS + 1]
+    tried = [_likeliest([item.begun(float(moment) - onset) for item in seen])[0] for moment in near]
+    best = float(near[int(np.argmax(tried))])
+    return *_likeliest(seen if best == onset else signatures(best)), best
+
+
+def _stepped(receiver: GnssRecord, onset: float, axis: int) -> GnssRecord:
+    """The receiver as it would be without a step of STEP, east (0) or north (1), from a moment on."""
+    since = receiver.time - (onset - EARLIER)
+    away = -STEP * np.maximum(since, 0.0)
+    R_M, R_N = radii(receiver.lat)
+    lat, lon = receiver.lat, receiver.lon
+    if axis == 0:
+        lon = lon + away / ((R_N + np.nan_to_num(receiver.alt)) * np.cos(lat))
+    else:
+        lat = lat + away / (R_M + np.nan_to_num(receiver.alt))
+    assert receiver.v_n is not None
+    velocity = receiver.v_n - STEP * np.outer(since >= 0.0, np.eye(3)[axis])
+    return replace(receiver, lat=lat, lon=lon, v_n=velocity)
+
+
+class _Seen(NamedTuple):
+    """Of the measurements of a source: times (K,), normalised innovations (K, m), what 1 m/s adds to them (K, m, 2)."""
+
+    time: Array
+    z: Array
+    s: Array
+
+    def begun(self, later: float) -> _Seen:
+        """As if the step began so much later (s)."""
+        K = len(self.time)
+        moved = [np.interp(self.time - later, self.time, row, left=0.0) for row in self.s.reshape(K, -1).T]
+        return self._replace(s=np.stack(moved, axis=1).reshape(self.s.shape))
+
+
+def _likeliest(seen: Sequence[_Seen]) -> tuple[float, Array]:
+    """Twice the logarithm of the likelihood ratio of the step (2,) m/s that fits best, and that step.
+
+    A source whose innovations are coloured, or too large, without the step carries so much less information.
+    """
+    shares = [1.0] * len(seen)
+    ratio = 0.0
+    step: Array = np.zeros(2)
+    for _ in range(2):
+        A = sum(
+            (w * np.einsum("kmi,kmj->ij", s, s) for w, (_, _, s) in zip(shares, seen, strict=True)), np.zeros((2, 2))
+        )
+        b = sum((w * np.einsum("kmi,km->i", s, z) for w, (_, z, s) in zip(shares, seen, strict=True)), np.zeros(2))
+        if np.linalg.matrix_rank(A) < 2:
+            return 0.0, step
+        step = np.linalg.solve(A, b).astype(np.float64)
+        ratio = float(b @ step)
+        shares = [1.0 / whiteness(z - s @ step).growth ** 2 for _, z, s in seen]
+    return ratio, step
+
+
+def _same(source: Residuals, others: Sequence[Residuals]) -> Residuals | None:
+    return next((r for r in others if r.name == source.name), None)
+
+
+def _signature(source: Residuals, others: Sequence[Residuals | None]) -> _Seen | None:
+    """What a step adds to the normalised innovations of a source.
+
+    A gate may have taken the first rows of a step for outliers: they count, as one outlier does that is no step.
+    """
+    there = [r for r in others if r is not None and np.array_equal(r.stamp, source.stamp)]
+    if len(there) < len(others) or not len(source.time):
+        return None
+    alike = np.all([(r.used == source.used) & (r.rows == source.rows) for r in there], axis=0) & (source.rows > 0)
+    axes = np.isfinite(source.innovation[alike]).all(axis=0)
+    z, *moved = ((r.innovation[alike] / r.sigma[alike])[:, axes] for r in (source, *there))
+    if not z.size:
+        return None
+    s = np.stack([(z - other) / STEP for other in moved], axis=-1)
+    return _Seen(source.time[alike], no_outlier(z), s)
