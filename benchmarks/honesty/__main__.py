@@ -6,7 +6,18 @@ into the page. The worlds are drawn from seed and run.
 
 from __future__ import annotations
 
-from benchmarks.honesty import circling, damping, driving, moving, navigation, staying, transfer, turning, underway
+from benchmarks.honesty import (
+    circling,
+    damping,
+    driving,
+    foreign_rows,
+    moving,
+    navigation,
+    staying,
+    transfer,
+    turning,
+    underway,
+)
 from benchmarks.honesty.frame import main
 from benchmarks.honesty.harness import framed
 
@@ -20,6 +31,7 @@ CASES = (
     *navigation.CASES,
     *circling.CASES,
     *driving.CASES,
+    *foreign_rows.CASES,
 )
 
 if __name__ == "__main__":

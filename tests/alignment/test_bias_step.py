@@ -90,6 +90,25 @@ def test_gravity_of_a_sound_still_base_does_not_drift(runs):
     assert all(quay(run)[1] is None for run in range(runs))
 
 
+@pytest.mark.parametrize("run", [0, *some([], [1, 2, 3, 4, 5])])
+def test_people_who_get_in_and_out_are_no_drift(run):
+    """Four steps of some arc minutes, which the gyros see: forces along a line were "an accelerometer drifts by 2 mg"."""
+    rng = np.random.default_rng([93, run])
+    spec = imu_spec("navigation")
+    sim = simulate(rest(PLACE, rng.uniform(0.0, 6.28)), rate=50.0, duration=240.0, imu=spec, seed=8, run=run)
+    record, tilt = sim.record, np.zeros((len(sim.record), 3))
+    for at in rng.uniform(20.0, 220.0, 4):
+        step = np.radians(3.0 / 60.0) * rng.standard_normal(2)
+        tilt[:, :2] += step * (0.5 + 0.5 * np.tanh((record.time[:, None] - at) / 0.3))
+    gyro = record.gyro + np.diff(tilt, axis=0, prepend=tilt[:1])
+    answer = align(replace(record, gyro=gyro, accel=record.accel - np.cross(tilt, record.accel)), PLACE, spec)
+    assert answer.status == "aligned"
+    heading = rotation_vector_from_dcm(answer.C_nb @ sim.truth.C_nb[-1].T)[
+        2
+    ]  # tilted by less than an arc minute of that
+    assert abs(heading) < 4.0 * answer.euler_sigma[0]
+
+
 def test_a_ramp_of_the_east_gyro_on_a_still_base_shows_in_its_rate() -> None:
     """.12 deg/h over three minutes: 5 sigmas of heading, and less than chance gives in the velocity of the base."""
     inputs, truth = BENCHES["still"].draw(4401, 2)

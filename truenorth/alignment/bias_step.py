@@ -153,7 +153,8 @@ def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
     """On a still base: gravity that moves steadily in the IMU's axes. The base tilts, or an accelerometer drifts.
 
     A tilt rate ``b / g`` about east looks like a heading that is off by ``b / (g w_ie cos L)``: filters that let the base move
-    take a drift for a tilt. No log of gyros and accelerometers tells them apart, and a base that is still hardly tilts.
+    take a drift for a tilt. No log of gyros and accelerometers tells them apart, and a base that is still hardly tilts. One
+    whose people get in and out does, in steps that the gyros see: such a walk has a slope of its own, which shows no drift.
     """
     motion = task.motion
     count = len(motion.time) // DRIFT_BLOCK
@@ -167,7 +168,8 @@ def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
     span = float(motion.time[-1] - motion.time[0])
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
     # Two values of a bias that wanders, far apart, differ by its instability times sqrt(2).
-    ratio = float(np.sum((span * b) ** 2 / (span**2 * variance + 2.0 * instability**2)))
+    walked = task.gravity**2 * tilt_slopes(task, C_nb)
+    ratio = float(np.sum((span * b) ** 2 / (span**2 * (variance + walked) + 2.0 * instability**2)))
     moved = span * float(np.linalg.norm(b))  # m/s^2
     if ratio <= limit("drift"):
         return []
@@ -175,6 +177,25 @@ def gravity_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]:
     effect = Effect(heading=heading, level=moved / task.gravity)
     figures: dict[str, Figure] = {"moved": moved, "tilt": effect.level, "ratio": ratio, "heading": heading}
     return [Evidence("bias.gravity_drifts", figures, "known", effect, ("still_part",))]
+
+
+def tilt_slopes(task: Task, C_nb: Array) -> Array:
+    """(2,) variance of the slope that the base's own walk, as the gyros see it, gives to forces east and north, (rad/s)^2.
+
+    A constant rate is that of the earth, or of a tilt that nobody can tell from it, and is left out. Of means over blocks the
+    differences ``d`` of a walk of density q have the variance ``q T`` and no correlation; a rocking about a place has -1/2 of its
+    variance from one to the next. The line through a walk over ``S`` has a slope of variance ``6 q / (5 S)``.
+    """
+    rate = task.motion.rate @ C_nb.T
+    angle = np.cumsum(rate - rate.mean(axis=0), axis=0)
+    count = len(angle) // DRIFT_BLOCK
+    tilt = (
+        np.stack([angle[:, 1], -angle[:, 0]], axis=1)[: count * DRIFT_BLOCK].reshape(count, DRIFT_BLOCK, 2).mean(axis=1)
+    )
+    d = np.diff(tilt, axis=0)
+    d -= d.mean(axis=0)
+    walk = np.maximum(np.mean(d**2, axis=0) + 2.0 * np.mean(d[1:] * d[:-1], axis=0), 0.0)
+    return np.asarray(1.2 * walk / (count * DRIFT_BLOCK**2))
 
 
 def _stays(step: Touch, time: Array, rate: Array) -> bool:
