@@ -52,8 +52,11 @@ messages: $(READY)
 release: $(READY)
 	$(BIN)/python .ci/release.py
 
+# All extras but cuda: NVIDIA's compiler is half a gigabyte, of use only where there is a device.
+LOCKED := plot ros zenoh ublox septentrio novatel px4 ardupilot cluster tune magnetometer live test dev docs bench
+
 lock: $(READY)
-	$(BIN)/uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes \
+	$(BIN)/uv pip compile pyproject.toml $(LOCKED:%=--extra %) --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --custom-compile-command "make lock" --upgrade -q -o requirements.lock
 
 # The stamp is touched last, so an interrupted installation is started again.

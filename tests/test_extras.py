@@ -1,12 +1,17 @@
 """Without matplotlib everything but the figures is there, and one line says what would bring them."""
 
+import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
 PROGRAM = """
 import sys
+import tomllib
+from pathlib import Path
 sys.modules["matplotlib"] = None
 import truenorth as tn
 from typer.testing import CliRunner
@@ -52,3 +57,12 @@ def test_without_matplotlib(tmp_path):
     assert said[5:] == ["picture None", f"plot {need}"]
     for name in ("still/truth.csv", "result/report.html", "t2/report.html", "noise/imu.yaml"):
         assert (tmp_path / name).exists() or (tmp_path / name.replace("csv", "parquet")).exists(), name
+
+
+def test_all_extras_but_the_largest_are_locked():
+    here = Path(__file__).parents[1]
+    if not (here / "Makefile").exists():
+        pytest.skip("an sdist has no Makefile")
+    extras = set(tomllib.loads((here / "pyproject.toml").read_text())["project"]["optional-dependencies"])
+    locked = re.search(r"^LOCKED := (.*)$", (here / "Makefile").read_text(), re.MULTILINE)[1].split()
+    assert set(locked) == extras - {"cuda"}

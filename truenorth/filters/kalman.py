@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Unpack
 
 from truenorth.core.linalg import Array, Size
+from truenorth.filters.device import Device
 from truenorth.filters.drive import Running
 from truenorth.filters.linear import run_linear, variant
 from truenorth.filters.recursion import SOUND, Workspace, update
@@ -35,7 +36,12 @@ variant(Kalman, condition=condition)
 
 
 def kalman(
-    system: LinearSystem, state: FilterState | None = None, *, joseph: bool = True, **running: Unpack[Running]
+    system: LinearSystem,
+    state: FilterState | None = None,
+    *,
+    joseph: bool = True,
+    device: Device = "cpu",
+    **running: Unpack[Running],
 ) -> Estimates:
     """Kalman filter.
 
@@ -50,13 +56,18 @@ def kalman(
         Update the covariance in Joseph's form, which survives precise measurements of what was unknown; the plain
         form takes two thirds of the time of an update. Where P cannot hold the information of a row in either form (rows that mix
         states with a prior some 1e16 times R), the filter stops and says so; :func:`truenorth.filters.square_root` goes on.
+    device : "cpu", "cuda" or "auto"
+        Where many runs are worked out: "cuda" is a CUDA device (``pip install 'truenorth[cuda]'``), with the same results but for
+        rounding; "auto" takes it where there is one and the work is large enough.
     **running
         ``history``, ``innovations``, ``workers``: see :class:`truenorth.filters.Running`.
 
     Raises
     ------
+    UsageError
+        A CUDA device is asked for and is not there, or cannot hold the system.
     DataError
         The variance of an innovation or of a state is not positive, or there is nothing but rounding left in P, naming run
         and epoch.
     """
-    return run_linear(Kalman(joseph), system, state, joseph=joseph, **running)
+    return run_linear(Kalman(joseph), system, state, joseph=joseph, device=device, **running)

@@ -17,6 +17,7 @@ from truenorth.core.compiled import OPTIONS, compiled
 from truenorth.core.kernel_source import STEPS
 from truenorth.core.linalg import Array, Size, padded
 from truenorth.filters import recursion
+from truenorth.filters.device import Device, on_cuda, run_on_cuda
 from truenorth.filters.drive import Running, drive
 from truenorth.filters.recursion import (
     SOUND,
@@ -160,15 +161,22 @@ def run_linear(
     memory: Array | None = None,
     adaptation: int = 0,
     joseph: bool | None = None,
+    device: Device = "cpu",
     **running: Unpack[Running],
 ) -> Estimates:
     """Run the linear filter that has options of this type; parameters as in :func:`truenorth.filters.drive.drive`.
 
-    `joseph` is of the Kalman filter alone, by whose covariance runs that share a system can go together.
+    `joseph` is of the Kalman filter alone, by whose covariance runs that share a system can go together, and so is `device`.
     """
     _choose_by_type()
+    there = joseph is not None and on_cuda(device, system)
+    if there:
+        running["workers"] = min(1, running.get("workers", 1))  # threads would only wait for one another
 
     def kernel(size: Size, runs: Runs, epochs: int, out: Histories) -> None:
+        if joseph is not None and there:
+            run_on_cuda(runs, epochs, joseph, out)
+            return
         if joseph is not None and shares(runs, len(out.x), epochs):
             run_shared(size, runs, epochs, joseph, out)
             return
