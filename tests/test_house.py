@@ -1,4 +1,4 @@
-"""The house: who may import whom, no circles, no function over 120 lines. Imports for type checkers count."""
+"""The house: who may import whom, no circles, no function over 120 lines, no file over 400. Imports for type checkers count."""
 
 import ast
 import re
@@ -28,6 +28,7 @@ FLOOR["simulation"] = FLOOR["state"] + 0.5  # it stands aside: on floors up to t
 FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, next to the package itself
 SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
 LONGEST = 120
+LONGEST_FILE = 400
 TYPES_COMMANDS = {"truenorth.formats.samples"}  # it shows commands to type
 
 FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
@@ -100,6 +101,11 @@ def test_no_long_functions():
         if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno + 1 > LONGEST
     ]
     assert wrong == []
+
+
+def test_no_long_files():
+    lengths = {name: path.read_text(encoding="utf-8").count("\n") for name, path in FILES.items()}
+    assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
 
 
 @cache

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -25,15 +24,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.aiding.aids import Positions
 from truenorth.alignment import Alignment, align
-from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.rotary import SHORTEST
-from truenorth.core.attitude import angle_text, euler_sigma
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.free_memory import give_back
 from truenorth.core.position import Position
 from truenorth.estimate.gaps import LONGEST_BRIDGE
-from truenorth.live.answer import Answer, Motion, under_way
-from truenorth.live.carry import Carry
+from truenorth.live.answer import Answer, under_way
 from truenorth.live.feed import Feed
 from truenorth.live.feeds import GnssFeed
 from truenorth.live.intake import LATE, Intake, as_rows
@@ -41,8 +37,8 @@ from truenorth.live.kept import keep, kept
 from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.navigator import Navigator
+from truenorth.live.onward import RECENT, Onward, push
 from truenorth.live.reasons import reasons_of
-from truenorth.live.recent import Recent
 from truenorth.live.regime import Turner, aids_of, reach
 from truenorth.live.solving import Solving
 from truenorth.records import ImuRecord
@@ -54,16 +50,11 @@ Array = NDArray[np.float64]
 FIRST = 20.0  # s of log before the first answer: a filter needs as much
 GROWTH = 1.1  # times the length of the last solution, from which the next is due
 SHARE = 0.1  # of one core, for solutions
-SETTLED = 20.0  # s after a solution, from which a drive that began in its rows would have been noticed
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
-    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "left", "_gap_before", "until_then", "failure",
-    "solutions", "_solution", "_carry", "_earlier", "_newest", "_due",
+    "place", "imu", "method", "share", "feeds", "turner", "log", "intake", "failure", "solutions", "_due",
 )  # fmt: skip
-UNKNOWN = {"gnss": usual_antenna(None)}  # an antenna of which nothing is said: as the alignment takes it
 NOWHERE = "no place is given, and no fix has come"
-BACK = 10.0  # s before a solution's end, from which its filter may need rows
-RECENT = 200.0  # s of the newest rows that are kept as they came: a drive is noticed within a minute
 
 
 class Aligner:
@@ -113,16 +104,9 @@ class Aligner:
         self.log = Log(kind, most_rows)
         self.on_taken(None)
         self.intake = Intake()
-        self.left: float | None = None
-        self._gap_before = -np.inf  # s: the last gap before the base left
-        self.until_then = ""  # how well heading was known when it did
+        self.onward = Onward(kind)
         self.failure = ""
         self.solutions = 0
-        self._solution: Alignment | None = None
-        self._carry: Carry | None = None
-        self._earlier: Carry | None = None  # of the solution before, which knows no row of a drive that has just begun
-        self._mover: Navigator | None = None  # on the move
-        self._newest = Recent()  # of the last `RECENT`, and what a running solution lacks
         self._solving, self._newest_in = Solving(share, background), np.inf  # s: last row of the solution that runs
         self._due = self._then_due = -np.inf  # s: of the next solution, and of the one after the one that runs
         self._lock = threading.Lock()
@@ -189,9 +173,14 @@ class Aligner:
         return self.turner is not None or "indexer" in self.feeds
 
     @property
+    def left(self) -> float | None:
+        """When the base began to leave its place, s; None as long as it stays."""
+        return self.onward.left
+
+    @property
     def residuals(self) -> tuple[Residuals, ...]:
         """The newest innovations of the loop, under way."""
-        return () if self._mover is None else self._mover.residuals
+        return () if self.onward.mover is None else self.onward.mover.residuals
 
     @property
     def duration(self) -> float:
@@ -205,30 +194,7 @@ class Aligner:
         """What is known now; None before the first solution."""
         with self._lock:
             self._collect()
-            at, carry = self._solution, self._carry
-            if at is None:
-                return None
-            now = None if self._mover is None else self._mover.answer
-            if now is not None:
-                return replace(
-                    now, status=at.status if now.status == "navigated" else now.status, floor=np.asarray(at.euler_sigma_floor),
-                    reasons=(*reasons_of(self, at), *now.reasons), counts=self.intake.counts, left=self.left,
-                )  # fmt: skip
-            time, C_nb, phi = at.time, at.C_nb, at.phi_covariance
-            if carry is not None:
-                time, C_nb, phi = carry.now()
-            return Answer(
-                time=time,
-                C_nb=C_nb,
-                sigma=euler_sigma(C_nb, phi),
-                floor=np.asarray(at.euler_sigma_floor),
-                status=at.status,
-                reasons=reasons_of(self, at),
-                solution=at,
-                counts=self.intake.counts,
-                left=self.left,
-                motion=Motion.of(at) if under_way(at) else None,
-            )
+            return self.onward.answer(lambda at: reasons_of(self, at), self.intake.counts)
 
     def finish(self) -> Alignment:
         """Align all rows as :func:`truenorth.align` would; without a sensor that aids on the move, those before the base left.
@@ -268,19 +234,16 @@ class Aligner:
             raise UsageError(
                 "navigation of an IMU that an indexer turns; expected an IMU that stands still in its body"
             )
-        navigator = self._navigator(found, **options)
-        for block in self._newest:
-            navigator.push(block[:, 0], block[:, 1:4], block[:, 4:])
+        navigator = self.onward.navigator(found, self.feeds, **options)
+        for block in self.onward.newest:
+            push(navigator, block)
         return navigator
-
-    def _navigator(self, start: Alignment, **options: Any) -> Navigator:
-        feeds = list(self.feeds.values())
-        return Navigator(start, feeds=feeds, mountings=UNKNOWN, kind=self.log.source_kind, **options)
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write all that the run goes on from, whole or not at all; see :meth:`load`."""
         with self._lock:
-            return keep(path, "Aligner", {name: getattr(self, name) for name in KEPT})
+            state = {name: getattr(self, name) for name in KEPT}
+            return keep(path, "Aligner", {**state, "onward": self.onward.kept()})
 
     @classmethod
     def load(cls, path: str | PathLike[str], *, background: bool = True) -> Aligner:
@@ -293,9 +256,10 @@ class Aligner:
         """
         state = kept(path, "Aligner")
         found = cls(state["place"], state["imu"], background=background, share=state["share"], method=state["method"])
+        vars(found.onward).update(state.pop("onward"))
         vars(found).update(state)
-        if found._solution is not None and under_way(found._solution):
-            found._take_over(found._solution)
+        if (solution := found.onward.solution) is not None and under_way(solution):
+            found._take_over(solution)
         return found
 
     def close(self) -> None:
@@ -315,28 +279,10 @@ class Aligner:
             self.intake.counts.too_late += len(block)
             return
         self._taken(block)
-        if self._lost(self._solution) and self.log.end - self.log.start > LATE:
-            self._solution = self._carry = self._earlier = None
+        if self._lost(self.onward.solution) and self.log.end - self.log.start > LATE:
+            self.onward.lose()
             self._due = -np.inf
-        self._newest.add(block)
-        self._newest.forget(min(self.log.end - RECENT, self._newest_in))
-        if self._mover is not None:
-            self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
-        for carry in (self._earlier, self._carry):
-            if carry is None:
-                continue
-            carry.add(block)
-            if self.left is None and carry.left is not None:
-                self._carry, self._earlier, self._solution = carry, None, carry.solution
-                self._leave(carry.left, carry.solution)
-
-    def _leave(self, time: float, solution: Alignment) -> None:
-        """The base has left its place."""
-        self.left, self._gap_before = time, self.log.last_gap
-        sigma = angle_text(float(solution.euler_sigma[0]))
-        self.until_then = (
-            f"heading was known to {sigma} (one sigma)" if solution.heading_known else "heading was not known"
-        )
+        self.onward.add(block, min(self.log.end - RECENT, self._newest_in), self.log.last_gap)
 
     def _lost(self, found: Alignment | None) -> bool:
         """Whether a solution of a base that stays lies before a gap in the rows: what the base did in it, nobody knows."""
@@ -361,7 +307,7 @@ class Aligner:
 
     def _record(self, aids: Sequence[Any], until: float = np.inf) -> ImuRecord:
         """The rows since the last gap that cannot be bridged."""
-        since = self.log.last_gap if self.left is None else self._gap_before
+        since = self.log.last_gap if self.left is None else self.onward.gap_before
         if aids and not self._turned:
             time = self.log.rows[:, 0]
             wide = np.flatnonzero(np.diff(time) > LONGEST_BRIDGE)
@@ -395,27 +341,8 @@ class Aligner:
         self.solutions += 1
         if under_way(found) or (self.left is None and not self._lost(found)):
             self._take_over(found)
-        self._newest.forget(self.log.end - RECENT)
+        self.onward.newest.forget(self.log.end - RECENT)
         give_back()  # the rows that came meanwhile, and what the solution before held
 
     def _take_over(self, found: Alignment) -> None:
-        """Carry a new solution on: by the closed loop on the move, by the gyros alone on a base that stays."""
-        before, self._solution = self._solution, found
-        if found.moving is not None and before is not None and not under_way(before) and self.left is None:
-            drives = [time for feed in self.feeds.values() if (time := feed.moves_from()) is not None]
-            self._leave(min(drives), before)
-        if under_way(found):
-            self._carry = self._earlier = self._mover = None
-            if found.heading_known:
-                self._mover = self._navigator(found)
-        elif self._earlier is None or self._carry is None or self._carry.elapsed > SETTLED:
-            self._earlier = self._carry
-        if not under_way(found) and not self._turned:
-            self._carry = Carry(found, self.log.source_kind)
-        for block in self._newest:
-            if block[-1, 0] < found.time - BACK:
-                continue
-            if self._mover is not None:
-                self._mover.push(block[:, 0], block[:, 1:4], block[:, 4:])
-            if self._carry is not None:
-                self._carry.add(block)
+        self.onward.take_over(found, self.feeds, turned=self._turned, gap=self.log.last_gap)

@@ -9,13 +9,13 @@ from truenorth.live.answer import under_way
 from truenorth.live.feed import Feed
 from truenorth.live.intake import Intake
 from truenorth.live.log import Log
+from truenorth.live.onward import Onward
 
 
 class _Run(Protocol):
     """What an aligner knows of its rows."""
 
-    left: float | None
-    until_then: str
+    onward: Onward
     intake: Intake
     feeds: dict[str, Feed]
     log: Log
@@ -28,9 +28,9 @@ class _Run(Protocol):
 def reasons_of(run: _Run, at: Alignment) -> tuple[str, ...]:
     """The verdict of the last solution `at` in words, then what became of base, rows and log."""
     more = []
-    if run.left is not None:
+    if (left := run.onward.left) is not None:
         went_on = "alignment goes on in motion" if under_way(at) else "the gyros carry it on"
-        more.append(f"the base left its place at {run.left:.1f} s: {run.until_then} until then, {went_on}")
+        more.append(f"the base left its place at {left:.1f} s: {run.onward.until_then} until then, {went_on}")
     found = run.intake.counts.words()
     if found:
         more.append(found)

@@ -22,12 +22,13 @@ from truenorth.core.position import Position
 from truenorth.core.shown import ARCHIVE, load, save
 from truenorth.formats.layout import Layout
 from truenorth.live.aid_sources import AidSource, Replayed, open_aid
-from truenorth.live.aligner import SHARE, UNKNOWN, Aligner
+from truenorth.live.aligner import SHARE, Aligner
 from truenorth.live.answer import Answer
 from truenorth.live.feed import Feed
 from truenorth.live.journal import Journal
 from truenorth.live.log import Kind
 from truenorth.live.navigator import Navigator
+from truenorth.live.onward import UNKNOWN
 from truenorth.live.regime import Turner
 from truenorth.live.sources import Source, Stream, open_source
 from truenorth.navigation import Navigation
