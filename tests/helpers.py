@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
+import pytest
 
 
 def run_command(capsys, monkeypatch, *arguments):
@@ -33,6 +36,15 @@ def assert_lines(time, signal, lines, left, without):
     assert share(list(lines)) < left
     for name in lines:
         assert share([other for other in lines if other != name]) > without
+
+
+@contextmanager
+def raises_naming(kind: type[Exception], *words: str) -> Iterator[None]:
+    """What is done raises this error, and its message has each of the words."""
+    with pytest.raises(kind) as error:
+        yield
+    missing = [word for word in words if word not in str(error.value)]
+    assert missing == [], str(error.value)
 
 
 def changed(a, index, value):

@@ -5,6 +5,7 @@ from dataclasses import fields
 
 import pytest
 
+from tests.helpers import raises_naming
 from truenorth.core.errors import DataError, UsageError
 from truenorth.records.presets import PRESETS
 from truenorth.records.spec_keys import KEYS
@@ -123,10 +124,8 @@ def test_a_specification_passes_through_and_a_mapping_is_read():
 def test_mistakes_in_a_file_are_named_with_file_and_key(text, said, tmp_path):
     file = tmp_path / "imu.yaml"
     file.write_text(text)
-    with pytest.raises(DataError) as error:
+    with raises_naming(DataError, str(file), *said):
         imu_spec(file)
-    for words in (str(file), *said):
-        assert words in str(error.value)
 
 
 def test_neither_preset_nor_file():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.helpers import raises_naming
 from truenorth.core.errors import DataError
 from truenorth.formats import read_imu
 
@@ -57,10 +58,8 @@ def test_psins_compact_with_faults(line, text, words, tmp_path):
     lines[line] = text
     path = tmp_path / "log.imu"
     path.write_text("\n".join(lines))
-    with pytest.raises(DataError) as error:
+    with raises_naming(DataError, *words):
         read_imu(path)
-    for word in words:
-        assert word in str(error.value)
 
 
 def test_psins_compact_cut_short(tmp_path):
@@ -110,10 +109,8 @@ def test_kf_gins_reads_frd_and_leaves_an_odometer_alone(tmp_path):
 def test_one_under_the_name_of_the_other(name, table, header, words, tmp_path):
     path = tmp_path / name
     np.savetxt(path, table, fmt="%.17g", header=header, comments="", delimiter=",")
-    with pytest.raises(DataError) as error:
+    with raises_naming(DataError, name, *words):
         read_imu(path, format="psins" if name == "log.imu" else "kf-gins")
-    for word in (name, *words):
-        assert word in str(error.value)
 
 
 @pytest.mark.parametrize("name", ["log.txt", "log.imu"])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.helpers import raises_naming
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -160,7 +161,5 @@ def test_given_errors_in_datasheet_units():
     ],
 )
 def test_mistakes_in_given_errors_are_named(content, said):
-    with pytest.raises(DataError) as error:
+    with raises_naming(DataError, *said):
         given_errors(content, "file")
-    for words in said:
-        assert words in str(error.value)

@@ -12,10 +12,9 @@ from dataclasses import replace
 
 from truenorth.alignment.result import Alignment
 from truenorth.core.errors import AlignmentError, DataError
-from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved
+from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved, rival
 from truenorth.records.specs import ImuSpec
-from truenorth.state.evidence import Evidence, Figure, Kind, contradiction
-from truenorth.state.limits import may_be_chance
+from truenorth.state.evidence import Evidence, contradiction
 
 FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
 CLOCKS = ("second_look.late", "second_look.early", "delay.gyros_")  # evidence of them
@@ -51,15 +50,7 @@ def poorer_evidence(run: Callable[[ImuSpec], Along], first: Along, spec: ImuSpec
         ratio = likelihood_ratio(first.residuals, other.residuals)
         if ratio < RULED_OUT:
             break
-        effect = moved(first, other)
-        figures: dict[str, Figure] = {
-            "factor": factor,
-            "ratio": ratio,
-            "heading": effect.heading,
-            "level": effect.level,
-        }
-        kind: Kind = "hint" if may_be_chance(ratio) else "known"
-        found.append(Evidence("rival.poorer", figures, kind, effect, ("specification",)))
+        found.append(rival("rival.poorer", {"factor": factor}, ratio, moved(first, other), "specification"))
     return sorted(found, key=lambda item: item.effect.level)[-1:]
 
 

@@ -12,7 +12,7 @@ Source: R. Mehra and J. Peschon, "An innovations approach to fault detection and
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
@@ -137,15 +137,33 @@ def wandering_evidence(
     effect = NO_EFFECT
     for *_, other in found:
         effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(effect.items(), other.items(), strict=True)))
+    return [rival(f"rival.{sensor}_wanders", {"size": size}, ratio, effect, "specification")]
+
+
+def rival(key: str, own: Mapping[str, Figure], ratio: float, effect: Effect, suspect: str) -> Evidence:
+    """Another model that fits the measurements better: a hint where that may be chance, else an effect of known size.
+
+    Parameters
+    ----------
+    key : str
+    own : mapping
+        Figures of this rival.
+    ratio : float
+        Twice the logarithm of the likelihood ratio.
+    effect : Effect
+        By what the answer moves with the rival.
+    suspect : str
+        What would be at fault.
+    """
     figures: dict[str, Figure] = {
-        "size": size,
+        **own,
         "ratio": ratio,
         "chance": limit("rival"),
         "heading": effect.heading,
         "level": effect.level,
     }
     kind: Kind = "hint" if may_be_chance(ratio) else "known"
-    return [Evidence(f"rival.{sensor}_wanders", figures, kind, effect, ("specification",))]
+    return Evidence(key, figures, kind, effect, (suspect,))
 
 
 def _climb(

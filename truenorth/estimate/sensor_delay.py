@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved
+from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
-from truenorth.state.evidence import Evidence, Figure, Kind
-from truenorth.state.limits import limit, may_be_chance
+from truenorth.state.evidence import Evidence
+from truenorth.state.limits import limit
 from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
@@ -55,16 +55,8 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record:
         rows, track = step[:2]
     if rows == 0:
         return []
-    effect = moved(first, track)
-    figures: dict[str, Figure] = {
-        "delay": abs(rows) * record.interval,
-        "ratio": ratio,
-        "chance": limit("rival"),
-        "heading": effect.heading,
-        "level": effect.level,
-    }
-    kind: Kind = "hint" if may_be_chance(ratio) else "known"
-    return [Evidence(f"delay.gyros_{'late' if rows > 0 else 'early'}", figures, kind, effect, ("common_clock",))]
+    key, delay = f"delay.gyros_{'late' if rows > 0 else 'early'}", abs(rows) * record.interval
+    return [rival(key, {"delay": delay}, ratio, moved(first, track), "common_clock")]
 
 
 def _likelier(
