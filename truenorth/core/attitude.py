@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -222,7 +222,7 @@ def _columns(axes: str) -> Array:
 # For kernels: vectors and quaternions as tuples of scalars, which stay in registers and allocate nothing.
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def cross(a: Any, b: Any) -> Any:
     """``a x b`` of two vectors as tuples."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -244,7 +244,7 @@ def times_back(C: Any, v: Any) -> Any:
     return times(C.T, v)
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def quaternion_product(p: Any, q: Any) -> Any:
     """Hamilton's product of two quaternions as tuples."""
     return (
@@ -255,7 +255,7 @@ def quaternion_product(p: Any, q: Any) -> Any:
     )
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def quaternion_from_rotation_vector(rotation: Any) -> Any:
     """Unit quaternion of a rotation vector, tuples; exact to rounding at any angle."""
     x, y, z = rotation
@@ -270,7 +270,7 @@ def quaternion_from_rotation_vector(rotation: Any) -> Any:
     return w, s * x, s * y, s * z
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def rotate(q: Any, v: Any) -> Any:
     """A vector turned by a unit quaternion, tuples: ``v + 2 w t + 2 u x t`` with ``t = u x v``."""
     u = (q[1], q[2], q[3])
@@ -283,7 +283,7 @@ def rotate(q: Any, v: Any) -> Any:
     )
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def normalised(q: Any) -> Any:
     """A nearly unit quaternion, a tuple, made unit: one Newton step, exact to rounding for errors below 1e-8."""
     scale = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])

@@ -92,7 +92,7 @@ def compiled(function: F | None = None, **options: Any) -> Any:
     Parameters
     ----------
     function : callable
-        The function; may be left out when options are given (``@compiled(inline="always")``).
+        The function; may be left out when options are given (``@compiled(forceinline=True)``).
     **options
         Passed on to :func:`numba.jit`.
 

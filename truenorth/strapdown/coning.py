@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import cross
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing
 from truenorth.core.errors import UsageError
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def coefficients(algorithm: str) -> tuple[Array, float]:
     return np.array(WITHIN[algorithm]), BEFORE[algorithm]
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def update_sums(rows: Any, start: int, samples: int, k: Any, k_before: float, before: Any) -> Any:
     """Weighted sum of the samples before the last, sum of all, and the last, of the update that begins at a row."""
     last = start + samples - 1
@@ -73,14 +73,14 @@ def update_sums(rows: Any, start: int, samples: int, k: Any, k_before: float, be
     return K, A, a
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def rotation_vector(K: Any, A: Any, a: Any) -> Any:
     """``phi = A + K x a``: rotation vector of an update, coning corrected."""
     coning = cross(K, a)
     return A[0] + coning[0], A[1] + coning[1], A[2] + coning[2]
 
 
-@compiled(inline="always")
+@borrowing(forceinline=True)
 def velocity_increment(K: Any, A: Any, a: Any, L: Any, B: Any, b: Any) -> Any:
     """Velocity increment of an update in body axes at its beginning: rotation and sculling corrected."""
     square = A[0] * A[0] + A[1] * A[1] + A[2] * A[2]

@@ -27,7 +27,7 @@ from truenorth.core.attitude import (
     quaternion_product,
     rotate,
 )
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
 from truenorth.strapdown.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
@@ -45,8 +45,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_normal_gravity_at = compiled(earth.normal_gravity_at, inline="always")
-_radii_at = compiled(earth.radii_at, inline="always")
+_normal_gravity_at = borrowing(earth.normal_gravity_at, forceinline=True)
+_radii_at = borrowing(earth.radii_at, forceinline=True)
 
 
 @dataclass(frozen=True)
