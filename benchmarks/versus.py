@@ -1,6 +1,7 @@
 """This checkout and an older one in one run, in turn: ``python -m benchmarks.versus OLD_CHECKOUT [REPEATS [ROWS]]``.
 
-All rows take half an hour; ``ROWS`` are numbers of some of them, such as ``1,2,4``.
+All rows take half an hour; ``ROWS`` are numbers of some of them, such as ``1,2,4``. ``parts`` in their place measures parts of
+the library that both have (:mod:`benchmarks.parts`), each checkout in a process of its own, in turn.
 
 Processor time of whole processes, children included, the least of the repetitions: what else the machine does counts
 little. Each checkout runs with the interpreter of its own ``.venv`` (``make .venv/.ready`` there).
@@ -16,6 +17,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -72,16 +74,32 @@ def spent(
     return after.children_user + after.children_system - before.children_user - before.children_system
 
 
-def said(checkout: Path, program: str) -> float:
-    """The figure that a program prints."""
-    python = str(checkout / ".venv/bin/python")
-    done = subprocess.run([python, "-c", program], cwd=checkout, check=True, capture_output=True, text=True)
-    return float(json.loads(done.stdout))
+def said(checkout: Path, program: str) -> Any:
+    """What a program prints, as JSON; it imports what stands in the checkout."""
+    python, environment = str(checkout / ".venv/bin/python"), {**os.environ, "PYTHONPATH": str(checkout)}
+    done = subprocess.run(
+        [python, "-c", program], cwd=checkout, check=True, capture_output=True, text=True, env=environment
+    )
+    return json.loads(done.stdout)
+
+
+def parts(old: Path, repeats: int) -> None:
+    """Print the table of the parts, the least of the repetitions."""
+    program = (NEW / "benchmarks" / "parts.py").read_text(encoding="utf-8")
+    rounds = [[said(checkout, program) for checkout in (old, NEW)] for _ in range(repeats)]
+    for what in rounds[0][0]:
+        before, now = (min(both[i][what] for both in rounds) for i in (0, 1))
+        print(f"| {what} | {before:.3g} | {now:.3g} | {before / now:.2f} |")
 
 
 def main() -> None:
     """Print the table, one row for each thing that is measured."""
     old, repeats = Path(sys.argv[1]).resolve(), int(sys.argv[2]) if len(sys.argv) > 2 else 3
+    head = "| what | before | now | ratio |\n| --- | ---: | ---: | ---: |"
+    if sys.argv[3:] == ["parts"]:
+        print(head, flush=True)
+        parts(old, repeats)
+        return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         log = folder / "ship.csv"
@@ -151,7 +169,7 @@ def main() -> None:
         for number, once in ((1, align), (2, with_report), (3, with_report), (6, demo)):
             if number in asked:
                 both(once, 1)  # what is not compiled yet
-        print("| what | before | now | ratio |\n| --- | ---: | ---: | ---: |", flush=True)
+        print(head, flush=True)
         for what, measured in (rows[number - 1] for number in asked):
             before, now = measured()
             print(f"| {what} | {before:.2f} | {now:.2f} | {before / now:.1f} |", flush=True)
