@@ -3,20 +3,26 @@
 Their white noise is under the sway, and the fit of the base's motion takes up what it makes of the velocity: white motion, or
 a slow oscillator. So the log is filtered again with noisier sensors, with the motion as fitted and with what remains of it
 without these. Velocity that wanders as ``t^(1/2)`` and ``g t^(3/2)`` is no motion of a base that stays.
+
+White noise is as dense above the sway as under it. Where a sensor looks white there, and is as quiet as specified, what is slow and
+louder is a motion that the fit has missed: a ship at her moorings goes to and fro in many tones.
 """
 
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+
+import numpy as np
 
 from truenorth.alignment.slow_sway import is_slow
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
 from truenorth.errors.sway import AxisMotion, with_motion
 from truenorth.estimate.staying import StayingLog
 from truenorth.filters import kalman
-from truenorth.quality.density import LOUD, noise_evidence
+from truenorth.quality.density import ALIKE, LOUD, noise_densities, noise_evidence
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -43,6 +49,7 @@ def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: flo
     interval : float, s
         Of the filter.
     """
+    seen = _loud_above_sway(log)
     duration = float(log.integrals.time[-1])
     steady = [
         AxisMotion(QUIETEST_BASE, tuple(item for item in axis.oscillators if not is_slow(item, duration)))
@@ -59,9 +66,12 @@ def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: flo
         both = (motion,) if factor == 1.0 else (motion, steady)
         return max(2.0 * float(kalman(with_motion(system, interval, m)).log_likelihood) for m in both)
 
+    suspects = [sensor for sensor in SENSORS if seen[sensor] * ALIKE >= LOUD]
+    if not suspects:
+        return {}
     as_said = likelihood(SENSORS[0], 1.0)
     found = {}
-    for sensor in SENSORS:
+    for sensor in suspects:
         below = max(as_said, likelihood(sensor, FACTORS[0]))
         factor = FACTORS[1]
         best = likelihood(sensor, factor)
@@ -74,6 +84,19 @@ def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: flo
             best, factor = better, more
         found[sensor] = factor
     return found
+
+
+def _loud_above_sway(log: StayingLog) -> dict[str, float]:
+    """How many times louder than specified each sensor is above the sway; infinite where it does not look white there."""
+    _, density = noise_densities(log.record)
+    if not np.isfinite(density).any(axis=0).all():
+        return dict.fromkeys(SENSORS, math.inf)
+    usual = np.nanmedian(density, axis=0)
+    said = asdict(log.noise)
+    channels = {"gyro": slice(0, 3), "accel": slice(3, 6)}
+    return {
+        sensor: float(usual[channels[sensor]].max()) / max(said[f"{sensor}_random_walk"], 1e-300) for sensor in SENSORS
+    }
 
 
 def sway_noise_evidence(noisier: Mapping[str, float], spec: ImuSpec, lat: float) -> list[Evidence]:
