@@ -7,11 +7,16 @@ import numpy as np
 from truenorth.campaign.aligning import _truth_of
 from truenorth.campaign.execution import one_thread_each
 from truenorth.core.position import Position
-from truenorth.errors.staying import StaticModel
+from truenorth.errors.staying import QUIETEST_BASE, StaticModel
+from truenorth.estimate.base_motion import VelocityNoise
 from truenorth.estimate.staying import core_system
+from truenorth.filters import LinearSystem
+from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
-from truenorth.strapdown.inertial import integrate
+from truenorth.simulation.ideal import ideal_log
+from truenorth.simulation.runs import simulate_runs
+from truenorth.strapdown.inertial import _grid, integrate
 
 PLACE = Position.from_degrees(45.0, 0.0)
 
@@ -50,3 +55,31 @@ def test_workers_keep_memory_unless_the_user_says_otherwise(monkeypatch):
         assert os.environ["MALLOC_MMAP_THRESHOLD_"] == "7"
     assert "MALLOC_TRIM_THRESHOLD_" not in os.environ
     assert os.environ["MALLOC_MMAP_THRESHOLD_"] == "7"
+
+
+def test_runs_share_what_their_times_decide_and_no_other():
+    ideal = ideal_log(rest(PLACE), rate=100.0, duration=60.0)
+    one, other = (run.record for run in simulate_runs(ideal, imu_spec("navigation"), 2))
+    rows = np.array([5999]) + 1
+    assert other.steps is one.steps
+    assert _grid(other, 1.0, rows, 0) is _grid(one, 1.0, rows, 0)
+    for grid in (_grid(one, 2.0, rows, 0), _grid(one, 1.0, rows - 1, 0), _grid(one, 1.0, rows, 2)):
+        assert grid is not _grid(one, 1.0, rows, 0)
+    late = one.shifted(5.0)
+    late = ImuRecord(np.delete(late.time, 3000), np.delete(one.gyro, 3000, 0), np.delete(one.accel, 3000, 0), one.kind)
+    assert (len(late.gaps), len(one.gaps)) == (1, 0)
+    assert not np.array_equal(integrate(late).time, integrate(one).time)
+
+
+def test_a_linearised_log_stands_the_check_that_it_is_spared():
+    log = simulate(rest(PLACE), duration=60.0, imu="navigation", seed=1).record
+    integrals, noise = integrate(log), StaticModel.of(imu_spec("navigation"))
+    for form in ("velocity", "force"):
+        system = core_system(noise, integrals, integrals, np.eye(3), PLACE, np.eye(12), form)
+        checked = LinearSystem(**{name: getattr(system, name) for name in system.axes})
+        loud = VelocityNoise(np.tile([1e-6, 4e-6, 1e-8], (system.epochs, 1)), [], 1)._with_motion(checked)
+        LinearSystem(**{name: getattr(loud, name) for name in loud.axes})
+        added = np.array([1e-6, 4e-6, 1e-8]) - QUIETEST_BASE**2
+        np.testing.assert_allclose(loud.R - system.R, np.tile(np.diag(added), (system.epochs, 1, 1)), atol=1e-18)
+        for name in ("Phi", "Q", "H", "R", "S", "P0"):
+            assert getattr(system, name).flags.c_contiguous

@@ -45,7 +45,7 @@ def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:
 def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
     """The filter's end, from which it goes on."""
     integrals = fine.integrals
-    trend = sway_trend(integrals.C_mean), sway_trend(integrals.C_late)
+    sways = isinstance(fine, SwayAlignment)
     return Ongoing(
         position=task.position,
         noise=noise,
@@ -56,7 +56,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         R=fine.disturbance**2,
         arm=fine.arm - fine.x[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
         motion=fine.motion if isinstance(fine, SwayAlignment) else (),
-        trend=trend if isinstance(fine, SwayAlignment) else None,
+        trend=(sway_trend(integrals.C_mean), sway_trend(integrals.C_late)) if sways else None,
         epochs=len(integrals.intervals),
         fitted=len(integrals.intervals),
         start=integrals.start,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,7 @@ def predictive_sigma(
     return math.sqrt(float(weight @ s**2) / float(weight.sum()))
 
 
+@lru_cache(maxsize=64)
 def usual(sensor: str, what: str, random_walk: float) -> float:
     """What is usual of a sensor with a random walk, such as its ``bias``: between the presets by a power law, SI."""
     presets = [imu_spec(name) for name in PRESETS]

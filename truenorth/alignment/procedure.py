@@ -262,7 +262,11 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     lat, alt = task.position.lat, task.position.alt
     rows = np.array([task.epoch.row])
     integrals = integrate(task.record, task.interval, rows_at=rows)
-    coarse = dual_vector(integrals, lat, alt) if method == "inertial" else oba(integrals, lat, alt, history=False)
+    refined = method in ("kalman", "swaying", *FADING, *STATIONARY)
+    if method == "inertial":
+        coarse = dual_vector(integrals, lat, alt)
+    else:
+        coarse = oba(integrals, lat, alt, history=False, gains=not refined)
     usual = usual_noise()
     walks = sway_walks(task.record) if spec is None and task.motion.overall == "swaying" else None
     if walks is not None:
@@ -276,7 +280,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     P = task.bias_prior(used, coarse.C_n0_i.T)
     if method in STATIONARY:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
-    if method not in ("kalman", "swaying", *FADING):
+    if not refined:
         disturbance = np.sqrt(np.mean(base_velocity(integrals, coarse.C_n0_i, lat, alt) ** 2, axis=0))
         covariance, floor = coarse_covariance(coarse, integrals, StaticModel.of(used), P, disturbance)
         C_n0_b = coarse.C_n0_i @ task.epoch.attitude(integrals.C_ib_at[0])

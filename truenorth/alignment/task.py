@@ -134,6 +134,8 @@ def noise_in(record: ImuRecord, imu: ImuSpec) -> ImuSpec:
     """
     spec = imu.seen_in(record)
     gyro, accel = (lost_walk(record, x) for x in (record.gyro, record.accel))
+    if gyro == accel == 0.0:
+        return spec
     return replace(
         spec,
         gyro_random_walk=math.hypot(spec.gyro_random_walk, gyro),

@@ -87,16 +87,8 @@ class StaticModel(Walks):
         nominal = (np.ascontiguousarray(x) for x in (C_n0_i, integrals.C_mean, integrals.C_late))
         _transitions(integrals.intervals, *nominal, known.f, known.f_late, C_n_n0, Phi, H)
         z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-        return LinearSystem(
-            Phi=Phi,
-            Q=known.Q,
-            H=H,
-            R=known.R + np.diag(R),
-            S=known.S,
-            z=z,
-            x0=np.zeros(STATES) if x0 is None else x0,
-            P0=P0,
-        )
+        with_log = known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + np.diag(R))
+        return with_log.with_arrays(z=z, x0=np.zeros(STATES) if x0 is None else x0, P0=P0)
 
 
 @compiled
@@ -149,9 +141,9 @@ class _Known(NamedTuple):
     f: Array  # [f x] and
     f_late: Array  # [f_late x], (K, 3, 3), as of :func:`gravity_force`
     C_n_n0: Array  # (K, 3, 3)
-    Q: Array
-    R: Array  # of the noise inside the intervals
-    S: Array
+    noise: (
+        LinearSystem  # whose Q, R (of the noise inside the intervals) and S are known; of the log it knows nothing yet
+    )
 
 
 @lru_cache(maxsize=1)
@@ -178,7 +170,11 @@ def _known_of(model: StaticModel, times: bytes, lat: float, alt: float) -> _Know
     S[:, DV] = -q_a * T / 2 * eye + q_g * T**3 / 24 * ff
     C_n_n0 = local_axes(time, lat)
     C_n0_n = np.swapaxes(C_n_n0, 1, 2)
-    return _Known(f, f_late, C_n_n0, Q, C_n_n0 @ R_inside @ C_n0_n, S @ C_n0_n)
+    R, S = C_n_n0 @ R_inside @ C_n0_n, S @ C_n0_n
+    one, H, z = np.eye(STATES), np.zeros((1, 3, STATES)), np.zeros((len(T), 3))
+    # A variance that is zero may be -1e-21 by rounding; no base is as quiet as that.
+    noise = LinearSystem(one[None], Q, H, R + np.eye(3), z, np.zeros(STATES), one, S=S).with_made(R=R)
+    return _Known(f, f_late, C_n_n0, noise)
 
 
 def mean_velocity(integrals: InertialIntegrals, C_n0_i: Array, lat: float, alt: float) -> Array:
@@ -244,7 +240,7 @@ def force_system(
     H, R, S = np.empty((count, 3, STATES)), np.empty((count, 3, 3)), np.empty((count, STATES, 3))
     _gains_of_velocity(core.Phi, core.Q, np.ascontiguousarray(C), H, R, S)
     z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-    return core.with_arrays(H=H, R=R, S=S, z=z)
+    return core.with_made(H=H, R=R, S=S).with_arrays(z=z)
 
 
 @compiled

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,9 @@ def white_variance(velocity: Array) -> Array:
     A start for the variance of the base's motion that slow errors of the INS do not enter; a bias of 100 ug is a difference of
     a mm/s every second.
     """
-    return np.maximum(0.5 * np.var(np.diff(velocity, axis=0), axis=0), QUIETEST_BASE**2)
+    steps = velocity[1:] - velocity[:-1]
+    steps -= steps.sum(axis=0) / len(steps)
+    return np.maximum(0.5 * ((steps**2).sum(axis=0) / len(steps)), QUIETEST_BASE**2)
 
 
 def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, Array]:
@@ -34,22 +35,29 @@ def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, 
 
     Returns it with the mean expected variance of the innovations.
     """
-    skip = min(5, len(estimates.innovation) // 5)
-    nu = estimates.innovation[skip:]
-    expected = np.einsum("kii->ki", estimates.innovation_covariance[skip:])
-    ratio = np.mean(nu**2 / expected, axis=0)
+    return _variance_of(estimates.innovation, estimates.innovation_covariance, R, colour)
+
+
+def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -> tuple[Array, Array]:
+    """:func:`base_variance` of innovations (K, 3) and their covariances (K, 3, 3)."""
+    skip = min(5, len(innovation) // 5)
+    # A row for each axis, whose sums run along memory.
+    nu = np.ascontiguousarray(innovation[skip:].T)
+    expected = np.ascontiguousarray(covariance.reshape(len(covariance), 9)[skip:, ::4].T)
+    count = nu.shape[1]
+    ratio = np.sum(nu * nu / expected, axis=1) / count
     # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
     # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
-    blocks = len(nu) // COLOUR_BLOCK
+    blocks = count // COLOUR_BLOCK
     if colour and blocks >= COLOUR_RUNS:
-        e = (nu / np.sqrt(expected))[: blocks * COLOUR_BLOCK].reshape(blocks, COLOUR_BLOCK, 3)
-        low = np.mean(e.sum(axis=1) ** 2, axis=0) / COLOUR_BLOCK
+        e = (nu / np.sqrt(expected))[:, : blocks * COLOUR_BLOCK].reshape(3, blocks, COLOUR_BLOCK)
+        low = np.sum((e @ np.ones(COLOUR_BLOCK)) ** 2, axis=1) / blocks / COLOUR_BLOCK
         # What white noise itself may give: Wilson and Hilferty's limit of chi-square over its freedom, 1 % at 5 blocks.
         chance = (1.0 - 2.0 / (9.0 * blocks) + COLOUR_ALARM * np.sqrt(2.0 / (9.0 * blocks))) ** 3
         # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
         coloured = low > chance * ratio
         ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)
-    mean = expected.mean(axis=0)
+    mean = np.sum(expected, axis=1) / count
     return np.maximum(R + (ratio - 1.0) * mean, QUIETEST_BASE**2), mean
 
 
@@ -79,15 +87,12 @@ class VelocityNoise:
             for _ in range(self.most):
                 R, same = self.R.copy(), True
                 for part in self.parts:
-                    seen = replace(
-                        estimates,
-                        innovation=estimates.innovation[part],
-                        innovation_covariance=estimates.innovation_covariance[part],
-                    )
-                    before = self.R[part][0]
-                    R[part], expected = base_variance(seen, before, colour)
+                    every = slice(None) if len(self.parts) == 1 and part.all() else part
+                    nu, covariance = estimates.innovation[every], estimates.innovation_covariance[every]
+                    before = self.R[every][0]
+                    R[every], expected = _variance_of(nu, covariance, before, colour)
                     # The vertical carries no attitude.
-                    same &= bool(np.all(np.abs(R[part][0] - before)[:2] < SAME_NOISE * expected[:2]))
+                    same &= bool(np.all(np.abs(R[every][0] - before)[:2] < SAME_NOISE * expected[:2]))
                 if same:
                     break
                 self.R = R
@@ -96,4 +101,6 @@ class VelocityNoise:
         return Filtered(system, estimates)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
-        return quiet.with_arrays(R=quiet.R + (self.R - QUIETEST_BASE**2)[:, None] * np.eye(3))
+        R = quiet.R + np.zeros((len(self.R), 1, 1))
+        R.reshape(len(R), -1)[:, ::4] += self.R - QUIETEST_BASE**2  # its diagonal
+        return quiet.with_made(R=R)

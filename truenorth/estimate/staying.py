@@ -243,5 +243,5 @@ def core_system(
     if key not in about:
         about.clear()
         about[key] = noise.linearise(slow, C_n0_i, lat, alt, P0, np.full(3, QUIETEST_BASE**2))
-    system = about[key].with_arrays(P0=P0)
+    system = about[key].with_made(P0=np.ascontiguousarray(P0))
     return force_system(system, integrals, C_n0_i, lat, alt) if form == "force" else system

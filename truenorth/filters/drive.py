@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal, TypedDict, TypeVar, get_args
@@ -88,9 +89,14 @@ def drive(
         out.memory[:] = _remembered(state, out.memory.shape[1], shape)
 
     size = padded(system.states)
-    in_parts(
-        len(out.x), workers, lambda start, stop: kernel(size, part(runs, start, stop), epochs, part(out, start, stop))
-    )
+    if len(out.x) == 1 and workers == 1:
+        kernel(size, runs, epochs, out)
+    else:
+        in_parts(
+            len(out.x),
+            workers,
+            lambda start, stop: kernel(size, part(runs, start, stop), epochs, part(out, start, stop)),
+        )
     _raise_failure(out, shape)
 
     out = out._replace(**{name: a.reshape(shape + a.shape[1:]) for name, a in out._asdict().items()})
@@ -104,13 +110,13 @@ def _remembered(state: FilterState, length: int, shape: tuple[int, ...]) -> Arra
         raise UsageError(
             f"the state remembers {state.memory.shape[-1]} figures, expected {length}: it is of another filter"
         )
-    return np.broadcast_to(state.memory, (*shape, length)).reshape(int(np.prod(shape, dtype=int)), length)
+    return np.broadcast_to(state.memory, (*shape, length)).reshape(math.prod(shape), length)
 
 
 def _histories(
     shape: tuple[int, ...], system: System, history: History, innovations: int, adaptation: int
 ) -> Histories:
-    count, n, m, epochs = int(np.prod(shape, dtype=int)), system.states, system.rows, system.epochs
+    count, n, m, epochs = math.prod(shape), system.states, system.rows, system.epochs
     of_x = 1 if history == "last" else epochs
     of_P = epochs if history == "full" else 1
     return Histories(
@@ -145,9 +151,9 @@ def part(arrays: T, start: int, stop: int) -> T:
 
 
 def _raise_failure(out: Histories, shape: tuple[int, ...]) -> None:
-    failed = np.flatnonzero(out.failure[:, 0])
-    if len(failed) == 0:
+    if not out.failure[:, 0].any():
         return
+    failed = np.flatnonzero(out.failure[:, 0])
     reason, epoch = out.failure[failed[0]]
     run = f" of run {', '.join(str(i) for i in np.unravel_index(failed[0], shape))}" if shape else ""
     if reason == NO_FILTER:

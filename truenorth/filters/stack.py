@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
@@ -57,9 +58,9 @@ class System(ABC):
             object.__setattr__(self, name, array)
         if any(_shape_of(before[name]) != _shape_of(getattr(self, name)) for name in before):
             self._check_shapes()
-        for name, a in self._arrays():
-            if name in arrays:
-                _check_finite(self._owner, name, self.axes[name], a)
+        for name, value in arrays.items():
+            if value is not None:
+                _check_finite(self._owner, name, self.axes[name], getattr(self, name))
         for name in ("Q", "R", "P0"):
             if name in arrays:
                 _check_covariance(self._owner, name, self.axes[name], getattr(self, name))
@@ -77,17 +78,34 @@ class System(ABC):
     @property
     def epochs(self) -> int:
         """Number of epochs, K."""
-        return max(a.shape[-len(self.axes[name])] for name, a in self._arrays() if self.axes[name][0] == "K")
+        axes = self.axes
+        return max(a.shape[-len(axes[name])] for name, a in self._arrays() if axes[name][0] == "K")
 
     @property
     def runs(self) -> tuple[int, ...]:
         """Shape of the run axes; ``()`` for a single run."""
-        return np.broadcast_shapes(*(a.shape[: a.ndim - len(self.axes[name])] for name, a in self._arrays()))
+        axes, arrays = self.axes, self._arrays()
+        if all(a.ndim == len(axes[name]) for name, a in arrays):
+            return ()
+        return np.broadcast_shapes(*(a.shape[: a.ndim - len(axes[name])] for name, a in arrays))
 
     def with_arrays(self: S, **arrays: Array | None) -> S:
         """The same system with other arrays of some names; these alone are checked."""
         other = copy(self)
         other._take(arrays, {name: getattr(self, name) for name in arrays})
+        return other
+
+    def with_made(self: S, **arrays: Array | None) -> S:
+        """The same system with other arrays that the caller made himself of sound ones: nothing is converted or checked.
+
+        Parameters
+        ----------
+        **arrays
+            Contiguous, of doubles, finite, in shapes that fit; covariances as they must be.
+        """
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.__dict__.update(arrays)
         return other
 
     def between(self: S, start: int, stop: int) -> S:
@@ -100,7 +118,7 @@ class System(ABC):
         return replace(self, **cut)  # type: ignore[type-var]
 
     def _arrays(self) -> list[tuple[str, Array]]:
-        return [(name, getattr(self, name)) for name in self.axes if getattr(self, name) is not None]
+        return [(name, a) for name in self.axes if (a := getattr(self, name)) is not None]
 
     @property
     def _owner(self) -> str:
@@ -135,11 +153,15 @@ class System(ABC):
 
 def flatten_runs(a: Array, core: int, shape: tuple[int, ...]) -> Array:
     """One run axis in front of the last `core` axes: of length 1 if all runs share `a`, else their number."""
+    if a.ndim == core and a.flags.c_contiguous:
+        flat = a[None]
+        flat.flags.writeable = False
+        return flat
     lead, tail = a.shape[: a.ndim - core], a.shape[a.ndim - core :]
     if any(length != 1 for length in lead):
         a = np.broadcast_to(a, shape + tail)
         lead = shape
-    flat = np.ascontiguousarray(a).reshape((int(np.prod(lead, dtype=int)), *tail)).view()
+    flat = np.ascontiguousarray(a).reshape((math.prod(lead), *tail)).view()
     flat.flags.writeable = False
     return flat
 

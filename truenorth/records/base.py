@@ -128,15 +128,12 @@ class Record(_Ordered):
     @cached_property
     def steps(self) -> Array:
         """(N,) length of the interval that ends at each row, s; the first row's is the nominal one."""
-        steps = np.empty(len(self.time))
-        steps[0] = self.interval
-        np.subtract(self.time[1:], self.time[:-1], out=steps[1:])
-        return steps
+        return _steps(self.time)
 
     @cached_property
     def gaps(self) -> NDArray[np.intp]:
         """Rows that follow a gap: their step is longer than 1.5 nominal intervals."""
-        return np.flatnonzero(self.steps > GAP_FACTOR * self.interval)
+        return _gaps(self.time)
 
     def between(self, start: float | None = None, stop: float | None = None) -> Self:
         """Rows with ``start <= time <= stop``, as a record of its own; the record itself where that is all.
@@ -205,6 +202,27 @@ class Record(_Ordered):
 def _median_step(time: Array) -> float:
     """The same for records that share their time, such as the runs of a campaign."""
     return float(np.median(np.diff(time)))
+
+
+@remembered
+def _steps(time: Array) -> Array:
+    """The same, nobody writes to it."""
+    steps = np.empty(len(time))
+    steps[0] = _median_step(time)
+    np.subtract(time[1:], time[:-1], out=steps[1:])
+    return steps
+
+
+@remembered
+def _gaps(time: Array) -> NDArray[np.intp]:
+    """The same, nobody writes to it."""
+    return np.flatnonzero(_steps(time) > GAP_FACTOR * _median_step(time))
+
+
+@remembered
+def _increases(time: Array) -> bool:
+    """Whether times are finite and increase; the same."""
+    return bool(np.isfinite(time).all() and (time[1:] > time[:-1]).all())
 
 
 def _own(given: Any, name: str, source: str) -> Array:
@@ -325,6 +343,8 @@ def first_disorder(time: Array) -> tuple[int, str] | None:
 
 
 def _check_time(time: Array, source: str) -> None:
+    if _increases(time):
+        return
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size:
         raise DataError(f"{source}: row {bad[0] + 1}, column time: {time[bad[0]]}; expected a finite number")

@@ -170,6 +170,8 @@ class ImuSpec:
 
     def with_random_walks(self, interval: float) -> ImuSpec:
         """What a filter sees of the noise of samples: random walks that hold it, at a sampling interval (s)."""
+        if self.gyro_sample_noise == self.accel_sample_noise == 0.0:
+            return self
         root = math.sqrt(interval)
         return replace(
             self,
@@ -183,6 +185,8 @@ class ImuSpec:
         """What a filter sees in a record: the noise of samples, and what its scattered time stamps make of its motion."""
         spec = self.with_random_walks(record.interval)
         gyro, accel = record.stamp_walks
+        if gyro == accel == 0.0:
+            return spec
         return replace(
             spec,
             gyro_random_walk=math.hypot(spec.gyro_random_walk, gyro),

@@ -124,6 +124,18 @@ def _drift(own: SensorErrors, dT: Array, interval: float, value: Any, draw: Any,
 @compiled
 def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, asymmetry: Any, out: Any) -> None:
     """``(I + matrix + c dT) x + A |x| + G f``; everything as increments."""
+    changes = False
+    for i in range(3):
+        changes |= by_temperature[i] != 0.0 or asymmetry[i] != 0.0
+        for j in range(3):
+            changes |= G[i, j] != 0.0
+    if not changes:
+        for k in range(len(x)):
+            a, b, c = x[k, 0], x[k, 1], x[k, 2]
+            out[k, 0] = a + matrix[0, 0] * a + matrix[0, 1] * b + matrix[0, 2] * c
+            out[k, 1] = b + matrix[1, 0] * a + matrix[1, 1] * b + matrix[1, 2] * c
+            out[k, 2] = c + matrix[2, 0] * a + matrix[2, 1] * b + matrix[2, 2] * c
+        return
     for k in range(len(x)):
         for i in range(3):
             total = (1.0 + by_temperature[i] * dT[k]) * x[k, i] + asymmetry[i] * abs(x[k, i])

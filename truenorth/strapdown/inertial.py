@@ -11,7 +11,8 @@ Source: Y. Qin, G. Yan et al., "Strapdown initial alignment on a swaying base us
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,11 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.attitude import skew
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.core.errors import AlignmentError
+from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
 from truenorth.strapdown.increments import in_blocks
 from truenorth.strapdown.inertial_integration import at_start, go_on, integrals_of, interval_means
 
 Array = NDArray[np.float64]
+MOST_GRIDS = 4  # of one record
 MOST_REMEMBERED = 10_000  # epochs: an alignment has 5000 at the most
 SUB_EPOCHS = 5  # points within a filter interval at which the mean attitude is sampled
 
@@ -46,12 +49,14 @@ def gravity_position(t: ArrayLike, lat: float, alt: float) -> Array:
 def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
     """Integrate ``exp([w_ie t x])`` `order` times from 0 to t; nobody writes to it."""
     t = np.asarray(t, dtype=np.float64)
+    if t.ndim == 0:
+        return _of_epochs(t.tobytes(), float(lat), order)[0]
     if t.ndim == 1 and t.size <= MOST_REMEMBERED:
         return _of_epochs(t.tobytes(), float(lat), order)
     return _integrated_rotation(t, lat, order)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def _of_epochs(times: bytes, lat: float, order: int) -> Array:
     """The same of times (of doubles) that come again: in each pass over a log, and in each run of a campaign."""
     found = _integrated_rotation(np.frombuffer(times), lat, order)
@@ -87,17 +92,17 @@ class InertialIntegrals:
     C_late: Array  # (K, 3, 3): mean of ``C_ib`` weighted by the elapsed part of the interval, ``(1/T^2) int s C_ib ds``
     C_ib_at: Array  # (M, 3, 3): ``C_ib`` after the rows that were asked for besides
 
-    @property
+    @cached_property
     def intervals(self) -> Array:
         """(K,) lengths of the filter intervals, s."""
         return np.diff(self.time)
 
-    @property
+    @cached_property
     def mean_velocity(self) -> Array:
         """(K, 3) mean over each interval of the integrated specific force, m/s."""
         return np.diff(self.position, axis=0) / self.intervals[:, None]
 
-    @property
+    @cached_property
     def mean_force(self) -> Array:
         """(K, 3) mean specific force of each interval in ``i``, m/s^2."""
         return np.diff(self.velocity, axis=0) / self.intervals[:, None]
@@ -130,40 +135,77 @@ def integrate(
     AlignmentError
         The record is shorter than two filter intervals.
     """
-    steps = record.steps
-    # Edges: edge r stands before row r, at the end of row r - 1.
-    edges = np.concatenate(([0.0], np.cumsum(steps)))
-    edges -= edges[context]
-    count = int((edges[-1] + 0.5 * record.interval) // interval)
-    if count < 2:
+    extra = np.asarray(rows_at, dtype=np.int64) + 1
+    grid = _grid(record, interval, extra, context)
+    if grid is None:
         raise AlignmentError(
-            f"{record.source}: {edges[-1]:.2f} s of data; at least {2 * interval:g} s are needed for any answer: "
+            f"{record.source}: {_length(record, context):.2f} s of data; at least {2 * interval:g} s are needed for any answer: "
             "record longer, or use more of the log (`record.between`)"
         )
+    C_all, v_all, p_all = _integrals(record, grid.every, gyro_bias, accel_bias)
+    if context:  # every[0] is the edge after the context: epochs begin there
+        C_0, v_0, since = C_all[0].T, v_all[0], grid.since[:, None]
+        C_all, v_all, p_all = C_0 @ C_all, (v_all - v_0) @ C_0.T, (p_all - p_all[0] - since * v_0) @ C_0.T
+
+    C, ends = C_all[grid.on_grid], grid.on_grid[:: grid.sub]
+    C_mean, C_late = interval_means(C, grid.time, grid.sub)
+    return InertialIntegrals(
+        start=float(record.time[context] - record.steps[context]),
+        time=grid.time[:: grid.sub],
+        C_ib=C_all[ends],
+        velocity=v_all[ends],
+        position=p_all[ends],
+        C_mean=C_mean,
+        C_late=C_late,
+        C_ib_at=C_all[grid.at],
+    )
+
+
+class _Grid(NamedTuple):
+    """Where a log is cut: its times alone decide it."""
+
+    every: NDArray[np.int64]  # (E,) rows after which anything is wanted, ascending
+    on_grid: NDArray[np.intp]  # places among them of the points within intervals
+    at: NDArray[np.intp]  # and of the rows that were asked for besides
+    time: Array  # s; of the points
+    since: Array  # (E,) s; of all, since the first
+    sub: int  # points an interval
+
+
+def _grid(record: ImuRecord, interval: float, extra: NDArray[np.int64], context: int) -> _Grid | None:
+    """The cuts of a record, remembered for those that share its times; None where it is too short."""
+    grids, key = _grids(record.time), (interval, extra.tobytes(), context)
+    if key in grids:
+        return grids[key]
+    edges = _edges(record, context)
+    count = int((edges[-1] + 0.5 * record.interval) // interval)
+    if count < 2:
+        return None
     sub = max(1, min(SUB_EPOCHS, int(interval / record.interval)))
     wanted = np.arange(count * sub + 1) * (interval / sub)
     epochs = np.clip(np.searchsorted(edges, wanted - 0.5 * record.interval), 0, len(record))
-    extra = np.asarray(rows_at, dtype=np.int64) + 1
     every, back = np.unique(np.concatenate((epochs, extra)), return_inverse=True)
-    C_all, v_all, p_all = _integrals(record, every, gyro_bias, accel_bias)
-    if context:  # every[0] is the edge after the context: epochs begin there
-        C_0, v_0, since = C_all[0].T, v_all[0], (edges[every] - edges[every[0]])[:, None]
-        C_all, v_all, p_all = C_0 @ C_all, (v_all - v_0) @ C_0.T, (p_all - p_all[0] - since * v_0) @ C_0.T
+    if len(grids) == MOST_GRIDS:
+        grids.clear()
+    since = edges[every] - edges[every[0]]
+    grids[key] = _Grid(every, back[: len(epochs)], back[len(epochs) :], edges[epochs], since, sub)
+    return grids[key]
 
-    on_grid, at = back[: len(epochs)], back[len(epochs) :]
-    t, C = edges[epochs], C_all[on_grid]
-    C_mean, C_late = interval_means(C, t, sub)
-    ends = slice(None, None, sub)
-    return InertialIntegrals(
-        start=float(record.time[context] - steps[context]),
-        time=t[ends],
-        C_ib=C[ends],
-        velocity=v_all[on_grid][ends],
-        position=p_all[on_grid][ends],
-        C_mean=C_mean,
-        C_late=C_late,
-        C_ib_at=C_all[at],
-    )
+
+@remembered
+def _grids(time: Array) -> dict[tuple[float, bytes, int], _Grid]:
+    """What :func:`_grid` remembers of a record's times; those of a campaign's runs are one array."""
+    return {}
+
+
+def _edges(record: ImuRecord, context: int) -> Array:
+    """(N + 1,) s: edge r stands before row r, at the end of row r - 1; zero behind the context."""
+    edges = np.concatenate(([0.0], np.cumsum(record.steps)))
+    return edges - edges[context]
+
+
+def _length(record: ImuRecord, context: int) -> float:
+    return float(_edges(record, context)[-1])
 
 
 def _integrals(
