@@ -9,6 +9,8 @@ Source: G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time series mo
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,12 +50,19 @@ def pick_form(gained: Array, motion: MotionSummary) -> tuple[Form, str]:
 def _portmanteau(x: Array) -> float:
     """Ljung and Box's statistic of both columns (K, 2), a parabola taken out."""
     count = len(x)
-    t = np.linspace(-1.0, 1.0, count)
-    trend = np.vander(t, TREND)
-    e = x - trend @ np.linalg.lstsq(trend, x, rcond=None)[0]
-    power = np.sum(e**2, axis=0)
+    trend = _trend(count)
+    e = x - trend @ (trend.T @ x)
+    power = np.einsum("ki,ki->i", e, e)
     total = 0.0
     for lag in range(1, LAGS + 1):
-        rho = np.sum(e[lag:] * e[:-lag], axis=0) / power
-        total += float(np.sum(rho**2)) / (count - lag)
+        rho = np.einsum("ki,ki->i", e[lag:], e[:-lag]) / power
+        total += float(rho @ rho) / (count - lag)
     return count * (count + 2) * total
+
+
+@lru_cache(maxsize=2)
+def _trend(count: int) -> Array:
+    """(count, 3) orthonormal columns that span the parabolas; nobody writes to it."""
+    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), TREND))[0]
+    basis.flags.writeable = False
+    return np.asarray(basis, dtype=np.float64)

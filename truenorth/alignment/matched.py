@@ -15,6 +15,7 @@ linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,8 +102,16 @@ def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovati
     L = np.asarray(np.linalg.cholesky(fine.estimates.innovation_covariance), dtype=np.float64)
     if others is not None:
         seen = np.concatenate([seen, through(fine.gains, others)[0]], axis=2)
-    white = np.asarray(np.linalg.solve(L, seen), dtype=np.float64)
-    return Innovations(L, fine.gains, white)
+    return Innovations(L, fine.gains, whitened(L, seen))
+
+
+def whitened(L: Array, x: Array) -> Array:
+    """``L^-1 x`` of lower triangular L (S, m, m) and x (S, m, r), with few rows m: a row of all of them at a time."""
+    found = np.empty_like(x)
+    for i in range(x.shape[1]):
+        known = sum((L[:, i, j, None] * found[:, j] for j in range(i)), np.zeros(()))
+        found[:, i] = (x[:, i] - known) / L[:, i, i, None]
+    return found
 
 
 def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
@@ -128,33 +137,43 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     whole = tuple(np.ascontiguousarray(a) for a in arrays)
     sizes = padded(n), padded(n + seen.L.shape[1]), len(padded(n + courses + right))
     _sum_back(*sizes, *whole, behind.astype(np.int64), forms, ends)
-    energies, matches = forms[:, :, : n + courses], forms[:, :, n + courses :]
+    return _matches(seen, banks, behind, forms, ends)
 
-    found, first = [], n
+
+def _matches(
+    seen: Innovations, banks: Sequence[Signatures], behind: NDArray[np.int64], forms: Array, ends: Array
+) -> tuple[Match, ...]:
+    """Of the signatures of all banks; the forms of ``(e_k, w)``, w of all courses, are those behind the epochs `behind`."""
+    gains, k = seen.gains, np.concatenate([bank.epoch for bank in banks])
+    state = np.concatenate([bank.state for bank in banks], axis=1).T[..., None]  # (S, n, 1)
+    measured = np.concatenate([bank.measured for bank in banks], axis=1).T[..., None]
+    first = whitened(seen.L[k], gains.H_Phi[k] @ state + measured)  # their first epoch by itself
+    n = state.shape[1]
+    e = (gains.step[k] @ state - gains.gain[k] @ measured)[..., 0]
+    energy, match = np.sum(first[..., 0] ** 2, axis=1), (np.swapaxes(first, 1, 2) @ seen.white[k])[:, 0]
+    left, at = np.empty((n, len(k))), np.searchsorted(behind, k)
+    columns, row, course, parts = np.arange(ends.shape[2], forms.shape[2]), 0, n, []
     for bank in banks:
-        own = np.r_[0:n, first : first + len(bank.after)]  # e, and this bank's courses
-        at = np.searchsorted(behind, bank.epoch)
-        found.append(_match(seen, bank, energies[at][:, own[:, None], own], matches[at][:, own], ends[at][:, :, own]))
-        first += len(bank.after)
-    return tuple(found)
-
-
-def _match(seen: Innovations, bank: Signatures, energies: Array, matches: Array, ends: Array) -> Match:
-    """Of the signatures of a bank; the forms of ``(e_k, w)`` are those behind the epoch of each."""
-    gains, k = seen.gains, bank.epoch
-    first = np.einsum("smi,is->sm", gains.H_Phi[k], bank.state) + bank.measured.T  # their first epoch by itself
-    first = np.linalg.solve(seen.L[k], first[..., None])[..., 0]
-    e = np.einsum("sij,js->si", gains.step[k], bank.state)
-    e = e - np.einsum("sim,ms->si", gains.gain[k], bank.measured)
-    begun = np.concatenate([e, bank.after.T], axis=1)
-    energy = np.sum(first**2, axis=1) + np.einsum("si,sij,sj->s", begun, energies, begun)
-    match = np.einsum("sm,smr->sr", first, seen.white[k]) + np.einsum("si,sir->sr", begun, matches)
-    others = seen.white[:, :, 1:].reshape(seen.white[..., 0].size, -1)
-    known = np.column_stack([others.T @ seen.white[:, :, 0].ravel(), match[:, 1:].T])
-    explained = np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, known)
-    energy = np.maximum(energy - np.einsum("sr,rs->s", match[:, 1:], explained[:, 1:]), 1e-300)
-    of_innovations = match[:, 0] - match[:, 1:] @ explained[:, 0]
-    return Match(of_innovations**2 / energy, of_innovations / energy, np.einsum("sij,sj->is", ends, begun))
+        courses, signatures = bank.after.shape
+        part, own = slice(row, row + signatures), np.r_[0:n, course : course + courses]  # e, and this bank's courses
+        begun = np.concatenate([e[part], bank.after.T], axis=1)
+        form = forms[at[part]][:, own[:, None], np.concatenate([own, columns])]
+        after = (begun[:, None] @ form)[:, 0]
+        energy[part] += np.sum(after[:, : len(own)] * begun, axis=1)
+        match[part] += after[:, len(own) :]
+        left[:, part] = (ends[at[part]][:, :, own] @ begun[..., None])[..., 0].T
+        row, course = row + signatures, course + courses
+        parts.append(part)
+    of_innovations = match[:, 0]
+    if match.shape[1] > 1:
+        others = seen.white[:, :, 1:].reshape(seen.white[..., 0].size, -1)
+        known = np.column_stack([others.T @ seen.white[:, :, 0].ravel(), match[:, 1:].T])
+        explained = np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, known)
+        energy = energy - np.einsum("sr,rs->s", match[:, 1:], explained[:, 1:])
+        of_innovations = of_innovations - match[:, 1:] @ explained[:, 0]
+    energy = np.maximum(energy, 1e-300)
+    size = of_innovations / energy
+    return tuple(Match((of_innovations * size)[part], size[part], left[:, part]) for part in parts)
 
 
 @compiled

@@ -8,6 +8,7 @@ sound gyro differs between two times as well.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +43,10 @@ def rate_step_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]
         motion.overall != "still" or count < FEWEST or motion.fraction("rotating") > 0.0
     ):  # a turn shares the earth's rate anew
         return []
-    shapes = np.stack([_shape(course, round(onset * count), count) for course, onset in SIGNATURES], axis=1)  # (K, S)
-    shapes -= shapes.mean(axis=0)
+    shapes = _shapes(count)
     energy = np.sum(shapes**2, axis=0)[:, None]
     size = shapes.T @ (motion.rate - motion.rate.mean(axis=0)) / energy  # (S, 3), rad/s
-    noise = 0.5 * np.mean(np.diff(motion.rate, axis=0) ** 2, axis=0)
+    noise = 0.5 * np.mean((motion.rate[1:] - motion.rate[:-1]) ** 2, axis=0)
     instability = max(spec.gyro_bias_instability, usual("gyro", "bias_instability", spec.gyro_random_walk))
     ratio = size**2 / (noise / energy + 2.0 * instability**2)
     best, axis = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
@@ -66,6 +66,15 @@ def rate_step_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]
     }
     kind: Kind = "hint" if may_be_chance(float(ratio[best, axis])) else "bounded"
     return [Evidence("bias.gyro_steps", figures, kind, Effect(heading=heading), ("still_part",))]
+
+
+@lru_cache(maxsize=2)
+def _shapes(count: int) -> Array:
+    """(K, S) of all signatures, about their means; nobody writes to it."""
+    shapes = np.stack([_shape(course, round(onset * count), count) for course, onset in SIGNATURES], axis=1)
+    shapes -= shapes.mean(axis=0)
+    shapes.flags.writeable = False
+    return shapes
 
 
 def _shape(course: str, begin: int, count: int) -> Array:

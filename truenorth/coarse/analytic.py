@@ -54,20 +54,33 @@ def means(record: ImuRecord) -> Means:
     return Means(
         w_ib_b=total[1:4] / total[0],
         f_b=total[4:] / total[0],
-        w_covariance=np.cov(w.T) / blocks,
-        f_covariance=np.cov(f.T) / blocks,
+        w_covariance=_scatter(w) / blocks,
+        f_covariance=_scatter(f) / blocks,
     )
+
+
+def _scatter(x: Array) -> Array:
+    """Covariance (3, 3) of rows (B, 3) about their mean."""
+    left = x - x.sum(axis=0) / len(x)
+    return left.T @ left / (len(x) - 1)
 
 
 @compiled
 def _block_sums(steps: Any, dtheta: Any, dvel: Any, edges: Any, sums: Any) -> None:
     """Add time, angle and velocity of the rows between edges (B + 1,) to sums (B, 7)."""
     for b in range(len(sums)):
+        T, w0, w1, w2 = sums[b, 0], sums[b, 1], sums[b, 2], sums[b, 3]
+        f0, f1, f2 = sums[b, 4], sums[b, 5], sums[b, 6]
         for k in range(edges[b], edges[b + 1]):
-            sums[b, 0] += steps[k]
-            for i in range(3):
-                sums[b, 1 + i] += dtheta[k, i]
-                sums[b, 4 + i] += dvel[k, i]
+            T += steps[k]
+            w0 += dtheta[k, 0]
+            w1 += dtheta[k, 1]
+            w2 += dtheta[k, 2]
+            f0 += dvel[k, 0]
+            f1 += dvel[k, 1]
+            f2 += dvel[k, 2]
+        sums[b, 0], sums[b, 1], sums[b, 2], sums[b, 3] = T, w0, w1, w2
+        sums[b, 4], sums[b, 5], sums[b, 6] = f0, f1, f2
 
 
 def static_jacobian(lat: float, g: float) -> Array:

@@ -67,7 +67,13 @@ def dual_vector(integrals: InertialIntegrals, lat: float, alt: float, form: Form
 
 
 def oba(
-    integrals: InertialIntegrals, lat: float, alt: float, form: Form = "velocity", *, history: bool = True
+    integrals: InertialIntegrals,
+    lat: float,
+    alt: float,
+    form: Form = "velocity",
+    *,
+    history: bool = True,
+    gains: bool = True,
 ) -> CoarseAttitude:
     """Optimisation-based alignment: the q-method over the intervals from ``t_k/2`` to ``t_k``, for all k.
 
@@ -81,6 +87,8 @@ def oba(
     form : {"velocity", "position"}
     history : bool
         Whether the attitude of each epoch is wanted.
+    gains : bool
+        Whether it is wanted how errors enter; without it the gains are of no epoch, (0, 3, 3).
 
     Returns
     -------
@@ -90,10 +98,12 @@ def oba(
     b, r = _vectors(integrals, lat, alt, form)
     ends = np.arange(1, len(b))
     starts = ends // 2
-    db, dr = b[ends] - b[starts], r[ends] - r[starts]
+    db, dr = b[1:] - b[starts], r[1:] - r[starts]
     weights = np.ones(len(ends))
     sums = np.cumsum(davenport_matrices(db, dr, weights), axis=0)
     found = rotation_from_davenport(sums if history else sums[-1:])
+    if not gains:
+        return _as_coarse(found[-1], np.zeros((0, 3, 3)), form)
     pair_gain = error_gain(dr, weights)
     gain = np.zeros((len(b), 3, 3))
     np.add.at(gain, ends, pair_gain)

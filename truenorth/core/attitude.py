@@ -148,21 +148,21 @@ def euler_jacobian(C_nb: Array) -> Array:
     xU, yU, zU = C_nb[..., 2, 0], C_nb[..., 2, 1], C_nb[..., 2, 2]
     yE, yN = C_nb[..., 0, 1], C_nb[..., 1, 1]
     # -phi x a as a matrix on phi is [a x]; rows of [a x]: E (0, -a_U, a_N), N (a_U, 0, -a_E), U (-a_N, a_E, 0).
-    zero = np.zeros_like(xU)
-    up_row = {i: np.stack([-C_nb[..., 1, i], C_nb[..., 0, i], zero], -1) for i in range(3)}
-    east_row = np.stack([zero, -yU, yN], -1)
-    north_row = np.stack([yU, zero, -yE], -1)
-    cos2 = np.maximum(yE**2 + yN**2, 1e-12)[..., None]
-    heading = (yN[..., None] * east_row - yE[..., None] * north_row) / cos2
-    pitch = up_row[1] / np.sqrt(cos2)
-    roll = (xU[..., None] * up_row[2] - zU[..., None] * up_row[0]) / np.maximum(xU**2 + zU**2, 1e-12)[..., None]
-    return np.stack([heading, pitch, roll], -2)
+    J = np.zeros(C_nb.shape)
+    of_heading, of_pitch, of_roll = J[..., 0, :], J[..., 1, :], J[..., 2, :]
+    own, both = yE**2 + yN**2, xU**2 + zU**2
+    cos2, level = np.maximum(own, 1e-12), np.maximum(both, 1e-12)
+    of_heading[..., 0], of_heading[..., 1], of_heading[..., 2] = -yE * yU / cos2, -yN * yU / cos2, own / cos2
+    of_pitch[..., 0], of_pitch[..., 1] = -yN / np.sqrt(cos2), yE / np.sqrt(cos2)
+    of_roll[..., 0] = (zU * C_nb[..., 1, 0] - xU * C_nb[..., 1, 2]) / level
+    of_roll[..., 1] = (xU * C_nb[..., 0, 2] - zU * C_nb[..., 0, 0]) / level
+    return J
 
 
 def euler_sigma(C_nb: Array, phi_covariance: Array) -> Array:
     """One-sigma of heading, pitch and roll (rad), none above that of an angle of which nothing is known."""
     J = euler_jacobian(C_nb)
-    variance = np.einsum("...ij,...jk,...ik->...i", J, phi_covariance, J)
+    variance = np.sum(J @ phi_covariance * J, axis=-1)
     return np.minimum(np.sqrt(variance), UNIFORM_SIGMA)
 
 

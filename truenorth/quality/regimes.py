@@ -11,6 +11,7 @@ Acceleration is separated from tilt by carrying the specific force with the gyro
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -125,7 +126,7 @@ class MotionSummary:
             return float(kind == "unknown" and self.kind.size == 0)
         return float(np.mean(self.kind == KINDS.index(kind)))
 
-    @property
+    @cached_property
     def overall(self) -> Kind:
         """The strongest kind of motion, in the order of `KINDS`, that over 5 % of the seconds show."""
         if self.kind.size == 0:
@@ -268,6 +269,8 @@ def _turns(rate: Array, rate_noise: float) -> NDArray[np.bool_]:
 def _in_every_window(active: NDArray[np.bool_], seconds: int) -> NDArray[np.bool_]:
     """Seconds all of whose windows are active: a second is at rest if any 10 s around it are."""
     length = seconds - active.size + 1
+    if not active.any():
+        return np.zeros(seconds, dtype=np.bool_)
     padded = np.pad(active, length - 1, constant_values=True)
     return np.asarray(sliding_window_view(padded, length).all(axis=1))
 
@@ -292,6 +295,8 @@ def _without_short(flags: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and past-last index of each run of true flags."""
+    if not flags.any():
+        return []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 

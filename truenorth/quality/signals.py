@@ -6,10 +6,10 @@ A few passes over the samples.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from truenorth.core.attitude import normalised, quaternion_from_rotation_vector, quaternion_product, rotate
@@ -64,18 +64,21 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
 def _cell_means(gyro: Any, accel: Any, rows: int, mean: Any) -> None:
     """Means (6, cells) of so many rows each."""
     for cell in range(mean.shape[1]):
-        for i in range(3):
-            w, f = 0.0, 0.0
-            for k in range(cell * rows, (cell + 1) * rows):
-                w += gyro[k, i]
-                f += accel[k, i]
-            mean[i, cell] = w / rows
-            mean[i + 3, cell] = f / rows
+        w0 = w1 = w2 = f0 = f1 = f2 = 0.0  # six sums that do not wait for each other
+        for k in range(cell * rows, (cell + 1) * rows):
+            w0 += gyro[k, 0]
+            w1 += gyro[k, 1]
+            w2 += gyro[k, 2]
+            f0 += accel[k, 0]
+            f1 += accel[k, 1]
+            f2 += accel[k, 2]
+        mean[0, cell], mean[1, cell], mean[2, cell] = w0 / rows, w1 / rows, w2 / rows
+        mean[3, cell], mean[4, cell], mean[5, cell] = f0 / rows, f1 / rows, f2 / rows
 
 
 def second_means(signal: Array, per_second: int) -> Array:
     """(3, seconds) means of (3, cells)."""
-    return signal.reshape(3, -1, per_second).mean(axis=2)
+    return np.asarray(signal.reshape(3, -1, per_second) @ np.ones(per_second) / per_second)
 
 
 @remembered
@@ -108,13 +111,16 @@ def white_noise(record: ImuRecord) -> Array:
 def _running_sums(gyro: Any, accel: Any, every: int, total: Any) -> None:
     """Sums (M + 1, 6) of all rows up to each `every`-th, about the first, so that gravity does not eat their digits."""
     total[0] = 0.0
+    w0 = w1 = w2 = f0 = f1 = f2 = 0.0  # six sums that do not wait for each other
     for j in range(1, total.shape[0]):
-        for i in range(3):
-            w, f = total[j - 1, i], total[j - 1, i + 3]
-            for k in range((j - 1) * every, j * every):
-                w += gyro[k, i] - gyro[0, i]
-                f += accel[k, i] - accel[0, i]
-            total[j, i], total[j, i + 3] = w, f
+        for k in range((j - 1) * every, j * every):
+            w0 += gyro[k, 0] - gyro[0, 0]
+            w1 += gyro[k, 1] - gyro[0, 1]
+            w2 += gyro[k, 2] - gyro[0, 2]
+            f0 += accel[k, 0] - accel[0, 0]
+            f1 += accel[k, 1] - accel[0, 1]
+            f2 += accel[k, 2] - accel[0, 2]
+        total[j, 0], total[j, 1], total[j, 2], total[j, 3], total[j, 4], total[j, 5] = w0, w1, w2, f0, f1, f2
 
 
 def _lower_quartiles(values: Array) -> Array:
@@ -145,13 +151,20 @@ def _allan_variances(total: Any, step: int, m: int, group: int, variance: Any) -
 def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
     """(3, windows) RMS of the angle about its straight line, in windows of 10 s that start at each second."""
     angle = np.cumsum(rates * interval, axis=1)
-    length = min(WINDOW * per_second, angle.shape[1])
-    windows = sliding_window_view(angle, length, axis=1)[:, ::per_second]
+    count = min(WINDOW, angle.shape[1] // per_second)
+    # Sums over each second; of the angle also with the place in the second, and with the second in the log.
+    seconds = angle.reshape(3, -1, per_second)
+    each, place = seconds @ np.ones(per_second), seconds @ np.arange(per_second, dtype=np.float64)
+    number = np.arange(each.shape[1], dtype=np.float64)
+    square = np.einsum("csk,csk->cs", seconds, seconds)
+    sums = np.concatenate([each, square, place + per_second * (number * each)])
+    total, energy, moment = _neighbours(sums, count).reshape(3, 3, -1)
+    length = count * per_second
+    middle = per_second * number[: total.shape[1]] + (length - 1) / 2.0
     line = np.arange(length) - (length - 1) / 2.0
-    energy = np.einsum("cwt,cwt->cw", windows, windows) / length
-    mean = windows.mean(axis=2)
-    slope = windows @ line
-    return np.sqrt(np.maximum(energy - mean**2 - slope**2 / (length * (line @ line)), 0.0))
+    slope = moment - middle * total
+    mean = total / length
+    return np.sqrt(np.maximum(energy / length - mean**2 - slope**2 / (length * (line @ line)), 0.0))
 
 
 def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) -> Array:
@@ -161,8 +174,8 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
     at least 0.1 deg/s, at most 3 deg/s. A constant turn slower than that is indistinguishable from bias.
     """
     length = min(WINDOW * per_second, rates.shape[1])
-    total = np.cumsum(np.pad(rates, ((0, 0), (1, 0))), axis=1)
-    mean = ((total[:, length:] - total[:, :-length]) / length)[:, ::per_second][:, : wander.shape[1]]
+    seconds = np.ascontiguousarray(rates).reshape(3, -1, per_second) @ np.ones(per_second)
+    mean = _neighbours(seconds, length // per_second) / length
     limit = np.clip(50.0 * float(np.linalg.norm(angle_noise)), np.radians(0.1), LARGEST_BIAS)
     everywhere = np.ones(mean.shape[1], dtype=bool)
     believable = np.linalg.norm(mean, axis=0) < limit
@@ -170,12 +183,18 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
         if not windows.any():
             continue
         chosen, still = mean[:, windows], wander[:, windows].max(axis=0)
-        drift = np.linalg.norm(chosen - np.median(chosen, axis=1, keepdims=True), axis=0) * WINDOW / np.sqrt(12.0)
+        drift = np.sqrt(np.sum((chosen - _middle(chosen)) ** 2, axis=0)) * WINDOW / np.sqrt(12.0)
         weight = 1.0 / (still**2 + drift**2 + STILL_ANGLE**2)
         bias: Array = chosen @ weight / weight.sum()
         if np.linalg.norm(bias) < limit:
             return bias
     return np.zeros(3)
+
+
+def _middle(values: Array) -> Array:
+    """(k, 1) median of each row: :func:`numpy.median`, which takes longer to begin."""
+    ordered, half = np.sort(values, axis=1), values.shape[1] // 2
+    return 0.5 * (ordered[:, [half]] + ordered[:, [half if values.shape[1] % 2 else half - 1]])
 
 
 def bias_by_gravity(rate: Array, force: Array) -> Array | None:
@@ -288,16 +307,33 @@ def _sliding_medians(signal: Any, ordered: Any, found: Any) -> None:
                 found[i, k - width + 1] = 0.5 * (ordered[(width - 1) // 2] + ordered[width // 2])
 
 
+@lru_cache(maxsize=16)
 def offset(seconds: int, width: int) -> NDArray[np.intp]:
-    """(m,) first second of the window of `width` seconds around each second, kept inside the record."""
-    return np.clip(np.arange(seconds) - width // 2, 0, seconds - width)
+    """(m,) first second of the window of `width` seconds around each second, kept inside the record; nobody writes to it."""
+    first = np.clip(np.arange(seconds) - width // 2, 0, seconds - width)
+    first.flags.writeable = False
+    return first
 
 
 def box_mean(signal: Array, width: int) -> Array:
     """(k, m) mean over `width` seconds around each second; at the ends over the last `width` that fit."""
     seconds = signal.shape[1]
-    windows = sliding_window_view(signal, min(width, seconds), axis=1)
-    return np.asarray(windows.mean(axis=2)[:, offset(seconds, min(width, seconds))])
+    width = min(width, seconds)
+    return np.asarray(_neighbours(signal, width)[:, offset(seconds, width)] / width)
+
+
+def _neighbours(signal: Array, count: int) -> Array:
+    """(k, m - count + 1) sums of so many neighbours; twice as many at a time, so that no large sum is taken from another."""
+    length = signal.shape[1] - count + 1
+    total, done, sums, width = np.zeros((len(signal), length)), 0, signal, 1
+    while True:
+        if count & width:
+            total += sums[:, done : done + length]
+            done += width
+        if done == count:
+            return total
+        sums = sums[:, :-width] + sums[:, width:]
+        width *= 2
 
 
 # ------------------------------------------------------------------------------------------- classification
