@@ -44,7 +44,7 @@ def aligned(vehicle: Vehicle, grade: str, length: float, by: str = "", **more: A
     def run(seed: int, number: int) -> Outcome:
         rng = np.random.default_rng([seed, number, 9])
         true = vehicle(rng, length)
-        record = sensed(rng, true, imu_spec(grade), 200.0 if vehicle is vehicles.multicopter else 100.0)
+        record = sensed(rng, true, imu_spec(grade), 250.0 if vehicle is vehicles.multicopter else 100.0)
         lat, lon, alt = (true.place.mean(axis=0) if not by else true.place[0]).tolist()
         place = Position(lat, lon, alt)
         if not by:
@@ -54,7 +54,7 @@ def aligned(vehicle: Vehicle, grade: str, length: float, by: str = "", **more: A
             arm = np.array([0.3, -0.5, 1.2]) + 0.02 * rng.standard_normal(3)
             aids |= {
                 "gnss": fixed(rng, true, arm, **more),
-                "antenna": Mounting(lever_arm=np.array([0.3, -0.5, 1.2]), lever_arm_sigma=0.02),
+                "antenna": Mounting(lever_arm=np.array([0.3, -0.5, 1.2]), lever_arm_sigma=0.02, latency_sigma=0.03),
             }
         if "odometer" in by:
             aids["odometer"] = counted(rng, true)
@@ -71,7 +71,7 @@ def navigated(vehicle: Vehicle, grade: str, length: float, **more: Any) -> Any:
     def run(seed: int, number: int) -> Outcome:
         rng = np.random.default_rng([seed, number, 10])
         true, spec = vehicle(rng, length), imu_spec(grade)
-        record = sensed(rng, true, spec, 200.0 if vehicle is vehicles.multicopter else 100.0)
+        record = sensed(rng, true, spec, 250.0 if vehicle is vehicles.multicopter else 100.0)
         arm = np.array([0.3, -0.5, 1.2])
         gnss = fixed(rng, true, arm, **more)
         sigma = np.concatenate([np.array([0.2, 0.2, 2.0]) * DEG, np.repeat([0.05, 2.0], 3), np.zeros(6)])
@@ -82,7 +82,7 @@ def navigated(vehicle: Vehicle, grade: str, length: float, **more: Any) -> Any:
         place = place + x[DP][[1, 0, 2]] / _metres(place)
         zero = np.zeros(3)
         start = Start(begin, exp(-x[PHI]) @ C, v + x[DV], *place.tolist(), zero, zero, np.diag(sigma**2))
-        result = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=arm)), imu=spec)
+        result = navigate(record, start, aid=Gnss(gnss, Mounting(lever_arm=arm, latency_sigma=0.03)), imu=spec)
         k = [int(np.argmin(np.abs(result.time - length * part))) for part in (0.25, 0.5, 0.75, 1.0)]
         place, v, C = true.at(result.time[k])
         s = result.track.sigma[k]

@@ -6,7 +6,7 @@ import pytest
 from truenorth.aiding.aids import Odometer
 from truenorth.core.position import Position
 from truenorth.navigation import Start, navigate
-from truenorth.navigation.stops import seconds_at_rest
+from truenorth.navigation.stops import DISTURBED_VELOCITY, seconds_at_rest, velocity_at_rest
 from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
@@ -49,6 +49,17 @@ def test_a_second_is_a_stop_where_all_that_look_agree(standing):
     found = seconds_at_rest(standing, gnss=silent)[0]
     assert len(found) > 190
     assert not np.any((found > 102.0) & (found < 198.0))
+
+
+def test_a_vehicle_that_hovers_is_at_rest_as_well_as_its_log_says():
+    """Taken for +-.03 m/s, swaying by .1, its zero velocities were "rejected: they contradict the track"."""
+    rng = np.random.default_rng(6)
+    time = np.arange(0.2, 60.0, 0.2)
+    noise = 0.02 * rng.standard_normal((len(time), 3))
+    sways = VelocityRecord(time, noise + 0.14 * np.sin(time[:, None] * [0.8, 0.0, 1.1]))
+    assert velocity_at_rest(T[T < 60.0], sways) == pytest.approx(0.1, rel=0.1)
+    assert velocity_at_rest(T[T < 60.0], VelocityRecord(time, noise), None) == DISTURBED_VELOCITY
+    assert velocity_at_rest(np.empty(0), sways) == DISTURBED_VELOCITY
 
 
 @pytest.mark.parametrize(("noise", "edge"), [(0.02, 4.0), (0.5, 12.0), (2.5, 22.0)])

@@ -25,7 +25,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.run import navigate_track, with_states
-from truenorth.navigation.stops import seconds_at_rest, updates_at
+from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.regimes import motion_summary
@@ -205,7 +205,7 @@ def moving_task(
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)
-        stops += updates_at(record, still, disturbed, INTERVAL)
+        stops += updates_at(record, still, disturbed, INTERVAL, velocity_at_rest(disturbed, odometer, gnss))
     return MovingTask(
         record,
         spec,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -74,6 +75,25 @@ def seconds_at_rest(
 def _near(at: Array, times: Array) -> NDArray[np.intp]:
     """How many of these times lie near each of those."""
     return np.searchsorted(times, at + NEAR) - np.searchsorted(times, at - NEAR)
+
+
+def velocity_at_rest(at: Array, *logs: OdometerRecord | GnssRecord | VelocityRecord | None) -> float:
+    """One-sigma velocity of a base that is shaken, m/s: as usual, or as its sensors of velocity say around these times.
+
+    An underwater vehicle that hovers is at rest to wheel and IMU, and sways by .1 m/s. White noise, half the mean square of
+    differences of rows that follow each other, is none of it.
+    """
+    found = DISTURBED_VELOCITY**2
+    for log in logs:
+        velocity = log.velocity if isinstance(log, VelocityRecord) else log.v_n if isinstance(log, GnssRecord) else None
+        if log is None or velocity is None or not len(at):
+            continue
+        v = velocity[_near(log.time, at) > 0]
+        for axis in v.T:
+            axis = axis[np.isfinite(axis)]
+            if len(axis) > FEWEST_FIXES:
+                found = max(found, float(np.mean(axis**2) - 0.5 * np.mean(np.diff(axis) ** 2)))
+    return math.sqrt(found)
 
 
 def _speed_of(log: OdometerRecord | GnssRecord | VelocityRecord) -> tuple[Array, NDArray[np.bool_]]:
@@ -159,22 +179,29 @@ def zero_updates(
         if stops != "auto":
             raise UsageError(f"zupt={stops!r}; expected 'auto' or pairs of seconds (start, stop)")
         still, disturbed = seconds_at_rest(record, odometer, gnss, velocity)
+        shaken = velocity_at_rest(disturbed, gnss, velocity)
     else:
+        shaken = DISTURBED_VELOCITY
         seconds = []
         for start, stop in stops:
             if not stop > start:
                 raise UsageError(f"stop from {start:g} s to {stop:g} s; expected its end after its beginning")
             seconds.append(np.arange(start, stop, 1.0) + 0.5)
         still, disturbed = np.empty(0), np.concatenate(seconds) if seconds else np.empty(0)
-    return updates_at(record, still, disturbed, interval)
+    return updates_at(record, still, disturbed, interval, shaken)
 
 
-def updates_at(record: ImuRecord, still: Array, disturbed: Array, interval: float) -> list[Aiding]:
-    """Zero velocities in the seconds around these times, and zero rotations where nothing moves at all."""
+def updates_at(
+    record: ImuRecord, still: Array, disturbed: Array, interval: float, shaken: float = DISTURBED_VELOCITY
+) -> list[Aiding]:
+    """Zero velocities in the seconds around these times, and zero rotations where nothing moves at all.
+
+    `shaken` is the one-sigma velocity of the disturbed ones, m/s.
+    """
     time = np.concatenate([still, disturbed])
     if time.size == 0:
         return []
-    sigma = np.concatenate([np.full(still.size, STILL_VELOCITY), np.full(disturbed.size, DISTURBED_VELOCITY)])
+    sigma = np.concatenate([np.full(still.size, STILL_VELOCITY), np.full(disturbed.size, shaken)])
     zero = np.zeros((time.size, 3))
     found = [Aiding("zero velocity", "velocity", time, zero, np.tile(sigma[:, None], 3))]
     if still.size:
