@@ -21,12 +21,12 @@ from truenorth.core.mapped import write_mappable
 
 HOURS, RATE, LAT = 48.0, 200.0, 45.0
 LIMIT = 2 << 30  # bytes
-GYRO, ACCEL = 4e-6, 7e-4  # rad/s and m/s^2: white noise of a row, of the class navigation
+GYRO, ACCEL = 4e-6, 7e-4  # rad/s and m/s^2: white noise of a row at that rate, of the class navigation
 
 
-def at_rest(path: Path, rows: int) -> None:
+def at_rest(path: Path, rows: int, rate: float = RATE) -> None:
     """Write a log, its arrays on the disk while they are made."""
-    rng = np.random.default_rng(1)
+    rng, wider = np.random.default_rng(1), np.sqrt(rate / RATE)
     files = {name: path.with_name(f"{name}.npy") for name in ("time", "gyro", "accel")}
     arrays = {
         name: np.lib.format.open_memmap(file, "w+", np.float64, (rows, 3) if name != "time" else (rows,))
@@ -35,9 +35,9 @@ def at_rest(path: Path, rows: int) -> None:
     gravity = np.array([0.0, 0.0, float(normal_gravity(np.radians(LAT), 0.0))])
     for part in row_blocks(rows):
         k = np.arange(part.start, part.stop)
-        arrays["time"][part] = (k + 1) / RATE
-        arrays["gyro"][part] = earth_rate_n(np.radians(LAT)) + GYRO * rng.standard_normal((len(k), 3))
-        arrays["accel"][part] = gravity + ACCEL * rng.standard_normal((len(k), 3))
+        arrays["time"][part] = (k + 1) / rate
+        arrays["gyro"][part] = earth_rate_n(np.radians(LAT)) + wider * GYRO * rng.standard_normal((len(k), 3))
+        arrays["accel"][part] = gravity + wider * ACCEL * rng.standard_normal((len(k), 3))
     write_mappable(path, arrays)
     for file in files.values():
         file.unlink()

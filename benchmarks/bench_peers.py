@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from benchmarks.bench_filters import system
 from benchmarks.bench_mechanisation import COUNT, T, log
+from benchmarks.timing import write_between
 from truenorth.core.attitude import dcm_from_euler, dcm_from_quaternion, rotation_vector_from_dcm
 from truenorth.filters import LinearSystem, kalman
 from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
@@ -25,7 +25,6 @@ from truenorth.strapdown.level import NavigationState, inertial_integrals, integ
 Array = NDArray[np.float64]
 ROUNDS = 7
 EPOCHS, RUNS = 1000, 200
-DOCUMENT = Path(__file__).parents[1] / "docs/performance.md"
 MARKS = "<!-- peers: made by make bench -->", "<!-- peers end -->"
 MISSING = {
     "navlie": "its version in the registry, 0.0.1, needs a package (pylie) that the registry does not have",
@@ -302,11 +301,7 @@ def main() -> None:
     lines += ["", *(f"Not compared: {name}, {why}." for name, why in MISSING.items())]
     print("\n".join(lines))
     if not any("not installed" in line for line in lines):
-        text = DOCUMENT.read_text(encoding="utf-8")
-        before, _, rest = text.partition(MARKS[0])
-        DOCUMENT.write_text(
-            "\n".join([before + MARKS[0], *lines, MARKS[1] + rest.partition(MARKS[1])[2]]), encoding="utf-8"
-        )
+        write_between(MARKS, lines)
 
 
 if __name__ == "__main__":

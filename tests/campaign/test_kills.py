@@ -2,7 +2,9 @@
 
 import os
 import random
+import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -30,6 +32,31 @@ def cluster():
 def test_a_dask_cluster_gives_the_same_bits(undisturbed, tmp_path, cluster):
     table = run_campaign(PLAN, tmp_path, scheduler=cluster.scheduler_address).table
     pd.testing.assert_frame_equal(table, undisturbed.table, check_exact=True)
+
+
+@pytest.mark.slow
+def test_a_cluster_started_as_the_documentation_says(undisturbed, tmp_path):
+    """The three lines of docs/campaigns.md, each in a process of its own, here on one machine."""
+    Client = pytest.importorskip("distributed").Client
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    text = (Path(__file__).parents[2] / "docs/campaigns.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^    ((?:dask|truenorth campaign) .*?)(?: +#.*)?$", text, re.MULTILINE)
+    lines = [line.replace("8786", port).replace("host", "127.0.0.1").split() for line in lines]
+    scheduler, worker, campaign = (line for line in lines if {"scheduler", "worker", "--scheduler"} & set(line))
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(PLAN), encoding="utf-8")
+    quiet = {"cwd": tmp_path, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    started = [subprocess.Popen([sys.executable, "-m", *line], **quiet) for line in (scheduler, worker)]
+    try:
+        with Client(f"tcp://127.0.0.1:{port}", timeout="60s", set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=60)
+        subprocess.run([sys.executable, "-m", *campaign], check=True, **quiet)
+    finally:
+        for process in reversed(started):
+            process.terminate()
+            process.wait()
+    pd.testing.assert_frame_equal(read_table(tmp_path / "out"), undisturbed.table, check_exact=True)
 
 
 @pytest.mark.slow

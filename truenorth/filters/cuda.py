@@ -221,7 +221,11 @@ def _fault_after(w, h, variance, noise, correlated):
 @cuda.jit(device=True)
 def _condition(w, H, z, correlated, joseph, gains):
     """Condition on all rows present: the fault if any, NIS and log-likelihood; `gains` (m, n + 1) may be asked for."""
-    n, nis, log_likelihood = w.x.shape[0], 0.0, 0.0
+    n, nis, log_likelihood, present = w.x.shape[0], 0.0, 0.0, 0
+    for row in range(w.R.shape[0]):
+        present += not math.isnan(z[row])
+    if present == 0:
+        return SOUND, nis, log_likelihood
     for i in range(cuda.threadIdx.x, n, cuda.blockDim.x):
         w.largest[i] = max(w.largest[i], w.P[i, i])
     for row in range(w.R.shape[0]):

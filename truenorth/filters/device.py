@@ -59,7 +59,7 @@ def _fault(n: int, m: int) -> str:
     except ImportError:
         return "numba-cuda is not installed: pip install 'truenorth[cuda]'"
     if not cuda.is_available():
-        return "there is no CUDA device here, or what Numba needs besides its driver: pip install 'truenorth[cuda]'"
+        return "there is no CUDA device here, or Numba lacks what it needs besides the driver: pip install 'truenorth[cuda]'"
     from truenorth.filters.cuda import shared_bytes
 
     if shared_bytes(n, m) > BLOCK_BYTES:
