@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import Sway, Tone, ideal_log, simulate
+from truenorth.simulation.drift import BLOCK, gauss_markov, of_gauss_markov, random_walk
 from truenorth.simulation.imu_errors import apply_errors, temperature
 from truenorth.simulation.response import respond
 from truenorth.simulation.sensing import increments
+from truenorth.simulation.streams import STREAMS, stream
 from truenorth.simulation.true_errors import SHAPES
 
 T = 0.01
@@ -181,3 +184,41 @@ def test_every_constant_term_can_be_given():
             value = np.full(shape, 1e-3) - (1e-3 * np.eye(3) if term == "misalignment" else 0.0)
             _, _, true = apply_errors(W * T, F * T, T, ImuSpec(), seed=0, given={f"{group}_{term}": value})
             np.testing.assert_array_equal(true.constants()[f"{group}_{term}"], value)
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [{"bias_instability": 1e-4}, {"rate_random_walk": 1e-4}, {"bias_instability": 1e-4, "rate_random_walk": 1e-4}],
+)
+@pytest.mark.parametrize("walk", [0.0, 1e-3])
+def test_errors_added_in_one_pass_are_those_added_one_by_one(terms, walk):
+    """To the bit, and with the numbers that NumPy's generator gives, across the rows that are drawn at once."""
+    count = 2 * BLOCK + 3
+    ideal = np.random.default_rng(1).standard_normal((count, 3))
+    spec = ImuSpec(**{f"gyro_{name}": value for name, value in terms.items()}, gyro_bias=1e-2, gyro_random_walk=walk)
+    found, _, true = apply_errors(ideal, ideal, T, spec, seed=5, run=2)
+    expected = ideal + true.gyro.constant_bias * T
+    wander = np.zeros((count, 3))
+    for name in terms:
+        rng = stream(5, 0, 2, STREAMS[f"gyro_{name}"])
+        wander += (
+            gauss_markov(1e-4, spec.correlation_time, T, count, rng)
+            if name == "bias_instability"
+            else random_walk(1e-4, T, count, rng)
+        )
+    expected += wander
+    if walk:
+        white = stream(5, 0, 2, STREAMS["gyro_random_walk"])
+        expected += white.standard_normal((count, 3)) * (walk * np.sqrt(T))
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(true.gyro.drift, wander / T)
+    assert true.accel.drift is None
+
+
+def test_the_recursion_takes_the_numbers_of_the_generator():
+    recursion, count = of_gauss_markov(1e-4, 300.0, T), BLOCK + 5
+    first, *e = stream(1, 2, 3, 4).standard_normal((count + 1, 3))
+    x = [recursion.before * first + recursion.alpha * e[0]]
+    for before, now in pairwise(e):
+        x.append(recursion.decay * x[-1] + recursion.alpha * now + recursion.beta * before)
+    np.testing.assert_array_equal(gauss_markov(1e-4, 300.0, T, count, stream(1, 2, 3, 4)), x)

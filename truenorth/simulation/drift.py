@@ -13,14 +13,19 @@ terms, ``alpha e[k+1] + beta e[k]`` with the same variance and covariance. One d
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.compiled import compiled
+from truenorth.simulation.streams import stream
 
 Array = NDArray[np.float64]
+BLOCK = 256  # rows whose random numbers are drawn at once
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
@@ -39,7 +44,7 @@ def gauss_markov(sigma: float, tau: float, interval: float, count: int, rng: np.
     -------
     (count, 3) array, unit of `sigma` times s
     """
-    return _integrals(2.0 * sigma**2 / tau, tau, sigma**2, interval, count, rng)
+    return _drawn(of_gauss_markov(sigma, tau, interval), count, rng)
 
 
 def random_walk(density: float, interval: float, count: int, rng: np.random.Generator) -> Array:
@@ -57,10 +62,83 @@ def random_walk(density: float, interval: float, count: int, rng: np.random.Gene
     -------
     (count, 3) array, unit of `density` times s^1.5
     """
-    return _integrals(density**2, math.inf, 0.0, interval, count, rng)
+    return _drawn(of_random_walk(density, interval), count, rng)
 
 
-def _integrals(q: float, tau: float, variance: float, T: float, count: int, rng: np.random.Generator) -> Array:
+class Recursion(NamedTuple):
+    """Of integrals: ``x[k+1] = decay x[k] + alpha e[k+1] + beta e[k]``, which begins at ``x[0] = before e' + alpha e[0]``."""
+
+    decay: float
+    alpha: float
+    beta: float
+    before: float
+
+
+def of_gauss_markov(sigma: float, tau: float, interval: float) -> Recursion:
+    """How :func:`gauss_markov` goes on."""
+    return _recursion(2.0 * sigma**2 / tau, tau, sigma**2, interval)
+
+
+def of_random_walk(density: float, interval: float) -> Recursion:
+    """How :func:`random_walk` goes on."""
+    return _recursion(density**2, math.inf, 0.0, interval)
+
+
+def add_errors(
+    out: Array, bias: Array, recursion: Recursion, rng: np.random.Generator, white: np.random.Generator, walk: float
+) -> None:
+    """Add to increments (N, 3), in place and in this order, a bias (3,), what a recursion gives, and white noise of sigma `walk`.
+
+    The bits are those of one after the other: what wanders takes no memory.
+    """
+    _recur(recursion, rng, bias, white, walk, out)
+
+
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """What wanders in one run of three sensors, as it can be drawn again; true where something does.
+
+    Attributes
+    ----------
+    count : int
+        Intervals.
+    interval : float, s
+    terms : mapping
+        Recursions by the numbers of their streams.
+    warmth : (count,) array or None
+        Temperature above that of calibration, K, and
+    by_temperature : (3,) array
+        what a kelvin does.
+    """
+
+    count: int
+    interval: float
+    terms: Mapping[tuple[int, int, int, int], Recursion]
+    warmth: Array | None
+    by_temperature: Array
+
+    def __bool__(self) -> bool:
+        return bool(self.terms) or self.warmth is not None
+
+    def integrals(self) -> Array:
+        """(count, 3) over each interval."""
+        total = np.zeros((self.count, 3))
+        if self.warmth is not None:
+            total += np.multiply.outer(self.warmth * self.interval, self.by_temperature)
+        for numbers, recursion in self.terms.items():
+            total += _drawn(recursion, self.count, stream(*numbers))
+        return total
+
+
+def _drawn(recursion: Recursion, count: int, rng: np.random.Generator) -> Array:
+    """Integrals of three axes, (count, 3)."""
+    x = np.zeros((count, 3))
+    _recur(recursion, rng, np.zeros(3), rng, 0.0, x)
+    return x
+
+
+@lru_cache(maxsize=16)
+def _recursion(q: float, tau: float, variance: float, T: float) -> Recursion:
     """Of a bias with this variance before the first interval."""
     v, weights = 0.5 * T * (1.0 + NODES), 0.5 * T * WEIGHTS
     g1, g0 = _ramp(v, tau), np.exp(-v / tau) * _ramp(T - v, tau)
@@ -69,9 +147,7 @@ def _integrals(q: float, tau: float, variance: float, T: float, count: int, rng:
     alpha, beta = 0.5 * (total - apart), 0.5 * (total + apart)
     first = variance * float(_ramp(np.array(T), tau)) ** 2 + q * float(weights @ g1**2)
     before = math.sqrt(first - alpha**2)  # what the first integral has besides its share in the second
-    x = np.empty((count, 3))
-    _recur(rng, math.exp(-T / tau), alpha, beta, before, x)
-    return x
+    return Recursion(math.exp(-T / tau), alpha, beta, before)
 
 
 def _ramp(v: Array, tau: float) -> Array:
@@ -79,18 +155,30 @@ def _ramp(v: Array, tau: float) -> Array:
 
 
 @compiled
-def _recur(rng: Any, d: float, alpha: float, beta: float, before: float, x: Any) -> None:
-    """Draw as they are needed the numbers that ``rng.standard_normal((count + 1, 3))`` gives: in a third of its time."""
+def _recur(recursion: Any, rng: Any, bias: Any, white: Any, walk: float, out: Any) -> None:
+    """Add ``bias``, the recursion and white noise; what is drawn are the numbers of ``standard_normal((count + 1, 3))``.
+
+    Some rows' numbers at a time, since what stands in registers is put away at each draw.
+    """
+    d, alpha, beta, before = recursion.decay, recursion.alpha, recursion.beta, recursion.before
     last, at = np.empty(3), np.empty(3)
+    e, w = np.empty((BLOCK, 3)), np.zeros((BLOCK, 3))
     for i in range(3):
         at[i] = before * rng.standard_normal()
-    for i in range(3):
-        last[i] = rng.standard_normal()
-        at[i] += alpha * last[i]
-        x[0, i] = at[i]
-    for k in range(1, len(x)):
-        for i in range(3):
-            e = rng.standard_normal()
-            at[i] = d * at[i] + alpha * e + beta * last[i]
-            last[i] = e
-            x[k, i] = at[i]
+        last[i] = 0.0
+    decay = 1.0  # none before the first
+    for first in range(0, len(out), BLOCK):
+        count = min(BLOCK, len(out) - first)
+        for k in range(count):
+            for i in range(3):
+                e[k, i] = rng.standard_normal()
+        if walk > 0.0:
+            for k in range(count):
+                for i in range(3):
+                    w[k, i] = white.standard_normal() * walk
+        for k in range(count):
+            for i in range(3):
+                at[i] = decay * at[i] + alpha * e[k, i] + beta * last[i]
+                last[i] = e[k, i]
+                out[first + k, i] = ((out[first + k, i] + bias[i]) + at[i]) + w[k, i]
+            decay = d

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.compiled import compiled
 from truenorth.records.specs import ImuSpec
-from truenorth.simulation.drift import gauss_markov, random_walk
+from truenorth.simulation.drift import Recursion, Wander, add_errors, of_gauss_markov, of_random_walk
 from truenorth.simulation.response import respond
 from truenorth.simulation.streams import STREAMS, stream
 from truenorth.simulation.true_errors import SensorErrors, TrueErrors, drawn_errors
@@ -73,26 +73,36 @@ def apply_errors(
         )
         order = int(value("filter_order"))
         out = respond(out, interval, bandwidth=value("bandwidth"), order=order, latency=value("latency"))
-        drift = _drift(own, dT, interval, value, draw, spec.correlation_time)
-        walk = value("random_walk") * math.sqrt(interval)
-        if drift is None:
-            out += own.constant_bias * interval
+        bias, walk = own.constant_bias * interval, value("random_walk") * math.sqrt(interval)
+        warmth = dT if own.bias_temperature.any() and dT.any() else None
+        terms = {
+            (seed, scenario, run, STREAMS[f"{group}_{term}"]): recursion
+            for term, recursion in _recursions(interval, value, spec.correlation_time).items()
+        }
+        wander = Wander(len(dT), interval, terms, warmth, own.bias_temperature)
+        if warmth is None and len(terms) == 1:
+            ((numbers, recursion),) = terms.items()
+            add_errors(out, bias, recursion, stream(*numbers), draw("random_walk"), walk)
+        else:
+            out += bias
+            if wander:
+                out += wander.integrals()
             if walk > 0.0:
                 _make_noise(out, draw("random_walk"), walk)
-        else:
-            _put_off(out, own.constant_bias * interval, drift, interval, draw("random_walk"), walk)
         if value("sample_noise") > 0.0:
             _make_noise(out, draw("sample_noise"), value("sample_noise") * interval)
         full_scale, step = value("range") * interval, value("quantisation")
         if step > 0.0 or math.isfinite(full_scale):
             _put_out(out, full_scale, step)
-        results.append((out, replace(own, drift=drift)))
+        results.append((out, replace(own, wander=wander)))
     (gyro, gyro_errors), (accel, accel_errors) = results
     return gyro, accel, TrueErrors(gyro_errors, accel_errors)
 
 
 def temperature(spec: ImuSpec, interval: float, count: int) -> Array:
     """(N,) temperature above that of calibration in the middle of each interval, K."""
+    if spec.temperature_start == spec.temperature_rate == 0.0:
+        return np.zeros(count)
     t = interval * (np.arange(count) + 0.5)
     tau = spec.temperature_time_constant
     since = t if math.isinf(tau) else -tau * np.expm1(-t / tau)
@@ -104,21 +114,14 @@ def size_effect(leverage: Array, spec: ImuSpec) -> Array:
     return np.einsum("kij,ij->ki", leverage, np.asarray(spec.accel_positions))
 
 
-def _drift(own: SensorErrors, dT: Array, interval: float, value: Any, draw: Any, tau: float) -> Array | None:
-    """Integrals over each interval of what wanders, (N, 3)."""
-    parts = []
-    if own.bias_temperature.any() and dT.any():
-        parts.append(np.multiply.outer(dT * interval, own.bias_temperature))
+def _recursions(interval: float, value: Any, tau: float) -> dict[str, Recursion]:
+    """Of the terms that wander by themselves, how they go on."""
+    found = {}
     if value("bias_instability") > 0.0:
-        parts.append(gauss_markov(value("bias_instability"), tau, interval, len(dT), draw("bias_instability")))
+        found["bias_instability"] = of_gauss_markov(value("bias_instability"), tau, interval)
     if value("rate_random_walk") > 0.0:
-        parts.append(random_walk(value("rate_random_walk"), interval, len(dT), draw("rate_random_walk")))
-    if not parts:
-        return None
-    total = parts[0]
-    for part in parts[1:]:
-        total += part
-    return total
+        found["rate_random_walk"] = of_random_walk(value("rate_random_walk"), interval)
+    return found
 
 
 @compiled
@@ -142,17 +145,6 @@ def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, as
             for j in range(3):
                 total += matrix[i, j] * x[k, j] + G[i, j] * f[k, j]
             out[k, i] = total
-
-
-@compiled
-def _put_off(out: Any, bias: Any, drift: Any, interval: float, rng: Any, walk: float) -> None:
-    """Add a bias (3,), what has drifted in each interval, and white noise, as below; the drift becomes a rate."""
-    for k in range(len(out)):
-        for i in range(3):
-            out[k, i] = (out[k, i] + bias[i]) + drift[k, i]
-            drift[k, i] /= interval
-            if walk > 0.0:
-                out[k, i] += rng.standard_normal() * walk
 
 
 @compiled

@@ -12,8 +12,9 @@ where one value means all three axes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from truenorth.core.errors import DataError, UsageError
 from truenorth.core.yaml_file import quantity, unknown_key
 from truenorth.records.spec_keys import KEYS
 from truenorth.records.specs import ImuSpec
+from truenorth.simulation.drift import Wander
 from truenorth.simulation.streams import STREAMS, stream
 
 Array = NDArray[np.float64]
@@ -52,9 +54,8 @@ class SensorErrors:
         Gyros to specific force; zero for accelerometers.
     bias_temperature, scale_factor_temperature : (3,) arrays
         Per kelvin.
-    drift : (N, 3) array or None
-        What wanders on top of the constant bias (instability, rate random walk, temperature), mean of each interval;
-        None where nothing does.
+    wander : Wander or None
+        What wanders on top of the constant bias: instability, rate random walk, temperature.
     """
 
     bias: Array
@@ -65,7 +66,12 @@ class SensorErrors:
     g_sensitivity: Array
     bias_temperature: Array
     scale_factor_temperature: Array
-    drift: Array | None = None
+    wander: Wander | None = field(default=None, repr=False)
+
+    @cached_property
+    def drift(self) -> Array | None:
+        """(N, 3) mean of what wanders over each interval, drawn again where it is asked for; None where nothing does."""
+        return self.wander.integrals() / self.wander.interval if self.wander else None
 
     @property
     def constant_bias(self) -> Array:
@@ -113,10 +119,10 @@ class TrueErrors:
     def constants(self) -> dict[str, Array]:
         """By name (``gyro_bias`` ..), those that are not zero: what :func:`drawn_errors` takes as given."""
         return {
-            f"{group}_{item.name}": value
+            f"{group}_{term}": value
             for group in ("gyro", "accel")
-            for item in fields(SensorErrors)
-            if item.name != "drift" and np.any(value := getattr(getattr(self, group), item.name))
+            for term in SHAPES
+            if np.any(value := getattr(getattr(self, group), term))
         }
 
 
@@ -149,7 +155,11 @@ def drawn_errors(
         draw: Array = sigma * stream(seed, scenario, run, STREAMS[name]).standard_normal(shape)
         return draw - np.diag(np.diag(draw)) if term == "misalignment" else draw
 
-    gyro, accel = (SensorErrors(**{term: value(group, term) for term in SHAPES}) for group in ("gyro", "accel"))
+    def drawn_of(group: str) -> SensorErrors:
+        terms: dict[str, Any] = {term: value(group, term) for term in SHAPES}
+        return SensorErrors(**terms)
+
+    gyro, accel = (drawn_of(group) for group in ("gyro", "accel"))
     return TrueErrors(gyro, accel)
 
 
