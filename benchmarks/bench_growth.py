@@ -20,19 +20,21 @@ from numpy.typing import NDArray
 from benchmarks.bench_campaign import PLAN
 from benchmarks.bench_days import at_rest
 from benchmarks.timing import DOCUMENT, write_between
-from truenorth import ImuRecord, Position, align, imu_spec, read_imu
+from truenorth import ImuRecord, Position, align, imu_spec, navigate, read_imu
 from truenorth.campaign import run_campaign
 from truenorth.figures.style import COLOURS, new_figure, style
 from truenorth.filters import LinearSystem, kalman
+from truenorth.navigation import Start
 from truenorth.simulation import rest, simulate
-from truenorth.strapdown.level import NavigationState, mechanise
 
+Array = NDArray[np.float64]
 PLACE = Position.from_degrees(45.0)
 DAYS = 48 * 3600.0
 LONG = 4.0  # s, from which a call is timed once
 MARKS = "<!-- growth: made by python -m benchmarks growth -->", "<!-- growth end -->"
 FIGURE = DOCUMENT.parent / "assets/growth.svg"
-NAMES = {"length": ["1 min", "10 min", "1 h", "4 h", "48 h"]}
+NAMES = {"length": ["1 min", "", "1 h", "", "48 h"]}
+PLAIN = {"facecolor": "white", "edgecolor": "none", "pad": 0.3}
 OVER = ("length", "rate, Hz", "states", "runs", "workers")
 
 
@@ -63,8 +65,10 @@ def simulated(rate: float) -> ImuRecord:
 
 def journey(seconds: float) -> Callable[[], object]:
     record = on_disk(seconds, 200.0)
-    start = NavigationState.at(np.eye(3), PLACE.lat, PLACE.lon, PLACE.alt)
-    return lambda: mechanise(record, start, every=200)
+    sigma = np.array([*3 * [1e-4], *3 * [0.01], *3 * [1.0], *3 * [1e-8], *3 * [1e-4]])
+    here = (PLACE.lat, PLACE.lon, PLACE.alt)
+    start = Start(0.0, np.eye(3), np.zeros(3), *here, np.zeros(3), np.zeros(3), np.diag(sigma**2))
+    return lambda: navigate(record, start, imu="navigation")
 
 
 def filtered(
@@ -100,7 +104,7 @@ def campaign(runs: int, workers: int = 1) -> Callable[[], object]:
 MANY: list[float] = [1, 10, 100, 1000, 10_000, 100_000]
 LINES = [
     Line("alignment, 100 Hz", "length", [60, 600, 3600, 14400, DAYS], lambda s: aligned(on_disk(s, 100.0))),
-    Line("strapdown, 200 Hz", "length", [60, 600, 3600, 14400, DAYS], journey),
+    Line("free navigation, 200 Hz", "length", [60, 600, 3600, 14400, DAYS], journey),
     Line("alignment of 600 s", "rate, Hz", [25, 50, 100, 200, 400], lambda r: aligned(simulated(r))),
     Line("filter, 2000 epochs", "states", [6, 9, 15, 24, 40], lambda n: filtered(states=int(n), epochs=2000)),
     Line("filter of 15 states, 200 epochs, own systems", "runs", MANY, lambda n: filtered(runs=int(n))),
@@ -133,7 +137,7 @@ def cost(call: Callable[[], object], traced: bool) -> tuple[float, float, float]
     return float(cpu), float(wall), most
 
 
-def slope(sizes: list[float], costs: NDArray[np.float64]) -> float:
+def slope(sizes: list[float], costs: Array) -> float:
     """Of a straight line through the logarithms."""
     return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
 
@@ -142,31 +146,39 @@ def in_words(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
+def row(line: Line, times: Array, memory: Array | None) -> str:
+    """Of the table."""
+    clock = " on the clock" if memory is None else ""
+    ends = f"{in_words(times[0])} to {in_words(times[-1])}{clock} | {slope(line.sizes, times):.2f}"
+    first, *_, last = NAMES.get(line.over, [f"{size:,g}" for size in line.sizes])
+    of_memory = "| "
+    if memory is not None:
+        few, many = (f"{float(f'{m:.3g}'):,g}" for m in (memory[0], memory[-1]))
+        of_memory = f"{few} to {many} | {slope(line.sizes, memory):.2f}"
+    return f"| {line.title} | {line.over}, {first} to {last} | {ends} | {of_memory} |"
+
+
 def main() -> None:
-    table = [
-        "| what | over | time, of the least and the largest | slope | memory, MiB | slope |",
-        "| --- | --- | --- | ---: | --- | ---: |",
-    ]
-    drawn = []
+    found = []
     for line in LINES:
         line.make(line.sizes[0])()  # compiles
         alone = line.over != "workers"
         costs = np.array([cost(line.make(size), alone) for size in line.sizes])
-        times, memory = costs[:, 0 if alone else 1], costs[:, 2]
-        drawn.append((line, times, memory if alone else None))
-        ends = f"{in_words(times[0])} to {in_words(times[-1])}" + ("" if alone else " on the clock")
-        of_memory = f"{memory[0]:.2g} to {memory[-1]:.3g} | {slope(line.sizes, memory):.2f}" if alone else "|"
-        first, *_, last = NAMES.get(line.over, [f"{size:,g}" for size in line.sizes])
-        over = f"{line.over}, {first} to {last}"
-        table.append(f"| {line.title} | {over} | {ends} | {slope(line.sizes, times):.2f} | {of_memory} |")
-        print(f"  {table[-1]}", flush=True)
+        found.append((line, costs[:, 0 if alone else 1], costs[:, 2] if alone else None))
+        print(f"  {row(*found[-1])}", flush=True)
         for size, (cpu, wall, most) in zip(line.sizes, costs):
             print(f"    {size:8g}{1e3 * cpu:12.3g} ms{1e3 * wall:12.3g} ms on the clock{most:10.3g} MiB", flush=True)
-    write_between(MARKS, table)
-    draw(drawn)
+    write(found)
 
 
-def draw(drawn: list[tuple[Line, NDArray[np.float64], NDArray[np.float64] | None]]) -> None:
+def write(found: list[tuple[Line, Array, Array | None]]) -> None:
+    """The table and the figure."""
+    head = "| what | over | time, of the least and the largest | slope | memory, MiB | slope |"
+    write_between(MARKS, [head, "| --- | --- | --- | ---: | --- | ---: |", *(row(*line) for line in found)])
+    draw(found)
+
+
+def draw(drawn: list[tuple[Line, Array, Array | None]]) -> None:
     """Time above, memory below, a column for each size; in the last place what the lines are."""
     with style():
         figure = new_figure(11.0, 5.6)
@@ -185,12 +197,15 @@ def draw(drawn: list[tuple[Line, NDArray[np.float64], NDArray[np.float64] | None
                 if values is not None:
                     panel = panels[row, column]
                     panel.loglog(line.sizes, values, **look)
-                    text = f" {slope(line.sizes, values):.2f}"
                     if line.over != "runs":
-                        named = NAMES.get(line.over, [f"{size:g}" for size in line.sizes])
-                        panel.set_xticks(line.sizes, named, fontsize=8)
-                        panel.minorticks_off()
-                    panel.annotate(text, (line.sizes[-1], values[-1]), color=look["color"], fontsize=8, va="center")
+                        named = [f"{size:g}" for size in line.sizes]
+                        panel.set_xticks(line.sizes, NAMES.get(line.over, named), fontsize=8)
+                    panel.minorticks_off()
+                    side = "bottom" if i % 2 else "top"
+                    at = {"xy": (line.sizes[-1], values[-1]), "xytext": (4, 0), "textcoords": "offset points"}
+                    panel.annotate(
+                        f"{slope(line.sizes, values):.2f}", **at, color=look["color"], fontsize=8, va=side, bbox=PLAIN
+                    )
         for column, over in enumerate(OVER):
             panels[1, column].set_xlabel(over)
             panels[0, column].margins(x=0.25)
@@ -200,7 +215,7 @@ def draw(drawn: list[tuple[Line, NDArray[np.float64], NDArray[np.float64] | None
         panels[0, -1].set_xlabel(OVER[-1])
         panels[0, -1].xaxis.set_tick_params(labelbottom=True)
         figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8)
-        figure.savefig(FIGURE)
+        figure.savefig(FIGURE, metadata={"Date": None})
 
 
 if __name__ == "__main__":
