@@ -200,8 +200,10 @@ def settle_fine(
     integrals: InertialIntegrals | None = None,
     form: Form = "velocity",
     turned: ImuSpec | None = None,
+    *,
+    history: bool = True,
 ) -> tuple[StayingLog, Settled[Filtered], Array]:
-    """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains are not wanted."""
+    """The log, its last pass and the disturbance of a :func:`fine_align`, where floors and gains (or a history) are not wanted."""
     record, C_n0_i, position, model, P_bias, interval, rows_at = start
     prior = prior_of(P_bias) if turned is None else prior_of(P_bias, spec=turned, arm=np.zeros(3), arm_sigma=TURN_ARM)
     log = StayingLog(record, C_n0_i, position, model, prior, interval, rows_at, integrals=integrals, form=form)
@@ -212,7 +214,7 @@ def settle_fine(
         gained = gained_velocity(log.integrals, C_n0_i, position.lat, position.alt)
         R = np.maximum(white_variance(gained) - expected, max(SLIGHT * expected, QUIETEST_BASE**2))
     everywhere = np.ones(len(log.integrals.intervals), dtype=np.bool_)
-    noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES)
+    noise = VelocityNoise(np.tile(R, (len(everywhere), 1)), [everywhere], MAX_NOISE_PASSES, history=history)
     last = settle(log, noise, left_over(float(log.integrals.time[-1])), most=MAX_PASSES)
     return log, last, np.sqrt(noise.R[0])
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.quality.signals import STILL_ANGLE
+from truenorth.quality.signals import STILL_ANGLE, median_of_rows
 from truenorth.state.evidence import Evidence, contradiction
 
 Array = NDArray[np.float64]
@@ -71,9 +71,9 @@ def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
     before = (sums[ASIDE:] - sums[:-ASIDE])[: -ASIDE - GAP] / ASIDE
     after = (sums[ASIDE:] - sums[:-ASIDE])[ASIDE + GAP :] / ASIDE
     steps = after - before
-    size = np.linalg.norm(steps, axis=1)
+    size = np.hypot(steps[:, 0], steps[:, 1])
     # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
-    usual = np.median(np.abs(np.diff(blocks, axis=0)), axis=0) / 0.6745 / math.sqrt(ASIDE)
+    usual = median_of_rows(np.abs(blocks[1:] - blocks[:-1]).T)[:, 0] / 0.6745 / math.sqrt(ASIDE)
     scatter = float(np.linalg.norm(usual))
     best = int(np.argmax(size))
     if size[best] < max(FACTOR * scatter, STILL_ANGLE * gravity):

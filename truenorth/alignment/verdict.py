@@ -98,7 +98,8 @@ def claimed(answer: Alignment) -> Effect:
 
 def level_sigma(answer: Alignment) -> float:
     """The larger axis of the error ellipse of level, rad."""
-    return float(np.sqrt(np.max(np.linalg.eigvalsh(answer.phi_covariance[:2, :2]))))
+    a, b, c = (float(answer.phi_covariance[i]) for i in ((0, 0), (1, 1), (0, 1)))
+    return math.sqrt(0.5 * (a + b) + math.hypot(0.5 * (a - b), c))
 
 
 def azimuth_sigmas(answer: Alignment) -> tuple[float, float]:

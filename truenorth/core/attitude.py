@@ -44,10 +44,10 @@ def skew(v: ArrayLike) -> Array:
 def dcm_from_rotation_vector(rotation: ArrayLike) -> Array:
     """``exp([rotation x])``, (..., 3, 3) of (..., 3) rad (Rodrigues)."""
     v = np.asarray(rotation, dtype=np.float64)
-    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    angle = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None, None]
+    angle = np.where(angle == 0.0, 1e-20, angle)  # the sine of so small an angle is the angle
     S = skew(v)
-    # np.sinc(x) = sin(pi x)/(pi x) has its limit at 0 built in.
-    return np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (S @ S)
+    return np.eye(3) + np.sin(angle) / angle * S + 0.5 * (np.sin(0.5 * angle) / (0.5 * angle)) ** 2 * (S @ S)
 
 
 def rotation_vector_from_dcm(C: ArrayLike) -> Array:

@@ -74,15 +74,17 @@ class VelocityNoise:
         Intervals that share one variance.
     most : int
         Filter runs at the most, for white and for coloured motion each.
+    history : bool
+        Whether the estimates of every epoch are wanted, or those of the last alone.
     """
 
-    def __init__(self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int) -> None:
-        self.R, self.parts, self.most = R, parts, most
+    def __init__(self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int, *, history: bool = True) -> None:
+        self.R, self.parts, self.most, self.history = R, parts, most, history
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
         """Filter a system that holds the variance of the quietest base so far."""
         system = self._with_motion(quiet)
-        estimates = kalman(system, history="full")
+        estimates = self._filtered(system)
         for colour in (False, True):
             for _ in range(self.most):
                 R, same = self.R.copy(), True
@@ -97,8 +99,11 @@ class VelocityNoise:
                     break
                 self.R = R
                 system = self._with_motion(quiet)
-                estimates = kalman(system, history="full")
+                estimates = self._filtered(system)
         return Filtered(system, estimates)
+
+    def _filtered(self, system: LinearSystem) -> Estimates:
+        return kalman(system, history="full" if self.history else "last", innovations=True)
 
     def _with_motion(self, quiet: LinearSystem) -> LinearSystem:
         R = quiet.R + np.zeros((len(self.R), 1, 1))

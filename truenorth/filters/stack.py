@@ -78,6 +78,8 @@ class System(ABC):
     @property
     def epochs(self) -> int:
         """Number of epochs, K."""
+        if self.z.shape[-2] > 1:  # whatever is of one epoch goes with it
+            return int(self.z.shape[-2])
         axes = self.axes
         return max(a.shape[-len(axes[name])] for name, a in self._arrays() if axes[name][0] == "K")
 

@@ -183,7 +183,7 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
         if not windows.any():
             continue
         chosen, still = mean[:, windows], wander[:, windows].max(axis=0)
-        drift = np.sqrt(np.sum((chosen - _middle(chosen)) ** 2, axis=0)) * WINDOW / np.sqrt(12.0)
+        drift = np.sqrt(np.sum((chosen - median_of_rows(chosen)) ** 2, axis=0)) * WINDOW / np.sqrt(12.0)
         weight = 1.0 / (still**2 + drift**2 + STILL_ANGLE**2)
         bias: Array = chosen @ weight / weight.sum()
         if np.linalg.norm(bias) < limit:
@@ -191,7 +191,7 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
     return np.zeros(3)
 
 
-def _middle(values: Array) -> Array:
+def median_of_rows(values: Array) -> Array:
     """(k, 1) median of each row: :func:`numpy.median`, which takes longer to begin."""
     ordered, half = np.sort(values, axis=1), values.shape[1] // 2
     return 0.5 * (ordered[:, [half]] + ordered[:, [half if values.shape[1] % 2 else half - 1]])
