@@ -108,6 +108,20 @@ def test_no_long_files():
     assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
 
 
+DIALECT = re.compile(r"\b(told|told_by|beside|hears|base of stone|(that|which) (is|are) none(?! of))\b")
+
+
+def test_the_text_has_no_dialect():
+    """Words that readers of the field stumbled over: what is said is plain English, in code and pages alike."""
+    pages = [*ROOT.parent.glob("*.md"), *(ROOT.parent / "docs").rglob("*.md"), *ROOT.rglob("*.yaml"), *FILES.values()]
+    wrong = [
+        f"{page.relative_to(ROOT.parent)}: {found.group()}"
+        for page in pages
+        for found in DIALECT.finditer(page.read_text(encoding="utf-8"))
+    ]
+    assert wrong == []
+
+
 @cache
 def documented(name):
     """The docstrings of a module: their nodes."""
