@@ -29,7 +29,6 @@ FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, next to the package i
 SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
 LONGEST = 120
 LONGEST_FILE = 400
-TYPES_COMMANDS = {"truenorth.formats.samples"}  # it shows commands to type
 
 FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
 
@@ -136,7 +135,7 @@ def test_the_library_names_no_options():
     wrong = [
         f"{name}: {node.value!r}"
         for name in FILES
-        if folder(name) != "cli" and name not in TYPES_COMMANDS
+        if folder(name) != "cli"
         for node in ast.walk(tree(name))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
         if re.search(r"(?<![\w-])--[a-z]|(?<!\S)-o\b", node.value) and id(node) not in documented(name)
