@@ -34,7 +34,7 @@ from truenorth.errors.group import Group
 from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
-from truenorth.estimate.rivals import jump_evidence, misfit, noise_evidence, wandering_evidence
+from truenorth.estimate.rivals import jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
@@ -42,6 +42,7 @@ from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
 from truenorth.state.layout import DP, PHI
+from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -187,6 +188,9 @@ def _aligned(
         tell(f"pass {(number := number + 1)}")
         task = slower
         guess, track, moved = _once_more(task, track, first)
+    if passes > 1:
+        tell(f"pass {(number := number + 1)}")
+        task, guess, track, moved = _as_specified(task, guess, track, moved, first)
     if number > 1:
         left = moved * float(track.sigma[-1, PHI][2]) if moved > SETTLED else 0.0  # what has not settled
         spread = math.hypot(spread, used_twice(track, guess, first), left)
@@ -219,6 +223,39 @@ def _once_more(task: MovingTask, track: Track, first: Guess) -> tuple[Guess, Tra
     guess = led_back(task.record, track, task.spec, first)
     other = task.run(guess, gated=True)
     return guess, other, abs(_turn_between(other.C_nb[-1], track.C_nb[-1])) / float(other.sigma[-1, PHI][2])
+
+
+def _as_specified(
+    task: MovingTask, guess: Guess, track: Track, moved: float, first: Guess
+) -> tuple[MovingTask, Guess, Track, float]:
+    """Passes with axes of the gyros that are constants, where the log does not speak against them: task, guess, track, moves.
+
+    Noise in turns besides states of the axes is the same error twice. It carries the first passes, of which nobody knows yet
+    whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose aids
+    have shown slow errors that nobody spoke of is not as specified: these may hide what the axes do.
+    """
+    constant = task.with_constant_axes()
+    if constant is task or task.lasting:
+        return task, guess, track, moved
+    found = guess, track, math.inf
+    for _ in range(MORE_PASSES):
+        if found[2] <= SETTLED:
+            break
+        try:
+            found = _once_more(constant, found[1], first)
+        except DataError:  # the filter broke down: they are not
+            return task, guess, track, moved
+        if _fits_worse(track, found[1]):
+            return task, guess, track, moved
+    return constant, *found
+
+
+def _fits_worse(track: Track, other: Track) -> bool:
+    """Whether the log speaks for the first of two tracks by more than chance does, or the other rejects more of it."""
+    rejected = sum(
+        int(np.sum(b.used)) < int(np.sum(a.used)) for a, b in zip(track.residuals, other.residuals, strict=True)
+    )
+    return rejected > 0 or likelihood_ratio(other.residuals, track.residuals) > limit("rival")
 
 
 def _seen(

@@ -88,6 +88,8 @@ class MovingTask:
     usual_fixes: bool = False
     lasting: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
     wanders: Sequence[Evidence] = ()  # and what is to be said of them
+    # Scale factors and misalignments of the gyros are the constants that the specification says; else noise in turns besides
+    steady: bool = False
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
         """The task with what a pass has taught of its sensors, and whether that is much."""
@@ -118,8 +120,14 @@ class MovingTask:
         """The task with another specification of the IMU."""
         # A gate that begins with any heading must bear what constants do not hold: without noise in turns the filter loses a cart
         # (`stim300_cart_chicago`) whose axes are not constants.
-        model = InsModel.from_spec(spec, standing=standing(), unsteady=True, groups=groups_of(self.errors, spec))
+        groups = groups_of(self.errors, spec)
+        model = InsModel.from_spec(spec, standing=standing(), unsteady=not self.steady, groups=groups)
         return replace(self, spec=spec, model=model)
+
+    def with_constant_axes(self) -> MovingTask:
+        """The task whose gyros have axes that stay as they are: the same one where there are no states of them."""
+        other = replace(self, steady=True).with_spec(self.spec)
+        return self if other.model.turn_noise == self.model.turn_noise else other
 
     def without_slow_errors(self) -> list[MovingTask]:
         """The task without each of the slow errors that innovations have shown."""

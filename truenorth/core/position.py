@@ -59,7 +59,7 @@ class Position:
         Raises
         ------
         UsageError
-            Not a number, or a latitude beyond a pole.
+            No number, or a latitude that is none.
         """
         try:
             return cls(math.radians(lat), math.radians(lon), alt, **sigmas)
