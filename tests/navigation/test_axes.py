@@ -29,9 +29,9 @@ def test_a_consumer_imu_in_a_few_drives(name):
 @pytest.mark.parametrize("grade", GRADES)
 @pytest.mark.parametrize("name", VEHICLES)
 def test_sigma_is_honest(name, grade, wrong):
-    """Sixty drives, as the level of twenty scatters by 15 %. With the axes of one sort alone off sigma allows for both.
+    """Sixty drives, as the level of twenty scatters by 15 %.
 
-    It may then be too large.
+    With the axes of one sort alone off sigma allows for both, and may be too large.
     """
     line = line_of(name, grade, 60, 11, wrong)
     assert not line.refused
