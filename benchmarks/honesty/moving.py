@@ -3,11 +3,16 @@
 A car or an underwater vehicle whose speeds, turns and course are drawn in each run. The IMU is industrial where GNSS aids (its
 heading is by motion), of navigation grade where the odometer alone does.
 
+What nobody says of a wheel or a receiver is assumed: a wheel that slips by .1 m/s to each side, mounting and scale to be found,
+fixes that wander. A world without such errors has errors smaller than sigma allows for. So those rows stand twice: the second time
+all that is assumed is drawn from what is assumed of it (``errors as assumed``), and sigma has to be right.
+
 Run: ``python -m benchmarks.honesty.moving --runs 20``.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -15,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty.harness import Case, Log, main, place
+from truenorth.aiding.sensors import ODOMETER_SIGMA
 from truenorth.alignment.in_motion import align_in_motion
+from truenorth.alignment.in_motion_task import WHEEL
 from truenorth.alignment.result import Alignment
-from truenorth.records import GnssRecord
+from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
 
 GOOD = ("aligned", "level_only", "not_converged")
 FLAGGED = (*GOOD, "inconsistent")  # of a wrong class of IMU: what is said must be right, and it may be refused
@@ -32,8 +39,9 @@ def drive(rng: np.random.Generator, fastest: float, rate: float, climb: float = 
         angle = rng.choice([-1.0, 1.0]) * rng.uniform(30.0, 120.0)
         legs.append({"kind": "straight", "duration": f"{rng.uniform(5.0, 20.0):.1f} s"})
         legs.append({"kind": "turn", "angle": f"{angle:.1f} deg", "rate": f"{rate * rng.uniform(0.6, 1.0):.2f} deg/s"})
-        speed = fastest * rng.uniform(0.4, 1.0)
-        legs.append({"kind": "accelerate", "to": f"{speed:.2f} m/s", "acceleration": f"{0.1 * fastest:.2f} m/s^2"})
+        before, speed = speed, fastest * rng.uniform(0.4, 1.0)
+        if f"{speed:.2f}" != f"{before:.2f}":
+            legs.append({"kind": "accelerate", "to": f"{speed:.2f} m/s", "acceleration": f"{0.1 * fastest:.2f} m/s^2"})
         if climb:
             slope = climb * rng.uniform(-1.0, 1.0)
             legs.append({"kind": "climb", "slope": f"{slope:.2f} deg", "duration": f"{rng.uniform(5.0, 15.0):.1f} s"})
@@ -72,7 +80,7 @@ def askew(rng: np.random.Generator) -> Mapping[str, Any]:
     """S-turns, the IMU askew in the vehicle by about a degree, the wheel's scale 2 % off."""
     mounting = [f"{1.5 * rng.standard_normal():.3f} deg", f"{rng.standard_normal():.3f} deg"]
     s_turns = {"kind": "s_turn", "angle": "40 deg", "rate": "8 deg/s", "times": 8, "bank": "flat"}
-    legs = [{"kind": "straight", "duration": f"{rng.uniform(10.0, 40.0):.0f} s"}]
+    legs: list[dict[str, Any]] = [{"kind": "straight", "duration": f"{rng.uniform(10.0, 40.0):.0f} s"}]
     legs += [{"kind": "accelerate", "to": "12 m/s", "acceleration": "1 m/s^2"}, s_turns]
     return {
         "duration": "300 s",
@@ -88,26 +96,73 @@ def askew(rng: np.random.Generator) -> Mapping[str, Any]:
     }
 
 
+def as_assumed(
+    scenario: Callable[[np.random.Generator], Mapping[str, Any]],
+) -> Callable[[np.random.Generator], Mapping[str, Any]]:
+    """The same world, the wheel's scale, mounting and arm drawn from what is assumed of a wheel of which nothing is said."""
+
+    def drawn(rng: np.random.Generator) -> Mapping[str, Any]:
+        found = dict(scenario(rng))
+        arm = [f"{WHEEL.lever_arm_sigma * x:.3f} m" for x in rng.standard_normal(3)]
+        own = {
+            "scale": f"{100.0 * WHEEL.scale_sigma * rng.standard_normal():.3f} %",
+            "mounting": [f"{np.degrees(WHEEL.angle_sigma) * x:.3f} deg" for x in rng.standard_normal(2)],
+            "lever_arm": arm,
+        }
+        return found | {"odometer": {**found["odometer"], **own}}
+
+    return drawn
+
+
 FIXES = {"position_noise": "2 m", "velocity_noise": "0.05 m/s"}
 WANDERING = FIXES | {"position_drift": "2 m", "correlation_time": "60 s"}
 
 
-def by(imu: str, change: Callable[[GnssRecord, np.random.Generator], GnssRecord] | None = None) -> Any:
-    """Aligned with what the log has; `change` spoils the fixes."""
+def by(
+    imu: str,
+    change: Callable[[GnssRecord, np.random.Generator], GnssRecord] | None = None,
+    slip: Callable[[OdometerRecord, np.random.Generator], VelocityRecord] | None = None,
+) -> Any:
+    """Aligned with what the log has; `change` spoils the fixes, `slip` the wheel."""
 
     def call(log: Log) -> Alignment:
-        gnss = log.aiding.get("gnss")
+        gnss, odometer = log.aiding.get("gnss"), log.aiding.get("odometer")
+        rng = np.random.default_rng(len(log.record) + int(1e6 * log.record.gyro[0, 0]))
         if gnss is not None and change is not None:
-            gnss = change(gnss, np.random.default_rng(len(log.record) + int(1e6 * log.record.gyro[0, 0])))
+            gnss = change(gnss, rng)
         position = log.start if gnss is None else None
-        return align_in_motion(log.record, imu, gnss=gnss, odometer=log.aiding.get("odometer"), position=position)
+        aids = {"odometer": odometer} if slip is None or odometer is None else {"velocity": slip(odometer, rng)}
+        wheel = WHEEL if odometer is not None else None
+        return align_in_motion(log.record, imu, gnss=gnss, position=position, wheel=wheel, **aids)
 
     return call
+
+
+def slipping(noise: float) -> Callable[[OdometerRecord, np.random.Generator], VelocityRecord]:
+    """A wheel as the aligner takes it: it slips sideways and upwards by what is assumed, and has such noise forward, m/s.
+
+    A log of three axes says what a wheel's rows stand for: the constraint is measured, and its noise drawn.
+    """
+
+    def change(odometer: OdometerRecord, rng: np.random.Generator) -> VelocityRecord:
+        sigma = np.array([WHEEL.slip, noise, WHEEL.slip])
+        drawn = rng.standard_normal((len(odometer), 3)) * [WHEEL.slip, math.sqrt(noise**2 - USUAL_NOISE**2), WHEEL.slip]
+        measured = drawn + np.outer(odometer.speed, [0.0, 1.0, 0.0])
+        time = odometer.time - 0.5 * odometer.steps
+        return VelocityRecord(time, measured, "body", np.tile(sigma, (len(odometer), 1)), odometer.source)
+
+    return change
 
 
 def places_only(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
     """Without velocities."""
     return replace(gnss, v_n=None, velocity_sigma=None)
+
+
+def boasting_places(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
+    """Without velocities; what it says of its places is that of their white part, and as much is taken for what wanders."""
+    assert gnss.position_sigma is not None
+    return replace(gnss, v_n=None, velocity_sigma=None, position_sigma=gnss.position_sigma / math.sqrt(2.0))
 
 
 def jittering(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
@@ -123,13 +178,23 @@ def boasting(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
     return replace(gnss, position_sigma=gnss.position_sigma / 3.0, velocity_sigma=gnss.velocity_sigma / 3.0)
 
 
-ODOMETER = {"noise": "0.02 m/s", "scale_sigma": "1 %"}
+USUAL_NOISE = 0.02  # m/s, of the wheels here
+ODOMETER = {"noise": f"{USUAL_NOISE} m/s", "scale_sigma": "1 %"}
+NOISY = vehicle("navigation", None, {"noise": "0.3 m/s"})
+QUIET = vehicle("navigation", None, ODOMETER)
 CASES = (
     Case("odometer, S-turns, IMU askew, scale 2 %", askew, by("navigation"), GOOD),
     Case(
-        "odometer noisier than usual (.3 m/s)",
-        vehicle("navigation", None, {"noise": "0.3 m/s"}),
-        by("navigation"),
+        "odometer, S-turns, errors as assumed",
+        as_assumed(askew),
+        by("navigation", slip=slipping(ODOMETER_SIGMA)),
+        GOOD,
+    ),
+    Case("odometer noisier than usual (.3 m/s)", NOISY, by("navigation"), GOOD),
+    Case(
+        "odometer noisier than usual (.3 m/s), errors as assumed",
+        as_assumed(QUIET),
+        by("navigation", slip=slipping(0.3)),
         GOOD,
     ),
     Case("GNSS, car", vehicle("industrial", FIXES), by("industrial"), GOOD),
@@ -140,8 +205,20 @@ CASES = (
     ),
     Case("GNSS stamps late by .1 to .5 s, drawn", vehicle("industrial", FIXES), by("industrial", jittering), GOOD),
     Case("GNSS with positions only", vehicle("industrial", FIXES), by("industrial", places_only), GOOD),
+    Case(
+        "GNSS with positions only, errors as assumed",
+        vehicle("industrial", WANDERING),
+        by("industrial", boasting_places),
+        GOOD,
+    ),
     Case("GNSS says sigmas three times too small", vehicle("industrial", FIXES), by("industrial", boasting), GOOD),
     Case("GNSS and odometer", vehicle("industrial", WANDERING, ODOMETER), by("industrial"), GOOD),
+    Case(
+        "GNSS and odometer, errors as assumed",
+        as_assumed(vehicle("industrial", WANDERING, ODOMETER)),
+        by("industrial", slip=slipping(ODOMETER_SIGMA)),
+        GOOD,
+    ),
     Case("IMU industrial, given as tactical", vehicle("industrial", FIXES), by("tactical"), FLAGGED),
     Case("IMU consumer, given as industrial", vehicle("consumer", FIXES), by("industrial"), FLAGGED),
 )

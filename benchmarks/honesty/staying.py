@@ -5,6 +5,7 @@ Run: ``python -m benchmarks.honesty.staying --runs 20``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,8 +13,10 @@ import numpy as np
 
 from benchmarks.honesty.harness import Case, Log, direction, main, place
 from truenorth.alignment import align
+from truenorth.alignment.inference import ACCEL_WIDTH, GYRO_WIDTH, usual
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rotary import align_rotary
+from truenorth.records.specs import ImuSpec, imu_spec
 
 UNSCALED = {
     "gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "bias_instability": "0.001 deg/h"},
@@ -117,6 +120,23 @@ def still(gyro: str) -> Any:
     return scenario
 
 
+def usual_still(rng: np.random.Generator) -> Mapping[str, Any]:
+    """A base at rest whose IMU is drawn from what is taken for usual where nobody gives a specification.
+
+    A random walk between navigation and industrial grade; biases from a population whose width is usual of such a walk, to the
+    factors that the inference allows for, and no better than is ever assumed.
+    """
+    best, grade = imu_spec("navigation"), rng.random()
+    values: dict[str, float] = {}
+    for sensor, width in (("gyro", GYRO_WIDTH), ("accel", ACCEL_WIDTH)):
+        least, most = (getattr(imu_spec(name), f"{sensor}_random_walk") for name in ("navigation", "industrial"))
+        walk = least * (most / least) ** grade
+        size = usual(sensor, "bias", walk) * math.exp(width * rng.standard_normal())
+        values[f"{sensor}_random_walk"] = walk
+        values[f"{sensor}_bias"] = max(size, getattr(best, f"{sensor}_bias"))
+    return still("0 deg/h")(rng) | {"imu": ImuSpec(name="usual", **values).to_mapping()}
+
+
 def low_cost(rng: np.random.Generator) -> Mapping[str, Any]:
     """A consumer IMU at rest for a few minutes."""
     return {
@@ -158,6 +178,12 @@ CASES = (
     Case("tactical, gentle sway, auto", gentle, _with("tactical"), ("aligned", "level_only", "not_converged")),
     Case("still, no specification, gyro bias .3 deg/h", still("0.3 deg/h"), _with(None), ("aligned", "level_only")),
     Case("still, no specification, gyro bias .05 deg/h", still("0.05 deg/h"), _with(None), ("aligned", "level_only")),
+    Case(
+        "still, no specification, biases as usual of the noise",
+        usual_still,
+        _with(None),
+        ("aligned", "level_only", "not_converged", "not_observable"),
+    ),
     Case("still, specification given, gyro bias .01 deg/h", still("0.01 deg/h"), _with(_imu("0.01 deg/h"))),
     # what a log says of its accelerometers alone may leave level unknown: that is no refusal, and its sigma is compared
     Case("low cost at rest, no specification", low_cost, _with(None), ("aligned", "level_only", "not_converged")),
