@@ -1,5 +1,7 @@
 """Stops: all sensors that look must agree; and a vehicle that stands keeps its height."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from truenorth.aiding.aids import Odometer
 from truenorth.core.position import Position
 from truenorth.navigation import Start, navigate
 from truenorth.navigation.stops import DISTURBED_VELOCITY, seconds_at_rest, velocity_at_rest
+from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
@@ -92,6 +95,25 @@ def test_height_does_not_wander_while_the_vehicle_stands(standing):
     assert np.abs(result.v_n[settled, 2]).max() < 0.02
     grown = np.sqrt(result.position_sigma[-1, 2] ** 2 - result.position_sigma[settled, 2][0] ** 2)
     assert 0.5 * walk[-1] < grown < 1.5 * walk[-1]
+
+
+def test_an_engine_that_idles_turns_nothing(standing):
+    """A tenth of a deg/s at 5 Hz, whole turns in the filter's steps: between an odometer's rows it was seen, and "rejected"."""
+    first = standing.between(0.0, 60.0)
+    shaken = 1e-4 * np.sin(10.0 * np.pi * first.time + 0.7)[:, None] * [1.0, 0.5, -0.8]
+    record = replace(first, gyro=first.gyro + np.diff(shaken, axis=0, prepend=shaken[:1]))
+    sigma = np.repeat([5e-3, 0.1, 1.0, SPEC.gyro_bias, SPEC.accel_bias], 3)
+    C = rest(PLACE, 0.6).states(0.0).C_nb
+    zero = np.zeros(3)
+    start = Start(0.0, C, zero, PLACE.lat, PLACE.lon, PLACE.alt, zero, zero, np.diag(sigma**2))
+    wheel = T[T < 60.0] + 0.23
+    log = Odometer(OdometerRecord(wheel, 0 * wheel, "speed"))
+    result = navigate(record, start, aid=log, imu=SPEC, altitude="fixed", zupt="auto", check_clocks=False)
+    turns = next(r for r in result.track.residuals if r.name == NO_ROTATION)
+    seen = turns.rows > 0
+    assert np.count_nonzero(seen) > 50
+    assert np.mean(turns.nis[seen] > 21.0) < 0.02  # .999 of sound ones of three rows lie below 16
+    assert result.status == "navigated"
 
 
 def test_an_ins_that_falls_for_minutes_is_no_fault_of_the_aiding(standing):

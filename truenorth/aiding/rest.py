@@ -2,6 +2,8 @@
 
     z = w_hat - C' w_ie = eps + C' (w_ie x phi)
 
+The mean is over the time T since the last event of any sensor. What shakes a base about a place, and a gyro's quantum, is an angle
+at both ends of it: a rate of ``angle / T``, whatever T; a row's sigma is that angle (rad), and its R made of it here.
 The white noise of the gyros over the interval is both the row's noise and the process noise of phi. The two are treated
 as independent: the reported sigma of heading is then larger than its error, never smaller.
 """
@@ -16,6 +18,7 @@ from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_EARTH, NOW_GYRO_NOISE, NOW_MEAN_RATE, NOW_SINCE, matrix_of, vector_of
 
 _PHI, _BG = 0, 9
+STILL_RATE = 1e-6  # rad/s, of a base's rotation, besides what the gyros show of themselves
 
 
 @compiled
@@ -49,7 +52,7 @@ def _rotation(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     rotation_row(matrix_of(now, NOW_C), vector_of(now, NOW_MEAN_RATE), vector_of(now, NOW_EARTH), H, z)
     if now[NOW_SINCE] > 0.0:  # a mean rate has the gyros' noise, too
         for i in range(3):
-            R[i] += now[NOW_GYRO_NOISE] / now[NOW_SINCE]
+            R[i] = R[i] / now[NOW_SINCE] ** 2 + STILL_RATE**2 + now[NOW_GYRO_NOISE] / now[NOW_SINCE]
 
 
 ROTATION = Row("rotation", _rotation, {}, unit="rad/s", axes=BODY_FRAME)

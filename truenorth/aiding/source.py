@@ -45,7 +45,7 @@ class Aiding:
     measured : (M, k) array
         NaN where absent; of as many numbers as its row takes.
     sigma : (M, 3) array
-        One-sigma noise; of a position in metres (east, north, up).
+        One-sigma noise; of a position in metres (east, north, up), of a rotation the angle, rad, at both ends of its mean rate.
     lever_arm : (3,) array, m
         IMU to sensor, body axes.
     C_mb : (3, 3) array

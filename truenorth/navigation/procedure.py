@@ -160,7 +160,7 @@ def navigate(
     if zupt is not None:
         tell("looking for stops")
         seen = (record_of(given, kind) for kind in (Odometer, Gnss, VelocityLog))
-        plan = replace(plan, always=[*zero_updates(record, zupt, plan.interval, *seen), *disturbances])
+        plan = replace(plan, always=[*zero_updates(record, zupt, *seen), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
     plan, given, track, wanders = _filtered(plan, given, smooth)

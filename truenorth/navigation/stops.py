@@ -25,8 +25,8 @@ FEWEST_FIXES = 5  # through which a line is laid
 REACHES = (2.0, 5.0, 10.0, 20.0)  # s before and after a fix
 SHARP = 0.4  # of the speed of standing: one sigma of a slope that is sharp enough
 STANDING_PULSES = 1.5  # pulses of an odometer in a second: no more is standing
+LEAST_ANGLE = 1e-9  # rad: of a simulated IMU that nothing shakes
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
-STILL_RATE = 1e-6  # rad/s, of its rotation, besides what the gyros show of themselves
 
 
 def stops_in(record: ImuRecord) -> tuple[Array, Array]:
@@ -143,18 +143,25 @@ def _speed_of_places(log: GnssRecord) -> tuple[Array, NDArray[np.bool_]]:
     return time[said], speed[said] > STANDING
 
 
-def rate_scatter(record: ImuRecord, interval: float, seconds: Array) -> float:
-    """RMS scatter of the mean rate over an interval, rad/s, in the seconds around these times: noise, quantum, vibration."""
+def angle_scatter(record: ImuRecord, seconds: Array) -> Array:
+    """(3,) RMS difference of two angles about a place, rad, in the seconds around these times: noise, quantum, vibration.
+
+    Of all samples about the line through a second of them: means over an interval of its own would not see an engine whose turns
+    it holds a whole number of.
+    """
     angle = np.cumsum(increments(record)[0], axis=0)
-    edges = (seconds - 0.5)[:, None] + interval * np.arange(max(3, int(1.0 / interval) + 1))
-    means = np.diff([np.interp(edges, record.time, angle[:, i]) for i in range(3)], axis=2) / interval
-    return float(np.sqrt(0.5 * np.mean(np.diff(means, axis=2) ** 2)))
+    count = min(max(FEWEST_FIXES, round(1.0 / record.interval)), len(angle))
+    first = np.minimum(np.searchsorted(record.time, seconds - 0.5), len(angle) - count)
+    part = angle[first[:, None] + np.arange(count)]
+    x = np.linspace(-1.0, 1.0, count)
+    left = part - part.mean(axis=1, keepdims=True)
+    left -= np.einsum("k,mki->mi", x, left)[:, None] / (x @ x) * x[None, :, None]
+    return np.asarray(np.sqrt(2.0 * np.mean(left**2, axis=(0, 1))))
 
 
 def zero_updates(
     record: ImuRecord,
     stops: str | Sequence[tuple[float, float]],
-    interval: float,
     odometer: OdometerRecord | None = None,
     gnss: GnssRecord | None = None,
     velocity: VelocityRecord | None = None,
@@ -165,8 +172,6 @@ def zero_updates(
     ----------
     stops : "auto" or sequence of (start, stop)
         Found from the IMU, or given, s on the record's clock.
-    interval : float, s
-        Of the filter: a mean rate is taken over it.
     odometer, gnss, velocity : records, optional
         Sensors of speed that have a say in what is found.
 
@@ -188,12 +193,10 @@ def zero_updates(
                 raise UsageError(f"stop from {start:g} s to {stop:g} s; expected its end after its beginning")
             seconds.append(np.arange(start, stop, 1.0) + 0.5)
         still, disturbed = np.empty(0), np.concatenate(seconds) if seconds else np.empty(0)
-    return updates_at(record, still, disturbed, interval, shaken)
+    return updates_at(record, still, disturbed, shaken)
 
 
-def updates_at(
-    record: ImuRecord, still: Array, disturbed: Array, interval: float, shaken: float = DISTURBED_VELOCITY
-) -> list[Aiding]:
+def updates_at(record: ImuRecord, still: Array, disturbed: Array, shaken: float = DISTURBED_VELOCITY) -> list[Aiding]:
     """Zero velocities in the seconds around these times, and zero rotations where nothing moves at all.
 
     `shaken` is the one-sigma velocity of the disturbed ones, m/s.
@@ -205,6 +208,6 @@ def updates_at(
     zero = np.zeros((time.size, 3))
     found = [Aiding("zero velocity", "velocity", time, zero, np.tile(sigma[:, None], 3))]
     if still.size:
-        scatter = np.full((still.size, 3), np.hypot(STILL_RATE, rate_scatter(record, interval, still)))
-        found.append(Aiding(NO_ROTATION, "rotation", still, np.zeros((still.size, 3)), scatter))
+        angle = np.tile(np.maximum(angle_scatter(record, still), LEAST_ANGLE), (still.size, 1))
+        found.append(Aiding(NO_ROTATION, "rotation", still, np.zeros((still.size, 3)), angle))
     return found
