@@ -30,7 +30,6 @@ from truenorth.errors.staying import (
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import ROUGHLY, Filtered, Settled, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
-from truenorth.filters import Estimates, LinearSystem
 from truenorth.filters.gains import Gains, filter_gains, initial_part
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -46,14 +45,12 @@ SLIGHT = 0.01  # of the sensors' variance: what a still base is taken to gain at
 
 
 @dataclass(frozen=True)
-class FineAlignment:
-    """What the last pass of the filter left."""
+class FineAlignment(Filtered):
+    """What the last pass of the filter left; its estimates have the whole history of x and P."""
 
     integrals: InertialIntegrals
     C_n0_i: Array  # (3, 3): nominal attitude of the last pass; states are errors of it
     nominal_bias: Array  # (6,): gyro and accelerometer biases taken off before the last pass
-    system: LinearSystem
-    estimates: Estimates  # with the whole history of x and P
     gains: Gains  # that the filter used
     # (n, n): the part of the last covariance that the biases alone make, ``P = floor + random``: what waiting does not improve
     floor: Array
@@ -91,19 +88,9 @@ class FineAlignment:
         )
 
     @property
-    def x(self) -> Array:
-        """(n,) the last state estimate."""
-        return self.estimates.x[-1]
-
-    @property
-    def P(self) -> Array:
-        """(n, n) its covariance."""
-        return self.estimates.P[-1]
-
-    @property
     def bias(self) -> Array:
         """(6,) gyro and accelerometer bias at the last epoch."""
-        return self.nominal_bias + self.x[6:STATES]
+        return self.nominal_bias + self.end[6:STATES]
 
     def misalignment_at(self, C_ib: Array, time: float) -> tuple[Array, Array, Array]:
         """Attitude, misalignment covariance and its floor at any time of the log (smoothed to the end of the data).
@@ -121,7 +108,7 @@ class FineAlignment:
         covariance, floor : (3, 3) arrays, rad^2, in ``n0``
         """
         J = self._carried_to(time)[PHI]
-        C_n0_b = dcm_from_rotation_vector(J @ self.x) @ self.C_n0_i @ C_ib
+        C_n0_b = dcm_from_rotation_vector(J @ self.end) @ self.C_n0_i @ C_ib
         return C_n0_b, self.joint_at(time)[PHI, PHI], J @ self.floor @ J.T
 
     def joint_at(self, time: float) -> Array:
@@ -134,7 +121,7 @@ class FineAlignment:
 
     def _carried_to(self, time: float) -> Array:
         """(9, n) misalignment and biases at a time from the last state: the whole log's knowledge carried back to it."""
-        J = np.zeros((9, len(self.x)))
+        J = np.zeros((9, len(self.end)))
         J[PHI, PHI] = np.eye(3)
         J[PHI, BG] = self._turned_between(time)  # phi(t) = phi_end + int_t^end C_n0_b eps
         J[PHI, STATES:] = -np.einsum("k,kij->ij", self._after(time), self.system.Phi[:, PHI, STATES:])
@@ -147,7 +134,7 @@ class FineAlignment:
         turns = T * (self.C_n0_i @ self.integrals.C_mean)
         # int from each epoch to the end of C_n0_b dt, with the final residual bias: the final answer carried back.
         after = np.concatenate([np.cumsum(turns[:0:-1], axis=0)[::-1], np.zeros((1, 3, 3))])
-        return self.x[PHI] + after @ self.x[BG] - self.estimates.x[:, PHI]
+        return self.end[PHI] + after @ self.end[BG] - self.estimates.x[:, PHI]
 
     def _turned_between(self, time: float) -> Array:
         """``int C_n0_b dt`` from `time` to the last epoch; negative beyond it."""

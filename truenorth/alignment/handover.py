@@ -54,7 +54,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         C_n0_i=fine.C_n0_i,
         bias=fine.nominal_bias,
         R=fine.disturbance**2,
-        arm=fine.arm - fine.x[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
+        arm=fine.arm - fine.end[STATES : STATES + 3] if isinstance(fine, SwayAlignment) else None,
         motion=fine.motion if isinstance(fine, SwayAlignment) else (),
         trend=(sway_trend(integrals.C_mean), sway_trend(integrals.C_late)) if sways else None,
         epochs=len(integrals.intervals),
@@ -64,7 +64,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         C_ib=integrals.C_ib[-1].copy(),  # not the whole log's, which a view would hold
         velocity=integrals.velocity[-1].copy(),
         place=integrals.position[-1].copy(),
-        x=fine.x.copy(),
+        x=fine.end.copy(),
         P=fine.P.copy(),
         largest=block_limits(fine.estimates),
     )

@@ -218,7 +218,7 @@ def _fine(
     last = settle(log, noise, in_sigmas(PHI), most=MAX_PASSES)
     parameters = slice(BIASES.start, len(log.taken))
     fine = FineAlignment.of(log, last, parameters, np.sqrt(noise.R[rests][0]))
-    return fine, log.taken + fine.x, prior
+    return fine, log.taken + fine.end, prior
 
 
 def _bias_at_rest(rest: Means, lat: float) -> tuple[Array, Array]:
@@ -252,7 +252,7 @@ def _touched(task: Task, fine: FineAlignment, stretches: list[tuple[float, float
 def _positions(fine: FineAlignment, stretches: list[tuple[float, float]], lat: float) -> tuple[TablePosition, ...]:
     """Where each position stands, and how the body came there from the one before."""
     found: list[TablePosition] = []
-    C_n0_b = dcm_from_rotation_vector(fine.x[PHI]) @ fine.C_n0_i @ fine.integrals.C_ib[1:]
+    C_n0_b = dcm_from_rotation_vector(fine.end[PHI]) @ fine.C_n0_i @ fine.integrals.C_ib[1:]
     C_nb = np.swapaxes(earth_rotation(fine.integrals.time[1:], lat), 1, 2) @ C_n0_b
     for start, stop in stretches:
         here = np.flatnonzero(_resting(fine.integrals, [(start, stop)]))
@@ -278,10 +278,10 @@ def _history(task: Task, fine: FineAlignment) -> History:
     sigma = np.sqrt(np.einsum("kii->ki", e.P))
     # The final answer carried back: phi(t) = phi_end - int_t^end (what the sensors' errors turn).
     parameters = slice(BIASES.start, None)
-    turns = np.einsum("kij,j->ki", fine.system.Phi[:, PHI, parameters], fine.x[parameters])
+    turns = np.einsum("kij,j->ki", fine.system.Phi[:, PHI, parameters], fine.end[parameters])
     after = np.concatenate([np.cumsum(turns[:0:-1], axis=0)[::-1], np.zeros((1, 3))])
     C_n_n0 = np.swapaxes(earth_rotation(fine.integrals.time[1:], task.position.lat), 1, 2)
-    departure = np.einsum("kij,kj->ki", C_n_n0, fine.x[PHI] - after - e.x[:, PHI])
+    departure = np.einsum("kij,kj->ki", C_n_n0, fine.end[PHI] - after - e.x[:, PHI])
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
         C_nb=C_nb,
