@@ -13,7 +13,7 @@ from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, radii
-from truenorth.errors.staying import STATES
+from truenorth.errors.staying import BA, BIASES
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import earth_rotation
 
@@ -83,8 +83,8 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
     if sways:
         covariance = covariance + creep(task, fine.integrals.time[1:])
     e = fine.estimates
-    bias, variance = fine.nominal_bias + e.x[:, 6:STATES], np.einsum("kii->ki", e.P)[:, 6:STATES]
-    prior = np.diag(fine.system.P0)[9:STATES]
+    bias, variance = fine.nominal_bias + e.x[:, BIASES], np.einsum("kii->ki", e.P)[:, BIASES]
+    prior = np.diag(fine.system.P0)[BA]
     accel_bias, accel_sigma = true_bias(bias[:, 3:], variance[:, 3:], prior, used.bias_variance[3:])
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],

@@ -31,11 +31,11 @@ from truenorth.core.attitude import skew
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.in_motion_azimuth import BA, BG, DK, DV, PHI, STATES
+from truenorth.errors.in_motion_azimuth import DK, STATES
 from truenorth.errors.walks import Walks
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state.layout import Layout
+from truenorth.state.layout import BA, BG, DV, PHI, Layout
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import prior_covariance
 from truenorth.state.track import Residuals, Track

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.azimuth_mechanisation import mechanise_interval
 from truenorth.core.attitude import dcm_from_quaternion, quaternion_from_dcm
 from truenorth.errors import in_motion_azimuth as model
-from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DK, DP, DV, STATES
+from truenorth.errors.in_motion_azimuth import AZIMUTH, DK, STATES
 from truenorth.filters import (
     Estimates,
     Gate,
@@ -30,6 +30,7 @@ from truenorth.filters import (
     unscented,
 )
 from truenorth.filters.system import FilterState
+from truenorth.state.layout import BA, BG, DP, DV
 from truenorth.strapdown import wander
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from truenorth.alignment.task import Task
 from truenorth.analysis.student import as_normal
 from truenorth.coarse.analytic import BLOCKS, Means
 from truenorth.core.earth import EARTH_RATE, normal_gravity
-from truenorth.errors.staying import StaticModel, mean_velocity
+from truenorth.errors.staying import BA, BG, BIASES, StaticModel, mean_velocity
 from truenorth.estimate.base_motion import white_variance
 from truenorth.filters import LinearSystem
 from truenorth.quality.regimes import MotionSummary
@@ -104,9 +104,9 @@ def check_filter(
 
     lat = task.position.lat
     C = earth_rotation(log.integrals.time[-1], lat).T @ log.C_n0_i @ log.integrals.C_ib[-1]
-    bias, P_last = log.bias + last.found.end[6:], last.found.P
-    rate, rate_P = C @ bias[:3], C @ P_last[6:9, 6:9] @ C.T
-    force, force_P = C @ bias[3:], C @ P_last[9:, 9:] @ C.T
+    bias, P_last = log.bias + last.found.end[BIASES], last.found.P
+    rate, rate_P = C @ bias[:3], C @ P_last[BG, BG] @ C.T
+    force, force_P = C @ bias[3:], C @ P_last[BA, BA] @ C.T
     slope = float(normal_gravity(lat, task.position.alt + 1.0)) - task.gravity
     check = LogCheck(
         rate_residual=rate[1:],

@@ -19,6 +19,7 @@ from truenorth.core.position import Position
 from truenorth.errors.staying import (
     BA,
     BG,
+    BIASES,
     PHI,
     QUIETEST_BASE,
     STATES,
@@ -90,7 +91,7 @@ class FineAlignment(Filtered):
     @property
     def bias(self) -> Array:
         """(6,) gyro and accelerometer bias at the last epoch."""
-        return self.nominal_bias + self.end[6:STATES]
+        return self.nominal_bias + self.end[BIASES]
 
     def misalignment_at(self, C_ib: Array, time: float) -> tuple[Array, Array, Array]:
         """Attitude, misalignment covariance and its floor at any time of the log (smoothed to the end of the data).

@@ -16,7 +16,7 @@ from truenorth.alignment.swaying import SwayAlignment
 from truenorth.alignment.task import Task
 from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION
-from truenorth.errors.staying import STATES, StaticModel
+from truenorth.errors.staying import BIASES, STATES, StaticModel
 from truenorth.errors.sway import sway_trend
 from truenorth.estimate.ongoing import Ongoing, block_limits
 from truenorth.navigation.handover import Handover
@@ -39,7 +39,7 @@ def hand_over(task: Task, fine: FineAlignment, answer: Alignment) -> Handover:
     deflected[6:] = answer.C_nb[:2].T * (DEFLECTION * task.gravity)
     P = turn @ P @ turn.T + deflected @ deflected.T
     P[:3, :3] = answer.phi_covariance
-    return Handover(answer.C_nb, fine.bias[3:], P, np.diag(fine.system.P0)[6:STATES].copy())
+    return Handover(answer.C_nb, fine.bias[3:], P, np.diag(fine.system.P0)[BIASES].copy())
 
 
 def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:

@@ -30,10 +30,10 @@ from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.matrices import matrices_of
-from truenorth.errors.staying import PHI, StaticModel, mean_velocity
+from truenorth.errors.staying import BA, BG, BIASES, PHI, StaticModel, mean_velocity
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import in_sigmas, settle
-from truenorth.estimate.staying import BIASES, Prior, StayingLog, prior_of
+from truenorth.estimate.staying import Prior, StayingLog, prior_of
 from truenorth.quality.noise import noise_coefficients
 from truenorth.quality.regimes import MotionSummary
 from truenorth.records import ImuRecord
@@ -140,10 +140,10 @@ def align_positions(
         answer,
         method="positions",
         method_reason=f"{len(found)} position{'s' if len(found) > 1 else ''} in the log, turns between them by the gyros",
-        gyro_bias=x[6:9],
-        gyro_bias_sigma=sigma[6:9],
-        accel_bias=x[9:12],
-        accel_bias_sigma=sigma[9:12],
+        gyro_bias=x[BG],
+        gyro_bias_sigma=sigma[BG],
+        accel_bias=x[BA],
+        accel_bias_sigma=sigma[BA],
         disturbance=fine.disturbance,
         history=_history(task, fine),
         table=_errors(found, touch, prior, x, fine.P),
@@ -288,10 +288,10 @@ def _history(task: Task, fine: FineAlignment) -> History:
         phi_covariance=covariance + task.deflection,
         phi_floor=floor + task.deflection,
         departure=departure,
-        gyro_bias=fine.nominal_bias[:3] + e.x[:, 6:9],
-        gyro_bias_sigma=sigma[:, 6:9],
-        accel_bias=fine.nominal_bias[3:] + e.x[:, 9:12],
-        accel_bias_sigma=sigma[:, 9:12],
+        gyro_bias=fine.nominal_bias[:3] + e.x[:, BG],
+        gyro_bias_sigma=sigma[:, BG],
+        accel_bias=fine.nominal_bias[3:] + e.x[:, BA],
+        accel_bias_sigma=sigma[:, BA],
         innovation=e.innovation,
         innovation_sigma=np.sqrt(np.einsum("kii->ki", e.innovation_covariance)),
         nis=e.nis,

@@ -45,7 +45,7 @@ from truenorth.coarse.uncertainty import base_velocity
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.staying import BG, STATES, StaticModel, gained_velocity
+from truenorth.errors.staying import BA, BG, StaticModel, gained_velocity
 from truenorth.quality.density import specification_evidence
 from truenorth.quality.quantum import quantum_evidence
 from truenorth.quality.record_evidence import record_evidence
@@ -345,13 +345,11 @@ def answer_of(
     if sways:
         answer = replace(answer, phi_covariance=answer.phi_covariance + creep(task, task.record.duration))
     history = make_history(task, fine, used, sways)
-    accel_bias, accel_sigma = true_bias(
-        fine.bias[3:], np.diag(fine.P)[9:STATES], np.diag(P_bias)[3:], used.bias_variance[3:]
-    )
+    accel_bias, accel_sigma = true_bias(fine.bias[3:], np.diag(fine.P)[BA], np.diag(P_bias)[3:], used.bias_variance[3:])
     return replace(
         answer,
         gyro_bias=fine.bias[:3],
-        gyro_bias_sigma=np.sqrt(np.diag(fine.P)[6:9]),
+        gyro_bias_sigma=np.sqrt(np.diag(fine.P)[BG]),
         accel_bias=accel_bias,
         accel_bias_sigma=accel_sigma,
         disturbance=fine.disturbance,

@@ -18,6 +18,7 @@ from truenorth.core.errors import AlignmentError
 from truenorth.quality.regimes import SEEN_LATE
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
+from truenorth.state.layout import DP, DV
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -92,7 +93,7 @@ def claimed(answer: Alignment) -> Effect:
     velocity = position = math.inf
     if answer.moving is not None:
         variance = np.diag(answer.moving.P)
-        velocity, position = float(np.sqrt(variance[3:6].max())), float(np.sqrt(variance[6:9].max()))
+        velocity, position = float(np.sqrt(variance[DV].max())), float(np.sqrt(variance[DP].max()))
     return Effect(sigma, level_sigma(answer), velocity, position)
 
 

@@ -43,11 +43,12 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.compiled import compiled
 from truenorth.filters import matrix_function, vector_function
+from truenorth.state.layout import DV, PHI
+from truenorth.state.layout import STATES as INS_STATES
 
 Array = NDArray[np.float64]
 
-PHI, DV, DP, BG, BA = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
-DK = 15
+DK = INS_STATES  # behind the fifteen of the INS
 STATES = 16
 AZIMUTH = 2  # the one nonlinear state
 

@@ -42,6 +42,7 @@ PHI = slice(0, 3)
 DV = slice(3, 6)
 BG = slice(6, 9)
 BA = slice(9, 12)
+BIASES = slice(BG.start, BA.stop)
 STARTS = tuple(states.start for states in (PHI, DV, BG, BA))  # for kernels
 STATES = 12
 QUIETEST_BASE = 1e-6  # m/s: keeps R positive on bedrock and an IMU without noise

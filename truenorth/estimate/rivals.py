@@ -27,6 +27,7 @@ from truenorth.quality.whiteness import whiteness
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, Kind
+from truenorth.state.layout import DP, DV
 from truenorth.state.limits import limit, may_be_chance
 from truenorth.state.track import Residuals
 from truenorth.strapdown.increments import without_gaps
@@ -336,4 +337,4 @@ def _effect(first: Along, rival: Along) -> Effect:
 
 def _of_states(size: Array) -> Effect:
     """Sizes (9,) of attitude, velocity and position, the larger of each."""
-    return Effect(float(size[2]), float(size[:2].max()), float(size[3:6].max()), float(size[6:9].max()))
+    return Effect(float(size[2]), float(size[:2].max()), float(size[DV].max()), float(size[DP].max()))

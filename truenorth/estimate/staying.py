@@ -19,7 +19,7 @@ from truenorth.core.remembered import remembered
 from truenorth.errors.arm import arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
 from truenorth.errors.matrices import MATRICES, matrices_of, with_matrices, without_errors
-from truenorth.errors.staying import BG, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
+from truenorth.errors.staying import BG, BIASES, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
 from truenorth.errors.sway import without_sway
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
@@ -32,7 +32,6 @@ Array = NDArray[np.float64]
 LEVEL_PRIOR = 0.1  # rad: coarse alignment levels better than this on any base
 HEADING_PRIOR = np.pi / np.sqrt(3.0)  # rad: nothing is known
 VELOCITY_PRIOR = 1.0  # m/s: of the base at the first instant
-BIASES = slice(6, 12)
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ from truenorth.quality.innovations import innovation_evidence
 from truenorth.records.base import GAP_FACTOR
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import note
+from truenorth.state.layout import DP, DV
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
@@ -175,7 +176,7 @@ class Navigator:
             reasons=self._reasons(result),
             solution=self.solution,
             counts=self.intake.counts,
-            motion=Motion(track.v_n[-1], track.position[-1], sigma[3:6].copy(), sigma[6:9].copy()),
+            motion=Motion(track.v_n[-1], track.position[-1], sigma[DV].copy(), sigma[DP].copy()),
         )
 
     @property

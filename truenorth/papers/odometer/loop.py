@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from truenorth.alignment.azimuth_filters import NOMINAL, Begin, Belief, Method, run_loop
 from truenorth.core.attitude import misalignment, skew
 from truenorth.errors import in_motion_azimuth as model
-from truenorth.errors.in_motion_azimuth import AZIMUTH, BA, BG, DV, PHI, STATES
+from truenorth.errors.in_motion_azimuth import AZIMUTH, STATES
 from truenorth.errors.walks import Walks
 from truenorth.papers.odometer.scenario import Drives
+from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.prior import prior_covariance
 
 Array = NDArray[np.float64]
