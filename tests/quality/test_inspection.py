@@ -90,6 +90,18 @@ def test_coarse_quanta_are_neither_frozen_nor_saturated():
     assert codes(found) & {"frozen", "saturated", "constant_channel"} == set()
 
 
+def test_the_crest_of_a_smooth_motion_through_a_coarse_quantum_is_no_saturation():
+    """90 rows of the uppermost quantum and 38 of the next: a parabola has up to 2.41 times as many, what is clipped far more."""
+    record = base(duration=60.0)
+    t = record.time - record.time[0]
+    steps = np.round(100.3 * np.sin(0.1 * np.pi * t) * np.exp(-(((t - 30.0) / 25.0) ** 2)))
+    assert np.count_nonzero(steps == steps.max()) > 2 * np.count_nonzero(steps == steps.max() - 1.0)
+    gyro = record.gyro.copy()
+    for most, found in ((np.inf, False), (80.0, True)):
+        gyro[:, 0] = 1e-5 * np.clip(steps, -most, most)
+        assert ("saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel)))) == found
+
+
 def test_saturation():
     record = base(amplitude=(10.0, 10.0, 5.0))
     limit = np.radians(8.0)

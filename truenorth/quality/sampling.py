@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -279,6 +280,7 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             inside = int(np.count_nonzero(signed == second))
             rows_at = np.flatnonzero(at_top)
             consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
+            consecutive = consecutive and not _crests(signed, rows_at, second, inside)
             spread = top - float(np.median(signed))
             often = count > PILED * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often)
@@ -295,6 +297,19 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
                     )
                 )
     return rows
+
+
+def _crests(signed: Array, rows_at: NDArray[np.intp], second: float, inside: int) -> bool:
+    """Whether the rows at the largest value are crests of a smooth motion, seen through a coarse quantum.
+
+    Around a crest ``x = x_0 - a t^2 / 2`` the uppermost quantum has up to ``1 / (sqrt(2) - 1)`` times as many rows as the next,
+    each side of either to a row; and the rows before and after are of the next one. What is clipped falls from its range faster.
+    """
+    breaks = np.flatnonzero(np.diff(rows_at) > 1)
+    first, last = rows_at[np.append(0, breaks + 1)], rows_at[np.append(breaks, len(rows_at) - 1)]
+    before, after = signed[np.maximum(first - 1, 0)], signed[np.minimum(last + 1, len(signed) - 1)]
+    smooth = bool(np.all(before >= second) and np.all(after >= second))
+    return smooth and len(rows_at) <= (inside + 2 * len(first)) / (math.sqrt(2.0) - 1.0) + len(first)
 
 
 def _finest(values: Array) -> float:
