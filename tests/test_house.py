@@ -29,7 +29,6 @@ FLOOR[""] = FLOOR["report"] + 0.5  # the table of results, next to the package i
 SIMULATES = {"advice", "campaign", "figures", "report", "papers", "cli", "simulation"}
 LONGEST = 120
 LONGEST_FILE = 400
-TYPES_COMMANDS = {"truenorth.formats.samples"}  # it shows commands to type
 
 FILES = {".".join(("truenorth", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
 
@@ -108,6 +107,20 @@ def test_no_long_files():
     assert {name: lines for name, lines in lengths.items() if lines > LONGEST_FILE} == {}
 
 
+DIALECT = re.compile(r"\b(told|told_by|beside|hears|base of stone|(that|which) (is|are) none(?! of))\b")
+
+
+def test_the_text_has_no_dialect():
+    """Words that readers of the field stumbled over: what is said is plain English, in code and pages alike."""
+    pages = [*ROOT.parent.glob("*.md"), *(ROOT.parent / "docs").rglob("*.md"), *ROOT.rglob("*.yaml"), *FILES.values()]
+    wrong = [
+        f"{page.relative_to(ROOT.parent)}: {found.group()}"
+        for page in pages
+        for found in DIALECT.finditer(page.read_text(encoding="utf-8"))
+    ]
+    assert wrong == []
+
+
 @cache
 def documented(name):
     """The docstrings of a module: their nodes."""
@@ -122,7 +135,7 @@ def test_the_library_names_no_options():
     wrong = [
         f"{name}: {node.value!r}"
         for name in FILES
-        if folder(name) != "cli" and name not in TYPES_COMMANDS
+        if folder(name) != "cli"
         for node in ast.walk(tree(name))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
         if re.search(r"(?<![\w-])--[a-z]|(?<!\S)-o\b", node.value) and id(node) not in documented(name)

@@ -55,8 +55,12 @@ def test_public_names_are_what_they_say():
     for name in truenorth.__all__:
         assert getattr(truenorth, name) is not None
     assert set(truenorth.__all__) <= set(dir(truenorth))
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = truenorth.nothing
+    for module in (truenorth.errors, truenorth.aiding):
+        assert all(getattr(module, name).__module__.startswith(module.__name__) for name in module.__all__)
+        assert dir(module) == sorted(module.__all__)
+    for module in (truenorth, truenorth.errors):
+        with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+            _ = module.nothing
 
 
 def test_the_names_of_type_checkers_are_those_of_the_program():

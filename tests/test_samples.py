@@ -5,6 +5,7 @@ import shlex
 import numpy as np
 import pytest
 
+from truenorth.cli.example import COMMANDS
 from truenorth.core.errors import UsageError
 from truenorth.formats import read_gnss, read_imu, read_master
 from truenorth.formats.samples import DATA, SAMPLES, write_sample
@@ -25,7 +26,7 @@ def test_the_command_that_is_named_aligns_the_sample(name, tmp_path, monkeypatch
     write_sample(name, tmp_path)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as stop:
-        app(shlex.split(SAMPLES[name].command)[1:])
+        app(shlex.split(COMMANDS[name])[1:])
     out = capsys.readouterr().out
     assert stop.value.code == 0, out
     assert out.startswith(("aligned", "level_only"))

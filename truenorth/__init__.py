@@ -8,6 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from truenorth.core.lazy import lazy
 from truenorth.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -247,14 +248,11 @@ _SUBMODULES = (
 )
 
 
+_get, _ = lazy("truenorth", _HOMES)
+
+
 def __getattr__(name: str) -> Any:
-    if name in _SUBMODULES:
-        return import_module(f"truenorth.{name}")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'truenorth' has no attribute {name!r}")
-    value = getattr(import_module(f"truenorth.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
+    return import_module(f"truenorth.{name}") if name in _SUBMODULES else _get(name)
 
 
 def __dir__() -> list[str]:

@@ -44,7 +44,7 @@ def test_the_scatter_of_ten_means_is_no_known_sigma():
 
 
 def test_a_sigma_that_is_known_stays_normal():
-    """Where the bias that may be is large beside the scatter, or the filter says how sure it is."""
+    """Where the bias that may be is large compared with the scatter, or the filter says how sure it is."""
     assert LogCheck(np.array([6.0, 6.0]), np.full(2, 1e-3), 0.0, 1.0, np.full(2, 9.0)).rate_misses(
         1.0
     ) == pytest.approx(6.0, rel=1e-3)

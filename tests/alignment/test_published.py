@@ -10,6 +10,7 @@ import yaml
 from scipy.stats import chi2
 from typer.testing import CliRunner
 
+from benchmarks import which_one
 from tests.runs import few_and_all, some
 from truenorth import Odometer, align
 from truenorth.alignment.against import against
@@ -23,32 +24,9 @@ from truenorth.records import GnssRecord
 from truenorth.simulation.scenario import SHIPPED, read_scenario
 from truenorth.state.mounting import Mounting
 
-IMU = {
-    "gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)"},
-    "accel": {"bias": "50 ug", "random_walk": "10 ug/sqrt(Hz)"},
-}
-STILL = {
-    "name": "still",
-    "duration": "240 s",
-    "rate": "50 Hz",
-    "position": {"lat": "45 deg", "lon": "10 deg"},
-    "motion": {"kind": "rest", "heading": "130 deg", "pitch": "1 deg", "roll": "-2 deg"},
-    "imu": IMU,
-}
-SWAY = STILL | {
-    "name": "sway",
-    "duration": "400 s",
-    "motion": {
-        "kind": "sway",
-        "heading": "130 deg",
-        "tones": {
-            "pitch": [{"amplitude": "3 deg", "period": "5 s"}],
-            "roll": [{"amplitude": "5 deg", "period": "6 s"}],
-            "east": [{"amplitude": "0.03 m", "period": "7 s"}],
-            "north": [{"amplitude": "0.02 m", "period": "8 s"}],
-        },
-    },
-}
+HEADING = {"heading": "130 deg"}
+STILL = which_one.STILL | {"rate": "50 Hz", "motion": which_one.STILL["motion"] | HEADING}
+SWAY = which_one.SWAY | {"rate": "50 Hz", "motion": which_one.SWAY["motion"] | HEADING}
 PLACE = Position(np.radians(45.0), np.radians(10.0))
 
 

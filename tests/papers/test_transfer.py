@@ -8,7 +8,7 @@ import pytest
 
 from truenorth.papers import reproduce
 from truenorth.papers.transfer.filtering import EPOCHS, errors_of
-from truenorth.papers.transfer.observability import told_by
+from truenorth.papers.transfer.observability import seen_in
 from truenorth.papers.transfer.study import CASES, TURN, level_in_turn
 from truenorth.papers.transfer.truth import ARCMIN, Case, Flights
 
@@ -72,7 +72,7 @@ def test_what_four_states_more_cost_where_nothing_is_wrong():
 
 
 def test_a_turn_ties_delay_and_forward_arm():
-    words = str(told_by(CASES["flat_turn"][0]))
+    words = str(seen_in(CASES["flat_turn"][0]))
     assert "r_forward + 200 m/s * tau" in words
 
 

@@ -46,7 +46,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list
 
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
     that beats slowly. They explain what they can (:func:`matrix_signatures`). An accelerometer's bias
-    wanders by its instability, which stands on the vertical for all to see: so small a step is none.
+    wanders by its instability, which stands on the vertical for all to see: so small a step is part of that.
     """
     ratio, size, ends = match
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))

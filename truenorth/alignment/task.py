@@ -132,15 +132,7 @@ def noise_in(record: ImuRecord, imu: ImuSpec) -> ImuSpec:
     imu : ImuSpec
         The specification.
     """
-    spec = imu.seen_in(record)
-    gyro, accel = (lost_walk(record, x) for x in (record.gyro, record.accel))
-    if gyro == accel == 0.0:
-        return spec
-    return replace(
-        spec,
-        gyro_random_walk=math.hypot(spec.gyro_random_walk, gyro),
-        accel_random_walk=math.hypot(spec.accel_random_walk, accel),
-    )
+    return imu.seen_in(record).with_more_noise(*(lost_walk(record, x) for x in (record.gyro, record.accel)))
 
 
 def lost_walk(record: ImuRecord, x: Array) -> float:

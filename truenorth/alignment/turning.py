@@ -49,7 +49,7 @@ def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
         return spec.gyro_bias > BLIND_RATE
     if task.motion.overall == "rotating":
         walk: float | None = float(np.max(task.motion.angle_noise))
-    else:  # the quietest seconds of a sway are none: only what is faster than it is noise
+    else:  # a sway has no quiet seconds: only what is faster than it is noise
         walks = sway_walks(task.record)
         walk = None if walks is None else walks.gyro_random_walk
     return walk is not None and usual("gyro", "bias", walk) > BLIND_RATE

@@ -21,6 +21,13 @@ Examples:
   truenorth align log.csv --lat 34.246 --lon 108.910 --imu navigation
 """
 
+# What aligns the files of each sample.
+COMMANDS = {
+    "rlg": "truenorth align log.csv --lat 34.246048 --lon 108.909664 --alt 380 --imu navigation",
+    "fog": "truenorth align drive.csv --lat 34.0256 --alt 416",
+    "transfer": "truenorth align slave.csv --master master.csv --imu industrial",
+}
+
 
 @command(EXAMPLES)
 def example(
@@ -32,8 +39,8 @@ def example(
 
     console = make_console()
     if name is None:
-        for known, sample in SAMPLES.items():
-            console.print(f"{known}: {sample.what}", soft_wrap=True)
+        for known, what in SAMPLES.items():
+            console.print(f"{known}: {what}", soft_wrap=True)
         return
     print_written(write_sample(name, output))
-    console.print(f"{SAMPLES[name].what}; try: {SAMPLES[name].command}", soft_wrap=True)
+    console.print(f"{SAMPLES[name]}; try: {COMMANDS[name]}", soft_wrap=True)

@@ -59,7 +59,7 @@ class Position:
         Raises
         ------
         UsageError
-            No number, or a latitude that is none.
+            Not a number, or a latitude beyond a pole.
         """
         try:
             return cls(math.radians(lat), math.radians(lon), alt, **sigmas)

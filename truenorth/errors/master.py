@@ -129,7 +129,7 @@ def master_errors(given: MasterErrors | str | None) -> MasterErrors:
     Raises
     ------
     UsageError
-        An unknown grade, a name that is none, a value that cannot be read.
+        An unknown grade or name, a value that cannot be read.
     """
     if given is None or given == "none":
         return MasterErrors()

@@ -218,8 +218,8 @@ def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> Ine
     """The integrals with the base's sway averaged out of the attitude by which biases act; an indexer's turning stays.
 
     A bias seen from a base that sways makes a velocity of the sway's own periods, tenths of a mm/s of 100 ug. So do scale
-    factors, a centre of rotation that is none, and the IMU's size: a filter that believed the signature of the bias would
-    claim levels of arcseconds. What is left to tell a bias is its mean, and an indexer's modulation.
+    factors, a centre of rotation that was found wrongly, and the IMU's size: a filter that believed the signature of the bias would
+    claim levels of arcseconds. What is left to show a bias is its mean, and an indexer's modulation.
 
     Parameters
     ----------

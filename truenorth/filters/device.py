@@ -149,7 +149,7 @@ def _fetch(there: Any, here: Histories) -> None:
 
 
 def _parts(runs: Runs, out: Histories) -> list[tuple[int, int]]:
-    """Runs that the free memory of the device holds at a time, beside what all share."""
+    """Runs that the free memory of the device holds at a time, in addition to what all share."""
     from numba import cuda
 
     own = [a for a in runs if len(a) > 1]

@@ -236,12 +236,18 @@ def clear(order: NDArray[np.int64], d: int, J: Array) -> None:
 
 
 @compiled
+def tangent(size: Size, function: Any, jacobian: Any, s: Points, value: Array, slope: Array, into: Array) -> None:
+    """Value of a function of the model at the state, and its Jacobian there, laid into a matrix of the filter."""
+    function(s.X, s.p, value)
+    slope[:] = 0.0
+    jacobian(s.X, s.p, slope)
+    load(size, slope, into)
+
+
+@compiled
 def predict_tangent(size: Size, functions: Functions, w: Workspace, s: Points) -> bool:
     """``X = f(X)``, ``P = Phi P Phi'`` with the Jacobian at X before; false where a number is not finite."""
-    functions.transition(s.X, s.p, s.x)
-    s.J[0][:] = 0.0
-    functions.transition_jacobian(s.X, s.p, s.J[0])
-    load(size, s.J[0], w.Phi)
+    tangent(size, functions.transition, functions.transition_jacobian, s, s.x, s.J[0], w.Phi)
     transpose(size, w.Phi, w.Phi_t)
     for i in range(len(s.X)):
         s.X[i] = s.x[i]
@@ -308,10 +314,7 @@ def predict_nodes(
 @compiled
 def measure_tangent(size: Size, functions: Functions, w: Workspace, s: Points) -> bool:
     """``z - h(X)`` in place of z, and H; false where a number is not finite."""
-    functions.measurement(s.X, s.p, s.h)
-    s.G[0][:] = 0.0
-    functions.measurement_jacobian(s.X, s.p, s.G[0])
-    load(size, s.G[0], w.H)
+    tangent(size, functions.measurement, functions.measurement_jacobian, s, s.h, s.G[0], w.H)
     sound = finite(s.h)
     for r in range(len(s.h)):
         w.z[r] -= s.h[r]

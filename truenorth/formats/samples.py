@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -23,27 +22,11 @@ DATA = Path(__file__).parent.parent / "data"
 MASTER = ("pitch", "roll", "heading", "VE", "VN", "VU", "lat", "lon", "alt", "time")
 
 
-@dataclass(frozen=True)
-class Sample:
-    """A recording: what it is, and a command that aligns its files."""
-
-    what: str
-    command: str
-
-
+# What each recording is.
 SAMPLES = {
-    "rlg": Sample(
-        "ring-laser IMU on a parked vehicle that people and its engine move, 300 s at 100 Hz",
-        "truenorth align log.csv --lat 34.246048 --lon 108.909664 --alt 380 --imu navigation",
-    ),
-    "fog": Sample(
-        "fibre-optic IMU with GNSS, vehicle with its engine idling, 68 s at 200 Hz",
-        "truenorth align drive.csv --lat 34.0256 --alt 416",
-    ),
-    "transfer": Sample(
-        "fibre-optic master INS and a MEMS IMU on one car, 50 s",
-        "truenorth align slave.csv --master master.csv --imu industrial",
-    ),
+    "rlg": "ring-laser IMU on a parked vehicle that people and its engine move, 300 s at 100 Hz",
+    "fog": "fibre-optic IMU with GNSS, vehicle with its engine idling, 68 s at 200 Hz",
+    "transfer": "fibre-optic master INS and a MEMS IMU on one car, 50 s",
 }
 
 

@@ -82,7 +82,7 @@ def walk_density(record: ImuRecord) -> Array:
 def bursts(record: ImuRecord) -> tuple[Array, Array]:
     """Edges (S+1,) of stretches, s, and by what density (S, 6) they exceed the usual one of the log; zero as a rule.
 
-    A level that the base's own motion reaches elsewhere in the log is none: a road that looks white for a stretch is a road.
+    A level that the base's own motion reaches elsewhere in the log is no burst: a road that looks white for a stretch is a road.
     """
     edges, density, level = _densities(record)
     if not len(density):

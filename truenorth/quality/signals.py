@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import normalised, quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import compiled
+from truenorth.core.linalg import add_rows
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
 
@@ -64,14 +65,8 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
 def _cell_means(gyro: Any, accel: Any, rows: int, mean: Any) -> None:
     """Means (6, cells) of so many rows each."""
     for cell in range(mean.shape[1]):
-        w0 = w1 = w2 = f0 = f1 = f2 = 0.0  # six sums that do not wait for each other
-        for k in range(cell * rows, (cell + 1) * rows):
-            w0 += gyro[k, 0]
-            w1 += gyro[k, 1]
-            w2 += gyro[k, 2]
-            f0 += accel[k, 0]
-            f1 += accel[k, 1]
-            f2 += accel[k, 2]
+        nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        w0, w1, w2, f0, f1, f2 = add_rows(gyro, accel, cell * rows, (cell + 1) * rows, nothing)
         mean[0, cell], mean[1, cell], mean[2, cell] = w0 / rows, w1 / rows, w2 / rows
         mean[3, cell], mean[4, cell], mean[5, cell] = f0 / rows, f1 / rows, f2 / rows
 

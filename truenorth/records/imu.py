@@ -132,7 +132,7 @@ class ImuRecord(Record):
         Raises
         ------
         UsageError
-            Something else, a table without these columns, or axes that are none.
+            Something else, a table without these columns, or axes that do not exist.
         """
         from truenorth.core.attitude import body_axes
 

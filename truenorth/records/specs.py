@@ -173,25 +173,22 @@ class ImuSpec:
         if self.gyro_sample_noise == self.accel_sample_noise == 0.0:
             return self
         root = math.sqrt(interval)
+        whole = self.with_more_noise(self.gyro_sample_noise * root, self.accel_sample_noise * root)
+        return replace(whole, gyro_sample_noise=0.0, accel_sample_noise=0.0)
+
+    def with_more_noise(self, gyro: float, accel: float) -> ImuSpec:
+        """With further random walks of gyros (rad/sqrt(s)) and accelerometers (m/s/sqrt(s)), independent of its own."""
+        if gyro == accel == 0.0:
+            return self
         return replace(
             self,
-            gyro_random_walk=math.hypot(self.gyro_random_walk, self.gyro_sample_noise * root),
-            accel_random_walk=math.hypot(self.accel_random_walk, self.accel_sample_noise * root),
-            gyro_sample_noise=0.0,
-            accel_sample_noise=0.0,
+            gyro_random_walk=math.hypot(self.gyro_random_walk, gyro),
+            accel_random_walk=math.hypot(self.accel_random_walk, accel),
         )
 
     def seen_in(self, record: ImuRecord) -> ImuSpec:
         """What a filter sees in a record: the noise of samples, and what its scattered time stamps make of its motion."""
-        spec = self.with_random_walks(record.interval)
-        gyro, accel = record.stamp_walks
-        if gyro == accel == 0.0:
-            return spec
-        return replace(
-            spec,
-            gyro_random_walk=math.hypot(spec.gyro_random_walk, gyro),
-            accel_random_walk=math.hypot(spec.accel_random_walk, accel),
-        )
+        return self.with_random_walks(record.interval).with_more_noise(*record.stamp_walks)
 
     def to_mapping(self) -> dict[str, Any]:
         """The specification as it stands in a file; only what differs from a perfect IMU."""

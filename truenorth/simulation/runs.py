@@ -96,7 +96,7 @@ def simulate(
     Raises
     ------
     UsageError
-        A motion that is none; a rate, a duration or a given error that makes no sense.
+        Something else than a motion; a rate, a duration or a given error that makes no sense.
     """
     if isinstance(motion, str):
         raise UsageError(

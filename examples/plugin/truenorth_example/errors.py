@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import truenorth as tn
-from truenorth.errors.group import Group, columns
+from truenorth.errors import Group, columns
 from truenorth.state.now import NOW_C, NOW_FORCE_W, matrix_of, vector_of
 
 

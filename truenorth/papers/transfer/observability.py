@@ -1,4 +1,4 @@
-"""Which states a manoeuvre tells apart under velocity matching, in words."""
+"""Which states a manoeuvre separates under velocity matching, in words."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVEN_ARM = TAU_SIGMA * 200.0  # m: the way flown in the delay's prior sigma, so 
 
 @dataclass(frozen=True)
 class Seen:
-    """What sixteen states and velocity matching tell in one manoeuvre."""
+    """What sixteen states and velocity matching show in one manoeuvre."""
 
     rank: int  # with perfect measurements
     words: str  # with the noise as it is: what stays above .9 of its prior sigma
@@ -27,8 +27,8 @@ class Seen:
         return self.words
 
 
-def told_by(case: Case) -> Seen:
-    """What velocity matching with sixteen states tells in a case's manoeuvre."""
+def seen_in(case: Case) -> Seen:
+    """What velocity matching with sixteen states shows in a case's manoeuvre."""
     scenario, method = case.scenario, METHODS["states16"]
     motion = scenario.build_motion()
     model = model_of(method, scenario.imu_spec)

@@ -16,7 +16,7 @@ from truenorth.papers.table import Table
 from truenorth.papers.texts import read_texts
 from truenorth.papers.transfer.drawings import STATES, Panel, draw_biases, draw_level, draw_misalignment, draw_panels
 from truenorth.papers.transfer.filtering import EPOCHS, METHODS, Errors, errors_of
-from truenorth.papers.transfer.observability import told_by
+from truenorth.papers.transfer.observability import seen_in
 from truenorth.papers.transfer.truth import ARCMIN, ARM_SIGMA, BEGIN, END, STOP, TAU_SIGMA, Case, Flights
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
                 _add_errors(table, sweep.case_of(value), method, errors)
     _add_gains(table, found)
     progress("observability")
-    seen = {name: told_by(CASES[name][0]) for name in DRAWN}
+    seen = {name: seen_in(CASES[name][0]) for name in DRAWN}
     for name, words in seen.items():
         table.value(name, "states16", "rank", "value", words.rank, "1")
     sweeps = swept(RULES, table, list(SWEEPS.values()))
