@@ -79,6 +79,16 @@ def test_chance_shows_a_step_no_more_often_than_its_limit(runs):
     assert 0 < looks < 0.3 * runs  # each look costs passes
 
 
+def test_a_receiver_that_is_off_in_every_turn_is_not_led_away():
+    """A cart's, whose clock is late: each turn looks like a step, and the largest does not stand out."""
+    rng = np.random.default_rng(6)
+    turns = np.cumsum(np.where(np.arange(ROWS) % 15 == 7, rng.choice([-1, 1], ROWS), 0))
+    log = receiver(np.outer(turns, [0.3, 0.45]))
+    again, first = noisy(log, rng)
+    assert doubtful_onsets(first.residuals[0])
+    assert led_by_evidence(again, first, log) == []
+
+
 def test_a_receiver_without_velocities_is_not_asked():
     log = GnssRecord(TIME, np.full(ROWS, 0.7), np.full(ROWS, 1.9), np.zeros(ROWS))
     assert led_by_evidence(lambda other: pytest.fail("a pass"), run(receiver(np.zeros((ROWS, 2)))), log) == []

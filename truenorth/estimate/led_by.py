@@ -22,7 +22,16 @@ from numpy.typing import NDArray
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import Along, likelihood_ratio
-from truenorth.quality.led_away import doubtful_onsets, led_away_evidence, led_by, no_outlier
+from truenorth.quality.led_away import (
+    BEGINS,
+    LARGE,
+    USUAL,
+    doubtful_onsets,
+    larger_than_chance,
+    led_away_evidence,
+    led_by,
+    no_outlier,
+)
 from truenorth.quality.whiteness import whiteness
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
@@ -33,6 +42,7 @@ Array = NDArray[np.float64]
 
 STEP = 1e-3  # m/s, with which a pass asks: so small that no gate decides otherwise
 ROWS = 12  # earlier and later than a simpler signature finds it: the likeliest is asked for itself
+MOMENTS = 60  # at which a step is tried to see what is usual
 EARLIER = 1e-3  # s, by which a step begins before the row that shows it
 
 
@@ -115,7 +125,21 @@ def _asked(
     near = source.time[max(row - ROWS, 0) : row + ROWS + 1]
     tried = [_likeliest([item.begun(float(moment) - onset) for item in seen])[0] for moment in near]
     best = float(near[int(np.argmax(tried))])
-    return *_likeliest(seen if best == onset else signatures(best)), best
+    seen = seen if best == onset else signatures(best)
+    ratio, step = _likeliest(seen)
+    return ratio / _usual(seen, step, best, source), step, best
+
+
+def _usual(seen: Sequence[_Seen], step: Array, onset: float, source: Residuals) -> float:
+    """How much larger ratios at other moments, and squares, are than of white innovations, once the step is gone; 1 at least.
+
+    Of a receiver that is off in every turn many are, and a step counts by how far it stands out.
+    """
+    left = [item._replace(z=item.z - item.s @ step) for item in seen]
+    moments = source.time[BEGINS :: max(1, len(source.time) // MOMENTS)]
+    ratios = np.array([_likeliest([item.begun(float(moment) - onset) for item in left])[0] for moment in moments])
+    squares = [larger_than_chance(np.sum(item.z[:, :2] ** 2, axis=1), LARGE) for item in left if item.z.shape[1] > 1]
+    return max(1.0, larger_than_chance(ratios, USUAL), *squares)
 
 
 def _stepped(receiver: GnssRecord, onset: float, axis: int) -> GnssRecord:

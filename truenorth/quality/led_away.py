@@ -112,7 +112,7 @@ def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:
     row = BEGINS + int(np.argmax(ratio[BEGINS:]))
     left = z.copy()
     left[row:] -= np.outer(keep ** np.arange(len(z) - row), steps[row])
-    over = max(_over(_ratios(left, keep)[0], USUAL), _over(np.sum(left**2, axis=1), LARGE))
+    over = max(larger_than_chance(_ratios(left, keep)[0], USUAL), larger_than_chance(np.sum(left**2, axis=1), LARGE))
     return float(ratio[row]) / (max(1.0, over) * whiteness(left).growth ** 2), row, steps[row]
 
 
@@ -123,7 +123,7 @@ def _ratios(z: Array, keep: float) -> tuple[Array, Array]:
     return np.sum(T**2, axis=1) / W, T / W[:, None]
 
 
-def _over(squares: Array, part: float) -> float:
+def larger_than_chance(squares: Array, part: float) -> float:
     """By how much a quantile of squares is larger than that of a chi-square of two degrees of freedom."""
     return float(np.quantile(squares, part)) / (-2.0 * math.log(1.0 - part))
 
