@@ -64,6 +64,7 @@ SHORTEST = 1.0  # s: below that no mean is worth its name
 NO_FORCE = 1e-6  # m/s^2, mean specific force that shows no vertical: accelerometers that are dead
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
 MOSTLY = 0.95  # of the seconds
+ROCKING = ("disturbed", "swaying", "moving")  # what a ship does that goes nowhere
 GOES = 10.0  # m: of the way from where a base was in the mean, that still passes for sway
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
@@ -362,9 +363,10 @@ def answer_of(
 def _rocks_all_along(motion: MotionSummary) -> bool:
     """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does.
 
-    Its arm accelerates it now less and now more: sway and acceleration may take turns.
+    Its arm accelerates it now less and now more, and the waves that she meets come in groups: sway, acceleration and what is less
+    than a sway may take turns.
     """
-    return len(motion.regimes) == 1 or motion.fraction("swaying") + motion.fraction("moving") > MOSTLY
+    return len(motion.regimes) == 1 or sum(motion.fraction(kind) for kind in ROCKING) > MOSTLY
 
 
 def _explained(motion: MotionSummary, found: _Found) -> bool:

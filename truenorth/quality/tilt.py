@@ -6,6 +6,10 @@ axes. Each reading of the columns (48 signed orders, times shifts of the gyros a
 pieces, so that biases and the earth do not matter, a constant and a slope are taken off, then the best arm for all, and what is
 left is compared. Where the columns as given stand, a small delay of all gyros and a scale factor of each are fitted: of a scale
 error ``k`` the tilt swings by ``k`` times the sway. A base that sways with one period hides it in the arm, ``k g / w^2``.
+
+A ship's accelerations are made by the waves that make her roll and pitch, and go with these: of a moored one, that hardly rolls,
+they are half of what the tilt makes. So they pass for a delay, but for another one about each axis, which the gyros of one clock do
+not have; and for scale errors, which only a base shows whose gyros explain nearly all of gravity's swing.
 """
 
 from __future__ import annotations
@@ -43,6 +47,7 @@ SURE, CLEAR = 2e-5, 2e-4
 HINT = 1e-3  # of a delay: its tilt is added to sigma, no more
 LEAST_SCALE = 0.005  # no gyro of a specification has a larger error of scale, or misalignment in rad
 LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
+ALIKE = 0.3  # of a delay, that it may differ by between axes: a base's own motion hides or adds a part about each
 IDENTITY = "+x +y +z"
 AXES = np.eye(3)
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
@@ -107,8 +112,9 @@ class Tilt:
             return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
         found = []
         sure, clear, hint = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR, HINT))
-        if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma):
-            certain = abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
+        agree = self._axes_agree(0.0 if self.rough else clear)  # on a rough base it has to be seen
+        if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma) and (agree or not self.rough):
+            certain = agree and abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
             # What the gyros do not explain may be the base's own, and have hidden as much of a delay as it may have made.
             effect = Effect(level=self.tilt if certain else math.hypot(self.tilt, self.given / GRAVITY_EQUATOR))
             found.append(Evidence(late, figures, "bounded" if certain else "hint", effect, ("common_clock",)))
@@ -118,6 +124,17 @@ class Tilt:
             figures = {"axis": "xyz"[i], "scale": float(self.scale[i]), "sigma": float(self.scale_sigma[i])}
             found.append(Evidence("tilt.scale", figures, "bounded", Effect(heading=size, level=size), ("units",)))
         return found
+
+    @property
+    def rough(self) -> bool:
+        """Whether the base's own accelerations are much of what the gyros should explain."""
+        return self.given**2 > PLAIN * self.unturned**2
+
+    def _axes_agree(self, clear: float) -> bool:
+        """Whether the two axes that show a delay best show the same one: one clock has one delay, a base's own motion any."""
+        best = np.argsort(self.by_axis_sigma)[:2]
+        (one, other), sigma = self.by_axis[best], float(np.linalg.norm(self.by_axis_sigma[best]))
+        return bool(abs(one - other) <= max(ALIKE * abs(self.delay), clear * sigma))
 
     def _on_two_axes(self, sure: float) -> bool:
         """Whether turns about two axes show it: a base that goes to and fro in the time of a sway looks like it about one."""
@@ -174,7 +191,8 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     wrong = np.where(np.abs(scale) >= np.maximum(least_scale(turns), clear * sigma_scale), scale, 0.0)
     if wrong.any():
         half, whole = (bench.left(theta / np.maximum(1.0 + part * wrong, 0.1)) for part in (0.5, 1.0))
-        if not whole < half < given:
+        # A base that turns within itself, on an indexer, goes with no wave.
+        if not whole < half < given or (rough and C_sb is None):
             sigma_scale = np.full(3, np.inf)
     each = little[4:], sigma[4:]
     return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, scale, sigma_scale, turns, len(theta), *each)
