@@ -5,6 +5,8 @@ import pytest
 
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
+from truenorth.core.position import Position
+from truenorth.quality.regimes import motion_summary
 from truenorth.quality.tilt import IDENTITY, Tilt, _changes, check_tilt
 from truenorth.simulation.scenario import read_scenario
 
@@ -64,6 +66,67 @@ def test_a_turn_that_leaks_in_by_a_misalignment_is_no_scale_factor():
     )
     assert leaks.evidence() == []
     assert [item.key for item in scaled.evidence()] == ["tilt.scale"]
+
+
+def _moored(seed):
+    """A ship that hardly rolls, carried by the waves that roll and pitch her: each wave makes all, in phases about their own."""
+    rng = np.random.default_rng(seed)
+    kinds = ("roll", "pitch", "east", "north")
+    tones, late = {kind: [] for kind in kinds}, dict(zip(kinds, rng.uniform(0.0, 360.0, 4), strict=True))
+    for period, phase in zip(rng.uniform(5.0, 11.0, 12), rng.uniform(0.0, 360.0, 12), strict=True):
+        size = 0.3 * abs(rng.normal())
+        for kind in kinds:
+            unit, part = ("deg", 0.6) if kind in ("roll", "pitch") else ("m", 0.15)
+            at = (phase + late[kind] + rng.normal(0.0, 50.0)) % 360.0
+            tones[kind].append(
+                {"amplitude": f"{part * size:.4f} {unit}", "period": f"{period:.3f} s", "phase": f"{at:.1f} deg"}
+            )
+    scenario = {
+        "name": "moored",
+        "duration": "240 s",
+        "rate": "50 Hz",
+        "position": {"lat": "50 deg", "lon": "1 deg"},
+        "motion": {"kind": "sway", "heading": "70 deg", "tones": tones},
+        "lever_arm": ["1 m", "6 m", "3 m"],
+        "imu": "navigation",
+    }
+    return read_scenario(scenario)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 6])
+def test_waves_that_carry_a_ship_as_they_roll_her_are_no_delay_and_no_scale_factor(seed):
+    """Eight of eight sound logs of such ships were refused: gyros early by .57 s, or too far by 54 %."""
+    found = check_tilt(_moored(seed).simulate(seed=seed).record)
+    assert found is None or found.evidence() == [], found
+
+
+def test_a_ship_that_the_waves_shake_sway_and_accelerate_by_turns_stays_where_she_is():
+    """She was refused as one that moves: neither sway nor acceleration lasted from the first second to the last."""
+    scenario = _moored(2)
+    record, body = scenario.simulate(seed=2).record, scenario.build_motion(2, 0)
+    summary = motion_summary(record)
+    assert summary.overall == "moving"
+    assert summary.fraction("disturbed") > 0.2
+    answer = align(record, Position.from_degrees(50.0, 1.0), "navigation")
+    assert (answer.status, answer.method) == ("aligned", "swaying"), answer.reasons
+    off = misses(answer, lambda time: body.states(np.array(time)))
+    assert max(float(np.abs(x).max()) for x in off.values()) < 4.0
+
+
+def test_gyros_that_are_late_are_late_about_each_axis():
+    """A common delay is sure, one about each axis is a motion; where little else is left, it is in sigma."""
+    each = {"by_axis_sigma": np.array([0.01, 0.01, 9.0]), "pieces": 8}
+
+    def of(by_axis, given):
+        by_axis = np.array([*by_axis, 0.0])
+        return Tilt(
+            given, 1.0, given, IDENTITY, float(by_axis.mean() * 1.5), 0.005, 0.01, by_axis=by_axis, **each
+        ).evidence()
+
+    for given in (0.1, 0.5):
+        assert [item.kind for item in of((0.20, 0.21), given)] == ["bounded"]
+    assert [item.kind for item in of((0.9, 0.3), 0.1)] == ["hint"]
+    assert of((0.9, 0.3), 0.5) == []
 
 
 def test_a_base_that_goes_to_and_fro_in_the_time_of_its_sway_is_no_delay():
