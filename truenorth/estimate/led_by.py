@@ -89,11 +89,12 @@ def _led(run: Callable[[GnssRecord], Along], track: Along, receiver: GnssRecord,
     found = []
     for source in track.residuals:
         chance = 2.0 * math.log(max(len(source.time), 2) / limit("step"))
-        asked: list[float] = []
+        asked: list[int] = []
         for onset in doubtful_onsets(source):
-            if any(np.sum((source.time > min(at, onset)) & (source.time <= max(at, onset))) <= ROWS for at in asked):
+            row = int(np.searchsorted(source.time, onset))
+            if any(abs(row - other) <= ROWS for other in asked):
                 continue
-            asked.append(onset)
+            asked.append(row)
             try:
                 ratio, step, at = _asked(run, track.residuals, receiver, source, onset)
             except DataError:
