@@ -73,7 +73,8 @@ def test_ring_from_any_heading(runs):
         sigmas.append(np.sqrt(np.diag(answer.phi_covariance)) / ARCMIN)
         assert abs(answer.moving.v_n - sim.motion.states(np.array([answer.time])).v_n[0]).max() < 0.03
     errors, sigmas = np.array(errors), np.array(sigmas)
-    assert np.sqrt(np.mean(errors[:, 2] ** 2)) < 2.0
+    # How well heading is known, and (below) that errors are no larger: the RMS of a few errors says neither by itself.
+    assert sigmas[:, 2].max() < 1.5
     assert np.sqrt(np.mean(errors[:, :2] ** 2)) < 0.05
     low, high = band(runs)
     assert low < np.sqrt(np.mean((errors[:, 2] / sigmas[:, 2]) ** 2)) < high
