@@ -12,7 +12,8 @@ import numpy as np
 from benchmarks.timing import best as seconds
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.records import ImuRecord
-from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import inertial_integrals, integrate_attitude, mechanise
 
 T, COUNT, REPEATS = 0.01, 60_000, 7
 LIMIT = 120.0  # ns a sample
@@ -34,7 +35,7 @@ def best(call: Callable[[], object]) -> float:
 def main() -> None:
     record = log()
     lat, lon, alt = np.radians(34.2), np.radians(108.9), 400.0
-    state = NavigationState.at(dcm_from_euler(1.0, 0.01, -0.02), lat, lon, alt)
+    state = State.at(dcm_from_euler(1.0, 0.01, -0.02), lat, lon, alt)
 
     print(f"  {COUNT} samples; ns a sample")
     figures = {

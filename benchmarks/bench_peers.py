@@ -20,7 +20,8 @@ from benchmarks.bench_mechanisation import COUNT, T, log
 from benchmarks.timing import write_between
 from truenorth.core.attitude import dcm_from_euler, dcm_from_quaternion, rotation_vector_from_dcm
 from truenorth.filters import LinearSystem, kalman
-from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import inertial_integrals, integrate_attitude, mechanise
 
 Array = NDArray[np.float64]
 ROUNDS = 15
@@ -139,7 +140,7 @@ def by_dynamax(s: LinearSystem) -> Callable[[], Array]:
 # ---------------------------------------------------------------------------------------------- strapdown
 
 
-def by_pyins(start: NavigationState) -> Callable[[], Array]:
+def by_pyins(start: State) -> Callable[[], Array]:
     import pandas as pd
     from pyins import strapdown, transform
     from pyins.util import ACCEL_COLS, GYRO_COLS, LLA_COLS, RPH_COLS, VEL_COLS
@@ -199,7 +200,7 @@ def jobs() -> list[Job]:
     """Everything that is compared."""
     one, many = system(EPOCHS, every=1), system(EPOCHS, (RUNS,), every=1)
     record = log()
-    start = NavigationState.at(dcm_from_euler(1.0, 0.01, -0.02), np.radians(34.2), np.radians(108.9), 400.0)
+    start = State.at(dcm_from_euler(1.0, 0.01, -0.02), np.radians(34.2), np.radians(108.9), 400.0)
     ends = np.array([0, COUNT])
 
     def metres(theirs: Array, ours: Array) -> float:

@@ -52,7 +52,7 @@ def least(call: Callable[[], object]) -> float:
 def strapdown() -> Iterator[Part]:
     """The mechanisation and the closed loop, over an hour of flight at 100 Hz."""
     mechanise = there("truenorth.strapdown.level:mechanise", "truenorth.strapdown:mechanise")
-    at = there("truenorth.strapdown.level:NavigationState", "truenorth.strapdown:NavigationState").at
+    at = there("truenorth.state.state:State", "truenorth.strapdown:NavigationState").at
     position = there("truenorth.core.position:Position", "truenorth.position:Position")
     Aiding = there("truenorth.aiding.source:Aiding", "truenorth.navigation.aiding:Aiding")
     InsModel = there("truenorth.errors.model:InsModel", "truenorth.models.ins:InsModel")

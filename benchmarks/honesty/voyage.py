@@ -17,7 +17,7 @@ from truenorth.aiding.fixes import AzimuthFix, Fixes, PositionFix
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
 from truenorth.core.units import parse
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of, without_errors
 from truenorth.errors.deflection import STANDARD_GRAVITY, Deflection
 from truenorth.errors.log import LogErrors, log_rows
 from truenorth.errors.marine import BA, BG, DP, DV, MOTION, OF_INS, PHI
@@ -29,6 +29,7 @@ from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
 from truenorth.simulation.processes import gauss_markov
 from truenorth.state import layout as ins
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 HOUR, DEG = 3600.0, math.radians(1.0)
@@ -51,7 +52,7 @@ def scaled(factor: float) -> ImuSpec:
     return replace(SPEC, **{name: factor * getattr(SPEC, name) for name in names})
 
 
-def passage(rng: np.random.Generator, hours: float, turns: bool = True) -> tuple[Any, Course]:
+def passage(rng: np.random.Generator, hours: float, turns: bool = True) -> tuple[Any, Track]:
     """Ideal log and true course: from a place up to 60 deg N or S, on any heading, at 4 to 12 m/s.
 
     A turn of 60 to 170 deg at 1 deg/s every 20 to 80 minutes, or straight on.
@@ -68,7 +69,7 @@ def passage(rng: np.random.Generator, hours: float, turns: bool = True) -> tuple
     way = course(place, legs, heading=heading, speed=speed)
     ideal = ideal_log(way, rate=1.0 / INTERVAL, duration=hours * HOUR)
     at = way.states(ideal.edges)
-    return ideal, Course(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    return ideal, Track.of_motion(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Voyage:
 
     record: ImuRecord
     start: Start
-    truth: Course
+    truth: Track
     gyro_bias: Array  # (3,) rad/s
     rng: np.random.Generator  # for its sensors
 
@@ -121,9 +122,9 @@ class Voyage:
 
     def _errors(self, result: Any) -> tuple[Array, Array]:
         """Times and errors (K, 7) of a navigation."""
-        found = Course(result.time, result.C_nb, result.v_n, result.position)
+        found = result.track
         rows = np.round((found.time - self.truth.time[0]) / self.truth.interval).astype(int)
-        truth = Course(*(a[rows] for a in (self.truth.time, self.truth.C_nb, self.truth.v_n, self.truth.position)))
+        truth = self.truth[rows]
         return found.time, errors_of(found, truth)
 
     def velocity_error(self, result: Any, after: float = 6.0) -> float:
@@ -181,7 +182,7 @@ def voyage(
         levelled = at_rest_columns(truth.C_nb[0], float(truth.position[0, 0]))
         x0[PHI] += levelled[ins.PHI] @ xi[0]
         P += plumb.sigma**2 * levelled @ levelled.T
-    begin = truth.between(0, 1).corrected(-x0[:7])
+    begin = without_errors(truth[:2], -x0[:7])
     lat, lon, alt = begin.position[0]
     start = Start(0.0, begin.C_nb[0], begin.v_n[0], lat, lon, alt, np.zeros(3), np.zeros(3), P, plumb=plumb.sigma)
     return Voyage(record, start, truth, x0[BG], rng)
@@ -195,7 +196,7 @@ def at_rest_columns(C_nb: Array, lat: float) -> Array:
     return out
 
 
-def deflected_along(truth: Course, deflection: Deflection, rng: np.random.Generator) -> Array:
+def deflected_along(truth: Track, deflection: Deflection, rng: np.random.Generator) -> Array:
     """(K+1, 2) deflection east, north, rad: Gauss-Markov over the distance gone."""
     step = np.linalg.norm(truth.v_n[1:, :2], axis=1) * truth.interval
     decay = np.exp(-step / deflection.distance)

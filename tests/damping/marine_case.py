@@ -8,11 +8,12 @@ import numpy as np
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import radii
 from truenorth.core.yaml_file import read_mapping
-from truenorth.damping.course import Course
 from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES
 from truenorth.simulation import simulate
 from truenorth.simulation.scenario import SHIPPED, read_scenario
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.state.track import Track
+from truenorth.strapdown.level import mechanise
 
 HOUR = 3600.0
 DEG_PER_HOUR = np.radians(1.0) / HOUR
@@ -37,7 +38,7 @@ def ideal_and_truth(lat=45.78, heading=51.3401917, interval=10.0, hours=48.0):
     scenario["motion"] = scenario["motion"] | {"heading": f"{heading} deg"}
     ideal = read_scenario(scenario).ideal()
     at = ideal.motion.states(ideal.edges)
-    return ideal, Course(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    return ideal, Track.of_motion(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
 
 
 def navigate(ideal, truth, x0, gyro_bias, accel_bias):
@@ -45,7 +46,7 @@ def navigate(ideal, truth, x0, gyro_bias, accel_bias):
     sim = simulate(ideal, errors={"gyro_bias": gyro_bias, "accel_bias": accel_bias})
     lat, lon, alt = truth.position[0]
     R_M, R_N = radii(lat)
-    start = NavigationState.at(
+    start = State.at(
         dcm_from_rotation_vector(-x0[PHI]) @ truth.C_nb[0],
         lat + x0[DP][1] / (R_M + alt),
         lon + x0[DP][0] / ((R_N + alt) * np.cos(lat)),

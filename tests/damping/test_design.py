@@ -7,9 +7,9 @@ import pytest
 
 from truenorth.core.errors import UsageError
 from truenorth.damping.adaptive import FuzzyDamping, leaked
-from truenorth.damping.course import Course
 from truenorth.damping.design import design, judged, step_response
 from truenorth.damping.networks import SCHULER_RATE, first_order, second_order, third_order
+from truenorth.state.track import Track
 
 
 @pytest.mark.parametrize("network", [first_order(), second_order(0.4, 1.3), third_order(0.6, 1.5, 2.0, 1.0, 3.0)])
@@ -61,7 +61,7 @@ def test_what_leaks_is_what_changes():
     network = first_order(0.5)
     time = np.arange(0.0, 40000.0, 10.0)
     v = np.where(time[:, None] < 5000.0, [3.0, -2.0, 0.0], [3.0, 6.0, 0.0])
-    course = Course(time, np.broadcast_to(np.eye(3), (len(time), 3, 3)), v, np.zeros((len(time), 3)))
+    course = Track.of_motion(time, np.broadcast_to(np.eye(3), (len(time), 3, 3)), v, np.zeros((len(time), 3)))
     leak = leaked(course, network)
     assert np.abs(leak[time < 4990.0]).max() < 1e-12
     assert np.abs(leak[:, 0]).max() < 1e-12

@@ -6,8 +6,11 @@ import pytest
 from tests.damping.marine_case import DEG_PER_HOUR, MICRO_G, ideal_and_truth, navigate, paper_errors
 from tests.runs import some
 from truenorth.core.errors import DataError
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of, linearised
+from truenorth.damping.loop import Loop, network_correction
+from truenorth.damping.networks import first_order
 from truenorth.errors.marine import BA, BG, DP, MarineModel, position_in_angles
+from truenorth.state.track import Track
 
 QUIET = MarineModel(0.0, 0.0)
 STATES = ["phi_e", "phi_n", "phi_u", "v_e", "v_n", "p_e", "p_n", "bg_x", "bg_y", "bg_z", "ba_x", "ba_y", "ba_z"]
@@ -16,7 +19,7 @@ SIZES = np.array([1e-6, 1e-6, 1e-5, 1e-3, 1e-3, 10, 10, *[1e-5 * DEG_PER_HOUR] *
 
 def carried(course, x):
     """The error state of each epoch by the linear model."""
-    _, Phi = course.linearise(QUIET)
+    _, Phi = linearised(course, QUIET)
     states = [x]
     for step in Phi:
         states.append(step @ states[-1])
@@ -65,5 +68,8 @@ def test_position_errors_in_angles():
 def test_uneven_epochs_are_refused():
     n = 5
     time = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
+    course = Track.of_motion(time, np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.zeros((n, 3)))
     with pytest.raises(DataError, match=r"a step of 2\.000 s after 2\.000 s"):
-        Course(time, np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.zeros((n, 3)))
+        network_correction(course, Loop(first_order(0.5)))
+    with pytest.raises(DataError, match="a track of 1 epochs; expected two"):
+        network_correction(course[:1], Loop(first_order(0.5)))

@@ -8,13 +8,15 @@ import pytest
 from tests.damping.marine_case import DEG_PER_HOUR, HOUR, MICRO_G, ideal_and_truth
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of, linearised, without_errors
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.prior import carried_prior, paper_prior
 from truenorth.errors.log import LogErrors
 from truenorth.errors.marine import BA, BG, DP, DV, OF_INS, PHI, REF, MarineModel
 from truenorth.simulation import simulate
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.state.track import Track
+from truenorth.strapdown.level import mechanise
 
 SIGMA = np.zeros(13)  # of the paper's errors
 SIGMA[DV], SIGMA[DP], SIGMA[PHI] = 0.1, 62.0, np.radians(np.array([0.7, 0.7, 7.7]) / 60.0)
@@ -31,12 +33,12 @@ START = 900  # 2.5 h
 def linear():
     """Truth, true errors and course of the linear model with the paper's errors, at 10 s."""
     _, truth = ideal_and_truth(hours=24.0)
-    _, Phi = truth.linearise(MarineModel(0.0, 0.0))
+    _, Phi = linearised(truth, MarineModel(0.0, 0.0))
     states = [SIGMA]
     for step in Phi:
         states.append(step @ states[-1])
     x = np.array(states)
-    return truth, x, truth.corrected(-x[:, :7])
+    return truth, x, without_errors(truth, -x[:, :7])
 
 
 def reference(truth, c, seed=0, sigma=0.05):
@@ -57,7 +59,7 @@ def paper_filters(course):
 def test_the_mean_of_the_rows_of_F_is_the_change_of_velocity(linear):
     """``H x`` of filter 2 against ``(dv(t) - dv(t - T))/T`` of the truth: the biases are constant here, T is 30 s."""
     truth, x, _ = linear
-    F, _ = truth.linearise(MarineModel(0.0, 0.0))
+    F, _ = linearised(truth, MarineModel(0.0, 0.0))
     m = 3
     H = np.stack([F[k - m : k, DV].mean(axis=0) for k in range(m, len(F))])
     middle = 0.5 * (x[m:-1] + x[: -m - 1])
@@ -85,10 +87,10 @@ def test_filter1_is_the_kalman_filter_of_the_whole(linear):
     from truenorth.filters import LinearSystem, kalman
 
     truth, _, course = linear
-    part, ref = course.between(0, 5000), reference(truth, -0.1)[:5001]
+    part, ref = course[:5001], reference(truth, -0.1)[:5001]
     P0 = paper_prior(course, START)
     found = run_filters(part, ref, start=START, kinds={"filter1": Filter(PAPER, P0, 0.05)})["filter1"]
-    _, Phi = part.between(START, 5000).linearise(PAPER)
+    _, Phi = linearised(part[START:], PAPER)
     H = np.zeros((1, 2, 13))
     H[0, :, DV] = np.eye(2)
     z = (part.v_n[:, :2] - ref)[START + 1 :]
@@ -179,14 +181,14 @@ def _spec():
 def _navigated(ideal, truth, x0, spec, run):
     """As `navigate`, with random walks."""
     sim = simulate(ideal, imu=spec, seed=5, run=run, errors={"gyro_bias": x0[BG], "accel_bias": x0[BA]})
-    begin = truth.between(0, 1).corrected(-x0[:7])
-    start = NavigationState.at(begin.C_nb[0], *begin.position[0], v_n=begin.v_n[0])
+    begin = without_errors(truth[:2], -x0[:7])
+    start = State.at(begin.C_nb[0], *begin.position[0], v_n=begin.v_n[0])
     out = mechanise(sim.record, start, altitude="fixed")
 
     def joined(first, rest):
         return np.concatenate([first[:1], rest])
 
-    return Course(
+    return Track.of_motion(
         truth.time, joined(begin.C_nb, out.C_nb), joined(begin.v_n, out.v_n), joined(begin.position, out.position)
     )
 

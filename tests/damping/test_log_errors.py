@@ -11,6 +11,7 @@ from tests.runs import few_and_all
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
 from truenorth.damping.bands import filter_bands
+from truenorth.damping.course import linearised, without_errors
 from truenorth.damping.drift import likely_drift
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
 from truenorth.damping.navigation import change_filter
@@ -50,12 +51,12 @@ def truth():
 def free(truth, model, rng, sigma=SIGMA):
     """A course with errors of the linear model, drawn from `sigma`."""
     x = sigma * rng.standard_normal(13)
-    _, Phi = truth.linearise(MarineModel(**WALKS))
+    _, Phi = linearised(truth, MarineModel(**WALKS))
     noise = np.sqrt(model.noise[:13] * truth.interval)
     states = [x]
     for step in Phi:
         states.append(step @ states[-1] + noise * rng.standard_normal(13))
-    return np.array(states), truth.corrected(-np.array(states)[:, :7])
+    return np.array(states), without_errors(truth, -np.array(states)[:, :7])
 
 
 def test_bands_of_a_filter_that_knows_all_are_its_own(truth):

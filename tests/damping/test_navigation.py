@@ -15,7 +15,7 @@ from truenorth.alignment import align
 from truenorth.cli import app
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of, without_errors
 from truenorth.damping.options import Damper
 from truenorth.errors.deflection import Deflection
 from truenorth.errors.log import LOGS, LogErrors
@@ -50,7 +50,7 @@ class Ship:
         x0 = SIGMA * self.rng.standard_normal(13)
         biases = {"gyro_bias": x0[BG], "accel_bias": x0[BA]}
         self.record = simulate(ideal, imu=ImuSpec(**_walks()), seed=seed, errors=biases).record
-        begin = self.truth.between(0, 1).corrected(-x0[:7])
+        begin = without_errors(self.truth[:2], -x0[:7])
         P = np.zeros((15, 15))
         P[np.ix_(OF_INS, OF_INS)] = np.diag(SIGMA**2)
         lat, lon, alt = begin.position[0]
@@ -75,8 +75,8 @@ class Ship:
         )
 
     def errors(self, result):
-        found = Course(result.time, result.C_nb, result.v_n, result.position)
-        return errors_of(found, self.truth.between(0, found.epochs))
+        found = result.track
+        return errors_of(found, self.truth[: len(found)])
 
 
 def _walks():

@@ -8,10 +8,11 @@ import pytest
 from tests.damping.marine_case import ideal_and_truth, paper_errors
 from truenorth.core import earth
 from truenorth.core.errors import UsageError
-from truenorth.damping.course import Course
+from truenorth.damping.course import linearised
 from truenorth.damping.loop import Loop, eigenvalues, network_correction
 from truenorth.damping.networks import NO_NETWORK, SCHULER_RATE, Network, first_order, second_order
 from truenorth.errors.marine import DP, DV, MOTION, PHI, MarineModel
+from truenorth.state.track import Track
 
 QUIET = MarineModel(0.0, 0.0)
 MADE = {"first": first_order, "second": second_order}
@@ -20,7 +21,9 @@ MADE = {"first": first_order, "second": second_order}
 def still_course(lat, v=(0.0, 0.0), epochs=2):
     """A vehicle at a latitude (deg) with a velocity, as if it did not move on."""
     place = np.tile([math.radians(lat), 0.0, 0.0], (epochs, 1))
-    return Course(10.0 * np.arange(epochs), np.tile(np.eye(3), (epochs, 1, 1)), np.tile([*v, 0.0], (epochs, 1)), place)
+    return Track.of_motion(
+        10.0 * np.arange(epochs), np.tile(np.eye(3), (epochs, 1, 1)), np.tile([*v, 0.0], (epochs, 1)), place
+    )
 
 
 @pytest.mark.parametrize("make", [first_order, second_order])
@@ -82,14 +85,14 @@ def undamped(hours):
     """A ship's truth, its model, the errors at the start, and what they become in a free INS: those of the motion, its course."""
     _, truth = ideal_and_truth(hours=hours)
     x = paper_errors()
-    F, Phi = truth.linearise(QUIET)
+    F, Phi = linearised(truth, QUIET)
     free = [x]
     for step in Phi:
         free.append(step @ free[-1])
     free = np.array(free)[:, MOTION]
     v = truth.v_n.copy()
     v[:, :2] += free[:, DV]
-    return truth, F, x, free, Course(truth.time, truth.C_nb, v, truth.position)
+    return truth, F, x, free, Track.of_motion(truth.time, truth.C_nb, v, truth.position)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from tests.damping.marine_case import ideal_and_truth, paper_errors
 from truenorth.aiding.aids import VelocityLog
 from truenorth.core.attitude import misalignment
 from truenorth.core.errors import DataError
+from truenorth.damping.course import linearised, motion_at, place_at, without_errors
 from truenorth.damping.options import Damper
 from truenorth.damping.reference import cleaned, reference_of
 from truenorth.errors.log import LogErrors
@@ -23,11 +24,11 @@ def course():
     """A free INS with errors of 3 m/s, at 2 s over 12 h: the worst slopes that a healthy log can show."""
     _, truth = ideal_and_truth(interval=2.0, hours=12.0)
     x = paper_errors()
-    _, Phi = truth.linearise(MarineModel(0.0, 0.0))
+    _, Phi = linearised(truth, MarineModel(0.0, 0.0))
     states = [x]
     for step in Phi:
         states.append(step @ states[-1])
-    return truth, truth.corrected(-np.array(states)[:, :7])
+    return truth, without_errors(truth, -np.array(states)[:, :7])
 
 
 def log(truth, seed):
@@ -77,7 +78,7 @@ def test_outliers_jumps_and_gaps(course):
 def test_a_log_in_body_axes_is_turned(course):
     """Forward and right at 10 Hz, a heading of 51.34 deg: the mean of an epoch, east and north."""
     truth, _ = course
-    part = truth.between(0, 199)
+    part = truth[:200]
     time = np.arange(0.0, 398.0, 0.1)
     body = VelocityRecord(time, np.tile([0.0, 12.0, np.nan], (len(time), 1)), "body")
     found = reference_of(part, body, LogErrors())
@@ -95,7 +96,7 @@ def test_rows_between_epochs_are_compared_at_their_own_times(frame):
     """
     _, truth = passage(np.random.default_rng(4), 2.0)
     v = truth.v_n if frame == "navigation" else np.einsum("kij,ki->kj", truth.C_nb, truth.v_n)
-    log, coarse = VelocityRecord(truth.time, v, frame), truth.every(2)
+    log, coarse = VelocityRecord(truth.time, v, frame), truth[::2]
     exact, near = (reference_of(coarse, log, LogErrors(), fine) for fine in (truth, None))
     np.testing.assert_allclose(exact.velocity, coarse.v_n[:, :2], atol=1e-9)
     assert np.nanmax(np.abs(near.velocity - coarse.v_n[:, :2])) < 0.1  # at the ends of turns outliers are left out
@@ -107,7 +108,7 @@ def test_a_swing_is_not_late():
     swing = 6.0 * np.sin(truth.time / 806.0)[:, None] * [1.0, -1.0]
     v = truth.v_n.copy()
     v[:, :2] -= swing
-    found = reference_of(truth.every(2), VelocityRecord(truth.time, v, "navigation"), LogErrors(), truth)
+    found = reference_of(truth[::2], VelocityRecord(truth.time, v, "navigation"), LogErrors(), truth)
     assert np.abs(found.velocity - v[::2, :2])[2:-2].max() < 1.5e-3
 
 
@@ -115,10 +116,10 @@ def test_a_fix_in_a_turn_holds_at_its_own_time():
     """Of the true course, with epochs every 8 s and a turn of 1 deg/s: place and heading between epochs, to .5 m and .1 deg."""
     _, truth = passage(np.random.default_rng(4), 2.0)
     turning = 1 + 2 * np.flatnonzero(np.abs(np.diff(truth.v_n[:, 0])[1::2]) > 0.05)[5]  # a row between two epochs
-    coarse = truth.every(2)
-    C_nb, _ = coarse.at(truth.time[[turning]])
+    coarse = truth[::2]
+    C_nb, _ = motion_at(coarse, truth.time[[turning]])
     assert np.degrees(np.abs(misalignment(C_nb, truth.C_nb[[turning]]))).max() < 0.1
-    lat, lon, _ = coarse.place(truth.time[turning])
+    lat, lon, _ = place_at(coarse, truth.time[turning])
     off = np.array([lat, lon]) - truth.position[turning, :2]
     assert np.abs(off * 6.37e6).max() < 0.5
 

@@ -5,13 +5,14 @@ import pytest
 
 from benchmarks.honesty.voyage import SPEC, voyage
 from tests.runs import few_and_all
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of
 from truenorth.damping.loop import SCHULER_RATE
 from truenorth.damping.networks import second_order
 from truenorth.damping.options import Damper
 from truenorth.damping.switching import HYSTERESIS, manoeuvred, switching
 from truenorth.errors.marine import DV
 from truenorth.navigation import navigate
+from truenorth.state.track import Track
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +34,8 @@ def navigated(ship, damper):
 
 
 def errors(ship, result):
-    found = Course(result.time, result.C_nb, result.v_n, result.position)
-    return errors_of(found, ship.truth.between(0, found.epochs))
+    found = result.track
+    return errors_of(found, ship.truth[: len(found)])
 
 
 def test_manoeuvres_are_separated_from_the_swing(ship):
@@ -46,7 +47,7 @@ def test_manoeuvres_are_separated_from_the_swing(ship):
     calm = np.convolve(calm, np.ones(61), "same") > 60.5  # two minutes from a turn
     assert np.abs(found - changed)[1:][calm].max() < 0.3
     swing = np.sin(SCHULER_RATE * truth.time)[:, None] * np.array([1.0, 0.0, 0.0])
-    straight = Course(
+    straight = Track.of_motion(
         truth.time, np.broadcast_to(truth.C_nb[0], truth.C_nb.shape), truth.v_n[0] + swing, truth.position
     )
     assert np.abs(manoeuvred(straight, np.full(len(truth.time), 1.0))).max() == 0.0

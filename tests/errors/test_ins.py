@@ -1,5 +1,7 @@
 """The INS error model against finite differences of the real mechanisation, and its noise against theory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,8 @@ from truenorth.simulation import ideal_log
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
 from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import mechanise
 
 LAT, ALT, SPEED = np.radians(60.0), 3000.0, 200.0
 RATE = 50.0
@@ -35,7 +38,7 @@ def _start(motion, dx):
     C = dcm_from_rotation_vector(-dx[PHI]) @ s.C_nb
     lat = s.lat + dx[DP][1] / (R_M + s.alt)
     lon = s.lon + dx[DP][0] / ((R_N + s.alt) * np.cos(s.lat))
-    return NavigationState.at(C, float(lat), float(lon), float(s.alt + dx[DP][2]), s.v_n + dx[DV])
+    return State.at(C, lat, lon, s.alt + dx[DP][2], s.v_n + dx[DV])
 
 
 def _errors(out, base):
@@ -77,15 +80,13 @@ def test_jacobian_is_the_derivative_of_the_mechanisation(flight, state, altitude
     if altitude == "fixed":
         start = _start(motion, np.zeros(STATES))
         level = start.v_n * [1, 1, 0]
-        base = mechanise(
-            record, NavigationState.at(start.C_nb, start.lat, start.lon, start.alt, level), altitude="fixed"
-        )
+        base = mechanise(record, replace(start, v_n=level), altitude="fixed")
     else:
         base = mechanise(record, _start(motion, np.zeros(STATES)), altitude=altitude)
     wrong = ImuRecord(record.time, record.gyro + dx[BG] / RATE, record.accel + dx[BA] / RATE, "increments")
     start = _start(motion, dx)
     if altitude == "fixed":
-        start = NavigationState.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n * [1, 1, 0])
+        start = replace(start, v_n=start.v_n * [1, 1, 0])
     moved = mechanise(wrong, start, altitude=altitude)
 
     T, C, f, v, lat, alt, every = _nominal(record, base)

@@ -21,7 +21,7 @@ from truenorth.simulation.course import Leg, course
 from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
 from truenorth.state.state import Start
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.strapdown.level import mechanise
 
 SPEC = ImuSpec(
     gyro_bias=np.radians(0.1) / 3600,
@@ -95,8 +95,7 @@ def test_free_inertial_is_the_mechanisation_in_the_local_level_frame():
     record = simulate(motion, rate=100.0, duration=300.0).record
     start = start_at(motion)
     track = navigate_track(record, start, InsModel(0.0, 0.0), covariance=False, interval=1.0, every=10)
-    state = NavigationState.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
-    out = mechanise(record, state, every=1000)
+    out = mechanise(record, start, every=1000)
     assert track.time[-1] == pytest.approx(out.time[-1])
     np.testing.assert_allclose(track.v_n[1:], out.v_n, rtol=0, atol=1e-6)
     away = (track.position[1:] - out.position) * [6.4e6, 3.2e6, 1.0]

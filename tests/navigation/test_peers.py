@@ -10,8 +10,8 @@ from truenorth.core.earth import normal_gravity
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord
-from truenorth.state.state import Start
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import Start, State
+from truenorth.strapdown.level import mechanise
 
 SWAP = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # NED and ENU, FRD and RFU, both ways
 
@@ -49,7 +49,7 @@ def test_no_farther_from_the_truth_than_python_ins(kind):
     v_n = SWAP @ first[["VN", "VE", "VD"]].to_numpy()
     start = Start(0.0, C_nb, v_n, lat, lon, alt, np.zeros(3), np.zeros(3), np.eye(15))
     track = navigate_track(record, start, InsModel(0.0, 0.0), covariance=False, interval=1.0, every=1)
-    level = mechanise(record, NavigationState.at(C_nb, lat, lon, alt, v_n), every=100)
+    level = mechanise(record, State.at(C_nb, lat, lon, alt, v_n), every=100)
 
     for name, t, C, v, position in (
         ("wander", track.time, track.C_nb, track.v_n, track.position),

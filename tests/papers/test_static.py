@@ -54,7 +54,8 @@ def test_the_model_is_that_of_the_mechanisation():
     from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
     from truenorth.core.position import Position
     from truenorth.simulation import rest, simulate
-    from truenorth.strapdown.level import NavigationState, mechanise
+    from truenorth.state.state import State
+    from truenorth.strapdown.level import mechanise
 
     lat, seconds, heading = math.radians(50.0), 5.0, 0.7
     record = simulate(
@@ -69,7 +70,7 @@ def test_the_model_is_that_of_the_mechanisation():
         moved = ImuRecord(
             record.time, record.gyro + T * np.array(gyro), record.accel + T * np.array([*accel, 0.0]), "increments"
         )
-        start = NavigationState.at(dcm_from_rotation_vector(-np.array(phi)) @ C, lat, v_n=np.array([*dv, 0.0]))
+        start = State.at(dcm_from_rotation_vector(-np.array(phi)) @ C, lat, v_n=np.array([*dv, 0.0]))
         out = mechanise(moved, start, altitude="fixed")
         return out.C_nb[-1], out.v_n[-1, :2]
 

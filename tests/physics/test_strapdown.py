@@ -15,8 +15,8 @@ from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, normal_gravity, radii, transport_rate_n
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
-from truenorth.strapdown.increments import last_rows
-from truenorth.strapdown.level import Memory, NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import VELOCITY, go_on, inertial_integrals, integrate_attitude, mechanise, underway
 
 ALGORITHMS = ("previous", "1", "2", "3", "4")
 METRES = np.array([6.4e6, 6.4e6, 1.0])  # of latitude, longitude, height
@@ -78,9 +78,9 @@ class Drive:
         dtheta, dvel = (T / 2 * sum(w * p[i] for w, p in zip(WEIGHTS, parts)) for i in (0, 1))
         return ImuRecord(t[1:], dtheta, dvel, "increments")
 
-    def state(self, t: float = 0.0) -> NavigationState:
+    def state(self, t: float = 0.0) -> State:
         at = np.float64(t)
-        return NavigationState.at(self.C_nb(at), *map(float, self.position(at)), stacked(self.v_n(at)))
+        return State.at(self.C_nb(at), *map(float, self.position(at)), stacked(self.v_n(at)))
 
 
 def stacked(parts):
@@ -199,8 +199,8 @@ def test_rates_give_the_motion_back_to_third_order(drive):
     for T in (0.02, 0.01):
         t = T * np.arange(-1, round(300 / T) + 1)
         rates = ImuRecord(t, *drive.rates(t))
-        start = replace(drive.state(), memory=Memory(before=last_rows(rates[:2])))
-        errors.append(departure(mechanise(rates[2:], start), drive))
+        _, out = go_on(rates[2:], underway(drive.state(), before=rates[:2]))
+        errors.append(departure(out, drive))
     np.testing.assert_allclose(np.log2(np.array(errors[0]) / errors[1]), 3, atol=0.1)
     attitude, _, position = errors[1]
     assert attitude < 1e-9
@@ -215,7 +215,7 @@ def test_a_base_at_rest_stays(lat, altitude):
     dtheta = np.tile(T * C_nb.T @ earth_rate_n(lat), (count, 1))
     dvel = np.tile(T * C_nb.T @ [0, 0, normal_gravity(lat, 500.0)], (count, 1))
     record = ImuRecord(T * np.arange(1, count + 1), dtheta, dvel, "increments")
-    out = mechanise(record, NavigationState.at(C_nb, lat, 1.0, 500.0), altitude=altitude, every=count)
+    out = mechanise(record, State.at(C_nb, lat, 1.0, 500.0), altitude=altitude, every=count)
     rounding = 2 * np.finfo(float).eps * count  # of a quaternion that stands still: the same way each time
     assert np.linalg.norm(rotation_vector_from_dcm(out.C_nb[0] @ C_nb.T)) < rounding
     np.testing.assert_allclose(out.v_n[0], 0, atol=9.8 * 600 * rounding)
@@ -249,7 +249,7 @@ slow_settings = settings(max_examples=20, deadline=None)
 def test_turning_the_body_axes_turns_the_answer(drive, record, C, algorithm):
     """The same motion, in velocity and position; the attitude ``C_nb C'``."""
     some, start = record[20_000:23_000], drive.state(200.0)
-    turned_start = NavigationState.at(start.C_nb @ C.T, start.lat, start.lon, start.alt, start.v_n)
+    turned_start = State.at(start.C_nb @ C.T, start.lat, start.lon, start.alt, start.v_n)
     out = mechanise(some, start, algorithm=algorithm, every=50)
     turned = mechanise(some.rotated(C), turned_start, algorithm=algorithm, every=50)
     np.testing.assert_allclose(turned.C_nb, out.C_nb @ C.T, atol=1e-12)
@@ -275,7 +275,7 @@ def test_longitude_is_not_felt(drive, record, turn):
     some, start = record[:2000], drive.state()
     out = mechanise(some, start, every=100)
     moved = mechanise(some, replace(start, lon=start.lon + turn), every=100)
-    np.testing.assert_array_equal(moved.q_nb, out.q_nb)
+    np.testing.assert_array_equal(moved.C_nb, out.C_nb)
     np.testing.assert_array_equal(moved.v_n, out.v_n)
     rounding = 2000 * np.spacing(8.0)
     np.testing.assert_allclose(moved.position[:, 1] - turn, out.position[:, 1], rtol=0, atol=rounding)
@@ -294,28 +294,43 @@ def test_chunks_have_the_bits_of_one_batch(drive, record, cuts, algorithm, kind,
     edges = np.concatenate([[0], np.cumsum(cuts)])
     part = record[: edges[-1]]
     part = ImuRecord(0.3 + part.time, part.gyro, part.accel, kind)  # stamps whose differences are not all the same
-    start = replace(drive.state(), interval=0.01)
+    start = underway(drive.state(), 0.01)
     options = {"algorithm": algorithm, "every": every, "altitude": altitude}
-    batch = mechanise(part, start, **options)
+    end, batch = go_on(part, start, **options)
     state, chunks = start, []
     for first, last in itertools.pairwise(edges):
-        chunks.append(mechanise(part[first:last], state, **options))
-        state = chunks[-1].state
-    for name in ("time", "q_nb", "v_n", "position"):
+        state, track = go_on(part[first:last], state, **options)
+        chunks.append(track)
+    for name in ("time", "C_nb", "v_n", "position"):
         joined = np.concatenate([getattr(c, name) for c in chunks])
         np.testing.assert_array_equal(joined, getattr(batch, name))
-    for name in ("q_nb", "v_n", "lat", "lon", "alt"):
-        np.testing.assert_array_equal(getattr(state, name), getattr(batch.state, name))
-    np.testing.assert_array_equal(state.memory.rest, batch.state.memory.rest)
+    np.testing.assert_array_equal(state.motion, end.motion)
+    np.testing.assert_array_equal(state.rest, end.rest)
     assert len(batch.time) == len(part) // (1 if algorithm == "previous" else int(algorithm)) // every
 
 
 def test_a_correction_between_chunks_counts(drive, record):
     """A state is what it says it is: nothing hidden brings the old velocity back."""
-    state = mechanise(record[:100], drive.state()).state
-    out = mechanise(record[100:102], replace(state, v_n=state.v_n + np.array([1.0, 0, 0])))
-    unchanged = mechanise(record[100:102], state)
+    state, _ = go_on(record[:100], underway(drive.state()))
+    motion = state.motion.copy()
+    motion[VELOCITY] += [1.0, 0.0, 0.0]
+    _, out = go_on(record[100:102], replace(state, motion=motion))
+    _, unchanged = go_on(record[100:102], state)
     np.testing.assert_allclose(out.v_n - unchanged.v_n, np.tile([1.0, 0, 0], (2, 1)), atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+def test_assumed_biases_are_taken_off(drive, record, kind):
+    """A log whose sensors have biases, from a state that knows them, gives what the log without them gives."""
+    some, gyro, accel = record[:500], np.array([1e-4, -2e-4, 3e-4]), np.array([0.01, -0.02, 0.03])
+    scale = some.interval if kind == "increments" else 1.0
+    true = ImuRecord(some.time, some.gyro, some.accel, kind)
+    read = ImuRecord(some.time, some.gyro + scale * gyro, some.accel + scale * accel, kind)
+    out = mechanise(read, replace(drive.state(), gyro_bias=gyro, accel_bias=accel))
+    expected = mechanise(true, drive.state())
+    for name, atol in (("C_nb", 1e-12), ("v_n", 1e-10)):
+        np.testing.assert_allclose(getattr(out, name), getattr(expected, name), rtol=0, atol=atol)
+    np.testing.assert_array_equal(out.gyro_bias, np.tile(gyro, (500, 1)))
 
 
 def test_inertial_frame_and_local_level_agree(drive, record):
@@ -359,6 +374,7 @@ def test_inertial_integrals_of_an_analytic_force(record):
 PROGRAM = """
 import numpy as np
 from truenorth.strapdown import inertial_integration
+from truenorth.state.state import State
 from truenorth.strapdown import level as strapdown
 from truenorth.strapdown.increments import last_rows
 from truenorth.records import ImuRecord
@@ -366,7 +382,7 @@ rows = np.full((9, 3), 1e-3)
 for kind in ("rates", "increments"):
     for algorithm in ("previous", "4"):
         record = ImuRecord(np.arange(9.0), rows, rows, kind)
-        strapdown.mechanise(record, strapdown.NavigationState.at(np.eye(3), 0.6), algorithm=algorithm)
+        strapdown.mechanise(record, State.at(np.eye(3), 0.6), algorithm=algorithm)
 strapdown.integrate_attitude(rows)
 strapdown.integrate_attitude(rows.tolist(), algorithm="2")
 strapdown.inertial_integrals(rows, record.accel, np.ones(9), [0, 9])

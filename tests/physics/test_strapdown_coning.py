@@ -10,9 +10,10 @@ from truenorth.core.attitude import rotation_vector_from_quaternion
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import DataError, UsageError
 from truenorth.records import ImuRecord
+from truenorth.state.state import State
 from truenorth.strapdown.coning import BEFORE, WITHIN, coefficients
 from truenorth.strapdown.increments import increments, last_rows
-from truenorth.strapdown.level import NavigationState, inertial_integrals, integrate_attitude, mechanise
+from truenorth.strapdown.level import go_on, inertial_integrals, integrate_attitude, mechanise, underway
 
 ALGORITHMS = ("previous", "1", "2", "3", "4")
 
@@ -136,7 +137,7 @@ def test_sculling_drift_is_what_theory_leaves(algorithm, phase):
     east = np.concatenate([[0], np.cumsum(integral(-F * np.sin(W * inside) * np.sin(turn)))])
 
     record = ImuRecord(t[1:], dtheta, dvel, "increments")
-    out = mechanise(record, NavigationState.at(np.eye(3), 0.0), algorithm=algorithm, altitude="fixed")
+    out = mechanise(record, State.at(np.eye(3), 0.0), algorithm=algorithm, altitude="fixed")
     error = out.v_n[:, 0] - east[N::N]
     drift = np.polyfit(np.arange(1, updates + 1), error, 1)[0]
     correction = A * F / W * 0.5 * (N * phase - np.sin(N * phase))
@@ -223,6 +224,6 @@ def test_chunks_must_follow_each_other():
     with pytest.raises(DataError, match=r"begins at 0\.0+ s, but the one before it ended at 9\.0+ s"):
         increments(record, last_rows(record))
     other = ImuRecord(np.arange(10.0, 12.0), np.ones((2, 3)), np.ones((2, 3)), "increments")
-    state = mechanise(record, NavigationState.at(np.eye(3), 0.7)).state
+    state, _ = go_on(record, underway(State.at(np.eye(3), 0.7)))
     with pytest.raises(DataError, match="holds increments, the one before it rates"):
-        mechanise(other, state)
+        go_on(other, state)

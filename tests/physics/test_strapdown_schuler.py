@@ -9,19 +9,21 @@ from tests.helpers import assert_lines
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.earth import EARTH_RATE, FLATTENING, SEMI_MAJOR, earth_rate_n, normal_gravity, radii
 from truenorth.records import ImuRecord
-from truenorth.strapdown.level import Mechanisation, NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.state.track import Track
+from truenorth.strapdown.level import mechanise
 
 
 def at_rest(
     lat: float, hours: float, T: float = 1.0, eps=(0.0, 0.0, 0.0), v_n=(0.0, 0.0, 0.0), phi=(0.0, 0.0, 0.0)
-) -> Mechanisation:
+) -> Track:
     """A level IMU on the fixed-height base, with gyro bias `eps` and initial errors `v_n` and `phi` (E, N, U)."""
     count = round(hours * 3600 / T)
     dtheta = np.tile(T * (earth_rate_n(lat) + eps), (count, 1))
     dvel = np.tile([0, 0, T * normal_gravity(lat, 0.0)], (count, 1))
     record = ImuRecord(T * np.arange(1, count + 1), dtheta, dvel, "increments")
     C_nb = dcm_from_rotation_vector(-np.array(phi))  # C_hat = (I - [phi x]) C
-    return mechanise(record, NavigationState.at(C_nb, lat, v_n=v_n), altitude="fixed")
+    return mechanise(record, State.at(C_nb, lat, v_n=v_n), altitude="fixed")
 
 
 def test_schuler_period_at_the_equator():
@@ -76,7 +78,7 @@ def test_free_vertical_channel_diverges_as_it_must():
     dtheta = np.tile(0.1 * earth_rate_n(lat), (count, 1))
     dvel = np.tile([0, 0, 0.1 * normal_gravity(lat, 0.0)], (count, 1))
     record = ImuRecord(0.1 * np.arange(1, count + 1), dtheta, dvel, "increments")
-    true = NavigationState.at(np.eye(3), lat)
+    true = State.at(np.eye(3), lat)
     off, on = (mechanise(record, replace(true, alt=alt), altitude="free").position[:, 2] for alt in (start, 0.0))
     h = 10.0
     gradient = (normal_gravity(lat, -h) - normal_gravity(lat, h)) / (2 * h)

@@ -27,7 +27,8 @@ from truenorth.simulation import (
     steps,
 )
 from truenorth.simulation.axis_angles import SCHEMES
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import mechanise
 
 deg = np.radians
 ARCSEC = deg(1 / 3600)
@@ -57,9 +58,7 @@ def residual(indexer, rate, duration):
     rig = Indexed(SHIP, indexer)
     record = simulate(rig, rate=rate, duration=duration).record
     start = rig.states(0.0)
-    state = NavigationState.at(
-        start.C_nb, float(start.lat), float(start.lon), float(start.alt), tuple(start.v_n), record.interval
-    )
+    state = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
     computed = mechanise(record, state, every=round(rate))
     true = rig.states(computed.time)
     error = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))

@@ -17,7 +17,8 @@ from truenorth.simulation import (
     simulate,
     simulate_sensor,
 )
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import mechanise
 
 
 def test_master_errors_are_computed_minus_true():
@@ -83,7 +84,7 @@ def test_a_flexed_slave_is_a_motion_like_any_other():
     flexed = Flexed(DRIVE, FLEXIBLE, duration=70.0, seed=3)
     record = simulate(flexed, rate=100.0, duration=60.0).record
     start = flexed.states(0.0)
-    state = NavigationState.at(start.C_nb, float(start.lat), float(start.lon), float(start.alt), tuple(start.v_n), 0.01)
+    state = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
     computed = mechanise(record, state, every=100)
     true = flexed.states(computed.time)
     error = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))

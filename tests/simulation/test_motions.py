@@ -15,7 +15,8 @@ from truenorth.simulation.profile import Ramp, profile, pulse
 from truenorth.simulation.route import Driving, route
 from truenorth.simulation.sea import Hull, WaveSpectrum, narrow_band, sea_motion
 from truenorth.simulation.turntable import Hold, positions, turntable
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import mechanise
 
 PLACE = Position.from_degrees(45.0, 10.0, 100.0)
 deg = np.radians
@@ -61,9 +62,7 @@ def come_back(motion: Motion, rate: float, duration: float, algorithm: str = "pr
     """Errors of attitude (rad), velocity (m/s) and position (m) of an ideal IMU through the strapdown."""
     record = simulate(motion, rate=rate, duration=duration).record
     start = motion.states(0.0)
-    state = NavigationState.at(
-        start.C_nb, float(start.lat), float(start.lon), float(start.alt), start.v_n, record.interval
-    )
+    state = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
     computed = mechanise(record, state, every=10, algorithm=algorithm)
     true = motion.states(computed.time)
     turned = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))

@@ -10,7 +10,8 @@ from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import Sway, Tone, ideal_log, rest, simulate
 from truenorth.simulation.imu_errors import apply_errors
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import mechanise
 
 PLACE = Position.from_degrees(40.0, 118.0)
 deg = np.radians
@@ -34,9 +35,7 @@ def test_an_ideal_imu_through_the_strapdown_comes_back(motion):
     """720 s at 100 Hz: .05 arcsec and 1e-4 m/s are wanted."""
     record = simulate(motion, rate=100.0, duration=720.0).record
     start = motion.states(0.0)
-    state = NavigationState.at(
-        start.C_nb, float(start.lat), float(start.lon), float(start.alt), tuple(start.v_n), record.interval
-    )
+    state = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
     computed = mechanise(record, state, every=100)
     true = motion.states(computed.time)
     error = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))

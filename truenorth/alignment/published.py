@@ -46,8 +46,9 @@ from truenorth.filters import Estimates, LinearSystem, fading, filter_gains, kal
 from truenorth.filters.fading import Fading
 from truenorth.filters.gains import initial_part
 from truenorth.records import ImuRecord
+from truenorth.state.state import State
 from truenorth.strapdown.inertial import earth_rotation, integrate
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.strapdown.level import mechanise
 
 Array = NDArray[np.float64]
 Published = Literal["kf", "sakf", "makf", "imakf", "states10", "states8"]
@@ -161,7 +162,7 @@ class StationaryLog:
         """The model about the attitude that the gyros carry on from the start."""
         record, place, n = self.task.record, self.task.position, self.states
         walks, T = StationaryModel(place.lat, place.alt, self.model), self.every * record.interval
-        start = NavigationState.at(self.C_n0_i, place.lat, place.lon, place.alt)
+        start = State.at(self.C_n0_i, place.lat, place.lon, place.alt)
         out = mechanise(record, start, altitude="fixed", every=self.every)
         count = len(out.time)
         C_nb = out.C_nb if n == 10 else _by_gyros(self.task, self.C_n0_i, T, count)

@@ -1,6 +1,6 @@
 """Damping: the Schuler, Foucault and 24 h oscillations of a free INS, calmed by networks or filters and a reference velocity."""
 
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.loop import Loop, Mode, eigenvalues, in_words, network_correction
 from truenorth.damping.navigation import Damping, damp_navigation
@@ -13,7 +13,6 @@ from truenorth.damping.spectrum import Spectrum, earth_line, schuler_lines, spec
 
 __all__ = [
     "NO_NETWORK",
-    "Course",
     "Damper",
     "Damping",
     "Estimate",

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.damping.course import Course
 from truenorth.damping.networks import Network
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -54,17 +54,17 @@ class FuzzyDamping:
         in_manoeuvre = np.clip((leak - self.calm) / (self.manoeuvre - self.calm), 0.0, 1.0)
         return np.asarray(1.0 - in_manoeuvre)
 
-    def of_course(self, course: Course, network: Network) -> Array:
+    def of_course(self, course: Track, network: Network) -> Array:
         """(K+1,) ``mu`` at the epochs of a course, for :func:`truenorth.damping.loop.network_correction`."""
         return self.strength(np.linalg.norm(leaked(course, network), axis=1))
 
 
-def leaked(course: Course, network: Network) -> Array:
+def leaked(course: Track, network: Network) -> Array:
     """(K+1, 2) the velocity that an internal network lets into the loop, ``(1 - H) v``, m/s; it has settled at the start."""
     from scipy.linalg import expm
 
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
-    coarse = course.every(stride)
+    coarse = course[::stride]
     A, B, C, D = network.realised()
     n, v = len(B), coarse.v_n[:, :2]
     block = np.zeros((n + 1, n + 1))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.bands import Bands
-from truenorth.damping.course import Course
 from truenorth.damping.filters import Estimate
 from truenorth.damping.reference import Reference
 from truenorth.damping.result import LogHistory
@@ -57,7 +56,7 @@ def switched(found: Switching, time: Array) -> Evidence:
     )
 
 
-def history_of(course: Course, estimate: Estimate | None, groups: Sequence[Group]) -> LogHistory | None:
+def history_of(course: Track, estimate: Estimate | None, groups: Sequence[Group]) -> LogHistory | None:
     """What the filter found of the log, epoch by epoch; None where no filter ran."""
     if estimate is None:
         return None
@@ -67,7 +66,7 @@ def history_of(course: Course, estimate: Estimate | None, groups: Sequence[Group
     return LogHistory(time, names, units, estimate.x[:, STATES:], estimate.sigma[:, STATES:])
 
 
-def residuals_of(course: Course, log: LogOn, damped: Course, found: Found, start: int) -> list[Residuals]:
+def residuals_of(course: Track, log: LogOn, damped: Track, found: Found, start: int) -> list[Residuals]:
     """What INS and log differ by: innovations of the augmented filter, else what is left after the correction."""
     if log.reference is None:
         return []
@@ -91,21 +90,13 @@ def even(track: Track) -> Track:
     """The track without a last epoch that comes too early."""
     steps = np.diff(track.time)
     if len(steps) > 1 and abs(steps[-1] - steps[0]) > 0.01 * steps[0]:
-        return replace(
-            track,
-            time=track.time[:-1],
-            C_nb=track.C_nb[:-1],
-            v_n=track.v_n[:-1],
-            position=track.position[:-1],
-            sensors=track.sensors[:-1],
-            P=track.P[:-1] if len(track.P) else track.P,
-        )
+        return track[:-1]
     return track
 
 
-def corrected(track: Track, damped: Course, found: Found, start: int) -> Track:
-    """The track with the errors taken off and the bands that are left; correlations are not given."""
-    P, sensors, estimate = track.P.copy(), track.sensors.copy(), found.estimate
+def corrected(damped: Track, found: Found, start: int) -> Track:
+    """A track whose errors are taken off, with the bands that are left; correlations are not given."""
+    P, sensors, estimate = damped.P.copy(), damped.sensors.copy(), found.estimate
     variance = np.einsum("kii->ki", P)[start:].copy()
     if found.bands is not None:
         sigma = found.bands.errors
@@ -119,7 +110,7 @@ def corrected(track: Track, damped: Course, found: Found, start: int) -> Track:
     P[start:] = 0.0
     states = np.arange(P.shape[1])
     P[start:, states, states] = variance
-    return replace(track, C_nb=damped.C_nb, v_n=damped.v_n, position=damped.position, P=P, sensors=sensors)
+    return replace(damped, P=P, sensors=sensors)
 
 
 def spectrum_of(v: Array, interval: float) -> Spectrum | None:

@@ -21,13 +21,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.damping.course import Course
+from truenorth.damping.course import linearised
 from truenorth.damping.filters import SETTLING, Filter, silences
 from truenorth.damping.loop import LONGEST_STEP, Loop, transition_and_input
 from truenorth.errors.marine import DV, MOTION
 from truenorth.filters.gains import Gains, filter_gains
 from truenorth.filters.kalman import kalman
 from truenorth.filters.system import LinearSystem
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -41,12 +42,12 @@ class Bands(NamedTuple):
     residual: Array
 
 
-def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: bool) -> Bands:
+def network_bands(course: Track, loop: Loop, whole: Filter, mu: Array, *, log: bool) -> Bands:
     """Of an INS with this loop: errors, network states, biases and errors of the log together.
 
     Parameters
     ----------
-    course : Course
+    course : Track
         From the switch on.
     whole : Filter
         All errors of INS and log: model, covariance at the switch, white noise of an epoch of the log.
@@ -56,18 +57,18 @@ def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: 
         It is fed with the log; else damping is internal.
     """
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
-    coarse = course.every(stride)
+    coarse = course[::stride]
     model, P0 = whole.model, whole.P0
-    F, _ = coarse.linearise(model)
+    F, _ = linearised(coarse, model)
     M, N = loop.matrices(F, coarse.position[1:, 0], np.interp(coarse.time[1:], course.time, mu))
     n, first = M.shape[1], MOTION.stop
     count = n + model.states - first
-    A, inputs = np.zeros((coarse.epochs, count, count)), np.zeros((coarse.epochs, count, 2))
+    A, inputs = np.zeros((len(coarse) - 1, count, count)), np.zeros((len(coarse) - 1, count, 2))
     A[:, :n, :n], inputs[:, :n] = M, N
     A[:, MOTION, n:] = F[:, MOTION, first:]
     A[:, n:, n:] = F[:, first:, first:]
     placed = np.concatenate([np.arange(first), np.arange(n, count)])  # the model's states
-    H = np.zeros((coarse.epochs, 2, count))
+    H = np.zeros((len(coarse) - 1, 2, count))
     H[:, :, placed] = whole.rows(coarse)  # dv - d: what is shown by the INS less what the log adds
     if log:
         added = H.copy()
@@ -86,7 +87,7 @@ def network_bands(course: Course, loop: Loop, whole: Filter, mu: Array, *, log: 
 
 
 def filter_bands(
-    course: Course,
+    course: Track,
     whole: Filter,
     one: Filter,
     two: Filter | None = None,
@@ -97,7 +98,7 @@ def filter_bands(
 
     Parameters
     ----------
-    course : Course
+    course : Track
         From the switch on.
     whole : Filter
         All errors of INS and log, as in :func:`network_bands`.
@@ -110,7 +111,7 @@ def filter_bands(
     """
     step = LONGEST_STEP if two is None else two.window
     stride = max(1, int(step / course.interval + 1e-9))
-    coarse = course.every(stride)
+    coarse = course[::stride]
     n, m = whole.model.states, one.model.states
     count = n + m + (0 if two is None else m)
     e, x1, x2 = slice(0, n), slice(n, n + m), slice(n + m, count)
@@ -119,30 +120,30 @@ def filter_bands(
     joint[e, e] = whole.P0
     P2 = None if two is None else two.P0
     R1 = one.sigma**2 / stride * np.eye(2)
-    absent = np.zeros(course.epochs + 1, dtype=bool) if absent is None else absent
+    absent = np.zeros(len(course), dtype=bool) if absent is None else absent
     silent = silences(absent, max(1, round(SETTLING / course.interval)))[::stride]
     absent = absent[::stride]
     # Until filter 1 has settled nothing goes into filter 2.
-    silent = silent | (np.arange(-1, coarse.epochs) * coarse.interval < SETTLING - 1e-6)
+    silent = silent | (np.arange(-1, len(coarse) - 1) * coarse.interval < SETTLING - 1e-6)
     share, apart = (None, None) if fused is None else (fused[0][::stride], fused[1][::stride])
-    errors, residual = np.empty((coarse.epochs + 1, MOTION.stop)), np.empty((coarse.epochs + 1, 2))
+    errors, residual = np.empty((len(coarse), MOTION.stop)), np.empty((len(coarse), 2))
     errors[0], residual[0] = np.diagonal(whole.P0)[MOTION], whole.sigma**2
     off, differs = np.zeros((2, MOTION.stop, count))  # of the last filter, and between the two
     last = x1 if two is None else x2
     off[:, MOTION] = -np.eye(MOTION.stop)
     off[:, last.start : last.start + MOTION.stop] = np.eye(MOTION.stop)
     differs[:, x1.start : x1.start + MOTION.stop] = np.eye(MOTION.stop)
-    for begin in range(0, coarse.epochs, PART):
-        part = coarse.between(begin, min(begin + PART, coarse.epochs))
-        rows = slice(begin + 1, begin + 1 + part.epochs)
+    for begin in range(0, len(coarse) - 1, PART):
+        part = coarse[begin : begin + PART + 1]
+        rows = slice(begin + 1, begin + len(part))
         mean = 0.5 * (part.v_n[1:] + part.v_n[:-1])
-        _, Phi = part.linearise(whole.model)
+        _, Phi = linearised(part, whole.model)
         Q, H = np.broadcast_to(whole.model.noise_of(part.interval, mean), Phi.shape), whole.rows(part)
-        F1, Phi1 = part.linearise(one.model)
+        F1, Phi1 = linearised(part, one.model)
         Q1, H1 = one.model.noise_of(part.interval, mean)[:1], one.rows(part)
         first, P1 = _gains(Phi1, Q1, H1, R1, absent[rows], P1)
-        A, G = np.zeros((part.epochs, count, count)), np.zeros((part.epochs, count, 2))
-        B = np.zeros((part.epochs, count, n))  # of the noise that drives the errors
+        A, G = np.zeros((len(part) - 1, count, count)), np.zeros((len(part) - 1, count, 2))
+        B = np.zeros((len(part) - 1, count, n))  # of the noise that drives the errors
         A[:, e, e], B[:, e] = Phi, np.eye(n)
         A[:, x1, e], A[:, x1, x1] = first.gain @ H @ Phi, first.step
         B[:, x1], G[:, x1] = first.gain @ H, first.gain
@@ -156,7 +157,7 @@ def filter_bands(
         driven = B @ Q @ np.swapaxes(B, -1, -2) + G @ R1 @ np.swapaxes(G, -1, -2)
         joints = _covariances(A, driven, joint)[1:]
         joint = joints[-1]
-        seen = np.repeat(off[None, DV], part.epochs, axis=0)
+        seen = np.repeat(off[None, DV], len(part) - 1, axis=0)
         seen[:, :, e] = -H  # x - (dv - d): the residual's slow part
         errors[rows], residual[rows] = _variances(off, joints), _variances(seen, joints)
         if share is not None and apart is not None:
@@ -201,7 +202,7 @@ def _given(variance: Array, covariance: Array, weight: Array, apart: Array, spre
     return np.maximum(variance - k**2 * spread, 0.0) + ((weight + k) * apart) ** 2
 
 
-def _spread(course: Course, coarse: Course, errors: Array, residual: Array) -> Bands:
+def _spread(course: Track, coarse: Track, errors: Array, residual: Array) -> Bands:
     """Roots of these variances, at all epochs of the course."""
 
     def at_all(variance: Array) -> Array:

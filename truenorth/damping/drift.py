@@ -20,10 +20,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.damping.course import Course
 from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.loop import LONGEST_STEP
 from truenorth.errors.log import DRIFT, LogErrors
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
 AS_LIKELY = 0.5
 
 
-def likely_drift(course: Course, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
+def likely_drift(course: Track, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
     """The log's errors with the most likely size and correlation time of its drift; an infinite time: a constant.
 
     Parameters
@@ -49,7 +49,7 @@ def likely_drift(course: Course, reference: Array, start: int, kind: Filter, giv
     given : LogErrors
     """
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
-    coarse, seen = course.between(start, course.epochs).every(stride), reference[start::stride]
+    coarse, seen = course[start::stride], reference[start::stride]
 
     def best(pairs: list[tuple[float, float]], slack: float = 0.0) -> tuple[float, float]:
         kinds = {str(pair): _with(kind, *pair) for pair in pairs}

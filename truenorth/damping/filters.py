@@ -25,10 +25,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
-from truenorth.damping.course import Course
+from truenorth.damping.course import linearised, without_errors
 from truenorth.errors.log import log_rows
 from truenorth.errors.marine import DP, DV, MOTION, PHI, STATES, MarineModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, gated, kalman
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -128,7 +129,7 @@ class Filter:
                 f"sigma {self.sigma:g}, window {self.window:g} s; expected sigma above zero, no negative window"
             )
 
-    def rows(self, course: Course) -> Array:
+    def rows(self, course: Track) -> Array:
         """(K, 2, n) what of its states ``v_INS - v_log`` shows, at the epochs of a course after the first."""
         v, C = course.v_n[1:], course.C_nb[1:]
         H = np.zeros((len(v), 2, self.model.states))
@@ -146,9 +147,9 @@ class Filter:
 class _Stream:
     """A filter that is fed block by block."""
 
-    def __init__(self, kind: Filter, course: Course, start: int) -> None:
+    def __init__(self, kind: Filter, course: Track, start: int) -> None:
         self.kind, self.lag, self.interval = kind, kind.lag(course.interval), course.interval
-        count, n = course.epochs + 1 - start, kind.model.states
+        count, n = len(course) - start, kind.model.states
         self.x, self.sigma, self.used = np.zeros((count, n)), np.empty((count, n)), np.full((count, 2), np.nan)
         self.sigma[0] = np.sqrt(np.diagonal(kind.P0))
         self.innovation, self.innovation_sigma = np.full((count, 2), np.nan), np.full((count, 2), np.nan)
@@ -156,19 +157,19 @@ class _Stream:
         self.rows = np.zeros((0, 2, n))
         self.done = 1
 
-    def feed(self, part: Course, z: Array, linear: tuple[Array, Array] | None = None) -> None:
+    def feed(self, part: Track, z: Array, linear: tuple[Array, Array] | None = None) -> None:
         """Take the next epochs: K intervals of the course, z (K, 2), F and Phi (K, n, n) where they are known."""
-        if self.kind.relinearise and part.epochs > FRESH:
-            for begin in range(0, part.epochs, FRESH):
-                end = min(begin + FRESH, part.epochs)
-                self.feed(part.between(begin, end), z[begin:end])
+        if self.kind.relinearise and len(z) > FRESH:
+            for begin in range(0, len(z), FRESH):
+                end = min(begin + FRESH, len(z))
+                self.feed(part[begin : end + 1], z[begin:end])
             return
         if self.kind.relinearise:
             last = self.x[self.done - 1, MOTION]
-            before = self.x[max(self.done - 1 - part.epochs, 0), MOTION]
+            before = self.x[max(self.done - len(part), 0), MOTION]
             ahead = last + (last - before if self.done > FRESH else 0.0) / 2.0  # at the middle of these epochs
-            part = part.corrected(ahead / 2.0)
-        F, Phi = part.linearise(self.kind.model) if linear is None else linear
+            part = without_errors(part, ahead / 2.0)
+        F, Phi = linearised(part, self.kind.model) if linear is None else linear
         n, K = self.kind.model.states, len(Phi)
         if self.lag == 0:
             H = self.kind.rows(part)
@@ -200,18 +201,18 @@ class _Stream:
         self._innovate(place, found)
         self.state, self.done = found.state, self.done + K
 
-    def _with_fixes(self, part: Course, z: Array, H: Array) -> tuple[Array, Array, Array]:
+    def _with_fixes(self, part: Track, z: Array, H: Array) -> tuple[Array, Array, Array]:
         """Rows of place (east, north, m) and heading behind those of the velocity, where there are fixes in this part."""
         R = self.kind.sigma**2 * np.eye(2)[None]
-        fixes, own = self.kind.fixes, slice(self.done, self.done + part.epochs)
+        fixes, own = self.kind.fixes, slice(self.done, self.done + len(z))
         if fixes is None or not np.isfinite(fixes.z[own]).any():
             return z, H, R
         rows = np.zeros((3, self.kind.model.states))
         rows[:2, DP], rows[2, PHI.stop - 1] = np.eye(2), 1.0
-        R = np.zeros((part.epochs, 5, 5))
+        R = np.zeros((len(z), 5, 5))
         R[:, :2, :2] = self.kind.sigma**2 * np.eye(2)
         R[:, range(2, 5), range(2, 5)] = fixes.sigma[own] ** 2
-        H = np.concatenate([H, np.broadcast_to(rows, (part.epochs, *rows.shape))], axis=1)
+        H = np.concatenate([H, np.broadcast_to(rows, (len(z), *rows.shape))], axis=1)
         return np.concatenate([z, fixes.z[own]], axis=1), H, R
 
     def _innovate(self, place: slice, found: Estimates) -> None:
@@ -233,7 +234,7 @@ class _Stream:
 
 
 def run_filters(
-    course: Course,
+    course: Track,
     reference: Array,
     *,
     start: int,
@@ -245,7 +246,7 @@ def run_filters(
 
     Parameters
     ----------
-    course : Course
+    course : Track
     reference : (K+1, 2) array, m/s
         Reference velocity east, north; NaN where absent.
     start : int
@@ -266,8 +267,8 @@ def run_filters(
     """
     if "filter2" in kinds and ("filter1" not in kinds or kinds["filter1"].window > 0.0):
         raise UsageError("filter2 is on the velocity that filter1 smooths; expected both, or another name for it alone")
-    if not 0 <= start < course.epochs:
-        raise UsageError(f"start at epoch {start}; expected 0 to {course.epochs - 1}")
+    if not 0 <= start < len(course) - 1:
+        raise UsageError(f"start at epoch {start}; expected 0 to {len(course) - 2}")
     if about is not None:
         kinds = {name: replace(kind, relinearise=False) for name, kind in kinds.items()}
     streams = {name: _Stream(kind, course, start) for name, kind in kinds.items()}
@@ -290,14 +291,14 @@ def run_filters(
 
     def run(name: str) -> None:
         stream = streams[name]
-        for begin in range(start, course.epochs, BLOCK):
-            end = min(begin + BLOCK, course.epochs)
-            part = course.between(begin, end)
-            linear = None if stream.kind.relinearise else part.linearise(stream.kind.model)
+        for begin in range(start, len(course) - 1, BLOCK):
+            end = min(begin + BLOCK, len(course) - 1)
+            part = course[begin : end + 1]
+            linear = None if stream.kind.relinearise else linearised(part, stream.kind.model)
             if about is not None:
                 known = about[begin - start : end - start + 1]
-                linear = part.corrected(0.5 * known).linearise(stream.kind.model)
-                part = part.corrected(known)
+                linear = linearised(without_errors(part, 0.5 * known), stream.kind.model)
+                part = without_errors(part, known)
             if stream.lag:
                 stream.feed(part, change(z, stream, begin, end, start), linear)
             else:

@@ -29,9 +29,10 @@ from numpy.typing import NDArray
 
 from truenorth.core import earth
 from truenorth.core.errors import UsageError
-from truenorth.damping.course import Course
+from truenorth.damping.course import linearised
 from truenorth.damping.networks import SCHULER_RATE, Network
 from truenorth.errors.marine import DV, MOTION, PHI, MarineModel
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -126,19 +127,19 @@ class Mode:
         return -self.eigenvalue.real / size if size > 0.0 else 0.0
 
 
-def eigenvalues(course: Course, loop: Loop, epoch: int = -1) -> list[Mode]:
+def eigenvalues(course: Track, loop: Loop, epoch: int = -1) -> list[Mode]:
     """Modes of the damped loop about an epoch of a course; the network's own poles among them.
 
     Parameters
     ----------
-    course : Course
+    course : Track
     loop : Loop
     epoch : int
         Which interval.
     """
-    first = epoch % course.epochs
-    part = course.between(first, first + 1)
-    F, _ = part.linearise(_QUIET)
+    first = epoch % (len(course) - 1)
+    part = course[first : first + 2]
+    F, _ = linearised(part, _QUIET)
     M, _ = loop.matrices(F, part.position[:1, 0], np.ones(1))
     return modes(M[0])
 
@@ -183,7 +184,7 @@ def in_words(modes: Sequence[Mode]) -> str:
 
 
 def network_correction(
-    course: Course,
+    course: Track,
     loop: Loop,
     reference: Array | None = None,
     *,
@@ -197,7 +198,7 @@ def network_correction(
 
     Parameters
     ----------
-    course : Course
+    course : Track
     loop : Loop
     reference : (K+1, 2) array, m/s
         Reference velocity east, north; NaN where absent, and the loop then coasts undamped. None: internal damping.
@@ -226,10 +227,10 @@ def network_correction(
     if reference is None and loop.azimuth_damping > 0.0:
         raise UsageError("azimuth damping needs a reference velocity: without one, north velocity is not wrong heading")
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
-    coarse = course.every(stride)
+    coarse = course[::stride]
     z = course.v_n[:, :2] - (0.0 if reference is None else reference)
-    z = _means(z, stride, coarse.epochs)
-    F, _ = coarse.linearise(_QUIET)
+    z = _means(z, stride, len(coarse) - 1)
+    F, _ = linearised(coarse, _QUIET)
     since = coarse.time[1:] - (coarse.time[0] if start is None else start)
     on = since > 1e-6
     damped: Array = np.asarray(np.clip(since / ramp, 0.0, 1.0) if ramp > 0.0 else on, dtype=np.float64)
@@ -241,14 +242,14 @@ def network_correction(
     if warm and reference is None:  # settled on the first velocity: H(0) = 1 lets nothing of it through
         A, B, _, _ = loop.network.realised()
         s[MOTION.stop :] = np.outer(z[0], np.linalg.solve(A, B)).ravel()
-    out = np.zeros((coarse.epochs + 1, MOTION.stop))
+    out = np.zeros((len(coarse), MOTION.stop))
     steps, inputs = transition_and_input(M, N, coarse.interval)
     deaf = np.isnan(z).any(axis=1) | ~listening
     M[:, :, DV] += N
     alone, _ = transition_and_input(M[deaf], N[deaf], coarse.interval)
     coast = dict(zip(np.flatnonzero(deaf), alone))
     switched = False
-    for k in range(coarse.epochs):
+    for k in range(len(coarse) - 1):
         if x0 is not None and on[k] and not switched:
             s[MOTION], s[MOTION.stop :], switched = x0, 0.0, True
             out[k] = x0

@@ -25,7 +25,7 @@ from truenorth.damping.answer import (
     switched,
 )
 from truenorth.damping.bands import filter_bands, network_bands
-from truenorth.damping.course import Course
+from truenorth.damping.course import motion_at, place_at, without_errors
 from truenorth.damping.drift import likely_drift
 from truenorth.damping.filters import Filter, FixRows, Fusion, run_filters
 from truenorth.damping.loop import LONGEST_STEP, Loop, eigenvalues, network_correction
@@ -43,6 +43,7 @@ from truenorth.quality.innovations import innovation_evidence, residual_evidence
 from truenorth.records import VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction, note
+from truenorth.state.layout import DV
 from truenorth.state.limits import limit
 
 if TYPE_CHECKING:
@@ -107,24 +108,23 @@ def damp_navigation(
         raise UsageError(f"fixes with damping {damper.method}; expected damping augmented, whose filter can weigh them")
     if strange := [group.name for group in others if group.name != DEFLECTION]:
         raise UsageError(f"damping with error states {', '.join(strange)}; expected {DEFLECTION!r} alone")
-    track = even(result.track)
-    course = _course(track)
+    course = even(result.track)
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
             f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most"
         )
     start = round(damper.start / course.interval)
-    if start >= course.epochs - 1:
+    if start >= len(course) - 2:
         raise DataError(
             f"damping begins {damper.start:g} s after {course.time[0]:.1f} s, the log ends at {course.time[-1]:.1f} s; expected an "
             "earlier start"
         )
-    finest = course if fine is None else _course(even(fine))
+    finest = course if fine is None else even(fine)
     log = LogOn(None, LogErrors(0.0), False) if velocity is None else _log_on(course, velocity, finest)
-    errors, evidence = _with_drift(course, track, log, spec, others, start)
-    whole = replace(_whole(track, log, errors, spec, others, start), fixes=_fixes_on(course, finest, fixes, start))
-    found = _damped(course, log.reference, spec, damper, start, whole, errors, track)
-    damped = course.corrected(found.x)
+    errors, evidence = _with_drift(course, log, spec, others, start)
+    whole = replace(_whole(course, log, errors, spec, others, start), fixes=_fixes_on(course, finest, fixes, start))
+    found = _damped(course, log.reference, spec, damper, start, whole, errors)
+    damped = without_errors(course, found.x)
     seen = slice(start, None)
     base = 0.0 if log.reference is None else log.reference.velocity[seen]
     spectra = [spectrum_of(c.v_n[seen, :2] - base, course.interval) for c in (course, damped)]
@@ -136,7 +136,7 @@ def damp_navigation(
         before=spectra[0],
         after=spectra[1],
         lines=lines_of(course.v_n[seen, :2] - base, course.interval),
-        modes=tuple(eigenvalues(course, _loop(damper), course.epochs // 2)) if network else (),
+        modes=tuple(eigenvalues(course, _loop(damper), (len(course) - 1) // 2)) if network else (),
         rejected=0 if found.estimate is None else found.estimate.rejected,
         length=float(course.time[-1] - course.time[start]),
         time=course.time[start:],
@@ -149,12 +149,13 @@ def damp_navigation(
     if log.reference is not None:
         evidence += log.reference.evidence()
         if damper.needs_reference:
-            evidence += _contradiction(course, log.reference, track.sigma[:, 3:5], log.errors, start)
+            evidence += _contradiction(course, log.reference, log.errors, start)
     evidence += [] if not report.rejected else [note("log.rejected", count=report.rejected)]
     if found.switching is not None and found.switching.switches:
         evidence.append(switched(found.switching, course.time))
+    track = course
     if damper.method != "none":
-        track = corrected(track, damped, found, start)
+        track = corrected(damped, found, start)
         track = replace(track, residuals=tuple(residuals))
     if damper.method == "augmented":
         evidence += innovation_evidence(residuals, last_sigma(track))
@@ -163,65 +164,65 @@ def damp_navigation(
     return judged_navigation(replace(result, track=track, damping=report), evidence)
 
 
-def _log_on(course: Course, velocity: VelocityLog, seen: Course) -> LogOn:
+def _log_on(course: Track, velocity: VelocityLog, seen: Track) -> LogOn:
     record = _mounted(velocity.record, velocity.mounting)
     errors = log_errors(velocity.errors, record.frame)
     return LogOn(reference_of(course, record, errors, seen), errors, record.frame == "body")
 
 
-def _fixes_on(course: Course, seen: Course, fixes: Fixes, start: int) -> FixRows | None:
+def _fixes_on(course: Track, seen: Track, fixes: Fixes, start: int) -> FixRows | None:
     """Fixes as errors of the course at their own times, given to the nearest epochs after the switch."""
-    z, sigma = np.full((course.epochs + 1, 3), np.nan), np.ones((course.epochs + 1, 3))
+    z, sigma = np.full((len(course), 3), np.nan), np.ones((len(course), 3))
 
     def epoch(time: float) -> int:
         k = round((time - course.time[0]) / course.interval)
-        if not start < k <= course.epochs:
+        if not start < k < len(course):
             raise DataError(
                 f"a fix at {time:.1f} s; damping runs from {course.time[start]:.1f} s to {course.time[-1]:.1f} s"
             )
         return k
 
     for fix in fixes.positions:
-        k, (lat, lon, alt) = epoch(fix.time), seen.place(fix.time)
+        k, (lat, lon, alt) = epoch(fix.time), place_at(seen, fix.time)
         R_M, R_N = earth.radii(lat)
         apart = math.remainder(lon - fix.lon, 2.0 * math.pi)
         z[k, :2], sigma[k, :2] = (apart * (R_N + alt) * math.cos(lat), (lat - fix.lat) * (R_M + alt)), fix.sigma
     for turn in fixes.azimuths:
-        k, C_nb = epoch(turn.time), seen.at(np.array([turn.time]))[0][0]
+        k, C_nb = epoch(turn.time), motion_at(seen, np.array([turn.time]))[0][0]
         heading = math.atan2(C_nb[0, 1], C_nb[1, 1])
         z[k, 2], sigma[k, 2] = math.remainder(heading - turn.heading, 2.0 * math.pi), turn.sigma
     return FixRows(z[start:], sigma[start:]) if np.isfinite(z).any() else None
 
 
 def _with_drift(
-    course: Course, track: Track, log: LogOn, spec: ImuSpec, others: Sequence[Group], start: int
+    course: Track, log: LogOn, spec: ImuSpec, others: Sequence[Group], start: int
 ) -> tuple[LogErrors, list[Evidence]]:
     """Errors of the log; a drift of which nobody knows how long it lasts is found."""
     errors = log.errors
     if log.reference is None or errors.drift == 0.0 or errors.drift_time is not None:
         return errors, []
-    kind = _whole(track, log, errors, spec, others, start)
+    kind = _whole(course, log, errors, spec, others, start)
     found = likely_drift(course, log.reference.velocity, start, kind, errors)
     if math.isinf(found.time):
         return found, [note("log.constant")]
     return found, [note("log.drifts", drift=found.drift, hours=found.time / 3600.0)]
 
 
-def _whole(track: Track, log: LogOn, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
+def _whole(course: Track, log: LogOn, errors: LogErrors, spec: ImuSpec, others: Sequence[Group], start: int) -> Filter:
     """All errors of INS and log at the switch."""
     model = MarineModel.from_spec(spec, (*errors.groups(), *others))
     places, rows = list(range(STATES)), OF_INS.tolist()
-    deflected, there = model.slice_of(DEFLECTION), track.layout.slice_of(DEFLECTION)
+    deflected, there = model.slice_of(DEFLECTION), course.layout.slice_of(DEFLECTION)
     if deflected is not None and there is not None:
         places += range(deflected.start, deflected.stop)
         rows += range(there.start, there.stop)
     P = model.prior(np.zeros((STATES, STATES)))
-    P[np.ix_(places, places)] = track.P[start][np.ix_(rows, rows)]
+    P[np.ix_(places, places)] = course.P[start][np.ix_(rows, rows)]
     noise = LEAST_NOISE if log.reference is None else log.reference.noise
     return Filter(model, P, noise, relinearise=True, turned=log.turned)
 
 
-def _contradiction(course: Course, reference: Reference, sigma: Array, errors: LogErrors, start: int) -> list[Evidence]:
+def _contradiction(course: Track, reference: Reference, errors: LogErrors, start: int) -> list[Evidence]:
     """That a log cannot be this vehicle's.
 
     For more than half of the log it differs from the free INS by more than both can be wrong. A log that is dead or in other
@@ -230,7 +231,7 @@ def _contradiction(course: Course, reference: Reference, sigma: Array, errors: L
     off = np.abs(course.v_n[start:, :2] - reference.velocity[start:])
     rows = log_rows(errors.groups(), course.C_nb[start:], course.v_n[start:])
     own = np.concatenate([np.zeros(0), *(group.prior for group in errors.groups())])
-    expected = np.sqrt(sigma[start:] ** 2 + (rows**2 @ own**2) + reference.noise**2)
+    expected = np.sqrt(course.sigma[start:, DV][:, :2] ** 2 + (rows**2 @ own**2) + reference.noise**2)
     there = np.isfinite(off).all(axis=1)
     if not there.any() or np.median((off / expected)[there].max(axis=1)) <= limit("log"):
         return []
@@ -263,21 +264,20 @@ def _loop(damper: Damper) -> Loop:
 
 
 def _damped(
-    course: Course,
+    course: Track,
     reference: Reference | None,
     spec: ImuSpec,
     damper: Damper,
     start: int,
     whole: Filter,
     errors: LogErrors,
-    track: Track,
 ) -> Found:
-    x = np.zeros((course.epochs + 1, MOTION.stop))
-    rest = course.between(start, course.epochs)
+    x = np.zeros((len(course), MOTION.stop))
+    rest = course[start:]
     if damper.method == "none":
         return Found(x, None, None, None)
     if damper.method in ("internal", "external"):
-        return _by_network(course, rest, reference, damper, start, whole, track)
+        return _by_network(course, reference, damper, start, whole)
     assert reference is not None  # checked before
     if damper.method == "augmented":
         kinds = {"augmented": replace(whole, gate=GATE)}
@@ -314,29 +314,23 @@ def change_filter(one: Filter, errors: LogErrors, interval: float) -> Filter:
 
 
 def _by_network(
-    course: Course,
-    rest: Course,
+    course: Track,
     reference: Reference | None,
     damper: Damper,
     start: int,
     whole: Filter,
-    track: Track,
 ) -> Found:
     """A network's correction, its bands, and what manoeuvres add to those of internal damping."""
     loop, at = _loop(damper), float(course.time[start])
     internal = damper.method == "internal"
     used = None if internal or reference is None else reference.velocity
-    sigma = np.sqrt(np.mean(track.sigma[:, 3:5] ** 2, axis=1))
+    sigma = np.sqrt(np.mean(course.sigma[:, DV][:, :2] ** 2, axis=1))
     found = switching(course, loop.network, sigma) if internal else None
-    mu = found.mu if found is not None and damper.switching else np.ones(course.epochs + 1)
+    mu = found.mu if found is not None and damper.switching else np.ones(len(course))
     x = network_correction(course, loop, used, start=at, ramp=damper.ramp, mu=mu)
-    bands = network_bands(rest, loop, whole, mu[start:], log=used is not None)
+    bands = network_bands(course[start:], loop, whole, mu[start:], log=used is not None)
     if found is not None:  # a manoeuvre's part alone, as if the rest of the velocity were known
         still = course.v_n[:, :2] - found.manoeuvre
         added = network_correction(course, loop, still, start=at, ramp=damper.ramp, mu=mu)
         bands = bands._replace(errors=np.hypot(bands.errors, added[start:]))
     return Found(x, bands, None, found if damper.switching else None)
-
-
-def _course(track: Track) -> Course:
-    return Course(track.time, track.C_nb, track.v_n, track.position)

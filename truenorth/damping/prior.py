@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.linalg import symmetric
 from truenorth.core.units import parse
-from truenorth.damping.course import Course
+from truenorth.damping.course import linearised
 from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES, MarineModel
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 
-def paper_prior(course: Course, epoch: int) -> Array:
+def paper_prior(course: Track, epoch: int) -> Array:
     """(13, 13) of the paper's scenario at 2.5 h, in our units: 1 m/s, .05 deg, 1'/1'/15', 1e-4 g, .01 deg/h.
 
     The paper does not state it; these match its figures.
@@ -32,12 +33,12 @@ def paper_prior(course: Course, epoch: int) -> Array:
     return np.diag(sigma**2)
 
 
-def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array) -> Array:
+def carried_prior(course: Track, epoch: int, model: MarineModel, P0: Array) -> Array:
     """(n, n) covariance at an epoch, of errors that had `P0` at the beginning of the course.
 
     Parameters
     ----------
-    course : Course
+    course : Track
     epoch : int
         Of the switch.
     model : MarineModel
@@ -47,12 +48,12 @@ def carried_prior(course: Course, epoch: int, model: MarineModel, P0: Array) -> 
     """
     P = model.prior(P0)
     stride = max(1, int(10.0 / course.interval + 1e-9))
-    head, rest = course.between(0, max(epoch, 1)).every(stride), epoch % stride
-    parts = [head.between(0, epoch // stride)] if epoch >= stride else []
+    head, rest = course[: max(epoch, 1) + 1 : stride], epoch % stride
+    parts = [head[: epoch // stride + 1]] if epoch >= stride else []
     if rest:
-        parts.append(course.between(epoch - rest, epoch))
+        parts.append(course[epoch - rest : epoch + 1])
     for part in parts:
-        _, Phi = part.linearise(model)
+        _, Phi = linearised(part, model)
         Q = model.noise_of(part.interval, 0.5 * (part.v_n[1:] + part.v_n[:-1]))
         for step, noise in zip(Phi, np.broadcast_to(Q, Phi.shape), strict=True):
             P = step @ P @ step.T + noise

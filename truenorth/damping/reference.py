@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.damping.course import Course
+from truenorth.damping.course import motion_at
 from truenorth.errors.log import LogErrors, log_rows
 from truenorth.records import VelocityRecord
 from truenorth.state.evidence import Evidence, note
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ class Reference:
         return found + [note("log.silent", time=time, length=length) for time, length in self.gaps]
 
 
-def reference_of(course: Course, record: VelocityRecord, errors: LogErrors, fine: Course | None = None) -> Reference:
+def reference_of(course: Track, record: VelocityRecord, errors: LogErrors, fine: Track | None = None) -> Reference:
     """Bring a velocity log onto a course.
 
     A log in body axes is turned by the course's attitude; one of forward speed alone is taken to make no leeway. What INS and
@@ -79,11 +80,11 @@ def reference_of(course: Course, record: VelocityRecord, errors: LogErrors, fine
 
     Parameters
     ----------
-    course : Course
+    course : Track
     record : VelocityRecord
     errors : LogErrors
         Its slow errors.
-    fine : Course, optional
+    fine : Track, optional
         The same INS at finer epochs, by which rows between the epochs of `course` are compared.
 
     Raises
@@ -107,15 +108,15 @@ def reference_of(course: Course, record: VelocityRecord, errors: LogErrors, fine
         )
     nearest, velocity = nearest[inside], np.nan_to_num(record.velocity[inside])
     seen = course if fine is None else fine
-    C_nb, v_n = seen.at(record.time[inside])
+    C_nb, v_n = motion_at(seen, record.time[inside])
     if record.frame == "body":
         velocity = np.einsum("kij,kj->ki", C_nb, velocity)
-    count = np.bincount(nearest, minlength=course.epochs + 1)
-    mean = np.full((course.epochs + 1, 2), np.nan)
+    count = np.bincount(nearest, minlength=len(course))
+    mean = np.full((len(course), 2), np.nan)
     full = count > 0
-    times = np.bincount(nearest, record.time[inside], minlength=course.epochs + 1)[full] / count[full]
+    times = np.bincount(nearest, record.time[inside], minlength=len(course))[full] / count[full]
     for axis in range(2):
-        total = np.bincount(nearest, v_n[:, axis] - velocity[:, axis], minlength=course.epochs + 1)
+        total = np.bincount(nearest, v_n[:, axis] - velocity[:, axis], minlength=len(course))
         off = _on_epochs(total[full] / count[full], times, course.time[full], T)
         mean[full, axis] = course.v_n[full, axis] - off
     given = None
@@ -126,11 +127,11 @@ def reference_of(course: Course, record: VelocityRecord, errors: LogErrors, fine
     return cleaned(course, mean, record.source, given, change_of(course, errors))
 
 
-def change_of(course: Course, errors: LogErrors) -> Array:
+def change_of(course: Track, errors: LogErrors) -> Array:
     """(K+1,) one-sigma of what errors fixed to the hull change in two minutes about each epoch, of the worse axis, m/s."""
     n = max(1, round(MINUTE / course.interval))
-    k = np.arange(course.epochs + 1)
-    before, after = np.maximum(k - n, 0), np.minimum(k + n, course.epochs)
+    k = np.arange(len(course))
+    before, after = np.maximum(k - n, 0), np.minimum(k + n, len(course) - 1)
     groups = errors.groups()
     rows = log_rows(groups, course.C_nb, course.v_n)
     own = np.concatenate([np.zeros(0), *(group.prior for group in groups)])
@@ -147,7 +148,7 @@ def _on_epochs(off: Array, times: Array, epochs: Array, interval: float) -> Arra
 
 
 def cleaned(
-    course: Course,
+    course: Track,
     velocity: Array,
     source: str = "reference",
     noise: float | None = None,
@@ -157,7 +158,7 @@ def cleaned(
 
     Parameters
     ----------
-    course : Course
+    course : Track
     velocity : (K+1, 2) array, m/s
         NaN where absent.
     source : str
@@ -250,8 +251,8 @@ def _step(d: Array, k: int, n: int) -> Array:
     return np.asarray(weights[::-1] @ d[k : k + n] - weights @ d[k - n : k])
 
 
-def _gaps(course: Course, rows: NDArray[np.int64]) -> tuple[tuple[float, float], ...]:
-    edges = course.time[np.concatenate([[0], rows, [course.epochs]])]
+def _gaps(course: Track, rows: NDArray[np.int64]) -> tuple[tuple[float, float], ...]:
+    edges = course.time[np.concatenate([[0], rows, [len(course) - 1]])]
     steps = np.diff(edges)
     least = max(GAP, 3.0 * course.interval)
     return tuple((float(edges[i]), float(steps[i])) for i in np.flatnonzero(steps > least))

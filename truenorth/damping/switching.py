@@ -10,16 +10,16 @@ Source: D. Huang, L. Cheng, *Inertial Navigation Systems* (1986), ch. 5 (undampe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.damping.adaptive import leaked
-from truenorth.damping.course import Course
 from truenorth.damping.loop import LONGEST_STEP
 from truenorth.damping.networks import SCHULER_RATE, Network
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -49,18 +49,18 @@ class Switching:
     switches: tuple[Switch, ...]
 
 
-def switching(course: Course, network: Network, sigma: Array) -> Switching:
+def switching(course: Track, network: Network, sigma: Array) -> Switching:
     """The switches of internal damping on a course.
 
     Parameters
     ----------
-    course : Course
+    course : Track
     network : Network
     sigma : (K+1,) array, m/s
         Of the undamped INS's velocity.
     """
     manoeuvre = manoeuvred(course, sigma)
-    shown = Course(course.time, course.C_nb, np.column_stack([manoeuvre, np.zeros(len(sigma))]), course.position)
+    shown = replace(course, v_n=np.column_stack([manoeuvre, np.zeros(len(sigma))]))
     leak = np.linalg.norm(leaked(shown, network), axis=1)
     allowed = SHARE * sigma
     mu, switches, damped = np.ones(len(leak)), [], True
@@ -72,10 +72,10 @@ def switching(course: Course, network: Network, sigma: Array) -> Switching:
     return Switching(mu, manoeuvre, leak, allowed, tuple(switches))
 
 
-def manoeuvred(course: Course, sigma: Array) -> Array:
+def manoeuvred(course: Track, sigma: Array) -> Array:
     """(K+1, 2) what manoeuvres have changed of the velocity, m/s: by turns of the head, and beyond an INS's own errors."""
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
-    coarse = course.every(stride)
+    coarse = course[::stride]
     v = coarse.v_n[:, :2]
     heading = np.unwrap(np.arctan2(coarse.C_nb[:, 0, 1], coarse.C_nb[:, 1, 1]))
     s, c = np.sin(np.diff(heading)), np.cos(np.diff(heading))

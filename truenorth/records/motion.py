@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 class MotionStates:
     """Motion at a set of times, any leading shape.
 
+    Not a :class:`truenorth.state.track.Track`: what an IMU feels there, rate and force, comes with it, and nothing is estimated.
+
     Attributes
     ----------
     time : (...) array, s

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import SupportsFloat
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import WholeBiases
@@ -26,6 +27,20 @@ class State:
     gyro_bias: Array  # (3,) rad/s
     accel_bias: Array  # (3,) m/s^2
 
+    @classmethod
+    def at(
+        cls,
+        C_nb: ArrayLike,
+        lat: SupportsFloat,
+        lon: SupportsFloat = 0.0,
+        alt: SupportsFloat = 0.0,
+        v_n: ArrayLike = (0.0, 0.0, 0.0),
+        time: float = 0.0,
+    ) -> State:
+        """A motion (attitude (3, 3), rad, m, m/s, s) of an IMU without biases."""
+        C, v = (np.array(values, dtype=np.float64) for values in (C_nb, v_n))
+        return State(time, C, v, float(lat), float(lon), float(alt), np.zeros(3), np.zeros(3))
+
 
 @dataclass(frozen=True)
 class Start(State):
@@ -33,8 +48,9 @@ class Start(State):
 
     Attributes
     ----------
-    P : (15, 15) array
-        Covariance of the errors phi, dv, dp, gyro and accelerometer bias (see :mod:`truenorth.errors.ins`), ENU.
+    P : (15, 15) or (n, n) array
+        Covariance of the errors phi, dv, dp, gyro and accelerometer bias (see :mod:`truenorth.errors.ins`), ENU; where a procedure
+        gives the prior of its groups too, of all states of its model.
     whole : WholeBiases or None
         The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
     wheel : Mounting or None

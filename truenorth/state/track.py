@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, Layout
+from truenorth.core.errors import DataError
+from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
 
 Array = NDArray[np.float64]
+Rows = slice | NDArray[np.integer[Any]] | NDArray[np.bool_]
 
+UNEVEN = 0.01  # share of the interval by which the time steps of even epochs may differ
 
 ARRAYS = ("time", "C_nb", "v_n", "position", "sensors", "P")  # of a track, a row an epoch
 RESIDUALS = ("time", "innovation", "sigma", "nis", "used", "stamp", "jumped")  # of residuals, a row a measurement
@@ -79,6 +83,43 @@ class Track:
     P: Array  # (K, n, n): covariance of the errors; K = 0 where none was asked for
     layout: Layout  # of the states
     residuals: tuple[Residuals, ...]
+
+    @classmethod
+    def of_motion(cls, time: Array, C_nb: Array, v_n: Array, position: Array, biases: Array | None = None) -> Track:
+        """A track that is a motion alone: the truth, or a free INS; `biases` (6,), of gyros and accelerometers, are assumed."""
+        sensors = np.zeros(STATES)
+        if biases is not None:
+            sensors[BG], sensors[BA] = biases[:3], biases[3:]
+        assumed = np.broadcast_to(sensors, (len(time), STATES))
+        return cls(time, C_nb, v_n, position, assumed, np.zeros((0, STATES, STATES)), Layout(), ())
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, rows: Rows) -> Track:
+        """Some of the epochs; the residuals, which have rows of their own, stay with the whole track."""
+        some = {name: values[rows] if len(values) else values for name in ARRAYS for values in [getattr(self, name)]}
+        return replace(self, residuals=(), **some)
+
+    @cached_property
+    def interval(self) -> float:
+        """From epoch to epoch, s.
+
+        Raises
+        ------
+        DataError
+            Fewer than two epochs, or time steps that differ.
+        """
+        steps = np.diff(self.time)
+        if len(steps) < 1:
+            raise DataError(f"a track of {len(self)} epochs; expected two at least")
+        odd = np.flatnonzero(np.abs(steps - np.median(steps)) > UNEVEN * np.median(steps))
+        if odd.size:
+            raise DataError(
+                f"a track with a step of {steps[odd[0]]:.3f} s after {self.time[odd[0]]:.3f} s, all others are "
+                f"{np.median(steps):.3f} s; expected even epochs"
+            )
+        return float((self.time[-1] - self.time[0]) / len(steps))
 
     def bias(self, group: slice, slow: str) -> Array:
         """(K, 3) a sensor's whole bias, its slow part included."""

@@ -15,12 +15,11 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from truenorth.core import earth
 from truenorth.core.attitude import (
     cross,
-    dcm_from_quaternion,
     normalised,
     quaternion_from_dcm,
     quaternion_from_rotation_vector,
@@ -30,99 +29,82 @@ from truenorth.core.attitude import (
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
 from truenorth.records import ImuRecord
+from truenorth.state.state import State
+from truenorth.state.track import Track
 from truenorth.strapdown.coning import Algorithm, coefficients, rotation_vector, update_sums, velocity_increment
 from truenorth.strapdown.increments import increments, interval_lengths, last_rows, read_only
 from truenorth.strapdown.inertial_integration import inertial_integrals, integrate_attitude
+from truenorth.strapdown.wander import set_matrix
 
 __all__ = [
-    "Mechanisation",
-    "NavigationState",
+    "Underway",
+    "go_on",
     "increments",
     "inertial_integrals",
     "integrate_attitude",
     "mechanise",
+    "underway",
 ]
 
 Array = NDArray[np.float64]
+Altitude = Literal["free", "fixed"]
+
+VELOCITY, PLACE = slice(4, 7), slice(7, 10)  # in the vector of the motion, behind the quaternion
 
 _normal_gravity_at = borrowing(earth.normal_gravity_at, forceinline=True)
 _radii_at = borrowing(earth.radii_at, forceinline=True)
 
 
 @dataclass(frozen=True)
-class Memory:
-    """What the algorithm remembers of the samples it has seen, besides the motion itself."""
+class Underway:
+    """Where a mechanisation stands between two chunks of a log.
 
-    # (3,) m/s^2: mean of ``dv_n/dt`` over the last update: extrapolates velocity to the middle of the next
-    acceleration: Array = field(default_factory=lambda: np.zeros(3))
-    dtheta: Array = field(default_factory=lambda: np.zeros(3))  # (3,) rad: last sample of the last update
-    dvel: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m/s
+    Not a :class:`truenorth.state.state.State`: a matrix made of the quaternion and back would not give the bits of one batch.
+    """
+
+    # (19,): quaternion ``q_nb``, velocity, place, mean acceleration over the last update, which extrapolates velocity to the
+    # middle of the next, and the increments of the last sample, as of :func:`mechanise_increments`
+    motion: Array
+    biases: Array  # (6,) rad/s and m/s^2: of gyros and accelerometers, taken off
+    # s; nominal sampling interval; None: that of the first record. Given, chunks have the bits of one batch however their
+    # time stamps were rounded.
+    interval: float | None = None
     # (M, 7): samples (interval, dtheta, dvel) that do not fill an update yet
     rest: Array = field(default_factory=lambda: np.zeros((0, 7)))
     before: ImuRecord | None = None  # the last rows of the record
     updates: int = 0  # since the last output
 
 
-@dataclass(frozen=True)
-class NavigationState:
-    """Where a mechanisation stands, and all it needs to go on.
+def underway(start: State, interval: float | None = None, before: ImuRecord | None = None) -> Underway:
+    """A mechanisation at its beginning.
 
-    Correct the motion between chunks with :func:`dataclasses.replace`; the memory stays.
+    Parameters
+    ----------
+    start : State
+        At the beginning of the first row's interval; its biases are taken off.
+    interval : float, s, optional
+        Nominal, of the samples; that of the first record when left out.
+    before : ImuRecord, optional
+        The rows just before the start, which rates need to be integrated to third order from the first sample on.
     """
-
-    q_nb: Array  # (4,): attitude quaternion, scalar first
-    v_n: Array  # (3,) m/s: East, north, up
-    lat: float  # rad
-    lon: float  # rad
-    alt: float  # m
-    # s; nominal sampling interval; None: that of the first record. Given, chunks have the bits of one batch however their
-    # time stamps were rounded.
-    interval: float | None = None
-    memory: Memory = field(default_factory=Memory, repr=False)
-
-    @classmethod
-    def at(
-        cls,
-        C_nb: ArrayLike,
-        lat: float,
-        lon: float = 0.0,
-        alt: float = 0.0,
-        v_n: ArrayLike = (0.0, 0.0, 0.0),
-        interval: float | None = None,
-    ) -> NavigationState:
-        """State to begin with, from an attitude matrix (3, 3)."""
-        return cls(quaternion_from_dcm(C_nb), np.array(v_n, dtype=np.float64), lat, lon, alt, interval)
-
-    @property
-    def C_nb(self) -> Array:
-        """(3, 3) attitude."""
-        return dcm_from_quaternion(self.q_nb)
-
-
-@dataclass(frozen=True)
-class Mechanisation:
-    """Computed motion at the output epochs."""
-
-    time: Array  # (K,) s
-    q_nb: Array  # (K, 4): attitude quaternion, scalar first
-    v_n: Array  # (K, 3) m/s: East, north, up
-    position: Array  # (K, 3): latitude, longitude (rad), height (m)
-    state: NavigationState  # to go on from: after the last whole update, whether it was put out or not
-
-    @property
-    def C_nb(self) -> Array:
-        """(K, 3, 3) attitude."""
-        return dcm_from_quaternion(self.q_nb)
+    motion = np.zeros(19)
+    motion[:4], motion[VELOCITY], motion[PLACE] = (
+        quaternion_from_dcm(start.C_nb),
+        start.v_n,
+        (start.lat, start.lon, start.alt),
+    )
+    rows = None if before is None else last_rows(before)
+    return Underway(motion, np.concatenate([start.gyro_bias, start.accel_bias]), interval, before=rows)
 
 
 def mechanise(
     record: ImuRecord,
-    state: NavigationState,
+    start: State,
     *,
     algorithm: Algorithm = "previous",
-    altitude: Literal["free", "fixed"] = "free",
+    altitude: Altitude = "free",
     every: int = 1,
-) -> Mechanisation:
+) -> Track:
     """Carry attitude, velocity and position on through a record.
 
     Coriolis, transport and gravity are taken at the middle of an update, extrapolated from the last one: of second
@@ -132,8 +114,8 @@ def mechanise(
     ----------
     record : ImuRecord
         Without gaps: what an increment row after a gap has missed is missing from the answer.
-    state : NavigationState
-        At the beginning of the first row's interval, or what an earlier chunk ended with.
+    start : State
+        At the beginning of the first row's interval; its biases are taken off.
     algorithm : {"previous", "1", "2", "3", "4"}
         Samples an update and their coning and sculling correction; "previous" updates at every sample, with the sample
         before it; "1" corrects nothing.
@@ -141,6 +123,41 @@ def mechanise(
         Free vertical channel, or height held and vertical velocity zero (at sea).
     every : int
         Output after every so many updates; 1 is the full rate.
+
+    Returns
+    -------
+    Track
+        The motion at the outputs, without covariance.
+
+    Raises
+    ------
+    UsageError
+        An algorithm that is not known; `altitude` neither free nor fixed; `every` below 1.
+    """
+    return go_on(record, underway(start), algorithm=algorithm, altitude=altitude, every=every)[1]
+
+
+def go_on(
+    record: ImuRecord,
+    state: Underway,
+    *,
+    algorithm: Algorithm = "previous",
+    altitude: Altitude = "free",
+    every: int = 1,
+) -> tuple[Underway, Track]:
+    """Take the next chunk of a log; the options as of :func:`mechanise`, the same for all chunks.
+
+    Parameters
+    ----------
+    record : ImuRecord
+    state : Underway
+        Left as it is.
+
+    Returns
+    -------
+    state : Underway
+        After the last whole update, whether it was put out or not.
+    track : Track
 
     Raises
     ------
@@ -155,52 +172,36 @@ def mechanise(
         raise UsageError(f"every={every}; expected 1 (each update) or more")
     k, k_before = coefficients(algorithm)
     samples = len(k) + 1
-    memory = state.memory
     interval = record.interval if state.interval is None else state.interval
-    rest = len(memory.rest)
-    dtheta, dvel = increments(record, memory.before, interval)
-    steps = interval_lengths(record, memory.before, interval)
+    rest = len(state.rest)
+    dtheta, dvel = increments(record, state.before, interval)
+    steps = interval_lengths(record, state.before, interval)
+    if state.biases.any():
+        taken = steps[:, None] * state.biases
+        dtheta, dvel = dtheta - taken[:, :3], dvel - taken[:, 3:]
     if rest:
-        steps = np.concatenate([memory.rest[:, 0], steps])
-        dtheta = np.vstack([memory.rest[:, 1:4], dtheta])
-        dvel = np.vstack([memory.rest[:, 4:7], dvel])
+        steps = np.concatenate([state.rest[:, 0], steps])
+        dtheta = np.vstack([state.rest[:, 1:4], dtheta])
+        dvel = np.vstack([state.rest[:, 4:7], dvel])
 
     updates = len(steps) // samples
-    outputs = (memory.updates + updates) // every
-    kernel = np.concatenate(
-        [
-            state.q_nb,
-            state.v_n,
-            [state.lat, state.lon, state.alt],
-            memory.acceleration,
-            memory.dtheta,
-            memory.dvel,
-        ]
-    )
-    out = np.empty((outputs, 10))
+    outputs = (state.updates + updates) // every
+    motion, C_nb, out = state.motion.copy(), np.empty((outputs, 3, 3)), np.empty((outputs, 6))
     data = (read_only(a) for a in (steps, dtheta, dvel, k))
-    mechanise_increments(*data, k_before, altitude == "fixed", every, memory.updates, kernel, out)
+    mechanise_increments(*data, k_before, altitude == "fixed", every, state.updates, motion, C_nb, out)
 
     done = updates * samples
-    after = NavigationState(
-        q_nb=kernel[:4],
-        v_n=kernel[4:7],
-        lat=float(kernel[7]),
-        lon=float(kernel[8]),
-        alt=float(kernel[9]),
-        interval=interval,
-        memory=Memory(
-            acceleration=kernel[10:13],
-            dtheta=kernel[13:16],
-            dvel=kernel[16:19],
-            rest=np.column_stack([steps[done:], dtheta[done:], dvel[done:]]),
-            before=last_rows(record),
-            updates=memory.updates + updates - outputs * every,
-        ),
+    after = Underway(
+        motion,
+        state.biases,
+        interval,
+        rest=np.column_stack([steps[done:], dtheta[done:], dvel[done:]]),
+        before=last_rows(record),
+        updates=state.updates + updates - outputs * every,
     )
     # Row of the record with which the update of each output ends; the first ends in this record, never in the rest.
-    ends = ((np.arange(outputs) + 1) * every - memory.updates) * samples - 1 - rest
-    return Mechanisation(record.time[ends], out[:, :4], out[:, 4:7], out[:, 7:], after)
+    ends = ((np.arange(outputs) + 1) * every - state.updates) * samples - 1 - rest
+    return after, Track.of_motion(record.time[ends], C_nb, out[:, :3], out[:, 3:], state.biases)
 
 
 @compiled
@@ -214,6 +215,7 @@ def mechanise_increments(
     every: int,
     since_output: int,
     state: Any,
+    C_nb: Any,
     out: Any,
 ) -> None:
     """The compiled loop of :func:`mechanise`: updates of attitude, velocity and position in place; nothing is checked.
@@ -237,8 +239,10 @@ def mechanise_increments(
     state : (19,) array
         Quaternion ``q_nb`` (scalar first), velocity east, north, up (m/s), latitude, longitude (rad), height (m), acceleration
         (m/s^2), last `dtheta` and `dvel`; overwritten with those at the end.
-    out : (M, 10) array
-        The first ten of these after every so many updates; written.
+    C_nb : (M, 3, 3) array
+        Attitude after every so many updates; written.
+    out : (M, 6) array
+        Velocity and place then; written.
     """
     samples = len(k) + 1
     q = (state[0], state[1], state[2], state[3])
@@ -300,9 +304,9 @@ def mechanise_increments(
         since_output += 1
         if since_output == every:
             since_output = 0
-            out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q
-            out[j, 4], out[j, 5], out[j, 6] = vE, vN, vU
-            out[j, 7], out[j, 8], out[j, 9] = lat, lon, alt
+            set_matrix(q, C_nb[j])
+            out[j, 0], out[j, 1], out[j, 2] = vE, vN, vU
+            out[j, 3], out[j, 4], out[j, 5] = lat, lon, alt
             j += 1
     state[0], state[1], state[2], state[3] = q
     state[4], state[5], state[6] = vE, vN, vU

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.units import parse
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of
 from truenorth.damping.filters import Estimate, Filter, Fusion, run_filters
 from truenorth.damping.loop import Loop, network_correction
 from truenorth.damping.networks import second_order
 from truenorth.damping.prior import carried_prior, paper_prior
 from truenorth.errors.log import LogErrors
-from truenorth.errors.marine import DP, MarineModel
+from truenorth.errors.marine import DP, MarineModel, position_in_angles
 from truenorth.papers.damping.truth import HOUR, LOG_NOISE, Voyage
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ LONG = MarineModel(
 class Case:
     """What every method left on one course."""
 
-    course: Course  # of the free INS
+    course: Track  # of the free INS
     time: Array  # (K+1,) s
     # dict of (K+1, 7) arrays; by method: phi_e, phi_n, phi_u (rad), v_e, v_n (m/s), lat, lon (rad), computed minus true after
     # its correction
@@ -57,7 +58,7 @@ class Case:
     runtime: float  # s; of all methods together, CPU time of all threads
 
 
-def filters_of(voyage: Voyage, course: Course, *, raw: bool = True) -> dict[str, Filter]:
+def filters_of(voyage: Voyage, course: Track, *, raw: bool = True) -> dict[str, Filter]:
     """The paper's filters and the two 15-state ones, for a course that has a log of this voyage."""
     start = round(SWITCH / course.interval)
     noise = LOG_NOISE / np.sqrt(course.interval)
@@ -75,7 +76,7 @@ def filters_of(voyage: Voyage, course: Course, *, raw: bool = True) -> dict[str,
 
 
 def run_all(
-    voyage: Voyage, course: Course, reference: Array, *, networks: bool = True, raw: bool = True, workers: int = 1
+    voyage: Voyage, course: Track, reference: Array, *, networks: bool = True, raw: bool = True, workers: int = 1
 ) -> Case:
     """Run every method on a course; its filters are switched on at 2.5 h, its networks with them."""
     begun = time.process_time()
@@ -99,7 +100,7 @@ def left_of(voyage: Voyage, free: Array, x: Array) -> Array:
     """(K+1, 7) errors in rad and m/s that the errors found, (M, 7 or more) at the last M epochs, leave of those of a free INS."""
     left = free.copy()
     left[len(free) - len(x) :] -= x[:, :7]
-    left[:, DP] = voyage.truth.in_angles(left[:, DP])
+    left[:, DP] = position_in_angles(left[:, DP], *voyage.truth.position[:, [0, 2]].T)
     return left
 
 
@@ -108,7 +109,7 @@ def fused(found: Mapping[str, Estimate], interval: float, span: float = SPAN) ->
     return Fusion(samples=max(1, round(span / interval)))(found["filter1"], found["filter2"], interval)
 
 
-def tuned_fusion(voyage: Voyage, course: Course, reference: Array, workers: int) -> Estimate:
+def tuned_fusion(voyage: Voyage, course: Track, reference: Array, workers: int) -> Estimate:
     """The fusion with what the long-run 15-state filter has: the same P0 and Q, and the R2 that suits them."""
     start, model = round(SWITCH / course.interval), replace(LONG, groups=())
     P0 = carried_prior(course, start, model, np.diag(voyage.paper_errors() ** 2))

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.consistency import nees
-from truenorth.damping.course import Course, errors_of
+from truenorth.damping.course import errors_of
 from truenorth.damping.filters import run_filters
 from truenorth.errors.marine import MOTION, PHI, REF
 from truenorth.papers.damping.methods import LONG, LONG_REFERENCE_PRIOR, SWITCH, Case, filters_of, run_all
 from truenorth.papers.damping.truth import LOG_NOISE, Voyage, drawn
 from truenorth.records.specs import ImuSpec
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def with_log(voyage: Voyage, seed: int, run: int) -> Voyage:
     return Voyage(voyage.ideal, voyage.truth, noise)
 
 
-def drawn_voyage(voyage: Voyage, c: float, seed: int, run: int) -> tuple[Voyage, Course, Array]:
+def drawn_voyage(voyage: Voyage, c: float, seed: int, run: int) -> tuple[Voyage, Track, Array]:
     """A voyage with the paper's errors and biases, each with a sign of its own, and the log's too: its course and its log."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(4, run)))
     x0 = voyage.paper_errors() * drawn(rng.choice([-1.0, 1.0], 13))

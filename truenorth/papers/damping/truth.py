@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from truenorth.core import earth
 from truenorth.core.units import parse
-from truenorth.damping.course import Course
+from truenorth.damping.course import without_errors
 from truenorth.errors.marine import BA, BG, DP, DV, PHI, STATES
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation import IdealLog, simulate
 from truenorth.simulation.scenario import read_scenario
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.state.track import Track
+from truenorth.strapdown.level import mechanise
 
 Array = NDArray[np.float64]
 
@@ -31,7 +33,7 @@ class Voyage:
     """The ideal log of the ship's IMU, and where it truly was."""
 
     ideal: IdealLog
-    truth: Course
+    truth: Track
     log_noise: Array  # (K+1, 2) m/s: white, of a speed log with a row an epoch
 
     def reference(self, c: float | Array) -> Array:
@@ -49,19 +51,19 @@ class Voyage:
         x[BA], x[BG] = ACCEL_BIAS, GYRO_BIAS
         return x
 
-    def navigate(self, x0: Array, spec: ImuSpec | None = None, seed: int = 0, run: int = 0) -> Course:
+    def navigate(self, x0: Array, spec: ImuSpec | None = None, seed: int = 0, run: int = 0) -> Track:
         """What a free INS says that begins with errors `x0` (13,), biases with them, and draws its noise from a specification."""
         given = {"gyro_bias": x0[BG], "accel_bias": x0[BA]}
         record = simulate(self.ideal, imu=spec, seed=seed, run=run, errors=given).record
-        begin = self.truth.between(0, 1).corrected(-x0[:7])
+        begin = without_errors(self.truth[:2], -x0[:7])
         lat, lon, alt = (float(value) for value in begin.position[0])
-        start = NavigationState.at(begin.C_nb[0], lat, lon, alt, begin.v_n[0])
+        start = State.at(begin.C_nb[0], lat, lon, alt, begin.v_n[0])
         out = mechanise(record, start, altitude="fixed")
         C_nb, v_n, position = (
             np.concatenate([first[:1], rest])
             for first, rest in ((begin.C_nb, out.C_nb), (begin.v_n, out.v_n), (begin.position, out.position))
         )
-        return Course(self.truth.time, C_nb, v_n, position)
+        return Track.of_motion(self.truth.time, C_nb, v_n, position)
 
 
 def drawn(values: Array) -> Array:
@@ -81,6 +83,6 @@ def sail(interval: float, seed: int, run: int = 0, scenario: str = "marine_dampi
     at = ideal.motion.states(ideal.edges)
     C = at.C_nb[0]  # the ship keeps its course: this mounting has the heading 0 throughout
     ideal = replace(ideal, dtheta=ideal.dtheta @ C.T, dvel=ideal.dvel @ C.T)
-    truth = Course(ideal.edges, at.C_nb @ C.T, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    truth = Track.of_motion(ideal.edges, at.C_nb @ C.T, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
     noise = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3, run))).standard_normal((len(at.lat), 2))
     return Voyage(ideal, truth, LOG_NOISE / math.sqrt(interval) * noise)

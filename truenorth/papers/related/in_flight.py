@@ -8,7 +8,6 @@ slave, and what is left grows: ``dp = nabla t^2 / 2`` of a level accelerometer's
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,8 @@ from truenorth.records.calibration import Calibration
 from truenorth.records.motion import Moving
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
-from truenorth.strapdown.level import NavigationState, mechanise
+from truenorth.state.state import State
+from truenorth.strapdown.level import mechanise
 
 Array = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ def released(
     C = answer.C_nb
     phi_u = 0.5 * float((C @ at.C_nb.T)[0, 1] - (C @ at.C_nb.T)[1, 0])
     rest = record.between(answer.time + 0.5 * record.interval, None)
-    start = NavigationState.at(C, float(at.lat), float(at.lon), float(at.alt), answer.transfer.v_n)
+    start = State.at(C, at.lat, at.lon, at.alt, answer.transfer.v_n)
     found: dict[str, Any] = {
         "gyro": (answer.gyro_bias - gyro_bias, answer.gyro_bias_sigma),
         "accel": (answer.accel_bias - accel_bias, answer.accel_bias_sigma),
@@ -113,7 +113,7 @@ def released(
     }
     for method, calibration in known.items():
         every = round(1.0 / record.interval)
-        out = mechanise(calibration.apply(rest), replace(start), altitude="fixed", every=every)
+        out = mechanise(calibration.apply(rest), start, altitude="fixed", every=every)
         truth = motion.states(out.time)
         R_M, R_N = earth.radii(truth.lat)
         east = (out.position[:, 1] - truth.lon) * (R_N + truth.alt) * np.cos(truth.lat)
