@@ -32,6 +32,14 @@ BLOCK = 1000  # rows over which the chance of a repeat is counted
 SATURATED_RUN = 3  # rows at the extreme, one after the other ...
 PILED = 10  # ... or so many times as many as at the next value: of a vibration's peaks each is a row
 RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off
+# Counts of a period of a pulse train, where both edges of two signals are counted: the four are not alike, so that of a sensor
+# at rest every fourth value may be full and those between empty. Values are compared over whole periods.
+PERIOD = 4
+COARSE = 0.3  # of the rows that repeat: a coarse quantum
+AROUND, WITHIN = 4, 3.0  # stretches to either side that a run is compared with, and their standard deviations
+OFF = 0.01  # of a step, by which an extreme misses what all other values are multiples of
+LATTICE = 1e-4  # of a step, by which those may
+FEWEST_LEVELS = 3  # values that show a step twice
 
 
 @dataclass(frozen=True)
@@ -206,7 +214,7 @@ def _frozen(
                     + ("channel is dead or not connected" if dead else "log is simulated without noise, or coarse"),
                 )
             )
-        elif runs[channel] > limit:
+        elif runs[channel] > limit and (chance[channel] < COARSE or _loses(data[channel], first, int(runs[channel]))):
             findings.append(
                 Finding(
                     "warning",
@@ -217,6 +225,22 @@ def _frozen(
                 )
             )
     return runs, at
+
+
+def _loses(values: Array, first: int, rows: int) -> bool:
+    """Whether a run of one value adds up to what the stretches of its length before and behind it do not.
+
+    A coarse sensor that carries its remainders on stays at one count for long where that is its mean.
+    """
+    behind = values[first + rows :]
+    stretches = np.concatenate(
+        [part[: len(part) // rows * rows].reshape(-1, rows)[:AROUND] for part in (values[:first][::-1], behind)]
+    )
+    if not len(stretches):
+        return True
+    sums = stretches.sum(axis=1)
+    expected = PERIOD * _finest(stretches) + WITHIN * float(np.std(sums))
+    return not abs(rows * float(values[first]) - float(sums.mean())) <= expected
 
 
 def _longest_run(same: NDArray[np.bool_]) -> tuple[int, int]:
@@ -266,7 +290,8 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
     rows = np.zeros(6, dtype=np.intp)
     unit = ("rad/s", "m/s^2") if record.kind == "rates" else ("rad a row", "m/s a row")
     for channel, name in enumerate(COLUMNS[record.kind]):
-        values = data[channel]
+        rounding = ROUNDING * _largest([data[channel]])  # of sums and products: counts that are alike may differ by it
+        values = rounding * np.round(data[channel] / rounding) if rounding else data[channel]
         for sign in (1.0, -1.0):
             signed = sign * values
             top = float(signed.max())
@@ -277,7 +302,8 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             if -float(signed.min()) > RANGE_SLACK * abs(top):  # a range has two sides alike: this one is not its end
                 continue
             second = float(np.max(signed, where=~at_top, initial=-np.inf))
-            inside = int(np.count_nonzero(signed == second))
+            levels, counts = np.unique(signed[~at_top], return_counts=True)
+            inside = int(counts[levels >= second - (PERIOD - 0.5) * _finest(levels)].max())
             rows_at = np.flatnonzero(at_top)
             consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
             consecutive = consecutive and not _crests(signed, rows_at, second, inside)
@@ -285,7 +311,8 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             often = count > PILED * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often)
             # Values that have many digits are never alike by chance, wherever the next ones stand.
-            if piled and (spread > 5.0 * (top - second) or (often and top - second > PILED * _finest(signed[~at_top]))):
+            piled = piled and (spread > 5.0 * (top - second) or (often and top - second > PILED * _finest(levels)))
+            if piled or _off(top, levels[1:]):  # what clips has two sides
                 rows[channel] += count
                 findings.append(
                     Finding(
@@ -297,6 +324,18 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
                     )
                 )
     return rows
+
+
+def _off(top: float, levels: Array) -> bool:
+    """Whether all values but the extreme are multiples of one step: something behind the sensor has clipped it."""
+    if len(levels) < FEWEST_LEVELS:
+        return False
+    step = _finest(levels)
+    places = (levels - levels[0]) / step
+    if np.abs(places - np.round(places)).max() > LATTICE:
+        return False
+    place = (top - levels[0]) / step
+    return bool(abs(place - round(place)) > OFF)
 
 
 def _crests(signed: Array, rows_at: NDArray[np.intp], second: float, inside: int) -> bool:
@@ -313,8 +352,10 @@ def _crests(signed: Array, rows_at: NDArray[np.intp], second: float, inside: int
 
 
 def _finest(values: Array) -> float:
-    """The smallest step between two values."""
-    return float(np.min(np.diff(np.unique(values)), initial=np.inf))
+    """The smallest step between two values, but for rounding of the arithmetic; infinite where all are alike."""
+    steps = np.diff(np.unique(values))
+    rounding = ROUNDING * float(np.abs(values).max(initial=0.0))
+    return float(np.min(steps, initial=np.inf, where=steps > rounding))
 
 
 def _chance_of_repeat(same: NDArray[np.bool_]) -> Array:
