@@ -11,7 +11,7 @@ import pytest
 from tests import recordings
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
-from truenorth.alignment.transfer_filter import Linear, Matching, SlaveStart, transfer_filter
+from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, axes_along, transfer_filter
 from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
@@ -21,6 +21,7 @@ from truenorth.filters import kalman
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.simulation import FlexureSpec, MasterSpec, ideal_log, simulate, simulate_sensor
+from truenorth.state.state import Start, State
 
 DEG, ARCMIN, DEG_PER_HOUR = np.radians(1.0), np.radians(1.0 / 60.0), np.radians(1.0) / 3600.0
 SPAN = 60.0
@@ -42,7 +43,7 @@ def _start(flight, model, C_mb_true):
     at = flight.states(np.array(0.0))
     P = model.prior(0.1, 1e-6, 1e-2, 5 * DEG_PER_HOUR, tau=0.05, arm=1.0, mounting=3 * DEG, C_nb=at.C_nb)
     C = at.C_nb @ C_mb_true.T
-    return SlaveStart(C, at.v_n, float(at.lat), float(at.lon), float(at.alt), P)
+    return Start.of(State.at(C, at.lat, at.lon, at.alt, at.v_n), P)
 
 
 def test_without_noise_it_finds_the_truth(flight, ideal):
@@ -52,10 +53,12 @@ def test_without_noise_it_finds_the_truth(flight, ideal):
     C_mb = dcm_from_euler(*MOUNT_TRUE)
     model = TransferModel(1e-7, 1e-6, mounting=True)
     track = transfer_filter(slave, master, model, _start(flight, model, C_mb), Matching(1e-3, 1e-5))
-    aux = track.aux[-1]
+    aux = track.sensors[-1]
     assert aux[model.slice_of(DELAY)][0] == pytest.approx(TAU_TRUE, abs=2e-5)
     np.testing.assert_allclose(aux[model.slice_of(ARM)], ARM_TRUE, atol=5e-3)
-    np.testing.assert_allclose(rotation_vector_from_dcm(track.C_mb[-1].T @ C_mb), 0, atol=0.02 * ARCMIN)
+    np.testing.assert_allclose(
+        rotation_vector_from_dcm(axes_along(track, Assumed())[-1].T @ C_mb), 0, atol=0.02 * ARCMIN
+    )
     true = flight.states(track.time[-1:]).C_nb
     np.testing.assert_allclose(
         rotation_vector_from_dcm(track.C_nb[-1:] @ np.swapaxes(true, 1, 2)), 0, atol=0.02 * ARCMIN
@@ -71,11 +74,11 @@ def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
     spec, C_mb = replace(MASTER, lever_arm=(0.0, 0.0, 0.0)), dcm_from_euler(*MOUNT_TRUE)
     slave, master = simulate(ideal).record, simulate_sensor(flight, spec, duration=SPAN).record
     model = TransferModel(TACTICAL.gyro_random_walk, TACTICAL.accel_random_walk, mounting=True)
-    start = replace(_start(flight, model, C_mb), delay=TAU_TRUE)
+    start = _start(flight, model, C_mb)
     C_nb = flight.states(master.time - TAU_TRUE).C_nb
     linear = Linear(C_nb @ C_mb.T, C_nb)
     matching = Matching(0.05, 2 * ARCMIN)
-    track = transfer_filter(slave, master, model, start, matching, linear=linear)
+    track = transfer_filter(slave, master, model, start, matching, Assumed(delay=TAU_TRUE), linear=linear)
     R = np.repeat([0.05**2, (2 * ARCMIN) ** 2], 3)
     system = system_of_motion(flight, model, start.P, R, SPAN - 0.1, step=0.1, C_mb=C_mb)
     expected = np.squeeze(kalman(system, history="sigma", innovations=False).sigma)

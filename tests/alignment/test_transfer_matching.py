@@ -8,7 +8,7 @@ import pytest
 from tests.alignment.test_transfer import ARCMIN, DEG, DEG_PER_HOUR, SPAN, TACTICAL
 from tests.runs import some
 from truenorth.alignment.transfer import align_transfer
-from truenorth.alignment.transfer_filter import Matching, SlaveStart, _slopes, transfer_filter
+from truenorth.alignment.transfer_filter import Assumed, Matching, _slopes, transfer_filter
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.errors.master import DELAY, TransferModel
@@ -16,6 +16,7 @@ from truenorth.papers.transfer.truth import Case, Flights
 from truenorth.records import ImuRecord
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.gnss import moved
+from truenorth.state.state import Start, State
 
 ARM_TRUE = np.array([0.5, 1.0, -0.3])
 NOISE = {"position": 1.0, "acceleration": 0.02}
@@ -47,10 +48,10 @@ def test_without_noise_it_finds_the_truth(flight, ideal, kind, sigma, tau):
     at = flight.states(np.array(0.0))
     P = model.prior(0.1, 3 * DEG, 1e-4, 5 * DEG_PER_HOUR, tau=0.05, arm=1e-3)
     C = dcm_from_rotation_vector([0.02, -0.03, 0.05]) @ at.C_nb
-    start = SlaveStart(C, at.v_n, float(at.lat), float(at.lon), float(at.alt), P, arm=ARM_TRUE)
-    track = transfer_filter(slave, master, model, start, Matching(sigma, translation=kind))
+    start, assumed = Start.of(State.at(C, at.lat, at.lon, at.alt, at.v_n), P), Assumed(np.array(ARM_TRUE))
+    track = transfer_filter(slave, master, model, start, Matching(sigma, translation=kind), assumed)
     true = flight.states(track.time[-1:]).C_nb
-    assert track.aux[-1][model.slice_of(DELAY)][0] == pytest.approx(tau, abs=5e-4)
+    assert track.sensors[-1][model.slice_of(DELAY)][0] == pytest.approx(tau, abs=5e-4)
     phi = rotation_vector_from_dcm(track.C_nb[-1:] @ np.swapaxes(true, 1, 2))
     np.testing.assert_allclose(phi, 0, atol=0.2 * ARCMIN)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from truenorth.alignment.transfer_filter import Matching, SlaveStart, master_aiding
+from truenorth.alignment.transfer_filter import Assumed, Matching, master_aiding
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
 from truenorth.core.errors import UsageError
@@ -67,9 +67,7 @@ def measured(motion, dx, C_mb):
         at.f_b,
         at.w_ib_b * 0.0,
     )
-    nothing = np.zeros((ALL.states, ALL.states))
-    start = SlaveStart(at.C_nb[0], at.v_n[0], 0.0, 0.0, 0.0, nothing, C_mb=C_mb, arm=ARM_AS_ASSUMED)
-    sources = master_aiding(master, ALL, start, Matching(1.0, 1.0))
+    sources = master_aiding(master, ALL, Assumed(ARM_AS_ASSUMED, C_mb=C_mb), Matching(1.0, 1.0))
     sources = [
         replace(s, **{name: getattr(s, name)[:1].copy() for name in ("time", "measured", "sigma")}) for s in sources
     ]

@@ -131,7 +131,10 @@ class Begin(NamedTuple):
 
 @dataclass(frozen=True)
 class Solution:
-    """What a filter found for B runs at K epochs after the beginning."""
+    """What a filter found for B runs at K epochs after the beginning.
+
+    Not a :class:`truenorth.state.track.Track`: many runs at once, with sigmas throughout but a covariance only where asked for.
+    """
 
     C_nb: Array  # (B, K, 3, 3)
     v_n: Array  # (B, K, 3) m/s

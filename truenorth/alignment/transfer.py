@@ -19,14 +19,15 @@ from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
 from truenorth.alignment.transfer_filter import (
     TRANSLATIONS,
+    Assumed,
     Linear,
     Matching,
-    SlaveStart,
-    TransferTrack,
+    axes_along,
+    by_rows,
     delay_found,
     transfer_filter,
 )
-from truenorth.alignment.transfer_start import Assumed, common_clock, hand_over, model_from_spec, parted_clocks
+from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
@@ -43,6 +44,8 @@ from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
+from truenorth.state.state import Start
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -166,7 +169,8 @@ def align_transfer(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
-    run = partial(transfer_filter, master=master, matching=Matching(*noise, what.kind, GATE), linear=linear)
+    rows = Matching(*noise, what.kind, GATE)
+    run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
@@ -178,25 +182,25 @@ def align_transfer(
 
 def _rivals(
     part: ImuRecord,
-    run: Callable[..., TransferTrack],
-    track: TransferTrack,
+    run: Callable[..., Track],
+    track: Track,
     model: TransferModel,
-    start: SlaveStart,
+    start: Start,
     spec: ImuSpec,
 ) -> list[Evidence]:
     """What else would explain the log; `run` with a slave, a model and a start."""
 
-    def other(model: TransferModel) -> TransferTrack:
+    def other(model: TransferModel) -> Track:
         return run(part, model=model, start=start)
 
     found = noise_evidence(other, track, model, part) + wandering_evidence(other, track, model, spec, part.duration)
     wide = _any_delay(start, model)
 
-    def of_translation(track: TransferTrack) -> TransferTrack:
+    def of_translation(track: Track) -> Track:
         """Attitudes alone do not part late gyros from an early master: what velocity or place say counts."""
         return replace(track, residuals=tuple(r for r in track.residuals if r.name in TRANSLATIONS))
 
-    def shifted(record: ImuRecord) -> TransferTrack:
+    def shifted(record: ImuRecord) -> Track:
         return of_translation(run(record, model=model, start=wide))
 
     first, free = of_translation(track), shifted(part)
@@ -205,7 +209,7 @@ def _rivals(
     return found + gyro_delay_evidence(shifted, first, part)
 
 
-def _any_delay(start: SlaveStart, model: TransferModel) -> SlaveStart:
+def _any_delay(start: Start, model: TransferModel) -> Start:
     """The start with a delay that is hardly known: gyros that are late were taken for a master that is early."""
     at = model.slice_of(DELAY)
     if at is None:
@@ -258,10 +262,10 @@ def _passes(
         # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
         velocity = kind == "acceleration" and number == 0
         rows = Matching(FIRST_NOISE["velocity"], noise[1]) if velocity else Matching(*noise, kind)
-        track = transfer_filter(part, master, model, start, rows, linear=linear)
+        track = transfer_filter(part, master, model, start, rows, assumed, linear=linear)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
-        begin = linear.begin if linear is not None else delay_found(model, track) if velocity else None
-        linear = _linear(part, master, model, track, begin)
+        begin = linear.begin if linear is not None else delay_found(track) if velocity else None
+        linear = _linear(part, master, track, assumed, begin)
     return noise, linear
 
 
@@ -302,39 +306,39 @@ def _three(values: Sequence[float], name: str, meaning: str) -> Array:
 def _linear(
     slave: ImuRecord,
     master: MasterRecord,
-    model: TransferModel,
-    track: TransferTrack,
+    track: Track,
+    assumed: Assumed,
     begin: tuple[float, float] | None = None,
 ) -> Linear:
     """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own."""
     C_nb = np.full((len(master), 3, 3), np.nan)
-    C_nb[track.row] = final_attitudes(slave, track)
-    C_nm = C_nb @ track.C_mb[-1].T
+    C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = final_attitudes(slave, track)
+    C_nm = C_nb @ axes_along(track, assumed)[-1].T
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
-    tau = model.slice_of(DELAY)
-    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.aux[-1][tau][0]), begin)
+    tau = track.layout.slice_of(DELAY)
+    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.sensors[-1, tau][0]), begin)
 
 
 def _refitted(
-    track: TransferTrack, noise: tuple[float, float], fitted: Sequence[bool], first: Translation
+    track: Track, noise: tuple[float, float], fitted: Sequence[bool], first: Translation
 ) -> tuple[float, float]:
     """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout.
 
     Where they are coloured (a seat that bends, vibration between the rows), as much as white noise of their density: so many rows
     tell delay, arm and mounting no better than fewer.
     """
-    later = slice(len(track.time) // 4, None)
+    later, said = slice(len(track) // 4, None), by_rows(track)
     result = list(noise)
     for kind, (sigma, least) in enumerate(zip(noise, (FIRST_NOISE[first], FIRST_NOISE["attitude"]), strict=True)):
         if not fitted[kind]:
             continue
         columns = slice(3 * kind, 3 * kind + 3)
-        nu, claimed = track.innovation[later, columns], track.innovation_sigma[later, columns]
+        nu, claimed = said.innovation[later, columns], said.sigma[later, columns]
         if np.isfinite(nu).any():
             spread = (1.4826 * float(np.nanmedian(np.abs(nu)))) ** 2
             of_state = max(0.0, float(np.nanmedian(claimed**2)) - sigma**2)
-            used = np.isin(track.verdict[later, kind], (USED, REOPENED))
+            used = np.isin(said.verdict[later, kind], (USED, REOPENED))
             colour = _colour(track.time[later][used], (nu / claimed)[used])
             result[kind] = max(colour * math.sqrt(max(spread - of_state, 0.0)), LEAST * least)
     return result[0], result[1]

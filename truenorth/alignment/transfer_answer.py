@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Matched
 from truenorth.alignment.result import Alignment, History
-from truenorth.alignment.transfer_filter import SlaveStart, TransferTrack
+from truenorth.alignment.transfer_filter import Assumed, MasterRows, axes_along, by_rows
 from truenorth.alignment.transfer_result import Relation, Transfer
-from truenorth.alignment.transfer_start import Assumed, bias_sigmas, misalignment_covariance, sigma_of_mounting
+from truenorth.alignment.transfer_start import bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_verdict import judge_transfer
 from truenorth.analysis.observability import observability
@@ -34,6 +34,8 @@ from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.state import Start
+from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments, interval_lengths
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -81,10 +83,10 @@ class LastPass(NamedTuple):
     master: MasterRecord
     model: TransferModel
     assumed: Assumed
-    start: SlaveStart
+    start: Start
     what: Matched
     noise: tuple[float, float]  # of translation and attitude of the master's rows
-    track: TransferTrack
+    track: Track
     # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     carried: float = 0.0
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
@@ -99,12 +101,12 @@ def assemble_transfer(
     of_master: list[Evidence],
 ) -> Alignment:
     """The answer at the last row of the master, judged; `of_master` is what was found of the master before, its clock included."""
-    slave, master, model, _, start, what, _, track, *_ = last
-    P = track.last_P
+    slave, master, model, assumed, _, what, _, track, *_ = last
+    P, said = track.P[-1], by_rows(track)
     phi_covariance, floor = misalignment_covariance(P)
     gyro_prior, accel_prior = bias_sigmas(spec)
     lat, lon, alt = (float(x) for x in track.position[-1])
-    transfer = _transfer(last, notes)
+    transfer = _transfer(last, said, notes)
     sigma = track.sigma[-1]
     answer = Alignment(
         status="not_converged",
@@ -115,10 +117,10 @@ def assemble_transfer(
         C_nb=track.C_nb[-1],
         phi_covariance=phi_covariance,
         phi_floor=floor,
-        gyro_bias=track.aux[-1, BG],
+        gyro_bias=track.sensors[-1, BG],
         gyro_bias_sigma=sigma[BG],
         gyro_bias_prior=gyro_prior,
-        accel_bias=track.aux[-1, BA],
+        accel_bias=track.sensors[-1, BA],
         accel_bias_sigma=sigma[BA],
         accel_bias_prior=accel_prior,
         position=Position(lat, lon, alt),
@@ -126,22 +128,22 @@ def assemble_transfer(
         imu_source=where,
         duration=slave.duration,
         disturbance=np.full(3, np.nan),
-        history=_history(slave, track, what),
+        history=_history(slave, track, said, what),
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(answer, transfer, track, start, heading_limit, of_master, last.least)
+    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least)
 
 
-def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
+def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:
     _, master, model, assumed, _, what, noise, track, carried, _ = last
-    sigma, aux = track.sigma[-1], track.aux[-1]
+    sigma, aux, C_mb = track.sigma[-1], track.sensors[-1], axes_along(track, assumed)[-1]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]
     silences = tuple(
         f"the master is silent for {master.steps[k]:.1f} s after {master.time[k - 1]:.1f} s" for k in silent[:3]
     )
-    verdict = track.verdict[:, np.array([what.translation is not None, what.attitude])]
+    verdict = said.verdict[:, np.array([what.translation is not None, what.attitude])]
     fitted = dict.fromkeys(("velocity", "position", "acceleration"), math.nan)
     fitted[what.kind] = noise[0] if np.isfinite(noise[0]) else math.nan
     return Transfer(
@@ -152,18 +154,18 @@ def _transfer(last: LastPass, notes: tuple[str, ...]) -> Transfer:
         lever_arm=assumed.lever_arm + (0.0 if arm is None else aux[arm]),
         lever_arm_sigma=np.zeros(3) if arm is None else np.hypot(sigma[arm], _bent(last, assumed.lever_arm + aux[arm])),
         lever_arm_prior=np.full(3, assumed.lever_arm_sigma),
-        mounting=_signed(np.array(euler_from_dcm(track.C_mb[-1]))),
-        mounting_sigma=sigma_of_mounting(track.last_P, mount, track.C_mb[-1]),
+        mounting=_signed(np.array(euler_from_dcm(C_mb))),
+        mounting_sigma=sigma_of_mounting(track.P[-1], mount, C_mb),
         mounting_prior=np.full(3, 0.0 if mount is None else assumed.mounting_sigma),
         velocity_noise=fitted["velocity"],
         attitude_noise=noise[1] if np.isfinite(noise[1]) else math.nan,
         used=int(np.sum(np.any((verdict == USED) | (verdict == REOPENED), axis=1))),
         rejected=int(np.sum(np.any(verdict == REJECTED, axis=1))),
         v_n=track.v_n[-1],
-        P=_fifteen(track.last_P, Position(0.0), carried),
+        P=_fifteen(track.P[-1], Position(0.0), carried),
         relative_sigma=_relative(track, model),
         considered=any(model.slice_of(own) is not None for own in (ATTITUDE_ERROR, VELOCITY_ERROR)),
-        jumps=_jumps(track, what),
+        jumps=_jumps(track, said, what),
         open=_open(last),
         notes=(*notes, *silences),
         position_noise=fitted["position"],
@@ -184,10 +186,10 @@ def _bent(last: LastPass, arm: Array) -> float:
     return float(np.linalg.norm(arm)) * min(1.0, float(bends @ bends) / max(whole, 1e-30))
 
 
-def _course(model: TransferModel, assumed: Assumed, track: TransferTrack) -> Relation:
+def _course(model: TransferModel, assumed: Assumed, track: Track) -> Relation:
     """Delay, lever arm and mounting row by row."""
     k = np.arange(0, len(track.time), max(1, -(-len(track.time) // MOST_ROWS)))
-    aux, sigma, C_mb = track.aux[k], track.sigma[k], track.C_mb[k]
+    aux, sigma, C_mb = track.sensors[k], track.sigma[k], axes_along(track, assumed)[k]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     none, nothing = np.zeros(len(k)), np.zeros((len(k), 3))
     return Relation(
@@ -201,9 +203,9 @@ def _course(model: TransferModel, assumed: Assumed, track: TransferTrack) -> Rel
     )
 
 
-def _relative(track: TransferTrack, model: TransferModel) -> Array:
+def _relative(track: Track, model: TransferModel) -> Array:
     """(3,) sigmas of heading, pitch and roll against the master's own solution: ``phi - m``."""
-    P, at = track.last_P, model.slice_of(ATTITUDE_ERROR)
+    P, at = track.P[-1], model.slice_of(ATTITUDE_ERROR)
     J = np.zeros((3, model.states))
     J[:, PHI] = np.eye(3)
     if at is not None:
@@ -224,11 +226,11 @@ def _signed(angles: Array) -> Array:
     return np.asarray((angles + np.pi) % (2 * np.pi) - np.pi)
 
 
-def _jumps(track: TransferTrack, matched: Matched) -> tuple[str, ...]:
+def _jumps(track: Track, said: MasterRows, matched: Matched) -> tuple[str, ...]:
     unit = "m" if matched.kind == "position" else "m/s"  # an acceleration is not taken up
     found = []
-    for k, kind in np.argwhere(track.verdict == REOPENED):
-        size = float(np.linalg.norm(track.innovation[k, 3 * kind : 3 * kind + 3]))
+    for k, kind in np.argwhere(said.verdict == REOPENED):
+        size = float(np.linalg.norm(said.innovation[k, 3 * kind : 3 * kind + 3]))
         what = (
             f"{matched.kind} jumped by {size:.2g} {unit}"
             if kind == 0
@@ -272,7 +274,7 @@ def _open(last: LastPass) -> tuple[str, ...]:
     words = [str(group) for group in said.hardly if len(group.states) > 1 and not quiet.issuperset(group.states)]
     if unseen:
         words.append(f"not seen at all: {', '.join(unseen)}")
-    return (*words, *_tied(names, track.last_P[np.ix_(seen, seen)], quiet | set(unseen)))
+    return (*words, *_tied(names, track.P[-1][np.ix_(seen, seen)], quiet | set(unseen)))
 
 
 def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
@@ -293,7 +295,7 @@ def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _states(slave: ImuRecord, track: TransferTrack, k: NDArray[np.intp]) -> tuple[MotionStates, MotionStates, Array]:
+def _states(slave: ImuRecord, track: Track, k: NDArray[np.intp]) -> tuple[MotionStates, MotionStates, Array]:
     """The slave's motion as estimated: means over the intervals between the rows k, and at their ends."""
     dtheta, dvel = increments(slave)
     turned = np.vstack([np.zeros(3), np.cumsum(dtheta, axis=0)])
@@ -302,7 +304,7 @@ def _states(slave: ImuRecord, track: TransferTrack, k: NDArray[np.intp]) -> tupl
     keep = np.concatenate([[True], np.diff(row) > 0])
     k, row = k[keep], row[keep]
     T = np.diff(slave.time[row - 1])
-    gyro, accel = track.aux[k[1:], BG], track.aux[k[1:], BA]
+    gyro, accel = track.sensors[k[1:], BG], track.sensors[k[1:], BA]
     w = np.diff(turned[row], axis=0) / T[:, None] - gyro
     f = np.diff(moved[row], axis=0) / T[:, None] - accel
     half = rotation_vector_from_dcm(np.swapaxes(track.C_nb[k[:-1]], 1, 2) @ track.C_nb[k[1:]]) / 2
@@ -317,9 +319,9 @@ def _states(slave: ImuRecord, track: TransferTrack, k: NDArray[np.intp]) -> tupl
     return states(middle, v, k[1:], w, f), states(track.C_nb[k[1:]], track.v_n[k[1:]], k[1:], w, f), T
 
 
-def _history(slave: ImuRecord, track: TransferTrack, what: Matched) -> History:
+def _history(slave: ImuRecord, track: Track, said: MasterRows, what: Matched) -> History:
     columns = slice(3, 6) if what.translation is None else slice(0, 3)
-    present = np.flatnonzero(np.isfinite(track.innovation[:, columns]).all(axis=1))
+    present = np.flatnonzero(np.isfinite(said.innovation[:, columns]).all(axis=1))
     k = present[:: max(1, -(-len(present) // MOST_ROWS))]
     covariance, floor = misalignment_covariance(track.P[k])
     final = final_attitudes(slave, track)[k]
@@ -329,22 +331,22 @@ def _history(slave: ImuRecord, track: TransferTrack, what: Matched) -> History:
         phi_covariance=covariance,
         phi_floor=floor,
         departure=-rotation_vector_from_dcm(track.C_nb[k] @ np.swapaxes(final, 1, 2)),
-        gyro_bias=track.aux[k, BG],
+        gyro_bias=track.sensors[k, BG],
         gyro_bias_sigma=track.sigma[k, BG],
-        accel_bias=track.aux[k, BA],
+        accel_bias=track.sensors[k, BA],
         accel_bias_sigma=track.sigma[k, BA],
-        innovation=track.innovation[k, columns],
-        innovation_sigma=track.innovation_sigma[k, columns],
-        nis=track.nis[k, 1 if what.translation is None else 0],
+        innovation=said.innovation[k, columns],
+        innovation_sigma=said.sigma[k, columns],
+        nis=said.nis[k, 1 if what.translation is None else 0],
         innovation_of=f"{what.translation or 'attitude'} of the master",
         innovation_unit=UNITS[what.translation],
     )
 
 
-def final_attitudes(slave: ImuRecord, track: TransferTrack) -> Array:
+def final_attitudes(slave: ImuRecord, track: Track) -> Array:
     """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases taken off."""
     dtheta, _ = increments(slave)
-    dtheta = dtheta - track.aux[-1, BG] * interval_lengths(slave)[:, None]
+    dtheta = dtheta - track.sensors[-1, BG] * interval_lengths(slave)[:, None]
     # The sample that each row falls into, and how much of it is past by then.
     ends, steps_of = slave.time, interval_lengths(slave)
     inside = np.clip(np.searchsorted(ends, track.time - SAME_TIME), 0, len(ends) - 1)

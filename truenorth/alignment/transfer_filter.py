@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.layout import BA, BG, DP, DV, PHI
 from truenorth.state.state import Start
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -50,20 +50,19 @@ RATE_NOISE, OTHER_NOISE = 0.85, 0.4
 
 
 @dataclass(frozen=True)
-class SlaveStart:
-    """Where the slave is said to be at the beginning, and what is assumed."""
+class Assumed:
+    """What is assumed of the master, with its one-sigma; a sigma of 0: known, no state."""
 
-    C_nb: Array  # (3, 3)
-    v_n: Array  # (3,) m/s
-    lat: float  # rad
-    lon: float  # rad
-    alt: float  # m
-    P: Array  # (n, n): of the states of a :class:`truenorth.errors.master.TransferModel`
+    lever_arm: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m: master to slave, slave axes
+    lever_arm_sigma: float = 0.0  # m
+    delay: float = 0.0  # s
+    delay_sigma: float = 0.0  # s
     C_mb: Array = field(default_factory=lambda: np.eye(3))  # (3, 3): slave to master axes
-    arm: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m: master to slave, slave axes
-    delay: float = 0.0  # s; of the master
-    gyro_bias: Array = field(default_factory=lambda: np.zeros(3))  # (3,) rad/s
-    accel_bias: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m/s^2
+    mounting_sigma: float = 0.0  # rad
+    heading: float | None = None  # rad; of the slave at the start, where no master gives attitude; else its course
+
+
+NOTHING_BETWEEN = Assumed()
 
 
 @dataclass(frozen=True)
@@ -88,56 +87,26 @@ class Linear:
     begin: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True)
-class TransferTrack:
-    """The slave at each row of the master, as known then."""
+class MasterRows(NamedTuple):
+    """What each row of the master said against the prediction; the rows are the epochs of the track."""
 
-    time: Array  # (K,) s: at which the row holds by the delay as known then, on the slave's clock
-    delay: float  # s; the known one
-    row: Integers  # (K,): the master's
-    C_nb: Array  # (K, 3, 3)
-    v_n: Array  # (K
-    position: Array  # 3)
-    # (K, n): what is assumed in the places of the states: biases, delay and lever arm besides the known ones, flexure
-    aux: Array
-    P: Array  # (K, n, n)
-    C_mb_assumed: Array  # (3, 3): the given axes, from which `aux` turns where there are states of the mounting
-    mount: slice | None  # where these stand
-    innovation: Array  # (K: velocity (m/s; or position, acceleration) and attitude (rad); NaN where absent
-    innovation_sigma: Array  # 6)
+    stamp: Array  # (K,) s: its time less the delay that is assumed
+    innovation: Array  # (K, 6): velocity (m/s; or position, acceleration) and attitude (rad); NaN where absent
+    sigma: Array  # (K, 6)
     nis: Array  # (K, 2)
     verdict: Integers  # (K, 2): `ABSENT`, `USED`, `REJECTED` or `REOPENED`, of :mod:`truenorth.estimate.memory`
-    # (6,): variance of what in the innovations is an error of the master's own, which does not change from row to row
-    slow: Array
-    residuals: tuple[Residuals, ...]  # the innovations source by source
-
-    @cached_property
-    def sigma(self) -> Array:
-        """(K, n) one-sigma of the states."""
-        return np.sqrt(np.maximum(np.einsum("kii->ki", self.P), 0.0))
-
-    @cached_property
-    def C_mb(self) -> Array:
-        """(K, 3, 3) slave to master axes."""
-        if self.mount is None:
-            return np.broadcast_to(self.C_mb_assumed, (len(self.time), 3, 3))
-        return np.asarray(dcm_from_rotation_vector(self.aux[:, self.mount]) @ self.C_mb_assumed)
-
-    @property
-    def last_P(self) -> Array:
-        """(n, n) covariance at the last row."""
-        return np.asarray(self.P[-1])
 
 
 def transfer_filter(
     slave: ImuRecord,
     master: MasterRecord,
     model: TransferModel,
-    start: SlaveStart,
+    start: Start,
     matching: Matching,
+    assumed: Assumed = NOTHING_BETWEEN,
     *,
     linear: Linear | None = None,
-) -> TransferTrack:
+) -> Track:
     """Run the closed loop over two records on one clock.
 
     Parameters
@@ -146,8 +115,10 @@ def transfer_filter(
         Without gaps.
     master : MasterRecord
         Rows that fall outside the slave's record say nothing.
-    start : SlaveStart
-        At the beginning of the slave's record.
+    start : Start
+        At the beginning of the slave's record; P is of all states of the model.
+    assumed : Assumed, optional
+        Delay, lever arm and axes besides which the model's states stand; its sigmas are P's.
     linear : Linear, optional
         Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
         rows (as much as 1 rad^-2 of information a row), would otherwise give a little false information on mounting and delay.
@@ -156,56 +127,58 @@ def transfer_filter(
     ------
     DataError
         No row of the master falls into the slave's record; a covariance that broke down.
+
+    Returns
+    -------
+    Track
+        The slave at each row of the master, as known then: at the time at which the row holds, on the slave's clock.
     """
     values = np.zeros(model.states)
     values[BG], values[BA] = start.gyro_bias, start.accel_bias
     P = start.P.copy()
     if linear is not None and linear.begin is not None and (tau := model.slice_of(DELAY)) is not None:
         values[tau], P[tau, tau] = linear.begin[0], linear.begin[1] ** 2
-    begin = float(slave.time[0] - slave.steps[0])
-    place = start.lat, start.lon, start.alt
-    at = Start(begin, start.C_nb, start.v_n, *place, start.gyro_bias, start.accel_bias, P[:15, :15])
     track = navigate_track(
         slave,
-        at,
+        start,
         model.ins,
-        master_aiding(master, model, start, matching, linear, slave),
+        master_aiding(master, model, assumed, matching, linear, slave),
         interval=LONGEST_STEP,
         every=0,
         prior=(P, values),
     )
-    if len(track.time) == 0:
+    if len(track) == 0:
         raise DataError(
             f"{master.source}: no row falls into the slave's record ({slave.time[0]:.3f} s to {slave.time[-1]:.3f} s; the master "
             f"runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s): check that both logs have the same clock"
         )
-    return _by_rows(track, master.time - start.delay, model, start)
+    return track
 
 
-def delay_found(model: TransferModel, track: TransferTrack) -> tuple[float, float] | None:
+def delay_found(track: Track) -> tuple[float, float] | None:
     """The delay that a pass by velocity tells, with `WIDER` times its sigma, to begin the matching of acceleration with.
 
     Over the onset of a manoeuvre (some tenths of a second) a force is no straight line: with a delay off by 50 ms its column is
     wrong by several sigmas of a row, and the first rows would settle the delay falsely. None: there is no such state.
     """
-    tau = model.slice_of(DELAY)
+    tau = track.layout.slice_of(DELAY)
     if tau is None:
         return None
     first, last = (float(np.sqrt(P[tau, tau][0, 0])) for P in (track.P[0], track.P[-1]))
-    return float(track.aux[-1][tau][0]), min(first, WIDER * last)
+    return float(track.sensors[-1, tau][0]), min(first, WIDER * last)
 
 
 def master_aiding(
     master: MasterRecord,
     model: TransferModel,
-    start: SlaveStart,
+    assumed: Assumed,
     matching: Matching,
     linear: Linear | None = None,
     slave: ImuRecord | None = None,
 ) -> list[Aiding]:
     """The master's rows as the loop takes them: its place, its translation, its attitude; what is not matched is left out."""
     count, groups, kind = len(master), model.groups, matching.translation
-    stamps = master.time - start.delay
+    stamps = master.time - assumed.delay
     patience = max(2, round(matching.patience / master.interval))
     found, place = [], None
     of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
@@ -215,7 +188,17 @@ def master_aiding(
         sigma = np.full((count, 3), PLACE_SIGMA)
         lag = _states(groups, {"lag": DELAY})
         found.append(
-            Aiding("master place", "position", stamps, place, sigma, -start.arm, states=lag, retimed=True, does="place")
+            Aiding(
+                "master place",
+                "position",
+                stamps,
+                place,
+                sigma,
+                -assumed.lever_arm,
+                states=lag,
+                retimed=True,
+                does="place",
+            )
         )
     measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
     if measured is not None and kind == "acceleration" and slave is not None:
@@ -233,7 +216,7 @@ def master_aiding(
                 stamps,
                 measured,
                 np.full((count, 3), matching.sigma),
-                start.arm,
+                assumed.lever_arm,
                 states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
                 figures=(OTHER_NOISE * of_sample,),
@@ -255,7 +238,7 @@ def master_aiding(
                 stamps,
                 measured,
                 np.full((count, 3), matching.attitude_sigma),
-                C_mb=start.C_mb,
+                C_mb=assumed.C_mb,
                 states=_states(groups, roles),
                 gate=matching.gate,
                 figures=(RATE_NOISE * of_sample,),
@@ -345,46 +328,25 @@ def _acceleration(master: MasterRecord, place: Array | None) -> Array:
     return np.asarray(np.einsum("kij,kj->ki", master.C_nb, master.f_b) - coriolis + gravity_n(lat, alt))
 
 
-def _by_rows(track: Track, stamps: Array, model: TransferModel, start: SlaveStart) -> TransferTrack:
-    """The loop's track and residuals, row by row of the master."""
-    kinds = {**dict.fromkeys(TRANSLATIONS, TRANSLATION), MASTER_ATTITUDE.name: ATTITUDE}
-    said = [r for r in track.residuals if r.name in kinds]
-    row = np.searchsorted(stamps, np.unique(np.concatenate([r.stamp for r in said])))
-    count = len(row)
-    assert count == len(track.time)  # each row is put out once
+def by_rows(track: Track) -> MasterRows:
+    """The residuals of a track of :func:`transfer_filter`, row by row of the master."""
+    stamps = np.unique(np.concatenate([r.stamp for r in track.residuals]))
+    count = len(stamps)
+    assert count == len(track)  # each row is put out once
     innovation, sigma = np.full((2, count, 6), np.nan)
     nis, verdict = np.full((count, 2), np.nan), np.full((count, 2), ABSENT)
-    for r in said:
-        kind = kinds[r.name]
-        at = np.searchsorted(stamps[row], r.stamp)
+    for r in track.residuals:
+        kind = ATTITUDE if r.name == MASTER_ATTITUDE.name else TRANSLATION
+        at = np.searchsorted(stamps, r.stamp)
         columns = slice(3 * kind, 3 * kind + 3)
         innovation[at, columns], sigma[at, columns], nis[at, kind] = r.innovation, r.sigma, r.nis
         verdict[at, kind] = np.where(r.jumped, REOPENED, np.where(r.used, USED, REJECTED))
-    return TransferTrack(
-        time=track.time,
-        delay=start.delay,
-        row=row,
-        C_nb=track.C_nb,
-        v_n=track.v_n,
-        position=track.position,
-        aux=track.sensors,
-        P=track.P,
-        C_mb_assumed=start.C_mb,
-        mount=model.slice_of(MOUNTING),
-        innovation=innovation,
-        innovation_sigma=sigma,
-        nis=nis,
-        verdict=verdict,
-        slow=_slow(track, model),
-        residuals=tuple(said),
-    )
+    return MasterRows(stamps, innovation, sigma, nis, verdict)
 
 
-def _slow(track: Track, model: TransferModel) -> Array:
-    """(6,) variance of the master's own errors of velocity and attitude at the end."""
-    found = np.zeros(6)
-    for first, name in ((0, VELOCITY_ERROR), (3, ATTITUDE_ERROR)):
-        at = model.slice_of(name)
-        if at is not None:
-            found[first : first + 3] = np.diag(track.P[-1])[at]
-    return found
+def axes_along(track: Track, assumed: Assumed) -> Array:
+    """(K, 3, 3) slave to master axes: the given ones, turned where there are states of the mounting."""
+    mount = track.layout.slice_of(MOUNTING)
+    if mount is None:
+        return np.broadcast_to(assumed.C_mb, (len(track), 3, 3))
+    return np.asarray(dcm_from_rotation_vector(track.sensors[:, mount]) @ assumed.C_mb)

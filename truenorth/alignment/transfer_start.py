@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_delay import WINDOW, find_delay
-from truenorth.alignment.transfer_filter import SlaveStart
+from truenorth.alignment.transfer_filter import Assumed
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.errors import DataError, UsageError
@@ -21,6 +21,7 @@ from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.layout import BG, PHI
+from truenorth.state.state import Start
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -29,19 +30,6 @@ SURPRISE = 3.0  # sigmas by which a delay found by correlation must miss the giv
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
-
-
-@dataclass(frozen=True)
-class Assumed:
-    """What is assumed of the master, with its one-sigma; a sigma of 0: known, no state."""
-
-    lever_arm: Array  # (3,) m: master to slave, slave axes
-    lever_arm_sigma: float  # m
-    delay: float  # s
-    delay_sigma: float  # s
-    C_mb: Array  # (3, 3): slave to master axes
-    mounting_sigma: float  # rad
-    heading: float | None = None  # rad; of the slave at the start, where no master gives attitude; else its course
 
 
 def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:
@@ -131,7 +119,7 @@ def hand_over(
     assumed: Assumed,
     noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
     position: Position | None,  # where the master gives none
-) -> tuple[ImuRecord, SlaveStart]:
+) -> tuple[ImuRecord, Start]:
     """The slave's record from the master's first row on, and its first state as the master gives it.
 
     Raises
@@ -195,8 +183,7 @@ def hand_over(
         C_nb=None if C_nm is None else C,
         C_mb=assumed.C_mb,
     )
-    start = SlaveStart(C, v, lat, lon, alt, P, C_mb=assumed.C_mb, arm=assumed.lever_arm, delay=assumed.delay)
-    return part, start
+    return part, Start(begin, C, v, lat, lon, alt, np.zeros(3), np.zeros(3), P)
 
 
 def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.source import Aiding
-from truenorth.alignment.transfer_filter import Matching, SlaveStart, master_aiding
+from truenorth.alignment.transfer_filter import Assumed, Matching, master_aiding
 from truenorth.errors.intervals import Intervals
 from truenorth.errors.master import TransferModel
 from truenorth.estimate.linear import rows_along
@@ -80,6 +80,5 @@ def _master_of(
     """A master that moves as the slave does at these epochs, with its own acceleration."""
     C_nm, f_m = at.C_nb @ C_mb.T, at.f_b @ C_mb.T
     master = MasterRecord(at.time, C_nb=C_nm, v_n=at.v_n, lat=at.lat, lon=at.lon, alt=at.alt, f_b=f_m)
-    start = SlaveStart(at.C_nb[0], at.v_n[0], 0.0, 0.0, 0.0, np.zeros((model.states, model.states)), C_mb=C_mb, arm=arm)
-    found = master_aiding(master, model, start, Matching(1.0, 1.0, translation))
+    found = master_aiding(master, model, Assumed(arm, C_mb=C_mb), Matching(1.0, 1.0, translation))
     return [source for source in found if source.does == "measurement"]

@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.transfer_filter import TRANSLATIONS, SlaveStart, TransferTrack
+from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, axes_along, by_rows
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
+from truenorth.errors.master import ATTITUDE_ERROR, VELOCITY_ERROR
 from truenorth.estimate.memory import USED
 from truenorth.estimate.rivals import counted_once
 from truenorth.quality.whiteness import whiteness
 from truenorth.state.evidence import Evidence, contradiction, note, notes
 from truenorth.state.limits import limit
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -25,8 +27,8 @@ LOPSIDED, STEADY, FEWEST = 6.0, 0.9, 20  # sigmas of a mean of innovations, thei
 def judge_transfer(
     answer: Alignment,
     transfer: Transfer,
-    track: TransferTrack,
-    start: SlaveStart,
+    track: Track,
+    assumed: Assumed,
     heading_limit: float,
     of_master: list[Evidence],
     least: float,
@@ -37,7 +39,7 @@ def judge_transfer(
     """
     evidence = list(of_master)
     evidence += _rejected(transfer)
-    evidence += _misses(transfer, track, start)
+    evidence += _misses(transfer, track, assumed)
     lopsided = _lopsided(track, transfer)
     evidence += [] if lopsided else _lasting(transfer, least)
     if lopsided:
@@ -69,13 +71,13 @@ def _rejected(transfer: Transfer) -> list[Evidence]:
     return [contradiction("transfer.rejected", "transfer_geometry", "flexure", share=share)]
 
 
-def _misses(transfer: Transfer, track: TransferTrack, start: SlaveStart) -> list[Evidence]:
+def _misses(transfer: Transfer, track: Track, assumed: Assumed) -> list[Evidence]:
     """A delay, an arm or a mounting that comes out far from what was said of it."""
     found = []
     for name, off, prior in (
-        ("delay", transfer.delay - start.delay, transfer.delay_prior),
-        ("lever_arm", transfer.lever_arm - start.arm, transfer.lever_arm_prior[0]),
-        ("mounting", _between(start.C_mb, track.C_mb[-1]), transfer.mounting_prior[0]),
+        ("delay", transfer.delay - assumed.delay, transfer.delay_prior),
+        ("lever_arm", transfer.lever_arm - assumed.lever_arm, transfer.lever_arm_prior[0]),
+        ("mounting", _between(assumed.C_mb, axes_along(track, assumed)[-1]), transfer.mounting_prior[0]),
     ):
         miss = float(np.max(np.abs(off)))
         if prior > 0.0 and miss > limit("mounting") * prior:
@@ -113,13 +115,13 @@ def _lasting(transfer: Transfer, least: float) -> list[Evidence]:
     ]
 
 
-def _lopsided(track: TransferTrack, transfer: Transfer) -> str:
+def _lopsided(track: Track, transfer: Transfer) -> str:
     """Which rows of the later three quarters have innovations with a mean beyond chance, and hardly a change from row to row.
 
     Rows that were used, that is: those of a jump lie on one side too, until it is taken up.
     """
-    later = slice(len(track.time) // 4, None)
-    nu, verdict = (track.innovation / track.innovation_sigma)[later], track.verdict[later]
+    later, said, lasting = slice(len(track) // 4, None), by_rows(track), _masters_own(track)
+    nu, verdict = (said.innovation / said.sigma)[later], said.verdict[later]
     first = {"position": "positions", "acceleration": "accelerations"}.get(
         transfer.matching.split("+")[0], "velocities"
     )
@@ -129,11 +131,21 @@ def _lopsided(track: TransferTrack, transfer: Transfer) -> str:
             continue
         follows = np.sum(rows[1:] * rows[:-1], axis=0) / np.sum(rows**2, axis=0)
         columns = slice(3 * kind, 3 * kind + 3)
-        slow = np.nanmean(track.slow[columns] / track.innovation_sigma[later, columns] ** 2, axis=0)
+        slow = np.nanmean(lasting[columns] / said.sigma[later, columns] ** 2, axis=0)
         mean = np.abs(rows.mean(axis=0)) / np.sqrt(1.0 / len(rows) + slow)
         if np.any((mean > LOPSIDED) & (follows > STEADY)):
             return name
     return ""
+
+
+def _masters_own(track: Track) -> Array:
+    """(6,) variance, at the end, of what in the innovations is the master's own error, which does not change from row to row."""
+    found = np.zeros(6)
+    for first, name in ((0, VELOCITY_ERROR), (3, ATTITUDE_ERROR)):
+        at = track.layout.slice_of(name)
+        if at is not None:
+            found[first : first + 3] = np.diag(track.P[-1])[at]
+    return found
 
 
 def _between(before: Array, after: Array) -> Array:

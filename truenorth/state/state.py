@@ -63,3 +63,10 @@ class Start(State):
     whole: WholeBiases | None = None
     wheel: Mounting | None = None
     plumb: float = 0.0
+
+    @classmethod
+    def of(cls, state: State, P: Array) -> Start:
+        """A state, its errors known by a covariance."""
+        return cls(
+            state.time, state.C_nb, state.v_n, state.lat, state.lon, state.alt, state.gyro_bias, state.accel_bias, P
+        )

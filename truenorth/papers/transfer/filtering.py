@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Translation
 from truenorth.alignment.transfer_filter import (
+    Assumed,
     Linear,
     Matching,
-    SlaveStart,
-    TransferTrack,
     delay_found,
     transfer_filter,
 )
@@ -39,6 +38,8 @@ from truenorth.papers.transfer.truth import (
 )
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, PHI
+from truenorth.state.state import Start, State
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -197,7 +198,9 @@ def errors_of(
 
     def one(number: int) -> list[list[Array]]:
         run = flights(number)
-        return [_errors(run, method, _track(flights, run, method)) for method in of.values()]
+        return [
+            _errors(run, _track(flights, run, method), assumed_of(flights, run, method).delay) for method in of.values()
+        ]
 
     one(0)  # compiles, and fills what the runs share, before the threads ask for it
     with ThreadPoolExecutor(workers) as pool:
@@ -208,19 +211,19 @@ def errors_of(
     }
 
 
-def _track(flights: Flights, run: Run, method: Method) -> TransferTrack:
+def assumed_of(flights: Flights, run: Run, method: Method) -> Assumed:
+    """Delay and lever arm that a method is given."""
+    if method.known:
+        return Assumed(run.arm, delay=run.tau)
+    return Assumed(delay=flights.case.extra_delay if method.late == "past" else 0.0)
+
+
+def _track(flights: Flights, run: Run, method: Method) -> Track:
     spec, at = flights.scenario.imu_spec, flights.start
     model = model_of(method, spec)
-    start = SlaveStart(
-        run.C_nb,
-        run.v_n,
-        float(at.lat),
-        float(at.lon),
-        float(at.alt),
-        prior_of(method, model, spec, at.C_nb),
-        arm=run.arm if method.known else np.zeros(3),
-        delay=run.tau if method.known else flights.case.extra_delay if method.late == "past" else 0.0,
-    )
+    begin = State.at(run.C_nb, at.lat, at.lon, at.alt, run.v_n)
+    start = Start.of(begin, prior_of(method, model, spec, at.C_nb))
+    assumed = assumed_of(flights, run, method)
     kind = method.translation or "velocity"
     sigma = np.inf if method.translation is None else method.noise * NOISE[kind]
     matching = Matching(sigma, ATTITUDE_NOISE if method.attitude else np.inf, kind)
@@ -229,27 +232,26 @@ def _track(flights: Flights, run: Run, method: Method) -> TransferTrack:
         master = extrapolated(master, flights.case.extra_delay)
     linear, master = None, master[:: method.every]
     if kind == "acceleration" and method.delay:
-        found = delay_found(model, transfer_filter(run.slave, master, model, start, Matching(VELOCITY_NOISE)))
+        found = delay_found(transfer_filter(run.slave, master, model, start, Matching(VELOCITY_NOISE), assumed))
         assert found is not None
         assert master.C_nb is not None
         linear = Linear(master.C_nb, master.C_nb, found[0], found)
-    return transfer_filter(run.slave, master, model, start, matching, linear=linear)
+    return transfer_filter(run.slave, master, model, start, matching, assumed, linear=linear)
 
 
-def _errors(run: Run, method: Method, track: TransferTrack) -> list[Array]:
+def _errors(run: Run, track: Track, delay: float) -> list[Array]:
     """The arrays of `Errors` of one run."""
     k = np.clip(np.searchsorted(track.time, EPOCHS), 1, len(track.time) - 1)
     k -= np.abs(track.time[k - 1] - EPOCHS) < np.abs(track.time[k] - EPOCHS)
     silent = np.abs(track.time[k] - EPOCHS) > NEAR
     C = run.motion.states(track.time[k]).C_nb
     phi = misalignment(track.C_nb[k], C)
-    aux, sigma, P = track.aux[k], track.sigma[k], track.P[k][:, PHI, PHI]
+    aux, sigma, P = track.sensors[k], track.sigma[k], track.P[k][:, PHI, PHI]
     nothing = np.full(len(k), np.nan)
-    model = model_of(method, ImuSpec())
     tau, tau_sigma, arm, arm_sigma = nothing, nothing, np.full((len(k), 3), np.nan), np.full((len(k), 3), np.nan)
-    if (at := model.slice_of(DELAY)) is not None:
-        tau, tau_sigma = aux[:, at.start] + track.delay - run.tau, sigma[:, at.start]
-    if (at := model.slice_of(ARM)) is not None:
+    if (at := track.layout.slice_of(DELAY)) is not None:
+        tau, tau_sigma = aux[:, at.start] + delay - run.tau, sigma[:, at.start]
+    if (at := track.layout.slice_of(ARM)) is not None:
         arm, arm_sigma = aux[:, at] - run.arm, sigma[:, at]
     square = nees(phi, P) / 3
     arrays = [
