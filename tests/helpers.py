@@ -54,6 +54,23 @@ def changed(a, index, value):
     return a
 
 
+def come_back(motion, rate, duration, **options):
+    """Errors of an ideal IMU through the strapdown from its true start: times, attitude (rad), velocity (m/s), position (m)."""
+    from truenorth.core.attitude import rotation_vector_from_dcm
+    from truenorth.simulation import simulate
+    from truenorth.state.state import State
+    from truenorth.strapdown.level import mechanise
+
+    start = motion.states(0.0)
+    begin = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
+    computed = mechanise(simulate(motion, rate=rate, duration=duration).record, begin, **options)
+    true = motion.states(computed.time)
+    turned = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))
+    moved = computed.position - np.stack([true.lat, true.lon, true.alt], -1)
+    moved[:, :2] *= 6.37e6
+    return computed.time, turned, computed.v_n - true.v_n, moved
+
+
 def start_before(record, C_nb, v_n, place, biases, sigma):
     """A start of navigation an interval before a record's first row; `place` holds lat, lon, alt, `sigma` the fifteen states'."""
     from truenorth.state.state import Start

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from tests.helpers import come_back
 from tests.simulation.test_simulation import SHIP
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
@@ -27,8 +28,6 @@ from truenorth.simulation import (
     steps,
 )
 from truenorth.simulation.axis_angles import SCHEMES
-from truenorth.state.state import State
-from truenorth.strapdown.level import mechanise
 
 deg = np.radians
 ARCSEC = deg(1 / 3600)
@@ -55,14 +54,8 @@ def Rz(a):
 
 def residual(indexer, rate, duration):
     """Largest error of attitude (arcsec) and velocity (m/s) of an ideal IMU through the strapdown."""
-    rig = Indexed(SHIP, indexer)
-    record = simulate(rig, rate=rate, duration=duration).record
-    start = rig.states(0.0)
-    state = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
-    computed = mechanise(record, state, every=round(rate))
-    true = rig.states(computed.time)
-    error = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))
-    return np.max(np.abs(error)) / ARCSEC, np.max(np.abs(computed.v_n - true.v_n))
+    _, turned, velocity, _ = come_back(Indexed(SHIP, indexer), rate, duration, every=round(rate))
+    return np.max(np.abs(turned)) / ARCSEC, np.max(np.abs(velocity))
 
 
 def test_the_ideal_imu_of_system_1_comes_back():

@@ -3,20 +3,19 @@
 import numpy as np
 import pytest
 
+from tests.helpers import come_back
 from tests.physics.test_strapdown_coning import residual
 from tests.simulation.test_route import TOWN
 from truenorth.core.attitude import euler_from_dcm, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.simulation import Disturbed, Motion, Sway, Tone, rest, simulate
+from truenorth.simulation import Disturbed, Motion, Sway, Tone, rest
 from truenorth.simulation.course import Leg, course, ring
 from truenorth.simulation.manoeuvres import accelerate, climb, s_turn, straight, turn, wing_rock
 from truenorth.simulation.profile import Ramp, profile, pulse
 from truenorth.simulation.route import Driving, route
 from truenorth.simulation.sea import Hull, WaveSpectrum, narrow_band, sea_motion
 from truenorth.simulation.turntable import Hold, positions, turntable
-from truenorth.state.state import State
-from truenorth.strapdown.level import mechanise
 
 PLACE = Position.from_degrees(45.0, 10.0, 100.0)
 deg = np.radians
@@ -58,23 +57,10 @@ FAMILIES = {
 }
 
 
-def come_back(motion: Motion, rate: float, duration: float, algorithm: str = "previous") -> tuple[np.ndarray, ...]:
-    """Errors of attitude (rad), velocity (m/s) and position (m) of an ideal IMU through the strapdown."""
-    record = simulate(motion, rate=rate, duration=duration).record
-    start = motion.states(0.0)
-    state = State.at(start.C_nb, start.lat, start.lon, start.alt, start.v_n)
-    computed = mechanise(record, state, every=10, algorithm=algorithm)
-    true = motion.states(computed.time)
-    turned = rotation_vector_from_dcm(computed.C_nb @ np.swapaxes(true.C_nb, 1, 2))
-    moved = computed.position - np.stack([true.lat, true.lon, true.alt], -1)
-    moved[:, :2] *= 6.37e6
-    return computed.time, turned, computed.v_n - true.v_n, moved
-
-
 @pytest.mark.parametrize("name", FAMILIES)
 def test_an_ideal_imu_comes_back_from_every_smooth_motion(name):
     """720 s at 100 Hz: .05 arcsec, 1e-4 m/s; the position follows within a centimetre."""
-    _, turned, v, moved = come_back(FAMILIES[name], 100.0, 720.0)
+    _, turned, v, moved = come_back(FAMILIES[name], 100.0, 720.0, every=10)
     assert np.degrees(np.max(np.abs(turned))) * 3600 < 0.05
     assert np.max(np.abs(v)) < 1e-4
     assert np.max(np.abs(moved)) < 1e-2
@@ -86,7 +72,7 @@ def test_a_cone_leaves_what_coning_theory_says_and_falls_with_the_rate():
     cone = Sway(PLACE, pitch_tones=(Tone(a, 1 / f),), roll_tones=(Tone(a, 1 / f, -np.pi / 2),))
     drift = {}
     for rate in (100.0, 200.0):
-        t, turned, _, _ = come_back(cone, rate, 20.0)
+        t, turned, _, _ = come_back(cone, rate, 20.0, every=10)
         drift[rate] = np.polyfit(t, turned[:, 2], 1)[0]
         theory = a**2 * residual("previous", np.array(2 * np.pi * f / rate)) * rate
         assert abs(drift[rate]) == pytest.approx(abs(theory), rel=0.2)
@@ -101,7 +87,7 @@ def test_a_shaken_mount_leaves_what_sculling_theory_says():
         rest(PLACE), roll_tones=(Tone(theta, 1 / f),), mount_tones=((Tone(9.8 / w**2, 1 / f),), (), ())
     )
     for rate, algorithm in ((100.0, "1"), (100.0, "previous"), (200.0, "previous")):
-        t, _, v, _ = come_back(sculling, rate, 20.0, algorithm)
+        t, _, v, _ = come_back(sculling, rate, 20.0, every=10, algorithm=algorithm)
         theory = theta * 9.8 / w * residual(algorithm, np.array(w / rate)) * rate
         assert abs(np.polyfit(t, v[:, 2], 1)[0]) == pytest.approx(abs(theory), rel=0.2)
 

@@ -12,9 +12,10 @@ from dataclasses import replace
 
 from truenorth.alignment.result import Alignment
 from truenorth.core.errors import AlignmentError, DataError
-from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved, rival
+from truenorth.estimate.rivals import RULED_OUT, likelihood_ratio, moved, rival
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.track import Track
 
 FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
 CLOCKS = ("second_look.late", "second_look.early", "delay.gyros_")  # evidence of them
@@ -27,7 +28,7 @@ def poorer(spec: ImuSpec, factor: float) -> ImuSpec:
     return replace(spec, **{name: factor * getattr(spec, name) for name in names})
 
 
-def poorer_evidence(run: Callable[[ImuSpec], Along], first: Along, spec: ImuSpec) -> list[Evidence]:
+def poorer_evidence(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec) -> list[Evidence]:
     """Whether a poorer IMU fits the measurements as well, and by what the answer moves with it.
 
     Measurements rule it out by far where the specification is right (ratios of -60 and less for a drive of four minutes): errors

@@ -5,6 +5,9 @@ Every message says what was found, what was expected and what to do; for a file 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 
 class TruenorthError(Exception):
     """Base of all errors that Truenorth raises on purpose."""
@@ -28,3 +31,16 @@ class AlignmentError(TruenorthError):
     """The data are sound, but cannot be aligned at all (too short to have an answer of any kind)."""
 
     exit_code = 4
+
+
+def expect_positive(where: str, values: Mapping[str, float]) -> None:
+    """Refuse values that are not positive and finite.
+
+    Raises
+    ------
+    UsageError
+        The first of them, by its name and where it stands.
+    """
+    for name, value in values.items():
+        if not 0.0 < value < math.inf:
+            raise UsageError(f"{where}: {name} is {value:g}; expected a positive number")

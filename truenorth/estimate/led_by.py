@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import Along, likelihood_ratio
+from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.quality.led_away import (
     BEGINS,
     LARGE,
@@ -36,7 +36,7 @@ from truenorth.quality.whiteness import whiteness
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
-from truenorth.state.track import Residuals
+from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
@@ -47,10 +47,10 @@ EARLIER = 1e-3  # s, by which a step begins before the row that shows it
 
 
 def led_by_evidence(
-    run: Callable[[GnssRecord], Along],
-    first: Along,
+    run: Callable[[GnssRecord], Track],
+    first: Track,
     receiver: GnssRecord,
-    without: Sequence[Callable[[GnssRecord], Along]] = (),
+    without: Sequence[Callable[[GnssRecord], Track]] = (),
 ) -> list[Evidence]:
     """The step of a receiver's velocity that is likelier than chance, by the filter's own response to it.
 
@@ -84,7 +84,7 @@ def led_by_evidence(
     return sorted(found, key=lambda item: -float(item.figures["ratio"]))[:1]
 
 
-def _led(run: Callable[[GnssRecord], Along], track: Along, receiver: GnssRecord, before: float) -> list[Evidence]:
+def _led(run: Callable[[GnssRecord], Track], track: Track, receiver: GnssRecord, before: float) -> list[Evidence]:
     """Steps that are likelier than chance; `before`: twice the logarithm of the likelihood ratio of this filter without one."""
     found = []
     for source in track.residuals:
@@ -105,7 +105,7 @@ def _led(run: Callable[[GnssRecord], Along], track: Along, receiver: GnssRecord,
 
 
 def _asked(
-    run: Callable[[GnssRecord], Along],
+    run: Callable[[GnssRecord], Track],
     first: Sequence[Residuals],
     receiver: GnssRecord,
     source: Residuals,

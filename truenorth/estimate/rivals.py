@@ -29,7 +29,7 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, Kind
 from truenorth.state.layout import DP, DV
 from truenorth.state.limits import limit, may_be_chance
-from truenorth.state.track import Residuals
+from truenorth.state.track import Residuals, Track
 from truenorth.strapdown.increments import without_gaps
 
 Array = NDArray[np.float64]
@@ -39,34 +39,6 @@ Array = NDArray[np.float64]
 LADDERS = {"gyro": (1.0, 5.0, 30.0, 200.0), "accel": (0.3, 1.5, 8.0)}
 RULED_OUT = -3.0  # twice the logarithm of a likelihood ratio
 FEWEST = 20  # measurements of each sort that a comparison needs
-
-
-class Along(Protocol):
-    """What of a track is compared."""
-
-    @property
-    def time(self) -> Array:
-        """(K,) s."""
-
-    @property
-    def C_nb(self) -> Array:
-        """(K, 3, 3) attitudes."""
-
-    @property
-    def v_n(self) -> Array:
-        """(K, 3) m/s."""
-
-    @property
-    def position(self) -> Array:
-        """(K, 3) latitude, longitude (rad), height (m)."""
-
-    @property
-    def sigma(self) -> Array:
-        """(K, n) one-sigma of the errors, attitude, velocity and position first."""
-
-    @property
-    def residuals(self) -> tuple[Residuals, ...]:
-        """Of each source."""
 
 
 class Walking(Protocol):
@@ -93,12 +65,12 @@ M = TypeVar("M", bound=Walking)
 
 
 def wandering_evidence(
-    run: Callable[[M], Along],
-    first: Along,
+    run: Callable[[M], Track],
+    first: Track,
     model: M,
     spec: ImuSpec,
     span: float,
-    without: Sequence[Callable[[M], Along]] = (),
+    without: Sequence[Callable[[M], Track]] = (),
 ) -> list[Evidence]:
     """Whether biases that wander explain the measurements better, and what that does to the answer.
 
@@ -168,8 +140,8 @@ def rival(key: str, own: Mapping[str, Figure], ratio: float, effect: Effect, sus
 
 
 def _climb(
-    run: Callable[[M], Along],
-    first: Along,
+    run: Callable[[M], Track],
+    first: Track,
     model: M,
     spec: ImuSpec,
     span: float,
@@ -199,7 +171,7 @@ def _climb(
     return found
 
 
-def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRecord) -> list[Evidence]:
+def jump_evidence(run: Callable[[ImuRecord], Track], first: Track, record: ImuRecord) -> list[Evidence]:
     """Whether the gaps of a log are jumps of its clock: without them it fits the measurements better.
 
     Parameters
@@ -228,7 +200,7 @@ def jump_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRe
     return [Evidence("record.clock_jumps", figures, "unknown", ANY_EFFECT, ("common_clock",))]
 
 
-def noise_evidence(run: Callable[[M], Along], first: Along, model: M, record: ImuRecord) -> list[Evidence]:
+def noise_evidence(run: Callable[[M], Track], first: Track, model: M, record: ImuRecord) -> list[Evidence]:
     """What noise for a while does to an answer on the move: its own walk, and what the filter makes of it.
 
     The filter takes for errors of attitude and biases what the noise does to velocity. With as much noise assumed all along it
@@ -302,7 +274,7 @@ def likelihood_ratio(first: Iterable[Residuals], rival: Iterable[Residuals]) -> 
     return total
 
 
-def moved(first: Along, other: Along) -> Effect:
+def moved(first: Track, other: Track) -> Effect:
     """By how much two tracks differ: in sigmas of the first, the RMS of the later half or the last, if larger, as sizes there.
 
     What changes late is in the last; a last one may be small by chance. Epochs that a delay has moved are compared with the
@@ -329,7 +301,7 @@ def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
     return after - (wanted - time[after - 1] < time[after] - wanted)
 
 
-def _effect(first: Along, rival: Along) -> Effect:
+def _effect(first: Track, rival: Track) -> Effect:
     """What the answer moves by, and by what the rival is less sure."""
     more = np.sqrt(np.maximum(rival.sigma[-1, :9] ** 2 - first.sigma[-1, :9] ** 2, 0.0))
     return moved(first, rival).joined(_of_states(more))

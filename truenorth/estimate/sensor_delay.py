@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import RULED_OUT, Along, likelihood_ratio, moved, rival
+from truenorth.estimate.rivals import RULED_OUT, likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
-from truenorth.state.track import Residuals
+from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ LADDER = (0.05, 0.1, 0.2, 0.4)  # s; sensors' own filters differ by less than .0
 CLIMBS = 3  # from one delay to a likelier one: with the first taken off fewer measurements seem to be outliers
 
 
-def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record: ImuRecord) -> list[Evidence]:
+def gyro_delay_evidence(run: Callable[[ImuRecord], Track], first: Track, record: ImuRecord) -> list[Evidence]:
     """Whether gyros that are taken earlier or later explain the measurements better, and what that does to the answer.
 
     Parameters
@@ -60,14 +60,14 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Along], first: Along, record:
 
 
 def _likelier(
-    run: Callable[[ImuRecord], Along], base: Along, record: ImuRecord, at: int
-) -> tuple[int, Along, float] | None:
+    run: Callable[[ImuRecord], Track], base: Track, record: ImuRecord, at: int
+) -> tuple[int, Track, float] | None:
     """Rows by which the gyros are more likely late than by `at`, the track without that delay, and the ratio; None: no others.
 
     `base` is the track with the delay `at` taken off.
     """
     ratios: dict[int, float] = {at: 0.0}
-    tracks: dict[int, Along] = {}
+    tracks: dict[int, Track] = {}
 
     def tried(rows: int) -> float:
         if rows not in ratios:
@@ -88,7 +88,7 @@ def _likelier(
     return (best, tracks[best], ratios[best]) if ratios[best] > limit("rival") else None
 
 
-def _not_of_gyros(track: Along) -> list[Residuals]:
+def _not_of_gyros(track: Track) -> list[Residuals]:
     return [r for r in track.residuals if r.name != NO_ROTATION]
 
 

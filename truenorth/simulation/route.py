@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
-from truenorth.core.errors import UsageError
+from truenorth.core.errors import UsageError, expect_positive
 from truenorth.core.position import Position
 from truenorth.simulation.course import Course
 from truenorth.simulation.profile import Profile, Ramp, profile
@@ -66,9 +66,7 @@ class Driving:
     onset: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (0 < value < math.inf):
-                raise UsageError(f"driving: {name} is {value:g}; expected a positive number")
+        expect_positive("driving", vars(self))
 
 
 def route(

@@ -159,12 +159,12 @@ class Point(Strict):
 class DrivingStyle(Strict):
     """See :class:`truenorth.simulation.route.Driving`."""
 
-    speed: Speed = 15.0
-    acceleration: Acceleration = 1.5
-    lateral_acceleration: Acceleration = 2.0
-    radius: Length = 15.0
-    smallest_radius: Length = 4.0
-    onset: Time = 1.0
+    speed: Speed = Driving.speed
+    acceleration: Acceleration = Driving.acceleration
+    lateral_acceleration: Acceleration = Driving.lateral_acceleration
+    radius: Length = Driving.radius
+    smallest_radius: Length = Driving.smallest_radius
+    onset: Time = Driving.onset
 
 
 class RouteMotion(Strict):

@@ -98,15 +98,15 @@ class Tones(Strict):
 class HullShape(Strict):
     """See :class:`truenorth.simulation.sea.Hull`."""
 
-    length: Length = 100.0
-    beam: Length = 16.0
-    roll_period: Time = 10.0
-    pitch_period: Time = 6.0
-    heave_period: Time = 6.5
-    roll_damping: float = 0.08
-    pitch_damping: float = 0.35
-    heave_damping: float = 0.35
-    yaw_gain: float = 0.3
+    length: Length = Hull.length
+    beam: Length = Hull.beam
+    roll_period: Time = Hull.roll_period
+    pitch_period: Time = Hull.pitch_period
+    heave_period: Time = Hull.heave_period
+    roll_damping: float = Hull.roll_damping
+    pitch_damping: float = Hull.pitch_damping
+    heave_damping: float = Hull.heave_damping
+    yaw_gain: float = Hull.yaw_gain
 
 
 class Waves(Strict):

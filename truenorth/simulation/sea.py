@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.errors import UsageError
+from truenorth.core.errors import UsageError, expect_positive
 from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.simulation.tones import Tone
 
@@ -100,9 +100,7 @@ class Hull:
     yaw_gain: float = 0.3  # yaw over the wave's slope times sin(2 beta)/2
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (0 < value < math.inf):
-                raise UsageError(f"hull: {name} is {value:g}; expected a positive number")
+        expect_positive("hull", vars(self))
 
 
 def sea_motion(

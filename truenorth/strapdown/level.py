@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,14 +97,15 @@ def underway(start: State, interval: float | None = None, before: ImuRecord | No
     return Underway(motion, np.concatenate([start.gyro_bias, start.accel_bias]), interval, before=rows)
 
 
-def mechanise(
-    record: ImuRecord,
-    start: State,
-    *,
-    algorithm: Algorithm = "previous",
-    altitude: Altitude = "free",
-    every: int = 1,
-) -> Track:
+class Options(TypedDict, total=False):
+    """Of a mechanisation; see :func:`go_on`."""
+
+    algorithm: Algorithm
+    altitude: Altitude
+    every: int
+
+
+def mechanise(record: ImuRecord, start: State, **options: Unpack[Options]) -> Track:
     """Carry attitude, velocity and position on through a record.
 
     Coriolis, transport and gravity are taken at the middle of an update, extrapolated from the last one: of second
@@ -116,13 +117,8 @@ def mechanise(
         Without gaps: what an increment row after a gap has missed is missing from the answer.
     start : State
         At the beginning of the first row's interval; its biases are taken off.
-    algorithm : {"previous", "1", "2", "3", "4"}
-        Samples an update and their coning and sculling correction; "previous" updates at every sample, with the sample
-        before it; "1" corrects nothing.
-    altitude : {"free", "fixed"}
-        Free vertical channel, or height held and vertical velocity zero (at sea).
-    every : int
-        Output after every so many updates; 1 is the full rate.
+    algorithm, altitude, every
+        As of :func:`go_on`.
 
     Returns
     -------
@@ -132,9 +128,9 @@ def mechanise(
     Raises
     ------
     UsageError
-        An algorithm that is not known; `altitude` neither free nor fixed; `every` below 1.
+        As :func:`go_on`.
     """
-    return go_on(record, underway(start), algorithm=algorithm, altitude=altitude, every=every)[1]
+    return go_on(record, underway(start), **options)[1]
 
 
 def go_on(
@@ -145,13 +141,20 @@ def go_on(
     altitude: Altitude = "free",
     every: int = 1,
 ) -> tuple[Underway, Track]:
-    """Take the next chunk of a log; the options as of :func:`mechanise`, the same for all chunks.
+    """Take the next chunk of a log; the options are the same for all chunks.
 
     Parameters
     ----------
     record : ImuRecord
     state : Underway
         Left as it is.
+    algorithm : {"previous", "1", "2", "3", "4"}
+        Samples an update and their coning and sculling correction; "previous" updates at every sample, with the sample
+        before it; "1" corrects nothing.
+    altitude : {"free", "fixed"}
+        Free vertical channel, or height held and vertical velocity zero (at sea).
+    every : int
+        Output after every so many updates; 1 is the full rate.
 
     Returns
     -------
