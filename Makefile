@@ -1,17 +1,21 @@
 # Every target does its own set-up: a fresh machine needs python3, make and a package registry.
 PYTHON ?= python3
 BIN := .venv/bin
+RUNS := .venv/.runs
 READY := .venv/.ready
 WARM := .venv/.warm
 WORKERS ?= auto
+
+# Python keeps the bytecode of what it imports, also where the environment forbids that: a start without takes 5 s.
+export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := demo
 .PHONY: install demo test test-all check format bench docs notebooks messages release lock clean
 
 install: $(WARM)
 
-# It compiles what it needs itself, a quarter of what `warm` compiles.
-demo: $(READY)
+# It installs and compiles what it needs itself: a quarter of the packages, and of what `warm` compiles.
+demo: $(RUNS)
 	$(BIN)/python examples/demo.py
 
 test: $(WARM)
@@ -59,13 +63,17 @@ lock: $(READY)
 	$(BIN)/uv pip compile pyproject.toml $(LOCKED:%=--extra %) --universal --python-version 3.11 --generate-hashes \
 	  --no-emit-index-url --custom-compile-command "make lock" --upgrade -q -o requirements.lock
 
-# The stamp is touched last, so an interrupted installation is started again.
-$(READY): requirements.lock pyproject.toml
+# The stamps are touched last, so an interrupted installation is started again. What the program needs to run comes first, in
+# the versions of the lock; uv holds what it gets, build tools too, against the hashes there.
+$(RUNS): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install -q uv
-	$(BIN)/uv pip sync -q --compile-bytecode --python $(BIN)/python --require-hashes requirements.lock
+	$(BIN)/uv pip install -q --python $(BIN)/python --constraints requirements.lock --build-constraints requirements.lock -e .
+	touch $@
+
+$(READY): $(RUNS)
+	$(BIN)/uv pip sync -q --python $(BIN)/python --require-hashes requirements.lock
 	$(BIN)/uv pip install -q --python $(BIN)/python --no-deps --no-build-isolation -e .
-	$(BIN)/python -m compileall -q truenorth
 	touch $@
 
 # Compiled code is kept in the user's cache; a second call finds it there.

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 import truenorth
 
@@ -65,3 +67,19 @@ def test_the_devcontainer_is_json():
 @pytest.mark.parametrize("name", ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE", "CONTRIBUTING.md"])
 def test_what_a_reader_looks_for_is_there(name):
     assert (ROOT / name).stat().st_size > 200
+
+
+def test_the_lock_has_what_the_demo_installs():
+    """`make demo` installs by constraints: uv holds against the lock's hashes what stands there, and what does not against none."""
+    entry = r"^([a-z0-9.-]+)==\S+.*\\\n    --hash=sha256:[0-9a-f]{64}\b"
+    locked = set(re.findall(entry, (ROOT / "requirements.lock").read_text(encoding="utf-8"), re.MULTILINE))
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]["requires"]
+    left, needed = [Requirement(line) for line in [*project()["dependencies"], *build]], set()
+    while left:
+        one = left.pop()
+        name = re.sub(r"[-_.]+", "-", one.name).lower()
+        if name not in needed and (one.marker is None or one.marker.evaluate({"extra": ""})):
+            needed.add(name)
+            left += map(Requirement, requires(name) or [])
+    assert {"llvmlite", "pydantic-core", "pathspec"} <= needed
+    assert needed - locked == set()

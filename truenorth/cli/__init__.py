@@ -5,6 +5,7 @@ Each command stands in a module of its own and imports its work when it runs, so
 
 from __future__ import annotations
 
+import atexit
 import gc
 import io
 import os
@@ -35,9 +36,9 @@ from truenorth.core.language import LANGUAGES, retold, speak
 from truenorth.core.version import __version__
 
 INTERRUPTED = 130
-# Objects made before Python looks for garbage, and rounds before it looks at old ones: a command makes a million objects that stay
-# (modules, types), and with Python's own numbers (700, 10, 10) it looks through them again and again, a twentieth of `align`.
-GARBAGE = (100_000, 50, 100)
+# Objects made before Python looks for garbage, and rounds before it looks at old ones: `align` makes 200,000 that stay (modules,
+# types), and with Python's own numbers (700, 10, 10) it looks through them again and again, a twentieth of its time.
+GARBAGE = (300_000, 50, 100)
 
 app = typer.Typer(
     name="truenorth",
@@ -102,6 +103,7 @@ def main() -> None:
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(*GARBAGE)
+    atexit.register(gc.freeze)  # else Python looks through all that is left before it ends, a tenth of `align`
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a terminal that has no ± shows ?, and the answer is still printed
             stream.reconfigure(errors="replace")
