@@ -27,7 +27,7 @@ from truenorth.alignment.published import FADING, STATIONARY, Published, factor_
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
-from truenorth.alignment.sway_noise import louder_walks
+from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
 from truenorth.alignment.turning import (
@@ -297,14 +297,17 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         fine = faded_align(start, method)
         return _Found(answer_of(task, fine, used, where, P), check, fine.settled, acted=factor_share(fine))
     picked, form = pick_form(gained_velocity(integrals, coarse.C_n0_i, lat, alt), task.motion)
-    if sways:
+    if sways and spec is None and turned is None:
+
+        def start_of(walks: StaticModel) -> CoarseStart:
+            inferred = infer_spec(check, walks)
+            P_bias = task.bias_prior(inferred, start.C_n0_i.T)
+            return start._replace(model=StaticModel.of(inferred), P_bias=P_bias)
+
+        fine, noise = sway_inferred(start_of, noise, usual)
+        used, P = infer_spec(check, noise), start_of(noise).P_bias
+    elif sways:
         fine = sway_align(start, turned=turned)
-        # What the inference took for the usual noise of sensors is not theirs.
-        if spec is None and turned is None and fine.noisier:
-            noise = louder_walks(noise, fine.noisier)
-            used, where = _specification(None, check, noise)
-            P = task.bias_prior(used, coarse.C_n0_i.T)
-            fine = sway_align(start._replace(model=StaticModel.of(used), P_bias=P))
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:

@@ -4,6 +4,8 @@ Their white noise is under the sway, and the fit of the base's motion takes up w
 a slow oscillator. So the log is filtered again with noisier sensors, with the motion as fitted and with what remains of it
 without these. Velocity that wanders as ``t^(1/2)`` and ``g t^(3/2)`` is no motion of a base that stays.
 
+So does a bias that changes: what it explains, by the quiet sensors' filter, is no sign of noise.
+
 White noise is as dense above the sway as under it. Where a sensor looks white there, and is as quiet as specified, what is slow and
 louder is a motion that the fit has missed: a ship at her moorings goes to and fro in many tones.
 """
@@ -12,7 +14,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -37,7 +39,15 @@ def louder_walks(noise: StaticModel, factors: Mapping[str, float]) -> StaticMode
     return replace(noise, **walks)
 
 
-def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: float) -> dict[str, float]:
+def is_louder(noise: StaticModel, usual: StaticModel) -> bool:
+    """Whether a sensor's random walk is another sensor's than the usual one."""
+    walks = ("gyro_random_walk", "accel_random_walk")
+    return any(getattr(noise, walk) > LOUD * getattr(usual, walk) for walk in walks)
+
+
+def noisier_sensors(
+    log: StayingLog, motion: Sequence[AxisMotion], interval: float, begun: Callable[[], float]
+) -> dict[str, float]:
     """How many times noisier than specified a sensor is, where the log rules out less than `LOUD` times.
 
     Parameters
@@ -48,6 +58,8 @@ def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: flo
         Of the base, as fitted with that noise.
     interval : float, s
         Of the filter.
+    begun : callable
+        Twice the logarithm of the likelihood ratio by which quiet sensors with a bias that changes explain the log better.
     """
     seen = _loud_above_sway(log)
     duration = float(log.integrals.time[-1])
@@ -82,7 +94,8 @@ def noisier_sensors(log: StayingLog, motion: Sequence[AxisMotion], interval: flo
             if better < best:
                 break
             best, factor = better, more
-        found[sensor] = factor
+        if best - below > begun():
+            found[sensor] = factor
     return found
 
 

@@ -15,7 +15,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.bias_step import bias_signatures
 from truenorth.alignment.fine import CoarseStart, FineAlignment
+from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
@@ -131,8 +133,13 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     return replace(
         fine,
         begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion, estimator.without)),
-        noisier=noisier_sensors(log, estimator.motion, step),
+        noisier=noisier_sensors(log, estimator.motion, step, partial(begun, fine)),
     )
+
+
+def begun(fine: SwayAlignment) -> float:
+    """Twice the logarithm of the likelihood ratio of the best step or ramp of a bias."""
+    return float(matched(innovations_of(fine), bias_signatures(fine))[0].ratio.max())
 
 
 def farthest(fine: FineAlignment, position: Position) -> float:
