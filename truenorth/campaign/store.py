@@ -113,7 +113,6 @@ def opened(folder: str | os.PathLike[str], plan: Plan, *, resume: bool = True) -
     target = writable_folder(folder)
     with _locked(target / ".lock"):
         store = Store(target)
-        writable_folder(store.runs)
         for stray in store.runs.glob(".*.part.parquet"):  # of a process that was killed
             stray.unlink(missing_ok=True)
         if not resume:
@@ -121,6 +120,7 @@ def opened(folder: str | os.PathLike[str], plan: Plan, *, resume: bool = True) -
                 shard.unlink()
             (target / "manifest.json").unlink(missing_ok=True)
         _claim(store, plan)
+        writable_folder(store.runs)
         yield store
 
 

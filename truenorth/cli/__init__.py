@@ -10,6 +10,7 @@ import gc
 import io
 import os
 import sys
+from contextlib import nullcontext
 
 import typer
 
@@ -19,7 +20,7 @@ from truenorth.cli.campaign import campaign
 from truenorth.cli.console import explain_compiling
 from truenorth.cli.example import example
 from truenorth.cli.faults import faults
-from truenorth.cli.files import FORCE, check_output, inputs, with_layout_name
+from truenorth.cli.files import FORCE, check_names, check_output, inputs, with_layout_name
 from truenorth.cli.imu import imu
 from truenorth.cli.inspect import inspect
 from truenorth.cli.live import live
@@ -113,9 +114,8 @@ def main() -> None:
         _speak_early(words)
         forced = FORCE in words
         words = with_layout_name([word for word in words if word != FORCE])
-        if not forced:
-            check_output(words)
-        with protected([] if forced else inputs(words)):
+        with nullcontext() if forced else protected(inputs(words), check_output(words)):
+            check_names(words)
             app(args=[*([FORCE] if forced else []), *_language_first(words)])
     except TruenorthError as error:
         print(f"truenorth: {in_options(retold(str(error)))}", file=sys.stderr)

@@ -12,11 +12,23 @@ KINDS = {  # by command: the kind of result that it writes into its output folde
     "live": "Alignment",
     "navigate": "Navigation",
     "advise": "Advice",
+    "noise": "Noise",
     "simulate": "Simulation",
     "campaign": "Campaign",
     "reproduce": "Study",
     "tune": "Tuned",
     "faults": "Faults",
+}
+FIRST = {  # by kind: files that are written in any case, looked for before the work
+    "Alignment": ("summary.json", "history.parquet", "report.html"),
+    "Navigation": ("summary.json", "track.parquet", "report.html"),
+    "Advice": ("advice.png",),
+    "Noise": ("imu.yaml", "noise.svg"),
+    "Simulation": ("scenario.yaml", "summary.json", "figure.png"),
+    "Campaign": ("summary.csv", "comparison.csv", "report.html"),
+    "Study": ("figures.csv", "report.html", "index.html"),
+    "Tuned": ("trials.csv", "judged.csv", "search.png"),
+    "Faults": ("faults.csv", "faults.md"),
 }
 READ_NO_FOLDER = (
     "simulate",
@@ -26,10 +38,18 @@ READ_NO_FOLDER = (
     "faults",
     "advise",
 )  # but files, and names of what is shipped
-MARKERS = {  # names of files, of results that keep no result.npz
-    "manifest.json": "Campaign",
-    "claims.md": "Study",
-    "truth.*": "Simulation",
+MARKERS = {  # by kind without a result.npz: files, or patterns of names, that stand together in such a folder only
+    "Campaign": ("manifest.json", "plan.yaml"),
+    "Study": ("claims.md",),
+    "Simulation": ("truth.*", "scenario.yaml"),
+    "Advice": ("advice.json",),
+    "Noise": ("kalibr.yaml", "imu.yaml"),
+    "Tuned": ("tuned.yaml", "trials.csv", "judged.csv"),
+    "Faults": ("trials.csv",),
+}
+GROWN = {  # the same of a campaign that was ended early, and of all studies
+    "Campaign": ("runs/case*.parquet",),
+    "Study": ("index.html", "*/claims.md"),
 }
 
 
@@ -63,8 +83,13 @@ def with_layout_name(words: Sequence[str]) -> list[str]:
     return found
 
 
-def check_output(words: Sequence[str]) -> None:
+def check_output(words: Sequence[str]) -> list[Path]:
     """Refuse, before the work, an output folder that holds a result of another kind.
+
+    Returns
+    -------
+    list of Path
+        Where the folder holds no result of this kind either: its files, which are not to be replaced.
 
     Raises
     ------
@@ -74,32 +99,57 @@ def check_output(words: Sequence[str]) -> None:
     from truenorth.core.errors import UsageError
 
     command = next((word for word in words if word in KINDS), None)
-    folder = next((Path(value) for value in _outputs(words)), None)
-    if command is None or folder is None or not folder.is_dir():
-        return
-    found, wanted = kind_in(folder), KINDS[command]
-    if found is not None and found != wanted:
-        raise UsageError(
-            f"{folder}: holds a result of another kind ({found}, where {command} writes {wanted}) and would be overwritten; "
-            f"name another folder with -o, or add {FORCE}"
-        )
+    if command is None:
+        return []
+    kept, wanted = [], KINDS[command]
+    for folder in filter(Path.is_dir, map(Path, _outputs(words))):
+        found = kinds_in(folder)
+        if found and wanted not in found:
+            raise UsageError(
+                f"{folder}: holds a result of another kind ({found[0]}, where {command} writes {wanted}) and would be "
+                f"overwritten; name another folder with -o, or add {FORCE}"
+            )
+        if not found and not _holds(folder, GROWN.get(wanted, ())):
+            kept += [path for path in folder.iterdir() if path.is_file()]
+    return kept
 
 
-def kind_in(folder: Path) -> str | None:
-    """The kind of result that a folder holds; None where it holds none that we know."""
-    for name, kind in MARKERS.items():
-        if any(folder.glob(name)):
-            return kind
+def check_names(words: Sequence[str]) -> None:
+    """Refuse, before the work, what would be refused after it: a file of a result that is to be kept.
+
+    Raises
+    ------
+    UsageError
+        It names the file.
+    """
+    from truenorth.core.atomic import check_free
+
+    command = next((word for word in words if word in KINDS), "")
+    for folder in _outputs(words):
+        for name in FIRST.get(KINDS.get(command, ""), ()):
+            check_free(Path(folder) / name)
+
+
+def kinds_in(folder: Path) -> list[str]:
+    """The kinds of results that a folder holds: more than one where somebody has forced it, none where we know none."""
+    found = [kind for kind, names in MARKERS.items() if _holds(folder, names)]
     archive = folder / "result.npz"
-    if not archive.is_file():
-        return None
-    from truenorth.core.archive import type_in
+    if archive.is_file():
+        from truenorth.core.archive import type_in
 
-    return type_in(archive).replace("ManoeuvreAdvice", "Advice") or None
+        found.append(type_in(archive).replace("ManoeuvreAdvice", "Advice"))
+    return [kind for kind in found if kind]
+
+
+def _holds(folder: Path, names: Sequence[str]) -> bool:
+    return bool(names) and all(any(folder.glob(name)) for name in names)
 
 
 def _outputs(words: Sequence[str]) -> Iterator[str]:
+    """The folder or file behind each option of an output: as the next word, behind ``=``, or right behind ``-o``."""
     for word, following in zip(words, (*words[1:], "")):
         option, equals, value = word.partition("=")
-        if option in OUTPUTS:
+        if word.startswith("-o"):
+            yield word[2:] or following
+        elif option in OUTPUTS:
             yield value if equals else following

@@ -9,36 +9,72 @@ import os
 import secrets
 import shutil
 import tempfile
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from truenorth.core.errors import UsageError
 
-_inputs: set[Path] = set()
+_renaming = threading.RLock()  # a set of several folders takes it for each
+_kept: dict[Path, bool] | None = (
+    None  # what the running command does not replace, and whether it reads it; None outside of one
+)
 
 
 @contextmanager
-def protected(inputs: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
-    """Refuse to replace these files, and all files in these folders, as long as the block runs.
+def protected(
+    inputs: Iterable[str | os.PathLike[str]], others: Iterable[str | os.PathLike[str]] = ()
+) -> Iterator[None]:
+    """Refuse to replace these files, all files in these folders, and what is :func:`noted`, as long as the block runs.
 
     Parameters
     ----------
     inputs : iterable of paths
         Those that do not exist are ignored.
+    others : iterable of paths
+        Files that are somebody else's.
     """
-    before = set(_inputs)
-    for path in map(Path, inputs):
-        with suppress(OSError):
-            if path.is_file():
-                _inputs.add(path.resolve())
-            elif path.is_dir():
-                _inputs.update(file.resolve() for file in path.iterdir() if file.is_file())
+    global _kept
+    before = _kept
+    _kept = {} if before is None else dict(before)
+    _kept.update({Path(path).resolve(): False for path in others})
+    for name in inputs:
+        noted(name)
     try:
         yield
     finally:
-        _inputs.clear()
-        _inputs.update(before)
+        _kept = before
+
+
+def noted(path: str | os.PathLike[str]) -> None:
+    """Say that a running command reads this file, or all files in this folder: it is not to write over them."""
+    if _kept is None:
+        return
+    given = Path(path)
+    with suppress(OSError, ValueError):
+        files = given.iterdir() if given.is_dir() else (given,)
+        _kept.update({file.resolve(): True for file in files if file.is_file()})
+
+
+def check_free(path: Path) -> None:
+    """Refuse to replace a file that the running command is to keep.
+
+    Raises
+    ------
+    UsageError
+        It is an input, or somebody else's.
+    """
+    reads = None if _kept is None else _kept.get(path.resolve())
+    if reads:
+        raise UsageError(
+            f"{path}: this file is an input of the command and would be overwritten; expected another output folder"
+        )
+    if reads is False:
+        raise UsageError(
+            f"{path}: is there already, of no such result, and would be overwritten; expected another output folder, or "
+            "`replace=True`"
+        )
 
 
 def writable_folder(folder: str | os.PathLike[str]) -> Path:
@@ -80,7 +116,7 @@ def atomic_files() -> Iterator[Callable[..., Path]]:
 
     Gives a function from a target to the temporary path to write to. A temporary name keeps the suffix of its target, since some
     writers choose their format by it, and is another one for each writer, so that two threads or processes can write the same
-    files: the last one to finish wins. A target with
+    files: the last one to finish wins, with its whole set. A target with
     `gone` is removed as the others take their names: the new set has no such file.
 
     Raises
@@ -94,10 +130,7 @@ def atomic_files() -> Iterator[Callable[..., Path]]:
     def temporary(target: str | os.PathLike[str], *, gone: bool = False) -> Path:
         path = Path(target)
         folder = writable_folder(path.parent)
-        if _inputs and path.resolve() in _inputs:
-            raise UsageError(
-                f"{path}: this file is an input of the command and would be overwritten; expected another output folder"
-            )
+        check_free(path)
         if gone:
             removed.add(path)
             return path
@@ -117,9 +150,38 @@ def atomic_files() -> Iterator[Callable[..., Path]]:
 
 
 def _put_in_place(written: Mapping[Path, Path], removed: Iterable[Path]) -> None:
-    """Rename all temporary files to their targets; where one cannot be renamed, put back what stood at the others."""
+    """Write all temporary files out, then rename them to their targets."""
     for path in written.values():
         _onto_disk(path)
+    with ExitStack() as locks:
+        for folder in sorted(
+            {target.resolve().parent for target in (*written, *removed)}
+        ):  # one order: none waits for another
+            locks.enter_context(_alone(folder))
+        _rename(written, removed)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold back the other threads and processes that put their set into this folder: it ends with one whole set of either."""
+    with _renaming:
+        number = None
+        with suppress(
+            ImportError, OSError
+        ):  # Windows, and file systems without locks: the threads of this process at least
+            import fcntl
+
+            number = os.open(folder, os.O_RDONLY)
+            fcntl.flock(number, fcntl.LOCK_EX)
+        try:
+            yield
+        finally:
+            if number is not None:
+                os.close(number)
+
+
+def _rename(written: Mapping[Path, Path], removed: Iterable[Path]) -> None:
+    """Rename all temporary files to their targets; where one cannot be renamed, put back what stood at the others."""
     old: dict[Path, Path | None] = {}
     try:
         for target in (*written, *removed):

@@ -6,13 +6,14 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from truenorth.core.atomic import noted
 from truenorth.core.errors import UsageError
 
 LONGEST = 255  # bytes, of a file's name
 
 
 def as_path(given: Any, what: str) -> Path:
-    """A path of what was given.
+    """A path of what was given to be read: a running command does not write over it.
 
     Raises
     ------
@@ -27,6 +28,7 @@ def as_path(given: Any, what: str) -> Path:
         raise UsageError(f"{what} {str(path)!r}: no file has such a name")
     if any(len(part.encode("utf-8", "surrogateescape")) > LONGEST for part in path.parts):
         raise UsageError(f"{what} {str(path)[:60]!r}...: no file has so long a name")
+    noted(path)
     return path
 
 

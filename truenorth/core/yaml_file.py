@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from truenorth.core.atomic import noted
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.core.units import parse
 
@@ -87,6 +88,7 @@ def read_mapping(path: str | PathLike[str]) -> dict[Any, Any]:
         if len(raw) > LARGEST:
             raise DataError(f"{path}: larger than {LARGEST >> 20} MiB; expected a few keys")
         text = raw.decode("utf-8")
+        noted(path)
         _check_size(text)
         content = yaml.load(text, Loader)
     except OSError as error:

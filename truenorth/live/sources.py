@@ -20,6 +20,7 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.atomic import noted
 from truenorth.core.errors import UsageError
 from truenorth.formats.layout import Layout
 from truenorth.live.bags import open_bag
@@ -201,6 +202,7 @@ def _replay(text: str, layout: Layout, after: float) -> Replay:
 
 def _follow(path: Path) -> Callable[[], bytes | None]:
     """A file that another program goes on writing."""
+    noted(path)
     file = path.open("rb")
 
     def read() -> bytes | None:
