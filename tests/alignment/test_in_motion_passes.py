@@ -8,11 +8,14 @@ import pytest
 import yaml
 
 from truenorth.aiding.aids import Odometer
-from truenorth.alignment import align
-from truenorth.alignment.in_motion_start import LEAST_HEADING, Guess, led_back, used_twice
+from truenorth.alignment import align, in_motion_passes
+from truenorth.alignment.in_motion_passes import begun, once_more
+from truenorth.alignment.in_motion_start import LEAST_HEADING, Guess, led_back
+from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.position import Position
 from truenorth.navigation.stops import seconds_at_rest
 from truenorth.records import ImuRecord, OdometerRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import scenario as scenario_module
 from truenorth.simulation.scenario import read_scenario
 
@@ -56,25 +59,44 @@ def test_vans_with_poor_gyros_and_wheels_of_pulses():
     assert np.sum(np.square(misses)) < 20.1
 
 
-def test_what_is_used_twice_is_taken_off():
-    """Variances of two independent sources: with the prior taken off again what the log alone gives."""
-    first = Guess(np.eye(3), 0.07, 0.5)
-    log, prior = 0.05, 0.15
+class LinearLog:
+    """A log that says a heading with a sigma, seen by a filter that takes its own sigma for `boast` times as small."""
 
-    class Passed:
-        sigma = np.full((1, 15), 1.0 / np.sqrt(1.0 / log**2 + 1.0 / prior**2))
+    record, spec = None, imu_spec(POOR)
 
-    more = used_twice(Passed, replace(first, heading_sigma=prior), first)
-    assert np.hypot(Passed.sigma[-1, 2], more) == pytest.approx(log, rel=1e-9)
-    assert used_twice(Passed, first, first) == 0.0
+    def __init__(self, heading, sigma, boast=1.0):
+        self.heading, self.sigma, self.boast = heading, sigma, boast
+
+    def run(self, guess, gated):
+        begun_with = float(euler_from_dcm(guess.C_nb)[0])
+        share = guess.heading_sigma**2 / (guess.heading_sigma**2 + self.sigma**2)
+
+        class Passed:
+            back = dcm_from_euler(begun_with + share * (self.heading - begun_with), 0.0, 0.0)
+            gyro_bias = accel_bias = np.zeros((1, 3))
+            sigma = np.full((1, 15), np.sqrt(share) * self.sigma / self.boast)
+
+        return Passed
 
 
-def test_a_pass_hands_on_what_it_has_found(monkeypatch):
+@pytest.mark.parametrize("sigma", [0.01, 0.05, 0.08])  # rad; a guess has 0.05
+@pytest.mark.parametrize("boast", [1.0, 1.5])
+def test_passes_settle_where_the_log_says_whatever_they_begin_with(monkeypatch, sigma, boast):
+    """Of a linear filter: heading and sigma of the log alone, also where the filter's own sigma is false."""
+    monkeypatch.setattr(in_motion_passes, "backtracked", lambda record, track: track.back)
+    log = LinearLog(1.0, sigma, boast)
+    first = Guess(dcm_from_euler(0.2, 0.0, 0.0), 0.07, 0.5)
+    found = begun(log, first, log.run(replace(first, heading_sigma=0.05), gated=False))
+    for _ in range(5):
+        found = once_more(log, found, first)
+    assert found.settled
+    assert euler_from_dcm(found.back)[0] == pytest.approx(1.0, abs=1e-6)
+    posterior = 1.0 / np.hypot(1.0 / sigma, 1.0 / found.guess.heading_sigma)
+    assert np.hypot(posterior, found.used_twice) == pytest.approx(sigma, rel=1e-3)
+
+
+def test_a_pass_hands_on_what_it_has_found():
     """Biases that it has narrowed; level and heading no wider than at first."""
-    from truenorth.alignment import in_motion_start
-    from truenorth.records.specs import imu_spec
-
-    monkeypatch.setattr(in_motion_start, "backtracked", lambda record, track: np.eye(3))
     spec = imu_spec(POOR)
     sigma = np.concatenate([np.full(9, 1e-3), 0.01 * np.sqrt(spec.bias_variance)])
     sigma[11] = np.sqrt(spec.bias_variance[2])
@@ -84,12 +106,12 @@ def test_a_pass_hands_on_what_it_has_found(monkeypatch):
 
     Track.sigma = sigma[None]
     first = Guess(np.eye(3), 0.07, 0.5)
-    found = led_back(None, Track, spec, first)
+    found = led_back(Track, np.eye(3), spec, first)
     assert np.array_equal(found.gyro_bias, [1e-4, 2e-4, 0.0])
     assert np.array_equal(found.accel_bias, [0.01, 0.02, 0.03])
     assert found.heading_sigma == LEAST_HEADING
     assert found.level_sigma == pytest.approx(1e-2)
-    assert led_back(None, Track, spec, Guess(np.eye(3), 0.001, 0.01)).heading_sigma == 0.01
+    assert led_back(Track, np.eye(3), spec, Guess(np.eye(3), 0.001, 0.01)).heading_sigma == 0.01
 
 
 def test_a_creeping_vehicle_does_not_stand():

@@ -20,7 +20,8 @@ from truenorth.alignment.in_motion_answer import moving_answer
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
-from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round, led_back, used_twice
+from truenorth.alignment.in_motion_passes import Pass, begun, once_more, turn_between
+from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
 from truenorth.alignment.in_motion_verdict import judge_moving
 from truenorth.alignment.rest_rate import rest_evidence
@@ -41,7 +42,7 @@ from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRec
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, note, notes
-from truenorth.state.layout import DP, PHI
+from truenorth.state.layout import DP
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
@@ -53,7 +54,7 @@ HEADING_LIMIT = math.radians(5.0)
 GYROCOMPASS = math.radians(20.0)  # of heading by bias, up to which the gyros are asked for north first
 BANK_TIME = 300.0  # s of log by which the headings of the bank compete
 # Passes over the log, and more where what was learnt of the sensors still changes, or heading by more than a part of its sigma.
-PASSES, MORE_PASSES, SETTLED = 2, 6, 0.3
+PASSES, MORE_PASSES = 2, 6
 LOUD = 3.0  # times its sigma, that an aid is so noisy that the first pass begins anew with what it is
 # Once it has settled: with slow errors that the aids' innovations show; one sensor's may hide another's
 SLOW_PASSES = 2
@@ -169,31 +170,31 @@ def _aligned(
         )
     else:
         why = "asked for"
-    guess, track, spread = _begun(task, method, tell)
-    louder, _ = task.learnt(track)
+    found, spread = _begun(task, method, tell)
+    louder, _ = task.learnt(found.track)
     if any(float(factor.max()) > LOUD for factor in louder.factors.values()):  # what it found was made of noise
         task = replace(task, factors=louder.factors)
-        guess, track, spread = _begun(task, method, tell)
-    first, number, much, moved = guess, 1, False, math.inf
-    while number < passes or ((much or moved > SETTLED) and passes > 1 and number < passes + MORE_PASSES):
-        task, much = task.learnt(track)
-        if number < passes or much or moved > SETTLED:
+        found, spread = _begun(task, method, tell)
+    first, number, much = found.guess, 1, False
+    while number < passes or ((much or not found.settled) and passes > 1 and number < passes + MORE_PASSES):
+        task, much = task.learnt(found.track)
+        if number < passes or much or not found.settled:
             tell(f"pass {number + 1}")
-            guess, track, moved = _once_more(task, track, first)
+            found = once_more(task, found, first)
         number += 1
     for _ in range(SLOW_PASSES if passes > 1 else 0):
-        slower = task.with_slow_errors(track)
+        slower = task.with_slow_errors(found.track)
         if slower is task:
             break
         tell(f"pass {(number := number + 1)}")
         task = slower
-        guess, track, moved = _once_more(task, track, first)
+        found = once_more(task, found, first)
     if passes > 1:
         tell(f"pass {(number := number + 1)}")
-        task, guess, track, moved = _as_specified(task, guess, track, moved, first)
+        task, found = _as_specified(task, found, first)
     if number > 1:
-        left = moved * float(track.sigma[-1, PHI][2]) if moved > SETTLED else 0.0  # what has not settled
-        spread = math.hypot(spread, used_twice(track, guess, first), left)
+        spread = math.hypot(spread, found.used_twice, found.unsettled)
+    guess, track = found.guess, found.track
     answer = moving_answer(task, task.with_lasting_fixes(track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
@@ -204,31 +205,22 @@ def _aligned(
     return judge_moving(answer, track, heading_limit, more)
 
 
-def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[Guess, Track, float]:
-    """The guess to begin with, the first pass from it, and how far guesses lie apart that explain the log as well, rad."""
+def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[Pass, float]:
+    """The first pass, and how far guesses lie apart that explain the log as well, rad."""
     tell("coarse alignment")
     if method == "gyrocompass":
         guess = task.by_the_earth()
         # Where the earth's rate is lost in the noise of the aids at first, all headings compete.
         if guess.heading_sigma <= COARSE_HEADING:
             tell("first pass")
-            return guess, task.run(guess, gated=False), 0.0
+            return begun(task, guess, task.run(guess, gated=False)), 0.0
     guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
     best, track, spread = _best_of_bank(task, guesses, tell)
-    return guesses[best], track, spread
+    return begun(task, guesses[best], track), spread
 
 
-def _once_more(task: MovingTask, track: Track, first: Guess) -> tuple[Guess, Track, float]:
-    """A pass from where a track leads back to: its guess, its track, and by how many of its sigmas heading has moved."""
-    guess = led_back(task.record, track, task.spec, first)
-    other = task.run(guess, gated=True)
-    return guess, other, abs(_turn_between(other.C_nb[-1], track.C_nb[-1])) / float(other.sigma[-1, PHI][2])
-
-
-def _as_specified(
-    task: MovingTask, guess: Guess, track: Track, moved: float, first: Guess
-) -> tuple[MovingTask, Guess, Track, float]:
-    """Passes with axes of the gyros that are constants, where the log does not speak against them: task, guess, track, moves.
+def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTask, Pass]:
+    """Passes with axes of the gyros that are constants, where the log does not speak against them: task, the last pass.
 
     Noise in turns besides states of the axes is the same error twice. It carries the first passes, of which nobody knows yet
     whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose aids
@@ -236,18 +228,18 @@ def _as_specified(
     """
     constant = task.with_constant_axes()
     if constant is task or task.lasting:
-        return task, guess, track, moved
-    found = guess, track, math.inf
-    for _ in range(MORE_PASSES):
-        if found[2] <= SETTLED:
+        return task, found
+    other = found
+    for number in range(MORE_PASSES):
+        if number > 0 and other.settled:
             break
         try:
-            found = _once_more(constant, found[1], first)
+            other = once_more(constant, other, first)
         except DataError:  # the filter broke down: they are not
-            return task, guess, track, moved
-        if _fits_worse(track, found[1]):
-            return task, guess, track, moved
-    return constant, *found
+            return task, found
+        if _fits_worse(found.track, other.track):
+            return task, found
+    return constant, other
 
 
 def _fits_worse(track: Track, other: Track) -> bool:
@@ -348,11 +340,5 @@ def _best_of_bank(task: MovingTask, guesses: Sequence[Guess], tell: Callable[[st
     weight = np.exp(-0.5 * (cost - cost.min()))
     weight /= weight.sum()
     best = int(np.argmin(cost))
-    off = [_turn_between(track.C_nb[-1], tracks[best].C_nb[-1]) for track in tracks]
+    off = [turn_between(track.C_nb[-1], tracks[best].C_nb[-1]) for track in tracks]
     return best, tracks[best], float(np.sqrt(np.sum(weight * np.square(off))))
-
-
-def _turn_between(C: Array, D: Array) -> float:
-    """About the vertical, rad."""
-    R = C @ D.T
-    return float(math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from truenorth.alignment.in_motion_start import Guess, led_back
+from truenorth.alignment.in_motion_start import Guess, backtracked, led_back
 from truenorth.alignment.in_motion_task import LATENCY_SIGMA, MovingTask
 from truenorth.core.errors import DataError
 from truenorth.estimate.latency import SHOWN_DELAY, as_late_as_found, delay_of
@@ -56,7 +56,8 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
 
     def other(record: ImuRecord) -> Track:
         rival = replace(task, record=record)
-        return rival.run(led_back(record, rival.run(guess, gated=gated), task.spec, first), gated=gated)
+        once = rival.run(guess, gated=gated)
+        return rival.run(led_back(once, backtracked(record, once), task.spec, first), gated=gated)
 
     return found + gyro_delay_evidence(other, track, task.record)
 

@@ -29,10 +29,9 @@ Array = NDArray[np.float64]
 COARSE_LEVEL, COARSE_HEADING = math.radians(0.5), math.radians(20.0)  # one sigma, by the earth's rate
 BANK_LEVEL = math.radians(4.0)  # of a level from the mean force of a vehicle that may be under way
 # Of what a pass has found for the next to begin with, no wider than the first guess: its level so many times as wide, biases
-# narrowed to such a part of their prior (both a hundredth of what the pass knows), and heading, a ninth of it at most, which is
-# taken off again (:func:`used_twice`).
-WIDER_LEVEL, NARROWED = 10.0, 0.3
-WIDER_HEADING, LEAST_HEADING = 3.0, math.radians(3.0)
+# narrowed to such a part of their prior (both a hundredth of what the pass knows), and heading as wide as it was found, which is
+# taken off again (:class:`truenorth.alignment.in_motion_passes.Pass`).
+WIDER_LEVEL, NARROWED, LEAST_HEADING = 10.0, 0.3, math.radians(3.0)
 HEADINGS = 12  # of the bank, all round
 LEVEL_TIME = 4.0  # s
 ODOMETER_START, GNSS_START, UNKNOWN_START = 0.3, 0.3, 5.0  # m/s, one sigma of the velocity at the start
@@ -138,7 +137,7 @@ def _velocity_b(log: OdometerRecord | VelocityRecord, mounting: Mounting, at: Ar
     return np.stack([np.interp(at, log.time - mounting.latency, v[:, i]) for i in range(3)], axis=1)
 
 
-def led_back(record: ImuRecord, track: Track, spec: ImuSpec, first: Guess) -> Guess:
+def led_back(track: Track, back: Array, spec: ImuSpec, first: Guess) -> Guess:
     """Where the next pass begins: the attitude that a track leads back to, and what it has found of level, heading and biases.
 
     An error of the accelerometers turns with a heading that is not known yet, and a level of some degrees with it: the product of
@@ -147,25 +146,17 @@ def led_back(record: ImuRecord, track: Track, spec: ImuSpec, first: Guess) -> Gu
 
     Parameters
     ----------
+    back : (3, 3) array
+        The attitude there.
     first : Guess
         Of the first pass.
     """
     sigma = track.sigma[-1]
     level = max(COARSE_LEVEL, WIDER_LEVEL * float(np.max(sigma[PHI][:2])))
-    heading = max(LEAST_HEADING, WIDER_HEADING * float(sigma[PHI][2]))
+    heading = max(LEAST_HEADING, float(sigma[PHI][2]))
     known = sigma[BG.start : BA.stop] < NARROWED * np.sqrt(spec.bias_variance)
     bias = np.where(known, np.concatenate([track.gyro_bias[-1], track.accel_bias[-1]]), 0.0)
-    return Guess(
-        backtracked(record, track), min(first.level_sigma, level), min(first.heading_sigma, heading), bias[:3], bias[3:]
-    )
-
-
-def used_twice(track: Track, guess: Guess, first: Guess) -> float:
-    """One sigma, rad, by which heading is known less than a track says whose guess had a heading of the pass before."""
-    variance, prior = float(track.sigma[-1, PHI][2]) ** 2, guess.heading_sigma**2
-    if guess.heading_sigma >= first.heading_sigma or variance >= 0.9 * prior:
-        return 0.0
-    return math.sqrt(variance**2 / (prior - variance))
+    return Guess(back, min(first.level_sigma, level), min(first.heading_sigma, heading), bias[:3], bias[3:])
 
 
 def backtracked(record: ImuRecord, track: Track) -> Array:
