@@ -20,7 +20,9 @@ SETTLED = 0.3  # of its sigma, that heading may still move
 # A pass that follows the heading that it begins with by more than this has too narrow a guess: the next has twice its sigma.
 # Steps are up to ten times what a pass moves.
 FOLLOWED, MOST_FOLLOWED = 0.75, 0.9
-LEAST_TURN = 1e-3  # of the guess's sigma, by which two guesses must differ that show how far passes follow them
+# Of the guess's sigma, by which two guesses must differ that show how far passes follow them: level and biases, which they begin
+# with too, move heading by less.
+LEAST_TURN = 0.3
 
 
 @dataclass(frozen=True)
