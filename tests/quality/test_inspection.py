@@ -332,6 +332,14 @@ def test_rows_that_are_held_are_found_though_their_channels_repeat_by_themselves
     assert "repeated_rows" not in codes(inspect(quiet))
 
 
+def test_noise_that_is_clipped_on_one_side_alone():
+    """No range has sides so unlike; but of values with many digits no two are alike by chance."""
+    record = base(duration=60.0)
+    gyro = record.gyro.copy()
+    gyro[:, 1] = np.minimum(gyro[:, 1], np.quantile(gyro[:, 1], 0.98))
+    assert "saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel)), "error")
+
+
 def test_a_vibration_is_clipped_row_by_row():
     """Of a vibration near half the rate of the log no two peaks follow each other."""
     record = base(duration=30.0)

@@ -31,7 +31,8 @@ FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
 SATURATED_RUN = 3  # rows at the extreme, one after the other ...
 PILED = 10  # ... or so many times as many as at the next value: of a vibration's peaks each is a row
-RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off
+RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off, ...
+TAIL, TAIL_LEVELS = 0.25, 20  # ... and more where a tail of so many levels, in this part of the spread, is cut off
 # Counts of a period of a pulse train, where both edges of two signals are counted: the four are not alike, so that of a sensor
 # at rest every fourth value may be full and those between empty. Values are compared over whole periods.
 PERIOD = 4
@@ -299,15 +300,19 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             count = int(np.count_nonzero(at_top))
             if count < 2 * SATURATED_RUN or count == values.size:
                 continue
-            if -float(signed.min()) > RANGE_SLACK * abs(top):  # a range has two sides alike: this one is not its end
-                continue
-            second = float(np.max(signed, where=~at_top, initial=-np.inf))
             levels, counts = np.unique(signed[~at_top], return_counts=True)
+            spread = top - float(np.median(signed))
+            tail = counts[levels > top - TAIL * spread]
+            cut = len(tail) > TAIL_LEVELS and count > PILED * max(
+                int(tail.max()), 2
+            )  # of many levels, each with few rows
+            if not cut and -float(levels[0]) > RANGE_SLACK * abs(top):  # a range has two sides alike: not its end
+                continue
+            second = float(levels[-1])
             inside = int(counts[levels >= second - (PERIOD - 0.5) * _finest(levels)].max())
             rows_at = np.flatnonzero(at_top)
             consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
             consecutive = consecutive and not _crests(signed, rows_at, second, inside)
-            spread = top - float(np.median(signed))
             often = count > PILED * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often)
             # Values that have many digits are never alike by chance, wherever the next ones stand.
