@@ -65,8 +65,8 @@ def strapdown() -> Iterator[Part]:
     record = simulate(motion, rate=100.0, duration=3600.0).record
     s = motion.states(0.0)
     state = at(s.C_nb, float(s.lat), float(s.lon), float(s.alt))
-    yield "mechanisation, ns a sample", lambda: mechanise(record, state), 1e9 / len(record)
-    yield "the same, 4 samples an update", lambda: mechanise(record, state, algorithm="4"), 1e9 / len(record)
+    yield "mechanisation to attitude matrices, ns a sample", lambda: mechanise(record, state).C_nb, 1e9 / len(record)
+    yield "the same, 4 samples an update", lambda: mechanise(record, state, algorithm="4").C_nb, 1e9 / len(record)
 
     P = np.diag(np.repeat([2e-4, 0.2, 10.0, 5e-8, 5e-4], 3) ** 2)
     start = Start(0.0, s.C_nb, s.v_n, float(s.lat), float(s.lon), float(s.alt), np.zeros(3), np.zeros(3), P)

@@ -97,6 +97,7 @@ def test_windows_shifts_and_tables(record):
     assert window.time.tolist() == [2.0, 3.0, 4.0]
     pd.testing.assert_frame_equal(window.to_frame(), record.to_frame().loc[2.0:4.0])
     assert record.between(None, record.time[-1]) is record
+    assert record[::1] is record
     late = record.shifted(0.25)
     assert late.time.tolist() == (T + 0.25).tolist()
     pd.testing.assert_frame_equal(late.to_frame().reset_index(drop=True), record.to_frame().reset_index(drop=True))

@@ -69,7 +69,7 @@ def passage(rng: np.random.Generator, hours: float, turns: bool = True) -> tuple
     way = course(place, legs, heading=heading, speed=speed)
     ideal = ideal_log(way, rate=1.0 / INTERVAL, duration=hours * HOUR)
     at = way.states(ideal.edges)
-    return ideal, Track.of_motion(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    return ideal, Track.along(at)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def ideal_and_truth(lat=45.78, heading=51.3401917, interval=10.0, hours=48.0):
     scenario["motion"] = scenario["motion"] | {"heading": f"{heading} deg"}
     ideal = read_scenario(scenario).ideal()
     at = ideal.motion.states(ideal.edges)
-    return ideal, Track.of_motion(ideal.edges, at.C_nb, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    return ideal, Track.along(at)
 
 
 def navigate(ideal, truth, x0, gyro_bias, accel_bias):

@@ -63,7 +63,7 @@ def test_what_four_states_more_cost_where_nothing_is_wrong():
     """The covariances say 6.6 %. What 50 flights measure scatters by 4 %: its paired 99.8 % interval must hold what is claimed."""
     found = errors_of(Flights(CASES["flat_turn_no_error"][0], 2), ("states12", "states16"), 50, 2)
     twelve, sixteen = (level_in_turn(found[name]) for name in ("states12", "states16"))
-    claimed = rms(found["states16"].phi_sigma[:, TURN, :2]) / rms(found["states12"].phi_sigma[:, TURN, :2])
+    claimed = rms(found["states16"].sigma[:, TURN, :2]) / rms(found["states12"].sigma[:, TURN, :2])
     assert claimed <= 1.08
     draws = np.random.default_rng(0).integers(0, 50, (4000, 50))
     ratios = np.sqrt(np.mean(sixteen[draws] ** 2, axis=1) / np.mean(twelve[draws] ** 2, axis=1))

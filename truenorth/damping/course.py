@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core import earth
-from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
+from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.errors.intervals import Intervals
-from truenorth.errors.marine import DP, DV, PHI, MarineModel
+from truenorth.errors.marine import DP, DV, MOTION, OF_INS, PHI, MarineModel
 from truenorth.records.interpolation import Between
 from truenorth.state.track import Track
 
@@ -69,10 +69,4 @@ def without_errors(course: Track, x: Array) -> Track:
 
 def errors_of(course: Track, truth: Track) -> Array:
     """(K+1, 7) errors of attitude, velocity and position (m) of a track against the true one, in the model's states."""
-    dv = course.v_n[:, :2] - truth.v_n[:, :2]
-    lat, lon, alt = truth.position.T
-    R_M, R_N = earth.radii(lat)
-    away = (course.position[:, 1] - lon + np.pi) % (2.0 * np.pi) - np.pi
-    dp = np.stack([away * (R_N + alt) * np.cos(lat), (course.position[:, 0] - lat) * (R_M + alt)], axis=1)
-    phi = misalignment(course.C_nb, truth.C_nb)
-    return np.concatenate([phi, dv, dp], axis=1)
+    return course.errors_against(truth)[:, OF_INS[MOTION]]

@@ -19,8 +19,6 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import rotation_vector_from_dcm
-from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.whiteness import whiteness
@@ -282,12 +280,7 @@ def moved(first: Track, other: Track) -> Effect:
     """
     half = slice(len(first.C_nb) // 2, None)
     near = _nearest(other.time, first.time[half])
-    turn = np.abs(rotation_vector_from_dcm(first.C_nb[half] @ np.swapaxes(other.C_nb[near], 1, 2)))
-    lat, _, alt = first.position[half].T
-    dlat, dlon, dalt = (first.position[half] - other.position[near]).T
-    R_M, R_N = radii(lat)
-    dp = np.stack([dlon * (R_N + alt) * np.cos(lat), dlat * (R_M + alt), dalt], axis=1)
-    off = np.concatenate([turn, np.abs(first.v_n[half] - other.v_n[near]), np.abs(dp)], axis=1)
+    off = np.abs(first[half].errors_against(other, near))
     sigma = first.sigma[half, :9]
     known = sigma > 0.0
     squares = np.where(known, off / np.where(known, sigma, 1.0), 0.0) ** 2

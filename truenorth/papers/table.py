@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from truenorth.campaign.summary import bootstrap_rms
 from truenorth.core.errors import UsageError
+from truenorth.papers.errors import AttitudeErrors, level
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+ARCMIN = math.radians(1.0) / 60.0
 STATISTICS = (
     "rms",
     "sigma",
@@ -177,19 +179,14 @@ class Table:
         self,
         case: str,
         method: str,
-        phi: Array,
-        sigma: Array | None = None,
-        nees: Array | None = None,
+        errors: AttitudeErrors,
         *,
         paper: Sequence[float] = (math.nan,) * 3,
         statistics: Sequence[str] = ("rms", "max"),
         **common: Any,
     ) -> None:
-        """Misalignment (N, 3) in arcmin as phi_e, phi_n, heading and level, with claimed sigmas (N, 3) and NEES/3 (N,)."""
-
-        def level(x: Array) -> Array:
-            return np.asarray(np.sqrt(np.mean(x[:, :2] ** 2, axis=1)))
-
+        """Errors of attitude of N runs in arcmin, as phi_e, phi_n, heading and level, with sigmas and NEES where claimed."""
+        phi, sigma = errors.phi / ARCMIN, errors.sigma / ARCMIN if np.isfinite(errors.sigma).all() else None
         for i, name in enumerate(("phi_e", "phi_n", "heading")):
             claimed = None if sigma is None else sigma[:, i]
             self.errors(
@@ -197,8 +194,8 @@ class Table:
             )
         claimed = None if sigma is None else level(sigma)
         self.errors(case, method, "level", level(phi), "arcmin", claimed, statistics=statistics, **common)
-        if nees is not None:
-            self.errors(case, method, "nees", nees, "1", statistics=("mean",), **common)
+        if np.isfinite(errors.nees).all():
+            self.errors(case, method, "nees", errors.nees, "1", statistics=("mean",), **common)
 
     def sample(self, reference: Reference) -> Sample | None:
         """The single runs of a reference; None where the table has a figure only."""

@@ -150,9 +150,11 @@ class Record(_Ordered):
                 f"{self.source}: no samples between {start} s and {stop} s; the record runs from "
                 f"{self.time[0]:g} s to {self.time[-1]:g} s, choose a window inside it"
             )
-        return self if last - first == len(self) else self[first:last]
+        return self[first:last]
 
     def __getitem__(self, rows: slice) -> Self:
+        if rows.indices(len(self)) == (0, len(self), 1):
+            return self  # it is checked already
         names = ("time", *(name for name in self.groups() if self._holds(name)))
         return self._with(**{name: getattr(self, name)[rows] for name in names})
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.attitude import misalignment
+from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
 from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
 
@@ -71,6 +73,34 @@ class Residuals:
         return int(np.sum(~self.used))
 
 
+class Motion(Protocol):
+    """Where something is, how it lies and moves, at a set of times."""
+
+    @property
+    def time(self) -> Array:
+        """(K,) s."""
+
+    @property
+    def C_nb(self) -> Array:
+        """(K, 3, 3)."""
+
+    @property
+    def v_n(self) -> Array:
+        """(K, 3) m/s."""
+
+    @property
+    def lat(self) -> Array:
+        """(K,) rad, as lon; alt is m."""
+
+    @property
+    def lon(self) -> Array:
+        """(K,) rad."""
+
+    @property
+    def alt(self) -> Array:
+        """(K,) m."""
+
+
 @dataclass(frozen=True)
 class Track:
     """The state along the track, ENU; one row an output epoch."""
@@ -120,6 +150,21 @@ class Track:
                 f"{np.median(steps):.3f} s; expected even epochs"
             )
         return float((self.time[-1] - self.time[0]) / len(steps))
+
+    @classmethod
+    def along(cls, motion: Motion) -> Track:
+        """The track of a motion at a set of times: a simulator's truth, or a trajectory that was read."""
+        place = np.stack([motion.lat, motion.lon, motion.alt], axis=1)
+        return cls.of_motion(motion.time, motion.C_nb, motion.v_n, place)
+
+    def errors_against(self, truth: Track, at: Rows = slice(None)) -> Array:
+        """(K, 9) errors phi, dv and dp (rad, m/s, m; ENU, computed minus true) against the truth's epochs `at`, all by default."""
+        C, v, (lat, lon, alt) = truth.C_nb[at], truth.v_n[at], truth.position[at].T
+        R_M, R_N = radii(lat)
+        away = (self.position[:, 1] - lon + np.pi) % (2.0 * np.pi) - np.pi
+        north, up = (self.position[:, 0] - lat) * (R_M + alt), self.position[:, 2] - alt
+        dp = np.stack([away * (R_N + alt) * np.cos(lat), north, up], axis=1)
+        return np.concatenate([misalignment(self.C_nb, C), self.v_n - v, dp], axis=1)
 
     def bias(self, group: slice, slow: str) -> Array:
         """(K, 3) a sensor's whole bias, its slow part included."""

@@ -23,7 +23,7 @@ from truenorth.papers.damping.switching import overshoot, switches
 from truenorth.papers.damping.truth import HOUR, sail
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import dependences, draw_sweeps, swept
-from truenorth.papers.table import Table
+from truenorth.papers.table import OF_RUNS, Table
 from truenorth.papers.texts import read_texts
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         table.value(MAIN, f"network_{way}", "overshoot", "value", value, "m/s")
     drawn: dict[str, Any] = {"time": 48 * HOUR, "noise": "random_walk"}
     table.errors("drawn", "augmented_long", "nees", nees, "1", statistics=("mean",), **drawn)
-    ratio = math.sqrt(np.mean(heading**2))
+    ratio = OF_RUNS["rms"](heading)
     table.value("drawn", "augmented_long", "phi_u", "rms_over_sigma", ratio, "1", runs=count, **drawn)
     _add_signs(table, "random_signs", signs)
     for name, part in swept_signs(short, -0.3, min(count, choices.RUNS), seed, workers, progress).items():
@@ -141,7 +141,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         seconds=max(case.runtime for case in cases.values()),
         correlation=", ".join(f"{q} {r:+.2f}" for q, r in zip(QUANTITIES, _correlation(signs))),
         too_small=", ".join(f"{q} {r:.1f}" for q, r in zip(QUANTITIES, signs.fused_ratio)),
-        sparse=_window(sparse, main, late),
+        sparse=_rms_in(main.time, sparse, late)[PHI_U],
         overlapping=window_rms(main, "filter2", late)[PHI_U],
         sparse_sigma=_last(sparse_sigma),
         overlapping_sigma=_last(main.estimates["filter2"].sigma),
@@ -186,20 +186,18 @@ def _turned(signs: Sequence[int]) -> Array:
 
 def window_rms(case: Case, method: str, hours: tuple[int, int]) -> Array:
     """(7,) RMS over a window, m/s and degrees."""
-    window = (case.time >= hours[0] * HOUR) & (case.time < hours[1] * HOUR)
-    return np.asarray(np.sqrt(np.mean(case.errors[method][window] ** 2, axis=0)) * SCALE)
+    return _rms_in(case.time, case.errors[method], hours)
 
 
 def run_rms(signs: Signs, method: str, hours: tuple[int, int]) -> Array:
     """(N, 7) RMS of each run over a window, m/s and degrees."""
-    window = (signs.time >= hours[0] * HOUR) & (signs.time < hours[1] * HOUR)
-    return np.asarray(np.sqrt(np.mean(signs.errors[method][:, window] ** 2, axis=1)) * SCALE)
+    return _rms_in(signs.time, signs.errors[method], hours)
 
 
-def _window(errors: Array, case: Case, hours: tuple[int, int]) -> float:
-    """RMS of heading over a window, deg."""
-    window = (case.time >= hours[0] * HOUR) & (case.time < hours[1] * HOUR)
-    return math.degrees(math.sqrt(np.mean(errors[window, PHI_U] ** 2)))
+def _rms_in(time: Array, errors: Array, hours: tuple[int, int]) -> Array:
+    """(..., 7) RMS of errors (..., K+1, 7) over a window, m/s and degrees."""
+    window = (time >= hours[0] * HOUR) & (time < hours[1] * HOUR)
+    return np.asarray(np.sqrt(np.mean(errors[..., window, :] ** 2, axis=-2)) * SCALE)
 
 
 def _last(sigma: Array) -> float:

@@ -83,6 +83,6 @@ def sail(interval: float, seed: int, run: int = 0, scenario: str = "marine_dampi
     at = ideal.motion.states(ideal.edges)
     C = at.C_nb[0]  # the ship keeps its course: this mounting has the heading 0 throughout
     ideal = replace(ideal, dtheta=ideal.dtheta @ C.T, dvel=ideal.dvel @ C.T)
-    truth = Track.of_motion(ideal.edges, at.C_nb @ C.T, at.v_n, np.stack([at.lat, at.lon, at.alt], axis=1))
+    truth = Track.along(replace(at, C_nb=at.C_nb @ C.T))
     noise = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3, run))).standard_normal((len(at.lat), 2))
     return Voyage(ideal, truth, LOG_NOISE / math.sqrt(interval) * noise)

@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.sensors import from_odometer
 from truenorth.coarse.odometer import odometer_alignment
-from truenorth.core.attitude import misalignment
 from truenorth.errors.in_motion_azimuth import STATES, correction
 from truenorth.errors.model import InsModel
 from truenorth.estimate.run import navigate_track, with_states
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, POSITION_SIGMA, VELOCITY_SIGMA, Errors
 from truenorth.papers.odometer.scenario import Drives
-from truenorth.state.layout import PHI
+from truenorth.state.layout import DV, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import prior_covariance
 from truenorth.state.state import Start
@@ -40,7 +39,7 @@ def run_invariant(
     }
     x0 = np.zeros((len(which), STATES))
     x0[:, PHI] = phi0
-    begin = np.swapaxes(correction(x0), 1, 2) @ drives.C_nb[0]
+    begin = np.swapaxes(correction(x0), 1, 2) @ drives.truth.C_nb[0]
     for b, run in enumerate(which):
         angles = LEVEL_SIGMA, LEVEL_SIGMA, azimuth_sigma[b]
         P = prior_covariance(angles, VELOCITY_SIGMA, POSITION_SIGMA, spec.constant_variance)
@@ -59,15 +58,16 @@ def run_invariant(
             every=round(1.0 / INTERVAL),
             invariant=invariant,
         )
-        kept["phi"].append(misalignment(track.C_nb[1:], drives.C_nb[1:]))
-        kept["velocity"].append(track.v_n[1:] - drives.v_n[1:])
+        errors = track.errors_against(drives.truth)[1:]
+        kept["phi"].append(errors[:, PHI])
+        kept["velocity"].append(errors[:, DV])
         kept["gyro_bias"].append(track.gyro_bias[1:] - drives.gyro_bias[run])
         kept["accel_bias"].append(track.accel_bias[1:] - drives.accel_bias[run])
         kept["sigma"].append(track.sigma[1:, PHI])
         kept["C_nb"].append(track.C_nb[-1])
     stacked = {name: np.stack(value) for name, value in kept.items()}
-    return Errors(
-        drives.time,
+    return Errors.with_sigma(
+        time=drives.time,
         lost=np.zeros(len(which), dtype=bool),
         acted=np.zeros(len(which)),
         **stacked,
@@ -79,6 +79,6 @@ def coarse_errors(drives: Drives, end: float) -> Array:
     found = []
     for record, odometer in zip(drives.records, drives.odometers, strict=True):
         coarse = odometer_alignment(record.between(0.0, end), odometer, drives.position)
-        M = drives.C_nb[0] @ coarse.C_n0_i.T
+        M = drives.truth.C_nb[0] @ coarse.C_n0_i.T  # `correction` of the errors sought: its inverse for small tilts
         found.append([M[2, 1], -M[2, 0], np.arctan2(M[1, 0], M[0, 0])])
     return np.array(found)

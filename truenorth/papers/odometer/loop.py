@@ -12,6 +12,7 @@ from truenorth.core.attitude import misalignment, skew
 from truenorth.errors import in_motion_azimuth as model
 from truenorth.errors.in_motion_azimuth import AZIMUTH, STATES
 from truenorth.errors.walks import Walks
+from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.odometer.scenario import Drives
 from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.prior import prior_covariance
@@ -24,16 +25,13 @@ POSITION_SIGMA = 1.0  # m
 
 
 @dataclass(frozen=True)
-class Errors:
-    """Errors of B runs at K epochs, and the filter's own sigmas.
+class Errors(AttitudeErrors):
+    """Errors of B runs at K epochs (B, K, 3), and the filter's own sigmas.
 
     Attributes
     ----------
     time : (K,) array, s
-    phi, velocity, gyro_bias, accel_bias : (B, K, 3) arrays, rad, m/s, rad/s, m/s^2
-        Of phi the whole rotation vector, East, North, Up.
-    sigma : (B, K, 3) array, rad
-        Of phi.
+    velocity, gyro_bias, accel_bias : (B, K, 3) arrays, m/s, rad/s, m/s^2
     C_nb : (B, 3, 3) array
         Computed attitude at the last epoch.
     lost : (B,) array of bool
@@ -43,11 +41,9 @@ class Errors:
     """
 
     time: Array
-    phi: Array
     velocity: Array
     gyro_bias: Array
     accel_bias: Array
-    sigma: Array
     C_nb: Array
     lost: NDArray[np.bool_]
     acted: Array
@@ -81,7 +77,7 @@ def run_method(
     """
     x0 = np.zeros((len(which), STATES))
     x0[:, PHI] = phi0
-    off, v = np.swapaxes(model.correction(x0), 1, 2), drives.v_n[begin]
+    off, v = np.swapaxes(model.correction(x0), 1, 2), drives.truth.v_n[begin]
     spec = drives.spec
     P = prior_covariance(LEVEL_SIGMA, VELOCITY_SIGMA, POSITION_SIGMA, spec.constant_variance, drives.scale_sigma)
     P = np.tile(P, (len(which), 1, 1))
@@ -90,22 +86,22 @@ def run_method(
     J[DV, PHI] = skew(v)  # dv = C v - v = v x phi
     start = Begin(
         begin,
-        off @ drives.C_nb[begin],
+        off @ drives.truth.C_nb[begin],
         off @ v,
-        drives.places[begin],
+        drives.truth.position[begin],
         J @ P @ J.T,
         Walks.of(spec).density(STATES, PHI, DV, BG, BA),
     )
     found = run_loop(drives.logs, which, start, method, gated=gated, turned=turned, belief=belief)
-    rows = slice(begin + 1, None)
-    return Errors(
-        drives.time[begin:],
-        misalignment(found.C_nb, drives.C_nb[rows]),
-        found.v_n - drives.v_n[rows],
-        found.errors[..., :3] - drives.gyro_bias[which, None],
-        found.errors[..., 3:6] - drives.accel_bias[which, None],
+    truth = drives.truth[begin + 1 :]
+    return Errors.with_sigma(
+        misalignment(found.C_nb, truth.C_nb),
         found.sigma[..., PHI],
-        found.C_nb[:, -1],
-        found.lost,
-        found.acted,
+        time=drives.time[begin:],
+        velocity=found.v_n - truth.v_n,
+        gyro_bias=found.errors[..., :3] - drives.gyro_bias[which, None],
+        accel_bias=found.errors[..., 3:6] - drives.accel_bias[which, None],
+        C_nb=found.C_nb[:, -1],
+        lost=found.lost,
+        acted=found.acted,
     )

@@ -33,7 +33,7 @@ def add_paper_table(table: Table, runs: int, seed: int) -> None:
     at_rest = _static(drives, seed)
     phi0 = coarse_errors(drives, 120.0)
     which, sigma = np.arange(runs), np.full(runs, CHAIN_SIGMA)
-    true = _euler(drives.C_nb[-1:])
+    true = _euler(drives.truth.C_nb[-1:])
     found: dict[str, Array] = {"static_reference": _euler(at_rest)}
     for method in PAPER:
         found[method] = _euler(run_method(drives, which, phi0, sigma, method).C_nb)

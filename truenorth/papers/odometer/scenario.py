@@ -14,6 +14,7 @@ from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -76,11 +77,9 @@ class Drives:
     wheel: Array  # (R, N) m: distance in each sample
     rows: NDArray[np.int64]  # (K+1,): samples before each epoch
     time: Array  # (K,) s
-    C_nb: Array  # (K+1, 3, 3) and (K+1: true, the start first
-    v_n: Array  # (K+1, 3, 3) 3) arrays
-    places: Array  # (K+1, 3): latitude, longitude (rad), height (m), as `C_nb`
-    gyro_bias: Array  # (R: true
-    accel_bias: Array  # 3)
+    truth: Track  # K+1 epochs, the start first
+    gyro_bias: Array  # (R, 3): true
+    accel_bias: Array  # (R, 3)
 
     @property
     def spec(self) -> ImuSpec:
@@ -105,7 +104,7 @@ class Drives:
     @property
     def place(self) -> tuple[float, float, float]:
         """Of the start."""
-        lat, lon, alt = self.places[0].tolist()
+        lat, lon, alt = self.truth.position[0].tolist()
         return lat, lon, alt
 
 
@@ -135,7 +134,6 @@ def drive(scenario: Scenario, runs: int, seed: int, *, until: float | None = Non
     edges: Array = interval * np.arange(count + 1.0)
     per_second = round(1.0 / interval)
     rows = np.arange(0, count + 1, per_second)
-    truth = ideal.motion.states(edges[rows])
     return Drives(
         scenario,
         records,
@@ -146,9 +144,7 @@ def drive(scenario: Scenario, runs: int, seed: int, *, until: float | None = Non
         _by_sample(odometers, edges),
         rows.astype(np.int64),
         edges[rows[1:]],
-        truth.C_nb,
-        truth.v_n,
-        np.stack([truth.lat, truth.lon, truth.alt], axis=1),
+        Track.along(ideal.motion.states(edges[rows])),
         np.stack(gyro),
         np.stack(accel),
     )
@@ -181,9 +177,7 @@ def coarser(drives: Drives, every: int) -> Drives:
         drives,
         rows=drives.rows[at],
         time=drives.time[every - 1 :: every],
-        C_nb=drives.C_nb[at],
-        v_n=drives.v_n[at],
-        places=drives.places[at],
+        truth=drives.truth[at],
     )
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.azimuth_filters import METHODS, Belief, reduced
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.filters.strong_tracking import StrongTracking
+from truenorth.papers.errors import AttitudeErrors, near_from
 from truenorth.papers.odometer.drawings import STARTS, draw_paper_figures, draw_starts
 from truenorth.papers.odometer.invariant import coarse_errors, run_invariant
 from truenorth.papers.odometer.loop import LEVEL_SIGMA, Errors, run_method
@@ -32,7 +33,7 @@ from truenorth.papers.odometer.scenario import (
 )
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
-from truenorth.papers.table import Table
+from truenorth.papers.table import OF_RUNS, Table
 from truenorth.papers.texts import read_texts
 
 Array = NDArray[np.float64]
@@ -175,10 +176,7 @@ def diverged(errors: Errors) -> NDArray[np.bool_]:
 
 def converge_times(errors: Errors) -> Array:
     """(B,) from when on each run stays within a degree, s; infinite where it does not."""
-    off = np.abs(errors.phi[:, :, 2]) > DIVERGED
-    last = np.where(off.any(axis=1), off.shape[1] - np.argmax(off[:, ::-1], axis=1), 0)
-    times = np.append(errors.time, np.inf)
-    return np.asarray(np.where(last == 0, 0.0, times[last]))
+    return near_from(errors.phi[:, :, 2], DIVERGED, errors.time)
 
 
 def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
@@ -189,8 +187,8 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
         if at < errors.time[0]:
             continue
         k = int(np.searchsorted(errors.time, at - 0.5))
-        phi, sigma = errors.phi[:, k] / ARCMIN, errors.sigma[:, k] / ARCMIN
-        table.attitude(case, method, phi, sigma, statistics=("rms", "max", "median"), time=at, noise="random_walk")
+        then = AttitudeErrors.with_sigma(errors.phi[:, k], errors.sigma[:, k])
+        table.attitude(case, method, then, statistics=("rms", "max", "median"), time=at, noise="random_walk")
     add("diverged", diverged(errors).astype(float), "1", ("mean",), time=TIMES[-1])
     add("converge_time", converge_times(errors), "s", ("median",))
     add("factor_share", errors.acted, "1", ("mean",))
@@ -207,7 +205,7 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
 
 def _ended(errors: Errors) -> str:
     off = heading(errors, TIMES[-1]) / ARCMIN
-    rms, median = float(np.sqrt(np.mean(off**2))), float(np.median(np.abs(off)))
+    rms, median = OF_RUNS["rms"](off), OF_RUNS["median"](off)
     return f"{rms:.1f}' RMS, median {median:.1f}', {np.mean(diverged(errors)):.0%} diverged"
 
 

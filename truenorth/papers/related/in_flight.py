@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from truenorth.alignment.transfer import align_transfer
-from truenorth.core import earth
+from truenorth.core.attitude import misalignment
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.figures.style import COLOURS
 from truenorth.papers.drawing import sheet
@@ -27,7 +27,9 @@ from truenorth.records.calibration import Calibration
 from truenorth.records.motion import Moving
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
+from truenorth.state.layout import DP
 from truenorth.state.state import State
+from truenorth.state.track import Track
 from truenorth.strapdown.level import mechanise
 
 Array = NDArray[np.float64]
@@ -98,7 +100,7 @@ def released(
     assert answer.transfer is not None
     at = motion.states(np.array(answer.time))
     C = answer.C_nb
-    phi_u = 0.5 * float((C @ at.C_nb.T)[0, 1] - (C @ at.C_nb.T)[1, 0])
+    phi_u = float(misalignment(C, at.C_nb)[2])
     rest = record.between(answer.time + 0.5 * record.interval, None)
     start = State.at(C, at.lat, at.lon, at.alt, answer.transfer.v_n)
     found: dict[str, Any] = {
@@ -114,10 +116,8 @@ def released(
     for method, calibration in known.items():
         every = round(1.0 / record.interval)
         out = mechanise(calibration.apply(rest), start, altitude="fixed", every=every)
-        truth = motion.states(out.time)
-        R_M, R_N = earth.radii(truth.lat)
-        east = (out.position[:, 1] - truth.lon) * (R_N + truth.alt) * np.cos(truth.lat)
-        found[method], time = np.hypot(east, (out.position[:, 0] - truth.lat) * (R_M + truth.alt)), out.time
+        east, north, _ = out.errors_against(Track.along(motion.states(out.time)))[:, DP].T
+        found[method], time = np.hypot(east, north), out.time
     return time, found
 
 

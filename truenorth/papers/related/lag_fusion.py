@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.sensors import from_gnss, from_odometer
 from truenorth.aiding.source import Aiding
 from truenorth.core import earth
-from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
+from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.errors.model import InsModel
 from truenorth.estimate.events import Setting
 from truenorth.estimate.run import begin, go_on, navigate_track, with_states
@@ -57,6 +57,7 @@ NAMES = {
     "shared": "two filters fused",
 }
 ARCMIN = math.radians(1.0 / 60.0)
+SHOWN = [DP.start, DP.start + 1, PHI.stop - 1]  # place east and north, and heading
 HALF_A_ROW = 0.5 / 7.0  # s: an odometer's row holds at the middle of its interval
 KEPT = ("time", "C_nb", "v_n", "position", "sensors", "P")  # of a track
 
@@ -112,7 +113,7 @@ def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tupl
     place = float(at.lat) + dp[1] / R_M, float(at.lon) + dp[0] / (R_N * math.cos(float(at.lat))), float(at.alt) + dp[2]
     start = Start(0.0, dcm_from_rotation_vector(-phi) @ at.C_nb, v, *place, np.zeros(3), np.zeros(3), P)
     lags = {name: float(spec.latency) for name, spec in late.aiding_specs.items()}
-    truth = there.states(np.arange(1.0, late.duration + 0.5))
+    truth = Track.along(there.states(np.arange(1.0, late.duration + 0.5)))
 
     def aided(source: Scenario, use: tuple[str, ...], known: bool, sigma: float) -> tuple[InsModel, list[Aiding]]:
         records = logs if source is late else source.simulate_aiding(seed=seed, run=run)
@@ -137,16 +138,8 @@ def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tupl
         return found, left
 
     def against(found: Track) -> tuple[Array, Array]:
-        count = len(truth.lat)
-        d = np.stack(
-            [
-                (found.position[-count:, 1] - truth.lon) * R_N * np.cos(truth.lat),
-                (found.position[-count:, 0] - truth.lat) * R_M,
-            ]
-        )
-        heading = misalignment(found.C_nb[-count:], truth.C_nb)[:, 2]
-        sigma = found.sigma[-count:]
-        return np.column_stack([d.T, heading]), np.column_stack([sigma[:, DP][:, :2], sigma[:, PHI][:, 2]])
+        last = found[-len(truth) :]
+        return last.errors_against(truth)[:, SHOWN], last.sigma[:, SHOWN]
 
     both, none = ("odometer", "gnss"), np.full(2, np.nan)
     model, aiding = aided(late, both, True, 0.0)

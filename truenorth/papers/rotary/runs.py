@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import CoarseStart
 from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
-from truenorth.analysis.consistency import nees
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
 from truenorth.core.indexing import C_bs_from_angles
@@ -25,6 +24,7 @@ from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import Prior
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.fading import Fading, fading
+from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.rotary.coarse import LAST, SOURCES, coarse_errors, sample
 from truenorth.papers.rotary.model import RotaryLog, earth_axes
 from truenorth.papers.rotary.truth import AXES, Noise, Run, simulate_run
@@ -58,12 +58,9 @@ SWEEPS = (
 
 
 @dataclass(frozen=True)
-class Found:
-    """One answer."""
+class Found(AttitudeErrors):
+    """One answer: errors (3,)."""
 
-    phi: Array  # (3,) rad: misalignment E, N, U, and what the method says of it (NaN where it says nothing)
-    sigma: Array  # (3,) rad
-    nees: float = float("nan")  # over 3; NaN where there is no covariance
     seconds: float = float("nan")  # that it took
 
 
@@ -182,7 +179,7 @@ def _filters(
         P = C_n_i @ estimates.P[:, PHI, PHI] @ np.swapaxes(C_n_i, 1, 2)
         for at in FILTER_TIMES:
             k = round(at / step) - 1
-            results.found[case, method, at] = _found(phi[k], P[k])
+            results.found[case, method, at] = Found.of(phi[k], P[k])
 
 
 def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> None:
@@ -204,17 +201,13 @@ def _whole(data: Run, case: str, results: Results, times: Sequence[float]) -> No
         C_start, inside = windowed_align(start, mount)
         seconds = time.perf_counter() - begun
         phi = misalignment(C_n_n0 @ C_start @ inside.C_ib[-1], truth)
-        results.found[case, "windowed_ls", at] = Found(phi, np.full(3, np.nan), seconds=seconds)
+        results.found[case, "windowed_ls", at] = Found.with_sigma(phi, seconds=seconds)
         begun = time.perf_counter()
         fine = sway_align(start, mount)
         seconds = time.perf_counter() - begun
         C_hat, P, _ = fine.misalignment_at(fine.integrals.C_ib[-1], at)
-        answer = _found(misalignment(C_n_n0 @ C_hat, truth), C_n_n0 @ P @ C_n_n0.T)
-        results.found[case, "coloured_noise_kf", at] = replace(answer, seconds=seconds)
-
-
-def _found(phi: Array, P: Array) -> Found:
-    return Found(phi, np.sqrt(np.diag(P)), float(nees(phi, P)) / 3)
+        phi = misalignment(C_n_n0 @ C_hat, truth)
+        results.found[case, "coloured_noise_kf", at] = Found.of(phi, C_n_n0 @ P @ C_n_n0.T, seconds=seconds)
 
 
 def all_runs(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.papers.errors import AttitudeErrors, level, near_from
 from truenorth.papers.rotary.coarse import LAST, SOURCES
 from truenorth.papers.rotary.drawings import (
     ARCMIN,
@@ -101,15 +102,11 @@ def _add_answers(table: Table, results: Sequence[Results], noise: str) -> None:
     """All answers of a case: errors, sigmas, NEES, time, and the share of epochs in which a factor acted."""
     for case, method, at in results[0].found:
         answers = [r.found[case, method, at] for r in results]
-        phi, sigma = (np.array([getattr(a, name) for a in answers]) / ARCMIN for name in ("phi", "sigma"))
-        claimed = bool(np.all(np.isfinite(sigma)))
         paper = PAPER_FINE.get(method) if case == "A" and at == 600.0 and noise == "per_sample" else None
         table.attitude(
             case,
             method,
-            phi,
-            sigma if claimed else None,
-            np.array([a.nees for a in answers]) if claimed else None,
+            AttitudeErrors.together(answers),
             statistics=("mean", "rms", "max"),
             paper=paper or (math.nan,) * 3,
             time=at,
@@ -117,7 +114,7 @@ def _add_answers(table: Table, results: Sequence[Results], noise: str) -> None:
         )
         seconds = float(np.median([a.seconds for a in answers]))
         if math.isfinite(seconds):
-            table.value(case, method, "runtime", "median", seconds, "s", time=at, noise=noise, runs=len(phi))
+            table.value(case, method, "runtime", "median", seconds, "s", time=at, noise=noise, runs=len(answers))
     for case, method in results[0].acted:
         acted = np.array([r.acted[case, method] for r in results])
         table.errors(case, method, "factor_share", acted, "1", statistics=("mean",), noise=noise)
@@ -136,8 +133,7 @@ def _add_coarse(table: Table, name: str, results: Sequence[Results]) -> None:
                 paper = PAPER_COARSE[row, k] if name == "A" and method == "dual_vector" else math.nan
                 table.value(name, method, quantity, statistic, value, "deg", paper=paper, runs=len(phi), **common)  # type: ignore[arg-type]
             table.errors(name, method, quantity, phi[:, k], "deg", statistics=("rms",), **common)  # type: ignore[arg-type]
-        level = np.sqrt(np.mean(phi[:, :2] ** 2, axis=1))
-        table.errors(name, method, "coarse_level", level, "deg", **common)  # type: ignore[arg-type]
+        table.errors(name, method, "coarse_level", level(phi), "deg", **common)  # type: ignore[arg-type]
         table.errors(name, method, "coarse_heading", phi[:, 2], "deg", **common)  # type: ignore[arg-type]
 
 
@@ -145,18 +141,11 @@ def _add_convergence(table: Table, results: Sequence[Results]) -> None:
     """Time from which heading stays within 5 arcmin of the truth to the end; infinite where it does not."""
     for case in ("A", "A_max_start"):
         for method in FILTERS:
-            times = _settled(results, case, method)
+            heading = np.array([r.curves[case, method][:, 2] for r in results])
+            times = near_from(
+                heading, NEAR, np.arange(heading.shape[1], dtype=np.float64)
+            )  # until the last second that is away
             table.errors(case, method, "converge_time", times, "s", statistics=("median",), noise="per_sample")
-
-
-def _settled(results: Sequence[Results], case: str, method: str) -> Array:
-    """(runs,) time from which heading stays near; infinite where it is not near at the end."""
-    times = []
-    for r in results:
-        away = np.flatnonzero(np.abs(r.curves[case, method][:, 2]) > NEAR)
-        last = int(away[-1]) + 1 if away.size else 0
-        times.append(float(last) if last < len(r.curves[case, method]) else math.inf)
-    return np.array(times)
 
 
 def _honesty(table: Table) -> list[tuple[str, float, float, float]]:

@@ -12,7 +12,7 @@ from truenorth.analysis.observability import Observability
 from truenorth.errors.stationary import KEPT
 from truenorth.figures.style import COLOURS, REFERENCE, new_figure, style
 from truenorth.papers.drawing import marked, sheet
-from truenorth.papers.static.filtering import Errors
+from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.static.truth import ARCMIN, Truth
 
 Array = NDArray[np.float64]
@@ -48,7 +48,9 @@ def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
     return figure
 
 
-def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Errors], runs: int) -> Figure:
+def draw_convergence(
+    times: Sequence[float], found: Mapping[tuple[str, int], list[AttitudeErrors]], runs: int
+) -> Figure:
     """RMS of heading and level over time in every case, compared with the claimed sigma."""
     cases = list(dict.fromkeys(case for case, _ in found))
     heading = f"Honest comparison, {runs} runs of each case"
@@ -62,8 +64,8 @@ def draw_convergence(times: Sequence[float], found: Mapping[tuple[str, int], Err
                 for row, part in ((0, slice(2, 3)), (1, slice(0, 2))):
                     ax = axes[row, column]
                     rms, sigma = (
-                        np.sqrt(np.mean(values[..., part] ** 2, axis=(1, 2))) / ARCMIN
-                        for values in (errors.error, errors.sigma)
+                        [np.sqrt(np.mean(getattr(e, name)[:, part] ** 2)) / ARCMIN for e in errors]
+                        for name in ("phi", "sigma")
                     )
                     ax.plot(times, rms, "o-", markersize=3, color=colour, label=f"{states} states, RMS")
                     ax.plot(times, sigma, "--", linewidth=1.0, color=colour, label=f"{states} states, sigma")

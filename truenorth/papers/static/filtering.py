@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.analysis.consistency import nees
 from truenorth.errors.stationary import DV, KEPT, PHI, StationaryModel
 from truenorth.filters import Estimates, FilterState, LinearSystem, kalman
+from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.static.truth import Truth
 
 Array = NDArray[np.float64]
 Filter = Callable[[LinearSystem, FilterState | None], Estimates]
-
-
-class Errors(NamedTuple):
-    """Errors of attitude and biases at some times, estimated minus true, with their sigmas.
-
-    Attributes
-    ----------
-    time : (T,) array, s
-    error, sigma : (T, runs, 8) arrays
-        phi, gyro and accelerometer biases.
-    nees : (T, runs) array
-        Of phi, over 3.
-    """
-
-    time: Array
-    error: Array
-    sigma: Array
-    nees: Array
 
 
 def system_of(truth: Truth, model: StationaryModel, states: int, P0: Array, R: float) -> LinearSystem:
@@ -73,20 +54,16 @@ def system_of(truth: Truth, model: StationaryModel, states: int, P0: Array, R: f
 
 def errors_at(
     system: LinearSystem, truth: Truth, times: Sequence[float], run: Filter | None = None, workers: int = 1
-) -> Errors:
-    """Filter in stretches between the times, and hold each estimate against the truth."""
+) -> list[AttitudeErrors]:
+    """Filter in stretches between the times, and hold each estimate against the truth: errors of all runs, time by time."""
     estimate = run or (lambda part, state: kalman(part, state, innovations=False, workers=workers))
-    kept = KEPT[8] if system.states == 10 else slice(None)
     true_phi = truth.phi if system.states == 10 else truth.phi_platform
     state: FilterState | None = None
-    error, sigma, square, first = [], [], [], 0
+    found, first = [], 0
     for time in times:
         last = int(np.searchsorted(truth.time, time * (1 - 1e-9))) + 1
         state = estimate(system.between(first, last), state).state
         x, P, first = state.x, state.P, last
-        e = x[:, kept] - np.concatenate([true_phi[:, last - 1], truth.bias], axis=1)
-        P = np.broadcast_to(P, (len(e), *P.shape[-2:]))
-        error.append(e)
-        sigma.append(np.sqrt(np.diagonal(P, axis1=1, axis2=2)[:, kept]))
-        square.append(nees(e[:, PHI], P[:, PHI, PHI]) / 3)
-    return Errors(np.asarray(times, dtype=np.float64), np.stack(error), np.stack(sigma), np.stack(square))
+        P = np.broadcast_to(P, (len(x), *P.shape[-2:]))
+        found.append(AttitudeErrors.of(x[:, PHI] - true_phi[:, last - 1], P[:, PHI, PHI]))
+    return found

@@ -27,6 +27,7 @@ from truenorth.filters import (
     particle,
     unscented,
 )
+from truenorth.papers.errors import level
 from truenorth.papers.static.gyrocompass import gyrocompass_loop
 from truenorth.papers.table import Table
 from truenorth.records import ImuRecord
@@ -170,8 +171,7 @@ def add_large(table: Table, found: Answers) -> None:
     """Errors of each method, and which runs have not found north."""
     for method, (phi, sigma) in found.items():
         common: dict[str, Any] = {"time": DURATION, "noise": "random_walk"}
-        level = np.sqrt(np.mean(phi[:, :2] ** 2, axis=1)) / ARCMIN
-        table.errors("large_180", method, "level", level, "arcmin", **common)
+        table.errors("large_180", method, "level", level(phi) / ARCMIN, "arcmin", **common)
         heading, claimed = np.abs(phi[:, 2]) / ARCMIN, None if sigma is None else sigma[:, 2] / ARCMIN
         table.errors(
             "large_180", method, "heading", heading, "arcmin", claimed, statistics=("rms", "max", "median"), **common

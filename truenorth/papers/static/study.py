@@ -15,14 +15,15 @@ from truenorth.core.units import parse
 from truenorth.errors.stationary import DV, KEPT, StationaryModel, names_and_units
 from truenorth.errors.walks import Walks
 from truenorth.filters import LinearSystem, h_infinity, kalman, smallest_bound
+from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.static.degrees import add_degrees, degrees_of, hardly_in_words
 from truenorth.papers.static.drawings import draw_convergence, draw_degrees, draw_large, draw_literal
-from truenorth.papers.static.filtering import Errors, errors_at, system_of
+from truenorth.papers.static.filtering import errors_at, system_of
 from truenorth.papers.static.large import DURATION, add_large, align_all, make_setting, simulate_logs
 from truenorth.papers.static.truth import ARCMIN, EVERY, PERIOD, Base, Truth, attitudes, simulate
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
-from truenorth.papers.table import Table
+from truenorth.papers.table import OF_RUNS, Table
 from truenorth.papers.texts import read_texts
 from truenorth.records.specs import ImuSpec
 
@@ -71,7 +72,7 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
     """Run the study; see :func:`truenorth.papers.reproduce`."""
     count = runs or RUNS
     table = Table()
-    found: dict[tuple[str, int], Errors] = {}
+    found: dict[tuple[str, int], list[AttitudeErrors]] = {}
     progress(f"the paper's own scenario: {count} runs")
     literal = _literal(count, seed)
     _add_literal(table, "literal", literal)
@@ -129,8 +130,8 @@ def reproduce(runs: int | None, seed: int, full: bool, workers: int, progress: C
         dependences(sweeps),
         entangled="; ".join(map(str, seen["still", 10].entangled)),
         every=PERIOD * EVERY,
-        short=_rms(short, TIMES[-1]),
-        complete=_rms(found["two_position", 10], TIMES[-1]),
+        short=_rms(short),
+        complete=_rms(found["two_position", 10]),
         still10=hardly_in_words(degrees["still", 10]),
         still8=hardly_in_words(degrees["still", 8]),
         turned10=hardly_in_words(degrees["two_position", 10]),
@@ -163,10 +164,9 @@ def _honest_system(truth: Truth, base: Base, states: int, share: float = 1.0, co
     return system_of(truth, model, states, P0, share * R + QUIET)
 
 
-def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
-    for k, at in enumerate(errors.time):
-        phi, sigma = errors.error[k, :, :3] / ARCMIN, errors.sigma[k, :, :3] / ARCMIN
-        table.attitude(case, method, phi, sigma, errors.nees[k], time=at, noise="random_walk")
+def _add_errors(table: Table, case: str, method: str, errors: list[AttitudeErrors]) -> None:
+    for at, found in zip(TIMES, errors, strict=True):
+        table.attitude(case, method, found, time=at, noise="random_walk")
 
 
 def _literal(
@@ -206,11 +206,11 @@ def _add_literal(table: Table, case: str, literal: dict[int, tuple[Truth, Array,
         true = truth.phi if states == 10 else truth.phi_platform
         for at in LITERAL_TIMES:
             k = round(at / PERIOD) - 1
-            error, claimed = (x[:, k] - true[:, k]) / ARCMIN, np.broadcast_to(sigma[k] / ARCMIN, x[:, k].shape)
-            table.attitude(case, f"states{states}", error, claimed, time=at, noise="per_sample")
+            errors = AttitudeErrors.with_sigma(x[:, k] - true[:, k], sigma[k])
+            table.attitude(case, f"states{states}", errors, time=at, noise="per_sample")
 
 
-def _wrong_noise(truth: Truth, base: Base) -> dict[str, Errors]:
+def _wrong_noise(truth: Truth, base: Base) -> dict[str, list[AttitudeErrors]]:
     """H-infinity against Kalman filters, all with ten states, where the sway is believed a hundred times smaller than it is."""
     wrong, right = _honest_system(truth, base, 10, WRONG), _honest_system(truth, base, 10)
     L = np.zeros((1, 10))
@@ -264,7 +264,6 @@ def _add_cost(table: Table, seed: int) -> None:
     table.value("still", "states10", "runtime", "ratio", best[10] / best[8], "1")
 
 
-def _rms(errors: Errors, at: float) -> float:
-    """Of heading over the runs at a time, arcmin."""
-    k = list(errors.time).index(at)
-    return float(np.sqrt(np.mean(errors.error[k, :, 2] ** 2)) / ARCMIN)
+def _rms(errors: list[AttitudeErrors]) -> float:
+    """Of heading over the runs at the end, arcmin."""
+    return OF_RUNS["rms"](errors[-1].phi[:, 2]) / ARCMIN

@@ -23,7 +23,7 @@ STATES = {"states12": "12 states", "states13": "13 states", "states16": "16 stat
 def draw_misalignment(errors: Errors, title: str) -> Figure:
     """The paper's figures 1 and 3: misalignment east, north and up over time."""
     names = ("phi E (tilt)", "phi N (tilt)", "phi U (heading)")
-    phi, sigma = errors.phi / ARCMIN, errors.phi_sigma / ARCMIN
+    phi, sigma = errors.phi / ARCMIN, errors.sigma / ARCMIN
     return _draw(phi[0], None, phi, sigma, names, "arcmin", (60.0, 60.0, 120.0), (4.0, 4.0, 10.0), title)
 
 

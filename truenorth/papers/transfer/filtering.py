@@ -18,9 +18,9 @@ from truenorth.alignment.transfer_filter import (
     delay_found,
     transfer_filter,
 )
-from truenorth.analysis.consistency import nees
 from truenorth.core.attitude import misalignment
 from truenorth.errors.master import ARM, DELAY, TransferModel
+from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.transfer.truth import (
     ACCELERATION_NOISE,
     ARM_SIGMA,
@@ -115,25 +115,20 @@ METHODS = {
 
 
 @dataclass(frozen=True)
-class Errors:
-    """Errors of all runs at `EPOCHS`, estimated minus true, with their sigmas; NaN where the master was silent.
+class Errors(AttitudeErrors):
+    """Errors of all runs (runs, K, ...) at `EPOCHS`, estimated minus true, with their sigmas; NaN where the master was silent.
 
     Attributes
     ----------
-    phi, phi_sigma : (runs, K, 3) arrays, rad
     gyro, gyro_sigma : (runs, K, 3) arrays, rad/s
     accel, accel_sigma : (runs, K, 3) arrays, m/s^2
     tau, tau_sigma : (runs, K) arrays, s
         NaN without such a state, as the lever arm's.
     arm, arm_sigma : (runs, K, 3) arrays, m
-    nees : (runs, K) array
-        Of phi, over 3.
     gyro_bias : (runs, K, 3) array, rad/s
         The true ones.
     """
 
-    phi: Array
-    phi_sigma: Array
     gyro: Array
     gyro_sigma: Array
     accel: Array
@@ -142,7 +137,6 @@ class Errors:
     tau_sigma: Array
     arm: Array
     arm_sigma: Array
-    nees: Array
     gyro_bias: Array
 
 
@@ -240,23 +234,21 @@ def _track(flights: Flights, run: Run, method: Method) -> Track:
 
 
 def _errors(run: Run, track: Track, delay: float) -> list[Array]:
-    """The arrays of `Errors` of one run."""
+    """The arrays of `Errors` of one run, in the order of its fields."""
     k = np.clip(np.searchsorted(track.time, EPOCHS), 1, len(track.time) - 1)
     k -= np.abs(track.time[k - 1] - EPOCHS) < np.abs(track.time[k] - EPOCHS)
     silent = np.abs(track.time[k] - EPOCHS) > NEAR
     C = run.motion.states(track.time[k]).C_nb
     phi = misalignment(track.C_nb[k], C)
-    aux, sigma, P = track.sensors[k], track.sigma[k], track.P[k][:, PHI, PHI]
+    aux, sigma = track.sensors[k], track.sigma[k]
     nothing = np.full(len(k), np.nan)
     tau, tau_sigma, arm, arm_sigma = nothing, nothing, np.full((len(k), 3), np.nan), np.full((len(k), 3), np.nan)
     if (at := track.layout.slice_of(DELAY)) is not None:
         tau, tau_sigma = aux[:, at.start] + delay - run.tau, sigma[:, at.start]
     if (at := track.layout.slice_of(ARM)) is not None:
         arm, arm_sigma = aux[:, at] - run.arm, sigma[:, at]
-    square = nees(phi, P) / 3
     arrays = [
-        phi,
-        sigma[:, PHI],
+        *vars(AttitudeErrors.of(phi, track.P[k][:, PHI, PHI])).values(),
         aux[:, BG] - run.gyro_bias,
         sigma[:, BG],
         aux[:, BA] - run.accel_bias,
@@ -265,7 +257,6 @@ def _errors(run: Run, track: Track, delay: float) -> list[Array]:
         tau_sigma,
         arm,
         arm_sigma,
-        square,
         np.broadcast_to(run.gyro_bias, (len(k), 3)),
     ]
     return [np.where(silent.reshape(-1, *[1] * (a.ndim - 1)), np.nan, a) for a in arrays]

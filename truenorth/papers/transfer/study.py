@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truenorth.campaign.comparison import paired
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
+from truenorth.papers.errors import level
 from truenorth.papers.study import Study
 from truenorth.papers.sweeps import Sweep, dependences, draw_sweeps, swept
 from truenorth.papers.table import Table
@@ -128,17 +129,17 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
     def over(values: Array) -> Array:
         return np.asarray(np.sqrt(np.nanmean(values[:, TURN] ** 2, axis=tuple(range(1, values.ndim)))))
 
-    level, level_sigma = errors.phi[..., :2], errors.phi_sigma[..., :2]
+    tilts, tilts_sigma = errors.phi[..., :2], errors.sigma[..., :2]
     window = {"time": STOP, "start": BEGIN}
-    add("level", over(level), over(level_sigma), "arcmin", ARCMIN, **window)
+    add("level", over(tilts), over(tilts_sigma), "arcmin", ARCMIN, **window)
     add("gyro_bias_y", over(errors.gyro[..., 1]), over(errors.gyro_sigma[..., 1]), "deg/h", DEG_PER_HOUR, **window)
     square = np.nanmean(errors.nees[:, TURN], axis=1)
     table.errors(case, method, "nees", square, "1", statistics=("mean",), noise="random_walk", **window)  # type: ignore[arg-type]
     for at in (BEGIN, STOP, END):
         k = int(np.searchsorted(EPOCHS, at))
         quantities = {
-            "level": (*_rms_over_axes(level[:, k], level_sigma[:, k]), "arcmin", ARCMIN),
-            "heading": (errors.phi[:, k, 2], errors.phi_sigma[:, k, 2], "arcmin", ARCMIN),
+            "level": (level(errors.phi[:, k]), level(errors.sigma[:, k]), "arcmin", ARCMIN),
+            "heading": (errors.phi[:, k, 2], errors.sigma[:, k, 2], "arcmin", ARCMIN),
             "tau": (errors.tau[:, k], errors.tau_sigma[:, k], "s", 1.0),
         }
         for i, axis in enumerate("xyz"):
@@ -155,10 +156,6 @@ def _add_errors(table: Table, case: str, method: str, errors: Errors) -> None:
         both = _forward(errors, k)
         if np.isfinite(both).all():
             add("lever_arm_y_and_speed_times_tau", both, None, "m", 1.0, time=at)
-
-
-def _rms_over_axes(errors: Array, sigmas: Array) -> tuple[Array, Array]:
-    return np.sqrt(np.mean(errors**2, axis=1)), np.sqrt(np.mean(sigmas**2, axis=1))
 
 
 def _forward(errors: Errors, k: int) -> Array:
