@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import misalignment
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.records.motion import MotionStates
 from truenorth.state.layout import BA, BG, SLOW_ACCEL, SLOW_GYRO, STATES, Layout
 
 Array = NDArray[np.float64]
@@ -73,34 +74,6 @@ class Residuals:
         return int(np.sum(~self.used))
 
 
-class Motion(Protocol):
-    """Where something is, how it lies and moves, at a set of times."""
-
-    @property
-    def time(self) -> Array:
-        """(K,) s."""
-
-    @property
-    def C_nb(self) -> Array:
-        """(K, 3, 3)."""
-
-    @property
-    def v_n(self) -> Array:
-        """(K, 3) m/s."""
-
-    @property
-    def lat(self) -> Array:
-        """(K,) rad, as lon; alt is m."""
-
-    @property
-    def lon(self) -> Array:
-        """(K,) rad."""
-
-    @property
-    def alt(self) -> Array:
-        """(K,) m."""
-
-
 @dataclass(frozen=True)
 class Track:
     """The state along the track, ENU; one row an output epoch."""
@@ -152,8 +125,8 @@ class Track:
         return float((self.time[-1] - self.time[0]) / len(steps))
 
     @classmethod
-    def along(cls, motion: Motion) -> Track:
-        """The track of a motion at a set of times: a simulator's truth, or a trajectory that was read."""
+    def along(cls, motion: MotionStates) -> Track:
+        """The track of a motion at times (K,): a simulator's truth."""
         place = np.stack([motion.lat, motion.lon, motion.alt], axis=1)
         return cls.of_motion(motion.time, motion.C_nb, motion.v_n, place)
 
