@@ -9,6 +9,7 @@ from truenorth.alignment.bias_step import bias_signatures, bias_step_evidence
 from truenorth.alignment.drift import Drift, detect_drift, drift_signatures
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
+from truenorth.alignment.masked import masked_evidence
 from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
@@ -36,6 +37,7 @@ def what_begins(
         seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     )
     steps = bias_step_evidence(fine, spec, bias)
+    steps += masked_evidence(fine) if others is None else []
     if isinstance(fine, SwayAlignment):
         steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
     return detect_drift(fine, drift), steps, hemisphere_evidence(gravity)

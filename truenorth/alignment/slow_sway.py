@@ -90,7 +90,7 @@ def slow_sway_evidence(
         lowest = min(lowest, -2.0 * float(estimates.log_likelihood))
         other = replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
-        found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in _causes(other)]
+        found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in causes(other)]
     # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
     lowest = min(lowest, without(np.zeros_like(system.z))[0])
     for kind in {_kind(cause) for _, cause in found}:
@@ -141,7 +141,7 @@ def _smaller(system: LinearSystem, motion: Sequence[AxisMotion], duration: float
     return system.with_arrays(Q=Q, P0=P0)
 
 
-def _causes(fine: FineAlignment) -> Iterator[Cause]:
+def causes(fine: FineAlignment) -> Iterator[Cause]:
     """The best of each bank, by a filter of which all innovations are at hand."""
     seen = innovations_of(fine)
     cost, end = -2.0 * float(fine.estimates.log_likelihood), fine.estimates.x[-1][PHI]
