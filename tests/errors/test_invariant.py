@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
-from truenorth.errors.invariant import left_jacobian, reset
+from truenorth.errors.invariant import keep_reset, left_jacobian, reset
 
 
 def jacobian(phi):
@@ -50,6 +50,20 @@ def test_a_correction_leaves_the_errors_that_its_covariance_says(azimuth):
         assert np.allclose(P[:6, :6], np.outer(left, left), rtol=0.0, atol=2e-3 * np.linalg.norm(left) ** 2)
         assert np.array_equal(P, P.T)
         assert np.all(P[6:] == 0.0)
+
+
+def test_the_map_that_is_kept_is_the_one_that_carries_the_covariance():
+    rng = np.random.default_rng(4)
+    s, x = np.zeros(24), rng.normal(size=8)
+    s[4:7] = 5.0, -7.0, 0.4
+    root = rng.normal(size=(8, 8))
+    P, D = root @ root.T, np.zeros((1, 6, 6))
+    keep_reset(s, x, 0, D)
+    whole = np.eye(8)
+    whole[:6, :6] = D[0]
+    expected = whole @ P @ whole.T
+    reset(s, x, P)
+    np.testing.assert_allclose(P, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
 
 def test_large_corrections_of_velocity_turn_with_the_attitude():

@@ -64,6 +64,31 @@ def corrected_velocity(v: Any, phi: Any, xi: Any) -> Any:
 
 
 @borrowing
+def _correction(phi: Any, v: Any, x: Any) -> Any:
+    """``xi`` of a correction, and the velocity after it; tuples."""
+    turned = cross(phi, v)
+    xi = (x[_DV] + turned[0], x[_DV + 1] + turned[1], x[_DV + 2] + turned[2])
+    return xi, corrected_velocity(v, phi, xi)
+
+
+@borrowing
+def carried(phi: Any, xi: Any, v: Any, after: Any, p: Any, d: Any) -> Any:
+    """Errors `p` of attitude and `d` of velocity beyond a correction, as those left after it; tuples."""
+    back = cross(v, p)
+    d = left_jacobian(phi, (d[0] - back[0], d[1] - back[1], d[2] - back[2]))
+    a = cross(xi, p)
+    b, c = cross(phi, a), cross(xi, cross(phi, p))
+    d = (
+        d[0] + 0.5 * a[0] + (b[0] + c[0]) / 6.0,
+        d[1] + 0.5 * a[1] + (b[1] + c[1]) / 6.0,
+        d[2] + 0.5 * a[2] + (b[2] + c[2]) / 6.0,
+    )
+    p = left_jacobian(phi, p)
+    forth = cross(after, p)
+    return p, (d[0] + forth[0], d[1] + forth[1], d[2] + forth[2])
+
+
+@borrowing
 def reset(s: Any, x: Any, P: Any) -> None:
     """Prepare a correction for being fed back as one of invariant errors.
 
@@ -77,27 +102,13 @@ def reset(s: Any, x: Any, P: Any) -> None:
         Their covariance, carried to the errors left.
     """
     phi, v = (x[_PHI], x[_PHI + 1], x[_PHI + 2]), (s[4], s[5], s[6])
-    turned = cross(phi, v)
-    xi = (x[_DV] + turned[0], x[_DV + 1] + turned[1], x[_DV + 2] + turned[2])
-    after = corrected_velocity(v, phi, xi)
+    xi, after = _correction(phi, v, x)
     for side in range(2):  # D P, then its rows as columns: D P D'
         for j in range(P.shape[0]):
             if side == 0:
-                p, d = (P[0, j], P[1, j], P[2, j]), (P[3, j], P[4, j], P[5, j])
+                p, d = carried(phi, xi, v, after, (P[0, j], P[1, j], P[2, j]), (P[3, j], P[4, j], P[5, j]))
             else:
-                p, d = (P[j, 0], P[j, 1], P[j, 2]), (P[j, 3], P[j, 4], P[j, 5])
-            back = cross(v, p)
-            d = left_jacobian(phi, (d[0] - back[0], d[1] - back[1], d[2] - back[2]))
-            a = cross(xi, p)
-            b, c = cross(phi, a), cross(xi, cross(phi, p))
-            d = (
-                d[0] + 0.5 * a[0] + (b[0] + c[0]) / 6.0,
-                d[1] + 0.5 * a[1] + (b[1] + c[1]) / 6.0,
-                d[2] + 0.5 * a[2] + (b[2] + c[2]) / 6.0,
-            )
-            p = left_jacobian(phi, p)
-            forth = cross(after, p)
-            d = (d[0] + forth[0], d[1] + forth[1], d[2] + forth[2])
+                p, d = carried(phi, xi, v, after, (P[j, 0], P[j, 1], P[j, 2]), (P[j, 3], P[j, 4], P[j, 5]))
             for i in range(3):
                 if side == 0:
                     P[_PHI + i, j], P[_DV + i, j] = p[i], d[i]
@@ -108,3 +119,16 @@ def reset(s: Any, x: Any, P: Any) -> None:
             P[j, i] = P[i, j]
     for i in range(3):
         x[_DV + i] = v[i] - after[i]
+
+
+@borrowing
+def keep_reset(s: Any, x: Any, link: int, D: Any) -> None:
+    """Fill in ``D[link]`` (6, 6), by which :func:`reset` will carry errors of attitude and velocity to those that are left."""
+    phi, v = (x[_PHI], x[_PHI + 1], x[_PHI + 2]), (s[4], s[5], s[6])
+    xi, after = _correction(phi, v, x)
+    for j in range(6):
+        of_phi = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+        of_dv = (1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0)
+        p, d = carried(phi, xi, v, after, of_phi, of_dv)
+        for i in range(3):
+            D[link, _PHI + i, j], D[link, _DV + i, j] = p[i], d[i]

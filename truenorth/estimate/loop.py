@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import load
-from truenorth.errors.invariant import reset
+from truenorth.errors.invariant import keep_reset, reset
 from truenorth.estimate.correct import damp_height, feed_back, joint_nis, measure, set_place, update_held
 from truenorth.estimate.memory import (
     ABSENT,
@@ -131,6 +131,8 @@ def correct(
         for b in range(len(m.aux)):
             kept.dx[link, b] = w.x[b]
     if model.invariant:
+        if smoothing:
+            keep_reset(m.s, w.x, link, kept.D)
         reset(m.s, w.x, w.P)
     feed_back(m.s, m.aux, w.x, model.dynamics.turns)
     set_matrix(m.s, m.sums.C_now)

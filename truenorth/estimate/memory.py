@@ -86,7 +86,8 @@ class Kept(NamedTuple):
     """Histories; an axis of length 0 keeps nothing.
 
     `time`, `state`, `aux`, `P` are those at each output; `when`, `innovation`, `sigma`, `nis`, `verdict` those of each
-    event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother.
+    event, the re-timed ones behind the others; `Phi, Q, H, dx` lead from event to event, for the smoother, and `D` (6, 6) from the
+    errors of attitude and velocity before a correction to those left after it.
     """
 
     time: Array
@@ -102,6 +103,7 @@ class Kept(NamedTuple):
     Q: Array
     H: Array
     dx: Array
+    D: Array
 
 
 class Sums(NamedTuple):

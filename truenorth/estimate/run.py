@@ -196,14 +196,12 @@ def navigate_track(
     Raises
     ------
     UsageError
-        Smoothing with a vertical loop, of invariant errors, of considered states or of re-timed measurements.
+        Smoothing with a vertical loop, of considered states or of re-timed measurements.
     DataError
         The filter broke down (see :func:`truenorth.filters.kalman`).
     """
     if smooth and any(source.loop > 0.0 for source in aiding):
         raise UsageError("a vertical loop has fixed gains and cannot be smoothed; expected a Kalman gain (no loop)")
-    if smooth and invariant:
-        raise UsageError("invariant errors are not smoothed; align first, then navigate with smooth=True")
     if smooth and (any(g.considered for g in model.groups) or any(source.retimed for source in aiding)):
         raise UsageError("considered states and re-timed measurements are not smoothed; expected smooth=False")
     steps = interval_lengths(record)
@@ -278,7 +276,7 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
     if setting.smooth:
         from truenorth.estimate.smoothing import smoothed
 
-        states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, model.dynamics.turns)
+        states, sensors, P = smoothed(Events(*plan), kept, state.memory.P, model.dynamics.turns, setting.invariant)
     C_nb, v_n, position, C_nw = wander.north(states)
     if setting.covariance:
         turn(C_nw, v_n, position, 1.0, P)
@@ -313,6 +311,7 @@ def _room(setting: Setting, plan: Rows, late: Rows, n: int) -> Kept:
         Q=np.empty((links, n, n)),
         H=np.zeros((links, 3, n)),
         dx=np.zeros((links, n)),
+        D=np.tile(np.eye(6), (links, 1, 1)),
     )
 
 

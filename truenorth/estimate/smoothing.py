@@ -2,7 +2,9 @@
 
 Corrections fed back make the loop's errors those of a linear filter less what it has corrected so far, ``x_c``. With
 ``z = nu + H x_c`` (innovation and what was corrected) the same linear filter is run again and smoothed by
-:func:`truenorth.filters.smoother`; its answer less ``x_c`` is what is left of the error at each epoch.
+:func:`truenorth.filters.smoother`; its answer less ``x_c`` is what is left of the error at each epoch. Corrections of invariant
+errors leave them in other coordinates, those of the attitude and velocity after each: they are carried there (``D``), as the
+loop carries its covariance.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.invariant import reset
 from truenorth.estimate.correct import feed_back
 from truenorth.estimate.memory import USED, Events, Kept
 from truenorth.filters import LinearSystem
@@ -19,7 +22,9 @@ from truenorth.strapdown import wander
 Array = NDArray[np.float64]
 
 
-def smoothed(plan: Events, kept: Kept, P0: Array, turns: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+def smoothed(
+    plan: Events, kept: Kept, P0: Array, turns: NDArray[np.int64], invariant: bool
+) -> tuple[Array, Array, Array]:
     """State, sensors and covariance (along w) at each output, smoothed.
 
     Parameters
@@ -31,6 +36,8 @@ def smoothed(plan: Events, kept: Kept, P0: Array, turns: NDArray[np.int64]) -> t
         Covariance at the beginning.
     turns : (T,) array
         First states of rotations.
+    invariant : bool
+        Corrections turn velocity with attitude.
 
     Returns
     -------
@@ -41,24 +48,31 @@ def smoothed(plan: Events, kept: Kept, P0: Array, turns: NDArray[np.int64]) -> t
     linked = (plan.source >= 0) | plan.output
     innovation, used = kept.innovation[linked], kept.verdict[linked] == USED
     count, n = len(innovation), len(P0)
-    corrected = np.zeros((count, n))  # after each event
+    corrected = np.zeros((count, n))  # after each event, in the errors before it
     z = np.full((count, 3), np.nan)
+    Phi = kept.Phi.copy()
     x = np.zeros(n)
     for k in range(count):
-        x = kept.Phi[k] @ x
+        if k > 0:
+            Phi[k, :, :6] = Phi[k, :, :6] @ kept.D[k - 1]
+        x = Phi[k] @ x
         if used[k]:
             z[k] = innovation[k] + kept.H[k] @ x
         x = x + kept.dx[k]
         corrected[k] = x
     R = np.zeros((count, 3, 3))
     R[:, range(3), range(3)] = np.where(np.isfinite(z), plan.variance[linked], 1.0)
-    system = LinearSystem(Phi=kept.Phi, Q=kept.Q, H=kept.H, R=R, z=z, x0=np.zeros(n), P0=P0)
-    answer = smoother(system)
+    answer = smoother(LinearSystem(Phi=Phi, Q=kept.Q, H=kept.H, R=R, z=z, x0=np.zeros(n), P0=P0))
     out = plan.output[linked]
-    left = answer.x[out] - corrected[out]
+    left, P, D = answer.x[out] - corrected[out], answer.P[out], kept.D[out]
+    left[:, :6] = np.einsum("kij,kj->ki", D, left[:, :6])
+    P[:, :6] = D @ P[:, :6]
+    P[:, :, :6] = P[:, :, :6] @ np.swapaxes(D, 1, 2)
     state, sensors = kept.state.copy(), kept.aux.copy()
     full = np.zeros((len(state), wander.LENGTH))
     full[:, : state.shape[1]] = state
     for k in range(len(state)):
-        feed_back(full[k], sensors[k], left[k].copy(), turns)
-    return full[:, : state.shape[1]], sensors, answer.P[out]
+        if invariant:
+            reset(full[k], left[k], P[k])
+        feed_back(full[k], sensors[k], left[k], turns)
+    return full[:, : state.shape[1]], sensors, P

@@ -218,7 +218,7 @@ class _Plan:
         """Filter (and smooth) with these measurements."""
         used = [*sensors, *self.always]
         model, every = with_states(self.model, used), self.every
-        turns = turns_velocity(self.altitude) and not options.get("smooth", False)
+        turns = turns_velocity(self.altitude)
         return navigate_track(
             self.record, self.start, model, used, interval=self.interval, every=every, invariant=turns, **options
         )
