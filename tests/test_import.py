@@ -55,7 +55,7 @@ def test_public_names_are_what_they_say():
     for name in truenorth.__all__:
         assert getattr(truenorth, name) is not None
     assert set(truenorth.__all__) <= set(dir(truenorth))
-    for module in (truenorth.errors, truenorth.aiding):
+    for module in (truenorth.errors, truenorth.aiding, truenorth.state, truenorth.strapdown):
         assert all(getattr(module, name).__module__.startswith(module.__name__) for name in module.__all__)
         assert dir(module) == sorted(module.__all__)
     for module in (truenorth, truenorth.errors):

@@ -49,6 +49,9 @@ if TYPE_CHECKING:
         simulation as simulation,
     )
     from truenorth import (
+        state as state,
+    )
+    from truenorth import (
         strapdown as strapdown,
     )
     from truenorth.advice import advise, advise_manoeuvre
@@ -244,6 +247,7 @@ _SUBMODULES = (
     "quality",
     "records",
     "simulation",
+    "state",
     "strapdown",
 )
 
