@@ -7,12 +7,15 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import truenorth
 from tests.campaign.test_plan import PLAN
 from tests.fuzz.test_readers import in_time
 from tests.helpers import run_command
+from truenorth.campaign import read_plan
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.core.position import Position
 from truenorth.formats import read_gnss, read_imu
@@ -249,3 +252,100 @@ CALLS = {
 def test_wrong_types_are_errors_of_ours(call):
     with in_time(), pytest.raises((TruenorthError, UsageError)):
         CALLS[call]()
+
+
+def parquet(path, rows, record=RECORD):
+    """A table of the documented columns with the first rows of a record, or so many rows of zeros, which take no room."""
+    names = ["time", *(f"{kind}_{axis}" for kind in ("dtheta", "dvel") for axis in "xyz")]
+    if rows <= len(record):
+        columns = np.column_stack([record.time, record.gyro, record.accel])[:rows].T
+        pq.write_table(pa.table(list(columns), names), path)
+        return path
+    group = pa.table([np.zeros(1 << 20)] * len(names), names)
+    with pq.ParquetWriter(path, group.schema) as writer:
+        for _ in range(rows >> 20):
+            writer.write_table(group)
+    return path
+
+
+def test_tables_without_rows_of_one_row_and_of_more_than_memory(tmp_path, monkeypatch):
+    with pytest.raises(DataError, match="no rows"):
+        read_imu(parquet(tmp_path / "log.parquet", 0))
+    np.savez(tmp_path / "one.npz", time=RECORD.time[:1], dtheta=RECORD.gyro[:1], dvel=RECORD.accel[:1])
+    with pytest.raises(DataError, match="no columns of an IMU"):
+        read_imu(tmp_path / "one.npz")
+    monkeypatch.setattr("truenorth.formats.parquet.LARGEST", 8 << 20)
+    with in_time(), pytest.raises(DataError, match="cut it into parts"):
+        read_imu(parquet(tmp_path / "large.parquet", 1 << 21))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ",".join(f"c{k}" for k in range(1_000_000)) + "\n" + ",".join(["1"] * 1_000_000),
+        "0" * 10_000_000,
+        "time," + "x" * 200_000 + "\n1,2\n",
+        "\n".join([",".join(["1.5"] * 900)] * 60),
+    ],
+    ids=["columns", "line", "name", "many columns"],
+)
+def test_a_text_that_is_no_table_of_a_sensor(text, tmp_path):
+    (tmp_path / "log.csv").write_text(text)
+    with in_time(), pytest.raises(DataError, match=r"log\.csv") as error:
+        read_imu(tmp_path / "log.csv")
+    assert len(str(error.value)) < 1500
+
+
+def test_names_of_columns_are_no_orders_to_the_terminal(tmp_path):
+    (tmp_path / "log.csv").write_text("time,\x1b[31mx\x1b]0;title\x07\n" + "".join(f"{k},1\n" for k in range(20)))
+    with pytest.raises(DataError, match=r"no columns of an IMU among time, \?\[31mx"):
+        read_imu(tmp_path / "log.csv")
+
+
+def test_rows_a_lifetime_apart(log, tmp_path, capsys, monkeypatch):
+    head, *rows = log.read_text().splitlines()
+    late = [",".join([str(float(row.split(",")[0]) + 1e9), *row.split(",")[1:]]) for row in rows[300:]]
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows[:300], *late]))
+    said = refused(capsys, monkeypatch, "align", tmp_path / "log.csv", *WHERE, "--imu", "navigation")
+    assert "row 301, column time: 1000000000 s after the row before" in said
+    refused(capsys, monkeypatch, "inspect", tmp_path / "log.csv")
+
+
+LONG = "9" * 400
+NAMED = {
+    "log": ["align", LONG, *WHERE],
+    "specification": ["align", "{log}", *WHERE, "--imu", LONG],
+    "output": ["align", "{log}", *WHERE, "--imu", "navigation", "-o", LONG],
+    "path of output": ["align", "{log}", *WHERE, "--imu", "navigation", "-o", "a/" * 3000],
+    "start": ["navigate", "{log}", "--start", LONG],
+    "scenario": ["simulate", LONG, "-o", "never"],
+    "plan": ["campaign", LONG, "-o", "never"],
+    "search": ["tune", LONG, "-o", "never"],
+    "no source": ["live", "", *WHERE],
+    "replay of nothing": ["live", "replay:", *WHERE],
+    "no address": ["live", "udp://[", *WHERE],
+    **{f"{kind} source": ["live", f"{kind}:{LONG}", *WHERE] for kind in ("replay", "follow", "bag", "serial")},
+    "aiding source": ["live", "replay:{log}@max", *WHERE, "--imu", "navigation", "--gnss", f"replay:{LONG}"],
+    "sigma": ["align", "{log}", *WHERE, "--imu", "navigation", "--position-sigma", "1e308"],
+    "rate": ["align", "{log}", *WHERE, "--imu", "navigation", "--rate", "1e-320"],
+}
+
+
+@pytest.mark.parametrize("what", NAMED)
+def test_names_and_figures_that_nothing_has(what, log, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    refused(capsys, monkeypatch, *(word.format(log=log) for word in NAMED[what]))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("where", ["imu", "scenarios"])
+def test_a_name_within_a_file_that_nothing_has(where, tmp_path):
+    change = {"scenarios": [PLAN["scenarios"][0] | {"imu": LONG}]} if where == "imu" else {"scenarios": [LONG]}
+    with pytest.raises(DataError, match="999"):
+        read_plan(PLAN | change)
+
+
+def test_a_log_whose_name_has_a_line_end(log, tmp_path, capsys, monkeypatch):
+    named = tmp_path / "new\nline.csv"
+    named.write_bytes(log.read_bytes())
+    assert run_command(capsys, monkeypatch, "live", f"replay:{named}@max", *WHERE, "--imu", "navigation")[0] in (0, 4)

@@ -28,7 +28,7 @@ from pydantic import Field, PrivateAttr, field_validator
 from truenorth.alignment.azimuth import AZIMUTH_METHODS
 from truenorth.alignment.procedure import Method
 from truenorth.core.errors import DataError, TruenorthError
-from truenorth.core.paths import as_path
+from truenorth.core.paths import as_path, is_file
 from truenorth.core.plugins import plugins
 from truenorth.core.schema import Angle, Strict, Time, validated
 from truenorth.core.yaml_file import read_mapping
@@ -191,7 +191,7 @@ class Plan(Strict):
     def _scenario(self, source: str | dict[str, Any]) -> dict[str, Any]:
         nearby = self._folder / source if isinstance(source, str) else None
         try:
-            scenario = read_scenario(nearby if nearby is not None and nearby.is_file() else source)
+            scenario = read_scenario(nearby if nearby is not None and is_file(nearby) else source)
         except TruenorthError as error:
             raise DataError(f"{self._source}: scenarios: {error}") from None
         resolved = scenario.to_mapping()

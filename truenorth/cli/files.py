@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from truenorth.core.paths import is_folder
+
 FORCE, LAYOUT = "--force", "--write-layout"
 OUTPUTS = ("-o", "--output", "--plot", LAYOUT)
 KINDS = {  # by command: the kind of result that it writes into its output folder
@@ -63,7 +65,7 @@ def inputs(words: Sequence[str]) -> Iterator[str]:
     for at, word in enumerate(words):
         option, _, value = word.partition("=")
         name = value or word
-        folder = command in READ_NO_FOLDER and Path(name).is_dir()
+        folder = command in READ_NO_FOLDER and is_folder(Path(name))
         if at != first and before not in OUTPUTS and option not in OUTPUTS and not folder:
             yield name
         before = word
@@ -102,7 +104,7 @@ def check_output(words: Sequence[str]) -> list[Path]:
     if command is None:
         return []
     kept, wanted = [], KINDS[command]
-    for folder in filter(Path.is_dir, map(Path, _outputs(words))):
+    for folder in filter(is_folder, map(Path, _outputs(words))):
         found = kinds_in(folder)
         if found and wanted not in found:
             raise UsageError(

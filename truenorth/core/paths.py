@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,20 @@ def as_path(given: Any, what: str) -> Path:
         raise UsageError(f"{what} {str(path)[:60]!r}...: no file has so long a name")
     noted(path)
     return path
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file can have is none's, and a folder that cannot be looked into has none."""
+    with suppress(OSError):
+        return path.is_file()
+    return False
+
+
+def is_folder(path: Path) -> bool:
+    """The same for a folder."""
+    with suppress(OSError):
+        return path.is_dir()
+    return False
 
 
 def unreadable(path: Path, error: OSError) -> UsageError:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from truenorth.core.errors import UsageError
 
+FARTHEST = 2e7  # m: half way round the earth
 METRES_PER_RADIAN = 6_371_000.0  # mean earth radius: good enough for a position's uncertainty
 
 
@@ -44,8 +45,8 @@ class Position:
             raise UsageError(f"longitude {lon:g} deg; expected -180 to 180 deg, east positive: check `lon`")
         if not -12_000.0 <= self.alt <= 50_000.0:
             raise UsageError(f"height {self.alt:g} m; expected metres between -12000 and 50000: check `alt`")
-        if not (self.horizontal_sigma >= 0.0 and self.vertical_sigma >= 0.0):
-            raise UsageError("a position sigma is negative or not a number; expected metres, zero or more")
+        if not all(0.0 <= sigma <= FARTHEST for sigma in (self.horizontal_sigma, self.vertical_sigma)):
+            raise UsageError(f"a position sigma is negative or not a number, or beyond {FARTHEST:g} m; expected metres")
 
     @property
     def sigma(self) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from truenorth.core.atomic import noted
 from truenorth.core.errors import DataError, TruenorthError, UsageError
+from truenorth.core.paths import is_file
 from truenorth.core.units import parse
 
 LARGEST = 1 << 20  # bytes
@@ -81,7 +82,7 @@ def read_mapping(path: str | PathLike[str]) -> dict[Any, Any]:
             return super().construct_mapping(node, deep=deep)
 
     try:
-        if not Path(path).is_file():
+        if not is_file(Path(path)):
             raise UsageError(f"{path}: cannot be read (No such file)")
         with Path(path).open("rb") as file:
             raw = file.read(LARGEST + 1)

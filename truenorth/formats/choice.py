@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.units import DIMENSIONS, parse_unit
 from truenorth.formats.behaviour import accel_readings, gravity_level
-from truenorth.formats.columns import Columns, missing_column
+from truenorth.formats.columns import Columns, listed, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import BLOCKS, Layout
 from truenorth.formats.names import Heading, clock_of, families, heading_of
@@ -140,7 +140,7 @@ def _parts(columns: Columns, reference: str) -> list[str]:
         whole = sorted({other.partition("[")[0] for other in columns.names})
         near = get_close_matches(name, whole, n=1)
         hint = f"; is it {near[0]!r}?" if near else ""
-        raise DataError(f"{columns.path.name}: {name!r} is missing; found {', '.join(whole) or 'none'}{hint}")
+        raise DataError(f"{columns.path.name}: {name!r} is missing; found {listed(whole)}{hint}")
     return parts
 
 
@@ -351,7 +351,8 @@ def _by_behaviour(columns: Columns, layout: Layout) -> Choice:
     skip = set(choice.time) | {name for name, v in numbers.items() if np.all(np.diff(v) == 1.0)}
     free = [name for name, v in numbers.items() if name not in skip and np.isfinite(v).all()]
     blocks = [free[i : i + 3] for i in range(0, len(free) - 2, 3)]
-    interval = float(np.median(np.diff(columns.clock(choice.time[0])[0]))) if choice.time else np.nan
+    clock = columns.clock(choice.time[0])[0] if choice.time else np.empty(0)
+    interval = float(np.median(np.diff(clock))) if len(clock) > 1 else np.nan
     forces = [
         block for block in blocks
         if _constant(values := np.column_stack([numbers[name] for name in block]))
@@ -362,7 +363,7 @@ def _by_behaviour(columns: Columns, layout: Layout) -> Choice:
     ]  # fmt: skip
     if longest < 3 or not forces or len(blocks) < 2:
         raise DataError(
-            f"{source}: no columns of an IMU among {', '.join(columns.names) or '(none)'}; expected time, gyro_x .. accel_z (rates "
+            f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
             "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
         )
     others = [block for block in blocks if block not in forces] if len(forces) == 1 else []

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 DAY = 86400.0
 OURS = tuple(name for pair in BLOCKS.values() for name in pair)  # arrays of three columns with our names
 
+MOST_NAMES, LONGEST_NAME = 40, 60  # of a message
+
 
 @dataclass(frozen=True)
 class Columns:
@@ -162,9 +164,15 @@ def columns_of_arrays(path: Path, variables: Mapping[str, Any]) -> Columns:
     return Columns(path, list(parts), read, column, whole=whole)
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names of a log's columns for a message: of many, and of long ones, the first part; what cannot be printed as ``?``."""
+    shown = ["".join(c if c.isprintable() else "?" for c in name[:LONGEST_NAME]) for name in names[:MOST_NAMES]]
+    return (", ".join(shown) or "(none)") + (f", ... ({len(names)} in all)" if len(names) > MOST_NAMES else "")
+
+
 def missing_column(columns: Columns, ours: str, wanted: str) -> DataError:
     """The error for a column of ours that is not there under the name that is `wanted`, with the nearest name."""
     near = {name.lower(): name for name in columns.names}
     match = get_close_matches(wanted.lower(), near, n=1)
     hint = f"; is it {near[match[0]]!r}? Then columns: {{{ours}: {near[match[0]]}}}" if match else ""
-    return DataError(f"{columns.path.name}: column {wanted!r} is missing; found {', '.join(columns.names)}{hint}")
+    return DataError(f"{columns.path.name}: column {wanted!r} is missing; found {listed(columns.names)}{hint}")

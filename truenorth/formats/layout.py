@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.paths import is_file
 from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import read_mapping, unknown_key
 from truenorth.records import COLUMNS
@@ -25,6 +25,7 @@ DIMENSION_OF: dict[Kind, dict[str, str]] = {
     "rates": {"gyro": "angular_rate", "accel": "acceleration", "time": "time"},
     "increments": {"gyro": "angle", "accel": "speed", "time": "time"},
 }
+SLOWEST, FASTEST = 1e-6, 1e9  # Hz, of a rate that is given
 KNOWN_COLUMNS = ("time", *COLUMNS["rates"], *COLUMNS["increments"], *ARRAY_ONLY)
 
 
@@ -76,8 +77,8 @@ def options_for(
         The same in the options of the call.
     """
     values: dict[str, Any] = {}
-    nearby = path.with_suffix(".yaml")
-    if nearby.is_file():
+    nearby = path.with_suffix(".yaml") if path.name else path / ".yaml"
+    if is_file(nearby):
         try:
             values = checked(read_mapping(nearby))
         except UsageError as error:
@@ -155,7 +156,7 @@ def _rate(value: Any) -> float:
     from truenorth.core.units import parse
 
     rate = parse(value, "frequency") if isinstance(value, str) else value
-    if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < math.inf:
+    if isinstance(rate, bool) or not isinstance(rate, int | float) or not SLOWEST <= rate <= FASTEST:
         raise UsageError(f"rate is {value!r}; expected samples a second, such as 100")
     return float(rate)
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.columns import Columns
+from truenorth.formats.content import LARGEST
 from truenorth.records import Record
 
 Array = NDArray[np.float64]
@@ -43,6 +44,11 @@ def columns(path: Path, format: str) -> Columns:
             if format == "feather":
                 return pf.read_table(path, columns=wanted)
             with pq.ParquetFile(path) as file:
+                cells = 0 if wanted is None else file.metadata.num_rows * len(wanted)
+                if 8 * cells > LARGEST:  # equal values take next to nothing in the file
+                    raise DataError(
+                        f"{path.name}: holds more than {LARGEST >> 30} GiB; expected a log that fits into memory: cut it into parts"
+                    )
                 return file.schema_arrow.empty_table() if wanted is None else file.read(wanted, use_threads=False)
         except (pa.ArrowException, OSError) as error:
             what = format.capitalize()
@@ -50,6 +56,8 @@ def columns(path: Path, format: str) -> Columns:
 
     def read(names: Sequence[str], gaps: bool = False) -> Array:
         found = table(names)
+        if not found.num_rows:
+            raise DataError(f"{path.name}: columns and no rows; expected numbers in them")
         for name in names:
             kind = found.schema.field(name).type
             if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):

@@ -21,7 +21,7 @@ from truenorth.core.units import DIMENSIONS, parse_quantity, parse_unit
 from truenorth.core.yaml_file import unknown_key
 from truenorth.formats.behaviour import EPOCH
 from truenorth.formats.checks import check_finite
-from truenorth.formats.columns import Columns
+from truenorth.formats.columns import Columns, listed
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.units import split, unit_in
 from truenorth.records import IN_ORDER, Late
@@ -166,7 +166,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
             if name not in columns.names:
                 near = get_close_matches(name, columns.names, n=1)
                 hint = f"; is it {near[0]!r}?" if near else ""
-                raise DataError(f"{source}: column {name!r} is missing; found {', '.join(columns.names)}{hint}")
+                raise DataError(f"{source}: column {name!r} is missing; found {listed(columns.names)}{hint}")
             unit = split(name)[1]
             stated |= {quantity.name} if _unit(quantity, unit, options) else set()
             sign = 1.0 if name == options.columns[quantity.name] else -1.0
@@ -178,7 +178,7 @@ def find(columns: Columns, quantities: Sequence[Quantity], options: Options) -> 
     labels = {ours: claim[0][0] for ours, claim in claims.items()}
     if "time" not in labels:
         raise DataError(
-            f"{source}: no column of time among {', '.join(columns.names) or '(none)'}; expected time in seconds: name it, in the "
+            f"{source}: no column of time among {listed(columns.names)}; expected time in seconds: name it, in the "
             "call or a YAML file next to the log"
         )
     factors = {ours: claim[0][1] for ours, claim in claims.items()}

@@ -35,6 +35,7 @@ STAMP = re.compile(
 DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
 REMARKS = ("#", "%", "//")
 LONGEST_LINE = 65536
+MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
 HEADER_LINES = 400  # more lines than this above the numbers are no header
 SAMPLE = 40  # lines by which the dialect is judged
@@ -267,8 +268,16 @@ def _head(path: Path, text: bytes) -> list[tuple[int, str]]:
             line = raw.decode("utf-8")
         except UnicodeDecodeError:
             line = raw.decode("latin-1")  # names of columns in another encoding; the numbers are the same in all
-        if line.strip():
-            lines.append((number, line))
+        if not line.strip():
+            continue
+        if not _is_remark(line) and (
+            len(line) > LONGEST_LINE or max(line.count(mark or " ") for mark in DELIMITERS) > MOST_COLUMNS
+        ):
+            raise DataError(
+                f"{path.name}: line {number}: longer than {LONGEST_LINE >> 10} KiB, or of more than {MOST_COLUMNS} columns; "
+                "expected a table, a row on each line: keep the columns of the sensor"
+            )
+        lines.append((number, line))
     return lines
 
 

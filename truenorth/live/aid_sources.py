@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.errors import TruenorthError, UsageError
+from truenorth.core.paths import is_file, is_folder
 from truenorth.live.feed import Feed
 from truenorth.live.journal import AidJournal
 from truenorth.live.listening import READERS, Listener
@@ -131,7 +132,7 @@ def open_aid(
     add = feed.add if kept is None else kept.add
     if text.startswith("replay:"):
         path = Path(text.removeprefix("replay:"))
-        if not path.exists():
+        if not (is_file(path) or is_folder(path)):
             raise UsageError(f"source {text}: there is no file {path}")
         rows = feed.rows_of(READERS[feed.key](path, **feed.reading, **options))
         after = -np.inf if kept is None else kept.earlier[:, 0].max(initial=-np.inf)

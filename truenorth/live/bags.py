@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.paths import is_file, is_folder
 from truenorth.formats.devices.ros import EXTRA, KNOWN, frame
 
 POLL = 0.05  # s, between two looks at a file that grows
@@ -120,7 +121,7 @@ def open_bag(path: Path, topics: Sequence[str]) -> Callable[[], bytes | None]:
     UsageError
         No such file, a folder without a bag, or no decoder.
     """
-    if not path.exists():
+    if not (is_file(path) or is_folder(path)):
         raise UsageError(f"bag:{path}: there is no such file or folder")
     files = _files(path)
     if not files:

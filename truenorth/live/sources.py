@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.atomic import noted
 from truenorth.core.errors import UsageError
+from truenorth.core.paths import is_file, is_folder
 from truenorth.formats.layout import Layout
 from truenorth.live.bags import open_bag
 from truenorth.live.decode import Decoder
@@ -163,8 +164,8 @@ def open_bytes(text: str) -> Callable[[], bytes | None]:
     """
     if text == "-":
         return lambda: os.read(sys.stdin.fileno(), BYTES)
-    address = urlsplit(text)
     try:
+        address = urlsplit(text)
         if address.scheme == "udp" and address.port:
             return _udp(address.hostname or "127.0.0.1", address.port)
         if address.scheme == "tcp" and address.port:
@@ -187,10 +188,10 @@ def open_bytes(text: str) -> Callable[[], bytes | None]:
 def _replay(text: str, layout: Layout, after: float) -> Replay:
     from truenorth.formats import read_imu
 
-    found = re.fullmatch(r"(.+?)(?:@(?:(\d+(?:\.\d*)?)x|(max)))?", text)
+    found = re.fullmatch(r"(.*?)(?:@(?:(\d+(?:\.\d*)?)x|(max)))?", text, re.DOTALL)
     assert found is not None
     path, speed, fastest = found.groups()
-    if not Path(path).exists():
+    if not path or not (is_file(Path(path)) or is_folder(Path(path))):
         raise UsageError(f"source replay:{text}: there is no file {path}")
     options: dict[str, Any] = {"units": layout.units or None, "columns": layout.columns or None}
     record = read_imu(path, axes=layout.axes, rate=layout.rate, kind=layout.kind, **options)

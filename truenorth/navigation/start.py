@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from truenorth.coarse.analytic import static_jacobian
 from truenorth.core.earth import DEFLECTION, normal_gravity
 from truenorth.core.errors import AlignmentError, DataError
 from truenorth.core.json_file import read_object
+from truenorth.core.paths import as_path
 from truenorth.core.position import Position
 from truenorth.errors.axes import standing
 from truenorth.navigation.handover import Handover
@@ -183,7 +183,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
     AlignmentError
         The alignment has no heading that may be used.
     """
-    path = Path(folder)
+    path = as_path(folder, "start")
     path = path / SUMMARY if path.is_dir() else path
     try:
         s = read_object(path)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import normalised, quaternion_from_rotation_vector, quaternion_product, rotate
 from truenorth.core.compiled import compiled
+from truenorth.core.errors import DataError
 from truenorth.core.linalg import add_rows
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
@@ -27,6 +28,7 @@ LEVEL_WINDOW = 31  # s, odd; the direction of gravity is the median over it
 # Three arcseconds are what spoils north by a degree in 15 s of static averaging.
 STILL_ANGLE = 3.0 * ARCSEC
 SEEN_TURN = np.radians(2.0)  # of gravity in body axes within WINDOW: accelerometers that shake still see it
+MOST_CELLS = 10_000_000  # eleven days
 QUARTER_TURN = np.radians(90.0)
 UNTURNED = 0.1  # part of the turn that gyros show, below which gravity has not turned at all
 SCATTERED = 0.5  # length of the mean of unit vectors, below which gravity has no one direction
@@ -36,7 +38,13 @@ LARGEST_BIAS = np.radians(3.0)  # rad/s; above this a constant rate is a turn, w
 
 @remembered
 def even_rates(record: ImuRecord) -> tuple[float, Array]:
-    """Cell length (about 0.1 s) and (6, cells) mean rates and specific forces on an even grid."""
+    """Cell length (about 0.1 s) and (6, cells) mean rates and specific forces on an even grid.
+
+    Raises
+    ------
+    DataError
+        A log of a few rows over so long a time that the grid does not fit into memory: it names the longest gap.
+    """
     rows_a_cell = max(1, round(CELL / record.interval))
     interval = rows_a_cell * record.interval
     if not record.gaps.size and abs(record.duration / len(record) - record.interval) < 0.01 * record.interval:
@@ -49,6 +57,12 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
     cumulated = np.cumsum(data * steps if record.kind == "rates" else data, axis=0)
     clock = np.cumsum(steps)
     cells = int(record.duration / interval)
+    if cells > MOST_CELLS + 100 * len(record):
+        widest = int(np.argmax(record.steps))
+        raise DataError(
+            f"{record.source}: row {widest + 1}, column time: {record.steps[widest]:.0f} s after the row before, in a log of "
+            f"{len(record)} rows; expected rows of one run: take the part before or after (`record.between`)"
+        )
     edges = record.time[0] - record.interval + interval * np.arange(cells + 1)
     covered = np.interp(edges, record.time, clock, left=0.0)
     length = np.diff(covered)

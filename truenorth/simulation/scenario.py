@@ -23,6 +23,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, field_validator
 
 from truenorth.core.errors import DataError, TruenorthError, UsageError
+from truenorth.core.paths import as_path, is_file
 from truenorth.core.position import Position
 from truenorth.core.schema import Angle, Frequency, Length, Strict, Time, validated
 from truenorth.core.yaml_file import read_mapping
@@ -124,7 +125,7 @@ class Scenario(Strict):
         """The IMU, in SI."""
         if self.imu is None:
             return ImuSpec(name="ideal")
-        if isinstance(self.imu, str) and (self._folder / self.imu).is_file():
+        if isinstance(self.imu, str) and is_file(self._folder / self.imu):
             return imu_spec(self._folder / self.imu)
         return imu_spec(self.imu)
 
@@ -260,7 +261,7 @@ class Scenario(Strict):
         resolved = self.model_dump(mode="json", exclude_none=True)
         if isinstance(self.motion, RouteMotion):
             resolved["motion"] = self.motion.with_points(self._folder).model_dump(mode="json", exclude_none=True)
-        if isinstance(self.imu, str) and (self._folder / self.imu).is_file():
+        if isinstance(self.imu, str) and is_file(self._folder / self.imu):
             resolved["imu"] = read_mapping(self._folder / self.imu)
         return resolved
 
@@ -279,8 +280,8 @@ def read_scenario(source: str | PathLike[str] | Mapping[str, Any] | Scenario) ->
         return source
     if isinstance(source, Mapping):
         return _checked(source, "scenario", Path())
-    path = Path(source)
-    if path.suffix in (".yaml", ".yml") or path.is_file():
+    path = as_path(source, "scenario")
+    if path.suffix in (".yaml", ".yml") or is_file(path):
         return _checked(read_mapping(path), str(path), path.parent)
     with resources.as_file(SHIPPED) as folder:
         names = sorted(file.stem for file in folder.glob("*.yaml"))
