@@ -80,6 +80,9 @@ class Tilt:
         From whose scatter the sigmas are.
     by_axis, by_axis_sigma : (3,) arrays, s
         The delay by the turns about each axis alone, and its one-sigma.
+    turn : float, rad
+        RMS of the turn about the vertical that the delay makes: gravity does not show it, and an IMU that spins on its base has it
+        all along.
     """
 
     given: float
@@ -95,6 +98,7 @@ class Tilt:
     pieces: int = 2
     by_axis: Array = field(default_factory=lambda: np.zeros(3))
     by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
+    turn: float = 0.0
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -116,7 +120,8 @@ class Tilt:
         if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma) and (agree or not self.rough):
             certain = agree and abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
             # What the gyros do not explain may be the base's own, and have hidden as much of a delay as it may have made.
-            effect = Effect(level=self.tilt if certain else math.hypot(self.tilt, self.given / GRAVITY_EQUATOR))
+            level = self.tilt if certain else math.hypot(self.tilt, self.given / GRAVITY_EQUATOR)
+            effect = Effect(heading=self.turn, level=level)
             found.append(Evidence(late, figures, "bounded" if certain else "hint", effect, ("common_clock",)))
         off = np.abs(self.scale)
         for i in np.flatnonzero(off >= np.maximum(least_scale(self.turned), clear * self.scale_sigma)):
@@ -195,7 +200,10 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
         if not whole < half < given or (rough and C_sb is None):
             sigma_scale = np.full(3, np.inf)
     each = little[4:], sigma[4:]
-    return Tilt(given, unturned, best, axes, late, float(sigma[0]), tilt, scale, sigma_scale, turns, len(theta), *each)
+    turn = abs(late) * bench.rate_up(theta)
+    return Tilt(
+        given, unturned, best, axes, late, float(sigma[0]), tilt, scale, sigma_scale, turns, len(theta), *each, turn
+    )
 
 
 def least_scale(turned: Array) -> Array:
@@ -274,6 +282,12 @@ class _Bench:
     def rate(self, theta: Array) -> float:
         """RMS of the rates, rad/s."""
         return float(np.sqrt(np.mean(np.sum((theta / self.interval) ** 2, axis=-1))))
+
+    def rate_up(self, theta: Array) -> float:
+        """RMS of the rate about the vertical, rad/s."""
+        up = self.force.mean(axis=1, keepdims=True) if self.C_sb is None else self.force
+        up = up / np.linalg.norm(up, axis=-1, keepdims=True)
+        return float(np.sqrt(np.mean(np.sum(theta / self.interval * up, axis=-1) ** 2)))
 
 
 def _by_pieces(pieces: int, flat: Array, columns: list[Array]) -> tuple[Array, Array]:
