@@ -102,6 +102,21 @@ def test_the_crest_of_a_smooth_motion_through_a_coarse_quantum_is_no_saturation(
         assert ("saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel)))) == found
 
 
+def test_increments_that_differ_in_their_last_digits_are_one_quantum():
+    """Differences of a count: at a crest a row of the uppermost quantum differs by rounding, and noise takes one further down."""
+    record = base(duration=60.0)
+    t = record.time - record.time[0]
+    for most, found in ((np.inf, False), (2140.0, True)):
+        steps = np.minimum(np.round(2185.3 * np.cos(0.2 * (t - 30.001))), most)
+        top = np.flatnonzero(steps == steps.max())
+        assert len(top) > 6
+        gyro = record.gyro.copy()
+        gyro[:, 2] = 4.8e-7 * steps
+        gyro[top[2], 2] = np.nextafter(gyro[top[2], 2], 0.0)
+        gyro[top[-1] + 1, 2] -= 4.8e-7
+        assert ("saturated" in codes(inspect(ImuRecord(record.time, gyro, record.accel, "increments")))) == found
+
+
 def test_saturation():
     record = base(amplitude=(10.0, 10.0, 5.0))
     limit = np.radians(8.0)

@@ -57,9 +57,9 @@ def test_slow_errors_are_taken_up_and_white_ones_are_not(name, sigma, size, time
     white = sigma * rng.standard_normal((ROWS, 3))
     assert seen(name, white, sigma)[0] == {}
     found, source = seen(name, white + markov(rng, size, time), sigma)
-    assert 0.5 * size < found[name].sigma[0] < 4.0 * size
+    assert 0.5 * size < found[name].group.sigma[0] < 4.0 * size
     (louder,) = with_slow([source], found)
-    assert found[name] in louder.states.values()
+    assert found[name].group in louder.states.values()
 
 
 def test_what_is_too_large_for_a_slow_error_is_another_fault():
@@ -80,4 +80,4 @@ def test_heights_that_are_left_out_say_nothing():
     e = 0.5 * rng.standard_normal((ROWS, 3)) + markov(rng, 2.0, 60.0)
     e[:, 2] = np.nan
     found, _ = seen("GNSS position", e, 0.5)
-    assert found["GNSS position"].sigma[2] < 1e-2 * found["GNSS position"].sigma[0]
+    assert found["GNSS position"].group.sigma[2] < 1e-2 * found["GNSS position"].group.sigma[0]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from truenorth.aiding.position import convergence, into_north
-from truenorth.aiding.row import ARM, AT_ARM, AT_LAG, AT_OWN, Row, lag_now, row, with_state
+from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, AT_OWN, Row, lag_now, row, with_state
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_PUSH, NOW_TURN, matrix_of, vector_of
@@ -67,6 +67,10 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         for j in range(2):
             z[j] += assumed[at[AT_OWN] + j]
             H[j, at[AT_OWN] + j] = -1.0
+    if at[AT_BIAS] >= 0:
+        for j in range(3):
+            z[j] += assumed[at[AT_BIAS] + j]
+            H[j, at[AT_BIAS] + j] = -1.0
 
 
-VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "own": 2}, swings=True)
+VELOCITY = Row("velocity", _velocity, {"lever arm": 3, "lag": 1, "bias": 3, "own": 2}, swings=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -20,10 +20,8 @@ from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
-from truenorth.estimate.latency import counted_from
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
-from truenorth.estimate.run import navigate_track, with_states
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.navigation.given import (
     by_key,
@@ -32,21 +30,20 @@ from truenorth.navigation.given import (
     mounted_as,
     record_of,
     sits_as_found,
-    turns_velocity,
 )
+from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
-from truenorth.navigation.second_look import SENSORS, as_found, on_any_clock, second_look
+from truenorth.navigation.second_look import on_any_clock, second_look
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
 from truenorth.navigation.velocity_axes import check_velocities
 from truenorth.navigation.whereabouts import check_places
-from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
-from truenorth.quality.slow_aids import Slow, as_lasting, one_less, slow_errors, with_slow
+from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence, note, notes
@@ -61,10 +58,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LONG = 3600.0  # s, up to which the filter predicts every FINE seconds, then every COARSE
-FINE, COARSE = 0.2, 1.0
+FINE = 0.2
 DAMPED = 8.0  # s: rows of a track that damping goes on from are no farther apart
 MOMENT = 1800.0  # s of a log, that show whether gyros and accelerometers are of one moment
-MOST_DELAYS = 8  # passes that begin with a delay found by the one before
 NEVER = Late(0, 0.0)
 PLUMB_LINE = Deflection()
 
@@ -153,7 +149,7 @@ def navigate(
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
     model = _model(begin, noise, groups, scale_factors, height)
-    plan = _Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
+    plan = Plan(record, begin, model, height, disturbances, *_intervals(record, interval, output, damping is not None))
     aiding = plan.sources(given)
     _check_overlap(record, aiding)
     check_places(given, begin, height)
@@ -163,7 +159,7 @@ def navigate(
         plan = replace(plan, always=[*zero_updates(record, zupt, *seen), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
-    plan, given, track, wanders = _filtered(plan, given, smooth)
+    plan, given, track, wanders = filtered(plan, given, smooth)
     evidence = [*_seen(plan, track, given, found), *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
@@ -197,38 +193,7 @@ def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: 
     return InsModel.from_spec(noise, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """One navigation, ready to run with any set of measurements."""
-
-    record: ImuRecord
-    start: Start
-    model: InsModel
-    altitude: Altitude
-    always: Sequence[Aiding]  # gaps and stops
-    interval: float
-    every: int
-    slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
-
-    def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
-        """Measurements of all aids."""
-        return with_slow([source for a in given.values() for source in a.sources(self.altitude)], self.slow)
-
-    def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
-        """Filter (and smooth) with these measurements."""
-        used = [*sensors, *self.always]
-        model, every = with_states(self.model, used), self.every
-        turns = turns_velocity(self.altitude)
-        return navigate_track(
-            self.record, self.start, model, used, interval=self.interval, every=every, invariant=turns, **options
-        )
-
-    def finest(self) -> Track:
-        """Free, at every interval, without covariance."""
-        return navigate_track(self.record, self.start, self.model, interval=self.interval, every=1, covariance=False)
-
-
-def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
+def _seen(plan: Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
     """What the measurements and the log show; `found`: the odometer sits as an alignment on the move has found."""
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = record_of(given, Gnss)
@@ -240,48 +205,7 @@ def _seen(plan: _Plan, track: Track, given: Mapping[str, Any], found: bool) -> l
     return evidence
 
 
-def _filtered(plan: _Plan, given: dict[str, Any], smooth: bool) -> tuple[_Plan, dict[str, Any], Track, list[Evidence]]:
-    """The plan with slow errors of aids that innovations show, aids as late as found, the track, and what is to be said."""
-    said: list[Evidence] = []
-    asked = given
-    track = plan.run(plan.sources(given), smooth=smooth)
-    later = _as_late_as_found(plan, given, track)
-    if later is not given:
-        given = later
-        track = plan.run(plan.sources(given), smooth=smooth)
-    for _ in range(2):  # one sensor's may hide another's
-        slow, shown = slow_errors(track, plan.sources(given))
-        if not slow:
-            break
-        plan = replace(plan, slow={**plan.slow, **slow})
-        said += shown
-        aiding = plan.sources(given)
-        track = as_lasting(plan.run(aiding, smooth=smooth), aiding)
-    receiver = given.get(Gnss.key)
-    if isinstance(receiver, Gnss):
-        said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
-        track = known_as_fixes(track, receiver.record, said_of)
-    for key, (name, _) in SENSORS.items():
-        if given.get(key) is not asked.get(key):
-            track = counted_from(track, name, given[key].mounting.latency - asked[key].mounting.latency)
-    return plan, given, track, said
-
-
-def _as_late_as_found(plan: _Plan, given: dict[str, Any], track: Track) -> dict[str, Any]:
-    """The aids as late as passes over the log have found them, one after the other; the same mapping where none is late."""
-    found = given
-    for _ in range(MOST_DELAYS):
-        later = as_found(found, track)
-        if later is found:
-            break
-        found = later
-        # No gates: a delay that is wrong rejects what would show the right one.
-        free = {key: replace(m, gate=0.0) for key, m in looked_at(found).items()}
-        track = plan.run(plan.sources(mounted_as(found, free)))
-    return found
-
-
-def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
+def _rivals(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, smooth: bool) -> list[Evidence]:
     """What other biases, clocks and mountings explain better."""
     aiding = plan.sources(given)
 
@@ -299,7 +223,7 @@ def _rivals(plan: _Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, 
     return found + second_look(lambda loose: plan.run(plan.sources(mounted_as(given, loose))), track, looked_at(given))
 
 
-def _led_away(plan: _Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
+def _led_away(plan: Plan, track: Track, given: Mapping[str, Any], smooth: bool) -> list[Evidence]:
     """Whether the receiver's velocity steps where the IMU's does not."""
     receiver = given.get(Gnss.key)
     if not isinstance(receiver, Gnss):
@@ -313,7 +237,7 @@ def _led_away(plan: _Plan, track: Track, given: Mapping[str, Any], smooth: bool)
     return led_by_evidence(partial(with_log, plan.slow), track, receiver.record, without)
 
 
-def _gyros_of_another_moment(plan: _Plan, given: Mapping[str, Any]) -> list[Evidence]:
+def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evidence]:
     """Whether gyros that are earlier or later than the accelerometers explain the measurements better, over the log's first part.
 
     Sensors that are late look like gyros that are early: their clocks are left open first.
@@ -331,7 +255,7 @@ def _gyros_of_another_moment(plan: _Plan, given: Mapping[str, Any]) -> list[Evid
     part = plan.record.between(None, plan.record.time[0] + MOMENT)
     try:
         track = run(part)
-        later = _as_late_as_found(replace(plan, record=part), open_, track)
+        later = delayed(replace(plan, record=part), open_, track)
         if later is not open_:
             aiding = plan.sources(later)
             track = run(part)

@@ -7,13 +7,14 @@ hours. So where nobody says how large slow errors are (``Mounting.bias_sigma`` N
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.sensors import place_axes
-from truenorth.quality.slow_aids import usual_bias
+from truenorth.aiding.sensors import place_axes, place_sigma
+from truenorth.quality.slow_aids import Lasting, says_size, usual_bias
 from truenorth.records import GnssRecord
 from truenorth.state.layout import DP
 from truenorth.state.track import Track
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 # m, along the level, of a receiver that says nothing but the kind of its fixes (NMEA 0183): differential, fixed and floating phase
 BY_QUALITY = {2: 1.0, 4: 0.05, 5: 0.5}
+
+# Times what a receiver says of a fix: what innovations show beyond that is neither chance nor what datasheets differ by
+UNTRUE = 1.5
 
 
 def accuracy_of(record: GnssRecord) -> Array:
@@ -33,10 +37,13 @@ def accuracy_of(record: GnssRecord) -> Array:
     return level * place_axes(record)
 
 
-def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None) -> Track:
+def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None, shown: Lasting | None = None) -> Track:
     """The track with position known no better than by a fix of this receiver; `bias`: what was said of its slow error.
 
-    Of heights, too, where the receiver has them.
+    Of heights, too, where the receiver has them. What the receiver says of a fix is noise, what wanders and what stays,
+    together. Innovations have shown the noise and what wanders (`shown`), which are in the track's covariance: only the rest can
+    stay. A receiver that says far less than innovations show, or nothing, says nothing of the rest: there position is known no
+    better than its slow error, which may last longer than the log.
     """
     if bias is not None or record is None or not record.has_position.any() or not len(track.P):
         return track
@@ -45,5 +52,11 @@ def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None) 
         sigma[2] = 0.0
     P, at = track.P.copy(), np.arange(DP.start, DP.stop)
     known = P[:, at, at] > 0.0  # a height that is held has no sigma
-    P[:, at, at] = np.where(known, np.maximum(P[:, at, at], sigma**2), P[:, at, at])
+    seen = math.inf if shown is None else math.hypot(shown.white, shown.group.sigma[0] / place_sigma(record))
+    if says_size(record) and seen < UNTRUE:
+        wide = P[:, at, at] + max(1.0 - seen**2, 0.0) * sigma**2
+    else:
+        least = sigma if shown is None else np.maximum(sigma, shown.group.sigma)
+        wide = np.maximum(P[:, at, at], least**2)
+    P[:, at, at] = np.where(known, wide, P[:, at, at])
     return replace(track, P=P)

@@ -12,7 +12,7 @@ to hours, multipath for a minute.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,10 +28,27 @@ from truenorth.state.layout import DP
 from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
-Slow = Mapping[str, Group]  # by the source's name
 
-FIXES = "GNSS position"
+FIXES, SPEEDS = "GNSS position", "GNSS velocity"
 USUAL_BIAS, USUAL_TIME = 2.0, 60.0  # m, s
+
+
+@dataclass(frozen=True)
+class Lasting:
+    """An error of a source that lasts.
+
+    Attributes
+    ----------
+    group : Group
+    white : float
+        How much of the sigma that the source says is white noise.
+    """
+
+    group: Group
+    white: float = 1.0
+
+
+Slow = Mapping[str, Lasting]  # by the source's name
 
 
 class _Kind(NamedTuple):
@@ -47,7 +64,7 @@ class _Kind(NamedTuple):
 
 KINDS = {
     FIXES: _Kind("bias", "GNSS bias", 3, USUAL_TIME, 20.0),
-    "GNSS velocity": _Kind("own", "GNSS velocity drift", 2, 20.0, 0.5),
+    SPEEDS: _Kind("bias", "GNSS velocity drift", 3, 20.0, 0.5),
     "odometer": _Kind(
         "bias", "odometer slip", 3, 20.0, 0.5, ("scale", "mounting")
     ),  # a wheel's, and of the body on its springs
@@ -62,13 +79,17 @@ FOLLOWED = 2.0  # times what is left in innovations: the filter has followed it
 
 def usual_bias(record: GnssRecord | None) -> float:
     """One sigma, m, by what the receiver says of a fix: it is right about the size, and silent about how its errors follow."""
-    said = record is not None and (record.position_sigma is not None or record.dop is not None)
-    return place_sigma(record) if said and record is not None else USUAL_BIAS
+    return place_sigma(record) if record is not None and says_size(record) else USUAL_BIAS
 
 
-def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Group], list[Evidence]]:
+def says_size(record: GnssRecord) -> bool:
+    """Whether the receiver says how good its fixes are."""
+    return record.position_sigma is not None or record.dop is not None
+
+
+def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Lasting], list[Evidence]]:
     """Slow errors that innovations show and nobody spoke of, by the source's name, and what is to be said of them."""
-    found: dict[str, Group] = {}
+    found: dict[str, Lasting] = {}
     said = []
     for source in aiding:
         kind = KINDS.get(source.name)
@@ -85,16 +106,15 @@ def slow_errors(track: Track, aiding: Iterable[Aiding]) -> tuple[dict[str, Group
         if sigma.max() > kind.most:
             continue
         sigma = np.maximum(sigma, LEAST * sigma.max())
-        found[source.name] = Group(kind.name, sigma, kind.time, unit=residuals.unit)
-        wander = float(size.max())
-        figures: dict[str, Figure] = {
-            "name": source.name,
-            "correlation": correlation,
-            "wander": wander,
-            "unit": residuals.unit,
-        }
-        said.append(Evidence("innovations.wander", figures))
+        found[source.name] = Lasting(Group(kind.name, sigma, kind.time, unit=residuals.unit))
+        said.append(wanders(source.name, correlation, float(size.max()), residuals.unit))
     return found, said
+
+
+def wanders(name: str, correlation: float, size: float, unit: str) -> Evidence:
+    """That the errors of a source last."""
+    figures: dict[str, Figure] = {"name": name, "correlation": correlation, "wander": size, "unit": unit}
+    return Evidence("innovations.wander", figures)
 
 
 def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
@@ -120,13 +140,18 @@ def _wander(residuals: Residuals, axes: int) -> tuple[float, Array] | None:
 
 
 def with_slow(aiding: Sequence[Aiding], slow: Slow) -> list[Aiding]:
-    """The same sources with these slow errors among their states."""
-    return [replace(s, states={**s.states, KINDS[s.name].role: slow[s.name]}) if s.name in slow else s for s in aiding]
+    """The same sources with these slow errors among their states, and the white noise that is left of what they say."""
+    return [_with_one(s, slow[s.name]) if s.name in slow else s for s in aiding]
+
+
+def _with_one(source: Aiding, lasting: Lasting) -> Aiding:
+    states = {**source.states, KINDS[source.name].role: lasting.group}
+    return replace(source, sigma=lasting.white * source.sigma, states=states)
 
 
 def one_less(slow: Slow) -> list[Slow]:
     """These slow errors without each of them in turn."""
-    return [{name: group for name, group in slow.items() if name != left_out} for left_out in slow]
+    return [{name: lasting for name, lasting in slow.items() if name != left_out} for left_out in slow]
 
 
 def as_lasting(track: Track, aiding: Iterable[Aiding]) -> Track:

@@ -1,0 +1,115 @@
+"""Passes over one log: what each of them shows of the aids before the next, and the track of the last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from truenorth.aiding.aids import Aid, Gnss
+from truenorth.aiding.source import Aiding
+from truenorth.errors.model import InsModel
+from truenorth.estimate.latency import counted_from
+from truenorth.estimate.run import navigate_track, with_states
+from truenorth.estimate.slow_fit import fitted
+from truenorth.navigation.given import looked_at, mounted_as, turns_velocity
+from truenorth.navigation.result import Altitude
+from truenorth.navigation.second_look import SENSORS, as_found
+from truenorth.quality.absolute import known_as_fixes, says_size
+from truenorth.quality.slow_aids import FIXES, SPEEDS, Slow, slow_errors, with_slow
+from truenorth.records import ImuRecord
+from truenorth.state.evidence import Evidence
+from truenorth.state.state import Start
+from truenorth.state.track import Track
+
+COARSE = 1.0  # s, between predictions of a filter that looks for the receiver's errors
+PART = 900.0  # s of a log, that show them: some ten times as long as they last
+MOST_DELAYS = 8  # passes that begin with a delay found by the one before
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One navigation, ready to run with any set of measurements."""
+
+    record: ImuRecord
+    start: Start
+    model: InsModel
+    altitude: Altitude
+    always: Sequence[Aiding]  # gaps and stops
+    interval: float
+    every: int
+    slow: Slow = field(default_factory=dict)  # errors of aids that innovations have shown
+
+    def sources(self, given: Mapping[str, Aid]) -> list[Aiding]:
+        """Measurements of all aids."""
+        return with_slow([source for a in given.values() for source in a.sources(self.altitude)], self.slow)
+
+    def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
+        """Filter (and smooth) with these measurements."""
+        used = [*sensors, *self.always]
+        model, every = with_states(self.model, used), self.every
+        turns = turns_velocity(self.altitude)
+        return navigate_track(
+            self.record, self.start, model, used, interval=self.interval, every=every, invariant=turns, **options
+        )
+
+    def finest(self) -> Track:
+        """Free, at every interval, without covariance."""
+        return navigate_track(self.record, self.start, self.model, interval=self.interval, every=1, covariance=False)
+
+
+def filtered(plan: Plan, given: dict[str, Any], smooth: bool) -> tuple[Plan, dict[str, Any], Track, list[Evidence]]:
+    """The plan with slow errors of aids that innovations show, aids as late as found, the track, and what is to be said."""
+    said: list[Evidence] = []
+    asked = given
+    track = plan.run(plan.sources(given), smooth=smooth)
+    later = delayed(plan, given, track)
+    if later is not given:
+        given = later
+        track = plan.run(plan.sources(given), smooth=smooth)
+    for _ in range(2):  # one sensor's may hide another's
+        slow, shown = slow_errors(track, plan.sources(given))
+        if not slow:
+            break
+        plan = replace(plan, slow={**plan.slow, **slow})
+        said += shown
+        track = plan.run(plan.sources(given), smooth=smooth)
+    receiver = given.get(Gnss.key)
+    if isinstance(receiver, Gnss):
+        if plan.slow.keys() & {FIXES, SPEEDS}:
+            plan, more = _fitted(plan, given, receiver)
+            said += more
+            track = plan.run(plan.sources(given), smooth=smooth)
+        said_of = None if receiver.mounting is None else receiver.mounting.bias_sigma
+        track = known_as_fixes(track, receiver.record, said_of, plan.slow.get(FIXES))
+    for key, (name, _) in SENSORS.items():
+        if given.get(key) is not asked.get(key):
+            track = counted_from(track, name, given[key].mounting.latency - asked[key].mounting.latency)
+    return plan, given, track, said
+
+
+def _fitted(plan: Plan, given: dict[str, Any], receiver: Gnss) -> tuple[Plan, list[Evidence]]:
+    """The plan with slow errors of the receiver that the log's first part makes likeliest, and what is new to be said."""
+    part = plan.record.between(None, plan.record.time[0] + PART)
+    short = replace(plan, record=part, interval=max(plan.interval, COARSE), every=len(part))
+    slow, said = fitted(
+        lambda slow: (other := replace(short, slow=slow)).run(other.sources(given)),
+        plan.slow,
+        replace(plan, slow={}).sources(given),
+        said=says_size(receiver.record),
+    )
+    return replace(plan, slow=slow), said
+
+
+def delayed(plan: Plan, given: dict[str, Any], track: Track) -> dict[str, Any]:
+    """The aids as late as passes over the log have found them, one after the other; the same mapping where none is late."""
+    found = given
+    for _ in range(MOST_DELAYS):
+        later = as_found(found, track)
+        if later is found:
+            break
+        found = later
+        # No gates: a delay that is wrong rejects what would show the right one.
+        free = {key: replace(m, gate=0.0) for key, m in looked_at(found).items()}
+        track = plan.run(plan.sources(mounted_as(found, free)))
+    return found
