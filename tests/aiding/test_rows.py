@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from truenorth.aiding.body_velocity import BODY_VELOCITY, COUNTED_FORWARD
 from truenorth.aiding.heading import HEADING
 from truenorth.aiding.magnetometer import FIELD
 from truenorth.aiding.source import KINDS, Aiding, state
@@ -24,9 +25,9 @@ MODEL = InsModel(0.0, 0.0, groups=(Group("slow gyro bias", np.full(3, 1e-6), 300
 W_B = np.array([0.3, -0.2, 0.5])
 
 
-ROWS = {**KINDS, "heading": HEADING, "magnetic field": FIELD}
+ROWS = {**KINDS, "odometer": BODY_VELOCITY, "heading": HEADING, "magnetic field": FIELD}
 
-LATE = {"body velocity": 0.05, "heading": 0.02 * np.linalg.norm(W_B)}
+LATE = {"body velocity": 0.05, "odometer": 0.05, "heading": 0.02 * np.linalg.norm(W_B)}
 
 
 def _aiding(kind):
@@ -35,7 +36,7 @@ def _aiding(kind):
         states |= state("sensor", role, np.ones(length))
     measured = {"position": [LAT + 1e-6, LON - 1e-6, ALT + 3.0], "heading": [0.3]}.get(kind, [1.0, 2.0, 3.0])
     C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
-    figures = (0.05, 0.4, -0.9) if kind == "magnetic field" else ()
+    figures = {"magnetic field": (0.05, 0.4, -0.9), "odometer": COUNTED_FORWARD}.get(kind, ())
     arm = np.array([1.0, -2.0, 3.0])
     return Aiding("sensor", ROWS[kind], [0.0], [measured], [[1.0] * 3], arm, C_mb, states, figures=figures)
 
@@ -90,7 +91,7 @@ def test_row_is_the_derivative_of_the_prediction(kind):
         scale = max(np.abs(H[rows]).max(axis=0)[state_number], np.abs(expected).max())
         atol = 2e-3 * scale + 1e-9 + (LATE.get(kind, 0.0) if state_number < 3 else 0.0)
         # The turn of a drift by the convergence of the meridians: 2 cm/s times less than 1e-6 rad/m.
-        atol += 2e-8 if kind == "body velocity" and 6 <= state_number < 9 else 0.0
+        atol += 2e-8 if kind in ("body velocity", "odometer") and 6 <= state_number < 9 else 0.0
         np.testing.assert_allclose(H[rows, state_number], expected, rtol=0, atol=atol, err_msg=f"state {state_number}")
 
 
@@ -110,12 +111,29 @@ def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
     push = np.array([0.2, 1.0, 0.0])  # change of velocity in the turning axes
     C_mb = dcm_from_rotation_vector([0.1, -0.2, 0.3])
 
-    def row(C, v_b, lag):
+    def row(C, v_b, lag, aside=1.0):
         s, H, z = np.zeros(24), np.zeros((3, 32)), np.zeros(3)
         s[4:7], change_n = C @ v_b, C @ (push + np.cross(w, v_b))
         nothing = (0.0, 0.0, 0.0)
         body_velocity_row(
-            s, C, tuple(w), tuple(change_n), C_mb, tuple(arm), 0.02, nothing, lag, -1, -1, -1, -1, 31, np.zeros(3), H, z
+            s,
+            C,
+            tuple(w),
+            tuple(change_n),
+            C_mb,
+            tuple(arm),
+            0.02,
+            nothing,
+            lag,
+            aside,
+            -1,
+            -1,
+            -1,
+            -1,
+            31,
+            np.zeros(3),
+            H,
+            z,
         )
         return z, H[:, 31]
 
@@ -123,3 +141,6 @@ def test_a_late_body_velocity_is_that_of_the_earlier_axes(w):
     before = row(C @ Rotation.from_rotvec(-lag * w).as_matrix(), v_b - lag * push, 0.0)[0]
     np.testing.assert_allclose(late, before, atol=1e-12)
     np.testing.assert_allclose(change, 1.02 * C_mb @ push, atol=1e-12)
+    counted, change = row(C, v_b, lag, 0.0)  # of a wheel: that it does not slide holds at every moment
+    np.testing.assert_allclose(counted, [row(C, v_b, 0.0)[0][0], late[1], row(C, v_b, 0.0)[0][2]], atol=1e-12)
+    np.testing.assert_allclose(change, [0.0, 1.02 * (C_mb @ push)[1], 0.0], atol=1e-12)

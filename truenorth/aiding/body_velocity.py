@@ -10,7 +10,9 @@ x]) C_mb assumed``; that about the forward axis cannot be seen from forward moti
 
 A log in the water shows the velocity against it: a drift d, east and north, adds ``(1 + k) C_mb C' d`` to y.
 
-A wheel does not slide sideways nor leave the road: components 0 of y are measurements too (non-holonomic constraint).
+A wheel does not slide sideways nor leave the road: components 0 of y are measurements too (non-holonomic constraint). They hold
+at every moment, whatever the clock of the counter: they have no lag. With one, a body that pitches on its springs by p at w rad/s,
+at a speed v, on an arm l, would show ``v p`` where the lag's column is ``l p''``, and a clock that is late by ``v / (l w^2)``.
 
 Source: P. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems", 2nd ed. (2013), sec.
 15.2.3, 15.4.1 and 6.3; signs mapped to ours.
@@ -32,6 +34,7 @@ from truenorth.aiding.row import (
     AT_SCALE,
     BODY_FRAME,
     MOUNT,
+    OWN,
     Row,
     lag_now,
     row,
@@ -43,6 +46,7 @@ from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_NORTH, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 
 _PHI, _DV, _BG = 0, 3, 9
+COUNTED_FORWARD = (1.0,)  # figures of a source that counts forward speed alone: the rest are constraints
 
 
 @compiled
@@ -56,6 +60,7 @@ def body_velocity_row(
     scale: float,
     bias: Any,
     lag: float,
+    aside: float,  # the part of it that components 0 and 2 have: 0 where they are no measurements but constraints, else 1
     at_arm: int,  # the first state of each; -1: none. The mounting angles are those about x and z.
     at_scale: int,
     at_mount: int,
@@ -71,21 +76,27 @@ def body_velocity_row(
     change = times_back(C, push)  # of the velocity as its axes do not turn
     swing = cross(w_b, v)  # and as they do: in a steady turn nothing changes sideways
     u = cross(w_b, arm)
-    y = (0.0, 0.0, 0.0)
+    late = (aside * lag, lag, aside * lag)
+    forward, sideways = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)  # the whole velocity, as late as either
     for k in range(3):
-        shown = v[k] + lag * swing[k] + u[k]
-        y = (y[0] + C_mb[0, k] * shown, y[1] + C_mb[1, k] * shown, y[2] + C_mb[2, k] * shown)
+        counted, held = v[k] + u[k] + late[1] * swing[k], v[k] + u[k] + late[0] * swing[k]
+        m = (C_mb[0, k], C_mb[1, k], C_mb[2, k])
+        forward = (forward[0] + m[0] * counted, forward[1] + m[1] * counted, forward[2] + m[2] * counted)
+        sideways = (sideways[0] + m[0] * held, sideways[1] + m[1] * held, sideways[2] + m[2] * held)
+    y = (sideways[0], forward[1], sideways[2])
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
         along, tilt = times_back(C, e), times_back(C, cross((s[4], s[5], s[6]), e))
         along_late, tilt_late = cross(w_b, along), cross(w_b, tilt)
-        turn, turn_late, sweep, mount = cross(e, arm), cross(e, v), cross(w_b, e), cross(y, e)
+        turn, turn_late, sweep = cross(e, arm), cross(e, v), cross(w_b, e)
+        aslant = cross(sideways, e)
+        mount = (aslant[0], cross(forward, e)[1], aslant[2])
         for i in range(3):
             for k in range(3):
                 M = gain * C_mb[i, k]
-                H[i, _DV + j] += M * (along[k] + lag * along_late[k])
-                H[i, _PHI + j] -= M * (tilt[k] + lag * tilt_late[k])
-                H[i, _BG + j] += M * (turn[k] + lag * turn_late[k])
+                H[i, _DV + j] += M * (along[k] + late[i] * along_late[k])
+                H[i, _PHI + j] -= M * (tilt[k] + late[i] * tilt_late[k])
+                H[i, _BG + j] += M * (turn[k] + late[i] * turn_late[k])
                 if at_arm >= 0:
                     H[i, at_arm + j] -= M * sweep[k]
             if at_mount >= 0 and j != 1:
@@ -98,9 +109,9 @@ def body_velocity_row(
         z[i] = gain * y[i] + bias[i] - measured[i]
         for k in range(3):
             M = gain * C_mb[i, k]
-            z[i] -= lag * M * change[k]
+            z[i] -= late[i] * M * change[k]
             if at_lag >= 0:
-                H[i, at_lag] += M * (change[k] - swing[k])
+                H[i, at_lag] += (1.0 if i == 1 else aside) * M * (change[k] - swing[k])
 
 
 @compiled
@@ -139,6 +150,7 @@ def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any,
         state_of(assumed, at[AT_SCALE]),
         bias,
         lag_now(now, assumed, at[AT_LAG]),
+        1.0 - figures[OWN],
         at[AT_ARM],
         at[AT_SCALE],
         at[AT_MOUNT],

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.aiding.body_velocity import COUNTED_FORWARD
 from truenorth.aiding.heading import HEADING
 from truenorth.aiding.source import Aiding, Role, state
 from truenorth.core.errors import UsageError
@@ -152,6 +153,7 @@ def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:
             mounting.C_mb,
             states,
             mounting.gate,
+            figures=COUNTED_FORWARD,
         )
     ]
 
