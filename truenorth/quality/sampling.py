@@ -293,6 +293,7 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
     for channel, name in enumerate(COLUMNS[record.kind]):
         rounding = ROUNDING * _largest([data[channel]])  # of sums and products: counts that are alike may differ by it
         values = rounding * np.round(data[channel] / rounding) if rounding else data[channel]
+        noise = float(np.median(np.abs(np.diff(values, n=2)))) / (0.6745 * math.sqrt(6.0)) if len(values) > 2 else 0.0
         for sign in (1.0, -1.0):
             signed = sign * values
             top = float(signed.max())
@@ -312,7 +313,9 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             inside = int(counts[levels >= second - (PERIOD - 0.5) * _finest(levels)].max())
             rows_at = np.flatnonzero(at_top)
             consecutive = bool(np.any(rows_at[SATURATED_RUN - 1 :] - rows_at[: 1 - SATURATED_RUN] == SATURATED_RUN - 1))
-            consecutive = consecutive and not _crests(signed, rows_at, second, inside)
+            # Noise of less than a quantum takes a row one further down; half a quantum is for rounding.
+            lowest = second - (1.5 if noise <= top - second else 0.5) * (top - second)
+            consecutive = consecutive and not _crests(signed, rows_at, lowest, inside)
             often = count > PILED * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often)
             # Values that have many digits are never alike by chance, wherever the next ones stand.
@@ -343,16 +346,17 @@ def _off(top: float, levels: Array) -> bool:
     return bool(abs(place - round(place)) > OFF)
 
 
-def _crests(signed: Array, rows_at: NDArray[np.intp], second: float, inside: int) -> bool:
+def _crests(signed: Array, rows_at: NDArray[np.intp], lowest: float, inside: int) -> bool:
     """Whether the rows at the largest value are crests of a smooth motion, seen through a coarse quantum.
 
     Around a crest ``x = x_0 - a t^2 / 2`` the uppermost quantum has up to ``1 / (sqrt(2) - 1)`` times as many rows as the next,
-    each side of either to a row; and the rows before and after are of the next one. What is clipped falls from its range faster.
+    each side of either to a row; and the rows before and after are of the next one, `lowest` at least. What is clipped falls
+    from its range faster.
     """
     breaks = np.flatnonzero(np.diff(rows_at) > 1)
     first, last = rows_at[np.append(0, breaks + 1)], rows_at[np.append(breaks, len(rows_at) - 1)]
     before, after = signed[np.maximum(first - 1, 0)], signed[np.minimum(last + 1, len(signed) - 1)]
-    smooth = bool(np.all(before >= second) and np.all(after >= second))
+    smooth = bool(np.all(before >= lowest) and np.all(after >= lowest))
     return smooth and len(rows_at) <= (inside + 2 * len(first)) / (math.sqrt(2.0) - 1.0) + len(first)
 
 
