@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+import sys
 import zipfile
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tests.campaign.test_plan import PLAN
 from tests.fuzz.test_readers import in_time
 from tests.helpers import run_command
 from truenorth.campaign import read_plan
+from truenorth.cli import main
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.core.position import Position
 from truenorth.formats import read_gnss, read_imu
@@ -349,3 +351,31 @@ def test_a_log_whose_name_has_a_line_end(log, tmp_path, capsys, monkeypatch):
     named = tmp_path / "new\nline.csv"
     named.write_bytes(log.read_bytes())
     assert run_command(capsys, monkeypatch, "live", f"replay:{named}@max", *WHERE, "--imu", "navigation")[0] in (0, 4)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xff\x00,",
+        b"procedure,fault,seed,run,size,outcome,worst,reason\nstill,none,x,0,1,harmless,0.1,\n",
+        b"a,b\n",
+        None,
+    ],
+    ids=["bytes", "no number", "other columns", "folder"],
+)
+def test_trials_that_are_not_ours(content, tmp_path, capsys, monkeypatch):
+    path = tmp_path / "trials.csv"
+    path.mkdir() if content is None else path.write_bytes(content)
+    words = ["faults", "--procedure", "still", "--fault", "none", "--runs", "1"]
+    refused(capsys, monkeypatch, *words, "-o", tmp_path)
+    refused(capsys, monkeypatch, *words, "--before", "/dev/zero")
+    refused(capsys, monkeypatch, *words, "--before", tmp_path / "nothing.csv")
+
+
+def test_a_closed_standard_output(log, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["truenorth", "align", str(log), *WHERE, "--imu", "navigation"])
+    monkeypatch.setattr(sys, "stdout", None)
+    try:
+        main()
+    except SystemExit as stop:
+        assert stop.code in (0, 4)  # noqa: PT017

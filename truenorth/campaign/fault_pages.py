@@ -13,6 +13,8 @@ from truenorth.campaign.fault_limits import BY_LIKELIHOOD, BY_MEANS, BY_STAYING,
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError, UsageError
+from truenorth.core.paths import unreadable
+from truenorth.formats.content import check_regular
 
 
 def read_trials(path: Path) -> list[Trial]:
@@ -25,16 +27,26 @@ def read_trials(path: Path) -> list[Trial]:
     """
     if not path.exists():
         return []
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
+    check_regular(path)
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file))
+    except OSError as error:
+        raise unreadable(path, error) from None
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: not a file of trials ({error})") from None
     if rows and tuple(rows[0]) != Trial._fields:
         raise DataError(f"{path}: its columns are {','.join(rows[0])}; expected {','.join(Trial._fields)}")
     found = []
     for row in rows[1:]:
         if len(row) == len(Trial._fields) and row[5] in OUTCOMES:
             procedure, fault, seed, run, size, outcome, worst, reason = row
+            try:
+                numbers = int(seed), int(run), float(worst)
+            except ValueError as error:
+                raise DataError(f"{path}: not a file of trials ({error})") from None
             found.append(
-                Trial(procedure, fault, int(seed), int(run), size, outcome, float(worst), reason)  # type: ignore[arg-type]
+                Trial(procedure, fault, numbers[0], numbers[1], size, outcome, numbers[2], reason)  # type: ignore[arg-type]
             )
     return found
 

@@ -42,7 +42,11 @@ def faults(
     from truenorth.campaign.fault_pages import keeper, page, read_trials
     from truenorth.campaign.faults import OUTCOMES, run_faults, table
     from truenorth.core.atomic import atomic_files, writable_folder
+    from truenorth.core.errors import UsageError
+    from truenorth.core.paths import is_file
 
+    if before is not None and not is_file(before):
+        raise UsageError(f"{before}: cannot be read (No such file)")
     folder = None if output is None else writable_folder(output)
     done = [] if folder is None else read_trials(folder / "trials.csv")
     keep = None if folder is None else keeper(folder / "trials.csv", done)
