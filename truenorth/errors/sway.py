@@ -31,8 +31,10 @@ from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
 
-MOST_OSCILLATORS = 2  # along an axis; always as many states, the unused ones zero: one compiled filter serves all
-AXIS_STATES = 4 * MOST_OSCILLATORS
+# Along E, N, U; always as many states, the unused ones zero: one compiled filter serves all. The sea is one or two, a ship's swing
+# on her lines is another; the vertical carries no attitude: its strongest motion is enough.
+MOST_OSCILLATORS = (3, 3, 1)
+MOTION_STATES = 4 * sum(MOST_OSCILLATORS)
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
@@ -185,6 +187,11 @@ def add_autocovariance(orders: Any, values: Any, interval: float, acf: Any) -> N
             c, s = c * c_step - s * s_step, c * s_step + s * c_step
 
 
+def motion_first(states: int, axis: int) -> int:
+    """The first state of the motion along an axis, of a system of so many states with its base's motion."""
+    return states - MOTION_STATES + 4 * sum(MOST_OSCILLATORS[:axis])
+
+
 def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMotion]) -> LinearSystem:
     """The system with the motion of its base as states.
 
@@ -199,13 +206,12 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     Returns
     -------
     LinearSystem
-        Of 24 more states.
+        Of `MOTION_STATES` more states.
     """
-    n = system.states
-    bigger = grown(system, n + 3 * AXIS_STATES)
+    bigger = grown(system, system.states + MOTION_STATES)
     white = np.zeros(3)
     for axis, item in enumerate(motion):
-        first = n + axis * AXIS_STATES
+        first = motion_first(bigger["Phi"].shape[-1], axis)
         part = slice(first, first + item.states)
         Phi, Q, P, h = item.blocks(interval)
         bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q
