@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from truenorth.alignment import align
-from truenorth.alignment.inference import predictive_sigma, usual
+from truenorth.alignment.inference import predictive_sigma
+from truenorth.alignment.usual import usual
 from truenorth.core.position import Position
 from truenorth.records.specs import PRESETS, imu_spec
 from truenorth.simulation.scenario import read_scenario

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
-from truenorth.alignment.inference import usual
 from truenorth.alignment.matched import Match, Signatures
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import Touch, find_touch
+from truenorth.alignment.usual import usual
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE

@@ -17,17 +17,21 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import CoarseStart, settle_fine
 from truenorth.alignment.noise import fit_noise
 from truenorth.alignment.task import Task
+from truenorth.alignment.usual import wandering_as_usual
 from truenorth.analysis.student import as_normal
 from truenorth.coarse.analytic import BLOCKS, Means
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.errors.staying import BA, BG, BIASES, StaticModel, mean_velocity
+from truenorth.errors.walks import Walks
 from truenorth.estimate.base_motion import white_variance
 from truenorth.filters import LinearSystem
 from truenorth.quality.regimes import MotionSummary
+from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation
 
 Array = NDArray[np.float64]
 
+LOST_HEADING = math.radians(20.0)  # that the scatter of a still base's mean rates leaves
 BLIND_RATE = math.radians(5.0) / 3600.0  # rad/s: a mean rate this far from the earth's holds no heading
 LOOSE_GYRO, LOOSE_ACCEL = math.radians(10.0) / 3600.0, 0.5  # rad/s, m/s^2: priors that let the log speak
 HELD_GYRO, HELD_ACCEL = 1e-3 * LOOSE_GYRO, 1e-3 * LOOSE_ACCEL
@@ -138,7 +142,10 @@ def fit_task_noise(
             S=sum((w * term.S for w, term in used if term.S is not None), np.zeros_like(silent.H.swapaxes(1, 2))),
         )
 
-    return fit_noise(build, white_variance(mean_velocity(integrals, C_n0_i, lat, alt)), usual)
+    R = white_variance(mean_velocity(integrals, C_n0_i, lat, alt))
+    if task.motion.overall != "still":
+        return fit_noise(build, R, usual)
+    return fit_noise(build, R, wandering_as_usual(fit_noise(build, R, usual)), climb=True)
 
 
 def sharper(filtered: LogCheck, mean: LogCheck, motion: MotionSummary) -> LogCheck:
@@ -191,3 +198,21 @@ def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
         return False
     noise = 5.0 * float(np.max(check.rate_noise))
     return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)
+
+
+def is_lost(task: Task, check: LogCheck, spec: ImuSpec | None, heading_limit: float) -> bool:
+    """Whether the gyros of a still base hold no heading, and wander by more than a linear filter of the whole log can follow.
+
+    By the scatter of their means; or by a specification whose biases leave heading less known than is wanted, where the tilt that
+    they walk, squared, is more of gravity than the noise of the accelerometers. These level such a base by themselves.
+    """
+    if task.motion.overall != "still" or task.motion.fraction("rotating") > 0.0:
+        return False
+    north = EARTH_RATE * math.cos(task.position.lat)
+    if float(np.max(check.rate_noise)) > north * math.sin(LOST_HEADING):
+        return True
+    if spec is None or math.sqrt(float(spec.bias_variance[0])) < north * math.sin(min(heading_limit, 0.5 * math.pi)):
+        return False
+    walks, T = Walks.of(spec), task.record.duration
+    tilt = walks.gyro_rate_walk * math.sqrt(T**3 / 3.0)
+    return task.gravity * 0.5 * tilt**2 > walks.accel_random_walk / math.sqrt(T)

@@ -12,22 +12,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import LogCheck
+from truenorth.alignment.usual import CORRELATION_TIME, usual
 from truenorth.errors.staying import StaticModel
 from truenorth.quality.noise import noise_coefficients
 from truenorth.records import ImuRecord
-from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
+from truenorth.records.specs import ImuSpec, imu_spec
 
 Array = NDArray[np.float64]
 
 GYRO_WIDTH = math.log(7.0)  # one sigma of the logarithm of a bias about what is usual with such a random walk
 ACCEL_WIDTH = math.log(2.0)  # narrower: an accelerometer's offset goes with its noise, a gyro's with its maker's care
-CORRELATION_TIME = 300.0  # s: of a bias that wanders, where nobody names one
 LEAST = 0.3  # of the navigation preset's biases: beginning of the search
 WORST_GYRO = np.radians(10.0)  # rad/s: end of the search for a bias scale
 WORST_ACCEL = 10.0  # m/s^2
@@ -60,15 +59,6 @@ def predictive_sigma(
     return math.sqrt(float(weight @ s**2) / float(weight.sum()))
 
 
-@lru_cache(maxsize=64)
-def usual(sensor: str, what: str, random_walk: float) -> float:
-    """What is usual of a sensor with a random walk, such as its ``bias``: between the presets by a power law, SI."""
-    presets = [imu_spec(name) for name in PRESETS]
-    walks = np.log([getattr(spec, f"{sensor}_random_walk") for spec in presets])
-    sizes = np.log([getattr(spec, f"{sensor}_{what}") for spec in presets])
-    return math.exp(float(np.interp(math.log(max(random_walk, 1e-12)), walks, sizes)))
-
-
 def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     """Specification inferred from a log; no better than the `navigation` preset is ever assumed of biases.
 
@@ -98,7 +88,10 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
 
 
 def usual_noise() -> StaticModel:
-    """Where the fit of the random walks begins: the navigation preset's."""
+    """Where the fit of the random walks begins: the navigation preset's.
+
+    Biases of accelerometers that wander are not told from a base that goes slowly to and fro: one that moves has none.
+    """
     return replace(StaticModel.of(imu_spec("navigation")), accel_rate_walk=0.0)
 
 

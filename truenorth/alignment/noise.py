@@ -22,10 +22,14 @@ Array = NDArray[np.float64]
 
 PRIOR_WIDTH = math.log(5.0)  # one sigma of a random walk about its usual value: a factor of five
 STEPS = (math.log(4.0), math.log(2.0), math.log(1.4))  # pattern search, coarse to fine
+WALKS = 2  # the first of the walks of biases, behind white noise
+LADDER = math.log(4.0) * np.array([-2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
 SETTLE = 3  # runs for the base's variance before the search
 
 
-def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usual: StaticModel) -> StaticModel:
+def fit_noise(
+    build: Callable[[StaticModel, Array], LinearSystem], R: Array, usual: StaticModel, *, climb: bool = False
+) -> StaticModel:
     """Random walks of greatest posterior density.
 
     Parameters
@@ -36,6 +40,9 @@ def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usu
         Variance of the base's velocity to begin with; fitted along.
     usual : StaticModel
         Centre of the log-normal prior; terms that are zero stay zero.
+    climb : bool
+        Look for walks of the biases far above the usual ones, too: far below what the log shows they move nothing, and no small
+        step finds the way up. Of a still base only: what moves another looks like them.
     """
     centre = np.array(astuple(usual))
     free = np.flatnonzero(centre > 0.0)
@@ -53,6 +60,13 @@ def fit_noise(build: Callable[[StaticModel, Array], LinearSystem], R: Array, usu
     for _ in range(SETTLE):
         _, R = cost(x, R)
     best, _ = cost(x, R)
+    for axis in free[free >= WALKS] if climb else ():
+        for rung in x[axis] + LADDER:
+            trial = x.copy()
+            trial[axis] = rung
+            value, R_trial = cost(trial, R)
+            if value < best:
+                best, x, R = value, trial, R_trial
     for step in STEPS:
         for axis in free:
             for change in (step, -step):

@@ -17,7 +17,7 @@ from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
-from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, sharper
+from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, is_lost, sharper
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
@@ -61,6 +61,7 @@ Method = Literal["auto", "analytic", "inertial", "oba", "kalman", "swaying", Pub
 
 HEADING_LIMIT = math.radians(5.0)
 SHORTEST = 1.0  # s: below that no mean is worth its name
+NO_NORTH = "the gyros do not see the earth turn: the mean force levels, nothing finds north"
 NO_FORCE = 1e-6  # m/s^2, mean specific force that shows no vertical: accelerometers that are dead
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
 MOSTLY = 0.95  # of the seconds
@@ -136,14 +137,10 @@ def align_base(
         raise no_attitude(record.source)
     chosen, why = _choose(method, task)
     tell(f"aligning: {chosen}")
-    blind = is_blind(task.motion, check_means(task.means, position.lat, task.gravity))
-    if blind:
+    means = check_means(task.means, position.lat, task.gravity)
+    if is_blind(task.motion, means) or is_lost(task, means, spec, heading_limit):
         asked = "" if method == "auto" else f"{method} was asked for, but "
-        chosen, why = (
-            "analytic",
-            f"{asked}the gyros do not see the earth turn: the mean force levels, nothing finds north",
-        )
-        found = _align_level(task, spec)
+        chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _align_level(task, spec)
     elif method == "auto" and turns_blindly(task, spec):
         chosen = "kalman"
         why = (
@@ -155,6 +152,8 @@ def align_base(
         found = _align_analytic(task, spec)
     else:
         found = _align_inertial(task, spec, chosen, sound)
+        if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit):
+            chosen, why, found = "analytic", NO_NORTH, _align_level(task, spec)
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     moves = None if chosen == "swaying" and _explained(task.motion, found) else _moves_from(task.motion)

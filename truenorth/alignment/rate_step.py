@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import SIGNATURES
-from truenorth.alignment.inference import usual
 from truenorth.alignment.task import Task
+from truenorth.alignment.usual import usual
 from truenorth.core.earth import EARTH_RATE
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure, Kind

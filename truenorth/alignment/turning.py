@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.check import BLIND_RATE, LogCheck
 from truenorth.alignment.fine import MAX_NOISE_PASSES, TURN_ARM, FineAlignment
-from truenorth.alignment.inference import GYRO_WIDTH, infer_spec, usual
+from truenorth.alignment.inference import GYRO_WIDTH, infer_spec
 from truenorth.alignment.swaying import ARM_PRIOR
 from truenorth.alignment.task import Task, filter_interval, level_of
+from truenorth.alignment.usual import usual
 from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import StaticModel, mean_velocity
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
