@@ -1,7 +1,6 @@
 """Gyros and accelerometers, or a receiver, of another moment: found on the move, and sound logs left alone."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +12,8 @@ from truenorth.core.position import Position
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, gyros_later
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
-from truenorth.state.track import Residuals
+from truenorth.state.layout import Layout
+from truenorth.state.track import Residuals, Track
 
 SEED = 9305
 
@@ -69,8 +69,8 @@ def test_gyros_do_not_speak_of_their_own_delay(name):
         n, stamp, ones = 40, np.arange(40.0), np.ones((40, 3))
         white = np.random.default_rng(1).standard_normal((n, 3))
         said = Residuals(name, stamp, white, ones, np.full(n, nis), np.ones(n, bool), 0, stamp, np.zeros(n, bool))
-        along = {"time": stamp, "C_nb": np.tile(np.eye(3), (n, 1, 1)), "v_n": 0.0 * ones, "position": 0.0 * ones}
-        return SimpleNamespace(**along, sigma=np.ones((n, 15)), residuals=(said,))
+        level, P = np.tile(np.eye(3), (n, 1, 1)), np.tile(np.eye(15), (n, 1, 1))
+        return Track(stamp, level, 0.0 * ones, 0.0 * ones, np.zeros((n, 15)), P, Layout(), (said,))
 
     evidence = gyro_delay_evidence(run, run(late), late)
     assert [item.key for item in evidence] == (["delay.gyros_late"] if name == "odometer" else [])

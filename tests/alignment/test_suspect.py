@@ -1,7 +1,5 @@
 """A specification that is too good: a poorer one that fits as well is in sigma, one that is ruled out is not."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,8 @@ from benchmarks.honesty.harness import framed
 from benchmarks.honesty.moving import CASES
 from truenorth.alignment.suspect import FACTORS, poorer_evidence
 from truenorth.records.specs import imu_spec
-from truenorth.state.track import Residuals
+from truenorth.state.layout import Layout
+from truenorth.state.track import Residuals, Track
 
 ROWS = 200
 SPEC = imu_spec("industrial")
@@ -24,11 +23,9 @@ def track(size, level=0.0):
     residuals = Residuals("GNSS velocity", time, z, np.ones((ROWS, 3)), np.sum(z**2, axis=1), used, 0, time, ~used)
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -level], [0.0, level, 1.0]])
     place = np.tile([0.7, 0.1, 100.0], (ROWS, 1))
-    sigma = np.full((ROWS, 9), 1e-3)
-    C_nb = np.tile(turn, (ROWS, 1, 1))
-    return SimpleNamespace(
-        time=time, C_nb=C_nb, v_n=np.zeros((ROWS, 3)), position=place, sigma=sigma, residuals=(residuals,)
-    )
+    C_nb, none = np.tile(turn, (ROWS, 1, 1)), np.zeros((ROWS, 3))
+    P = np.tile(1e-6 * np.eye(15), (ROWS, 1, 1))
+    return Track(time, C_nb, none, place, np.zeros((ROWS, 15)), P, Layout(), (residuals,))
 
 
 @pytest.mark.parametrize(("size", "found"), [(1.0, "hint"), (0.8, "known"), (1.1, None)])

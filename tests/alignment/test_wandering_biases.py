@@ -1,0 +1,76 @@
+"""A still base whose biases wander as Gauss-Markov processes of 100 s, as others simulate them: level is what its sigma says."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from tests.runs import few_and_all
+from truenorth import ImuRecord, align
+from truenorth.core.attitude import dcm_from_euler
+from truenorth.core.earth import earth_rate_n, normal_gravity
+
+RATE, DURATION, MEMORY = 50.0, 400.0, 100.0
+# Wander and random walk of gyros (deg/h, deg/sqrt(h)) and accelerometers (m/s^2, m/s/sqrt(h)).
+GRADES = {
+    "low": (10.0, 0.75, 2e-4, 0.05),
+    "middle": (3.5, 0.25, 5e-5, 0.03),
+    "high": (0.1, 0.002, 3.6e-6, 2.5e-5),
+}
+
+
+def wandering(rng, size, rows):
+    """(rows, 3) of a first-order Gauss-Markov process."""
+    keep = math.exp(-1.0 / (RATE * MEMORY))
+    steps = size * math.sqrt(1.0 - keep**2) * rng.standard_normal((rows, 3))
+    steps[0] = size * rng.standard_normal(3)
+    return lfilter([1.0], [1.0, -keep], steps, axis=0)
+
+
+def rest(grade, run):
+    """A log, its attitude (rad), its place (deg, m)."""
+    gyro, angle_walk, accel, velocity_walk = GRADES[grade]
+    rng = np.random.default_rng([run, len(grade)])
+    rows, lat = int(RATE * DURATION), rng.uniform(-60.0, 60.0)
+    attitude = np.radians([rng.uniform(-180.0, 180.0), rng.uniform(-30.0, 30.0), rng.uniform(-20.0, 20.0)])
+    C_bn = dcm_from_euler(*attitude).T
+    rate = C_bn @ earth_rate_n(math.radians(lat))
+    force = C_bn @ [0.0, 0.0, float(normal_gravity(math.radians(lat), 10.0))]
+    white = math.sqrt(RATE) / 60.0 * rng.standard_normal((2, rows, 3))
+    gyros = rate + wandering(rng, math.radians(gyro) / 3600.0, rows) + math.radians(angle_walk) * white[0]
+    accels = force + wandering(rng, accel, rows) + velocity_walk * white[1]
+    return ImuRecord(np.arange(1, rows + 1) / RATE, gyros, accels), attitude, (lat, 10.0, 0.0)
+
+
+def specification(grade):
+    """What the world of a grade is; its constant biases are none."""
+    gyro, angle_walk, accel, velocity_walk = GRADES[grade]
+    return {
+        "name": grade,
+        "correlation_time": f"{MEMORY} s",
+        "gyro": {
+            "bias": f"{0.01 * gyro} deg/h",
+            "random_walk": f"{angle_walk} deg/sqrt(h)",
+            "bias_instability": f"{gyro} deg/h",
+        },
+        "accel": {
+            "bias": f"{0.01 * accel} m/s^2",
+            "random_walk": f"{velocity_walk} m/s/sqrt(h)",
+            "bias_instability": f"{accel} m/s^2",
+        },
+    }
+
+
+@pytest.mark.parametrize("given", [False, True], ids=["nothing said", "given"])
+@pytest.mark.parametrize("grade", GRADES)
+@few_and_all(10, few=1)
+def test_level_of_biases_that_wander(grade, given, runs):
+    """Before: levels up to 27 sigmas off under a good status, and sound logs refused for a bias that changes."""
+    for run in range(runs):
+        record, attitude, place = rest(grade, run)
+        answer = align(record, place, specification(grade) if given else None)
+        assert answer.status in ("aligned", "level_only"), answer.reasons
+        off = np.array([answer.heading, answer.pitch, answer.roll]) - attitude
+        off[0] = math.remainder(off[0], 2.0 * math.pi)
+        assert np.all(np.abs(off) < 4.0 * answer.euler_sigma)
