@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from truenorth.alignment.noise import PRIOR_WIDTH
 from truenorth.errors.staying import StaticModel
 from truenorth.records.specs import PRESETS, imu_spec
 
@@ -26,9 +27,10 @@ def usual(sensor: str, what: str, random_walk: float) -> float:
 def wandering_as_usual(noise: StaticModel) -> StaticModel:
     """White noise as it is, and biases that wander as is usual of sensors with it.
 
-    Biases of accelerometers that are taken for constants see the earth turn gravity: a wander of .4 ug was a tilt of .02 deg.
+    Biases of accelerometers that are taken for constants see the earth turn gravity: a wander of .4 ug was a tilt of .02 deg. A
+    preset promises what most sensors keep: it is one sigma of the prior (:mod:`truenorth.alignment.noise`) above its centre.
     """
-    rate = math.sqrt(2.0 / CORRELATION_TIME)
+    rate = math.sqrt(2.0 / CORRELATION_TIME) * math.exp(-PRIOR_WIDTH)
     return replace(
         noise,
         gyro_rate_walk=rate * usual("gyro", "bias_instability", noise.gyro_random_walk),
