@@ -29,7 +29,7 @@ class TestRingLaserOnADisturbedVehicle:
             assert answer.method != "analytic"
 
     def test_scatter_of_120_s_windows_is_what_the_random_part_says(self):
-        """Squares about the weighted mean, each over its own sigma: chi-square with 6 degrees of freedom, 1.24 to 14.45 in 95 of 100.
+        """Squares about the weighted mean, each over its own sigma: chi-square of 6 degrees of freedom, 1.24 to 14.45 in 95 %.
 
         The windows are not alike: sigma is .01 deg where nobody moves the vehicle, .1 where people get in.
         """
