@@ -90,7 +90,7 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
 def usual_noise() -> StaticModel:
     """Where the fit of the random walks begins: the navigation preset's.
 
-    Biases of accelerometers that wander are not told from a base that goes slowly to and fro: one that moves has none.
+    Biases of accelerometers that wander look like a base that goes slowly to and fro: one that moves has none.
     """
     return replace(StaticModel.of(imu_spec("navigation")), accel_rate_walk=0.0)
 
