@@ -9,6 +9,8 @@ from truenorth.core.errors import DataError, UsageError
 
 LARGEST = 4 << 30  # bytes of a log that is unpacked or read into memory whole
 HEAD = 1 << 16
+REMARKS = ("#", "%", "//")  # at the beginning of a line that is no row
+REMARKS_BYTES = tuple(mark.encode() for mark in REMARKS)
 PACKED = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd", b"BZh": "bz2", b"\x04\x22\x4d\x18": "lz4"}
 PACKED_SUFFIXES = (".gz", ".zst", ".zstd", ".bz2", ".lz4")
 

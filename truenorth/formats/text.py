@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
-from truenorth.formats.content import text_of
+from truenorth.formats.content import REMARKS, REMARKS_BYTES, text_of
+from truenorth.formats.quotes import is_open, plain_cells, without_single_quotes, without_stray_quotes
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ STAMP = re.compile(
     r"(?:\d{2,4}[-/.]\d{1,2}[-/.]\d{2,4}[T ]?)?(?:\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?)?(?:Z|[+-]\d\d:?\d\d)?", re.ASCII
 )
 DELIMITERS = (",", ";", "\t", "|", None)  # None: blanks
-REMARKS = ("#", "%", "//")
 LONGEST_LINE = 65536
 MOST_COLUMNS = 2000
 LONGEST_HEAD = 1 << 22
@@ -54,6 +54,8 @@ class Dialect:
             return [cell.strip('"') for cell in line.split()]
         if '"' not in line:
             return [cell.strip() for cell in line.split(self.delimiter)]
+        if is_open(line, self.delimiter):
+            return plain_cells(line, self.delimiter)
         row = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True), [])
         return [cell.strip().strip('"').strip() for cell in row]
 
@@ -226,9 +228,6 @@ def write(record: Record, path: Path) -> None:
         pc.write_csv(table, file, pc.WriteOptions(include_header=False))
 
 
-REMARKS_BYTES = tuple(mark.encode() for mark in REMARKS)
-
-
 def open_table(path: Path) -> TextTable:
     """Find the table in a text.
 
@@ -238,19 +237,30 @@ def open_table(path: Path) -> TextTable:
         No line of numbers, lines that fit no dialect, or a header of another number of columns.
     """
     text, note = text_of(path)
+    text = without_single_quotes(text)
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
     dialect, count = _dialect(head)
-    first = next(
-        (k for k, (_, line) in enumerate(head) if not _is_remark(line) and _is_row(dialect, line, count)), None
+    text, mended = without_stray_quotes(
+        path.name, text, dialect.delimiter, count, lambda cells: _are_row(dialect, cells, count)
     )
-    notes = () if note is None else (note,)
+    head = _head(path, text) if mended else head
+    rows = [not _is_remark(line) and _are_row(dialect, dialect.cells(line), count) for _, line in head]
+    first = rows.index(True) if any(rows) else None
+    notes = tuple(said for said in (note, mended) if said is not None)
     if first is None:
         return _without_rows(path, text, head, notes)
     names, used = _header(path, dialect, head[:first], count, first_cells=dialect.cells(head[first][1]))
     above = tuple(line for k, (_, line) in enumerate(head[:first]) if k not in used)
     named = bool(used)
+    lost = [
+        head[k][0]
+        for k in range(max(used, default=-1) + 1, first)
+        if not _is_remark(head[k][1]) and all(map(dialect.is_number, dialect.cells(head[k][1])))
+    ]
+    if lost:
+        notes += (f"lines of numbers that are no whole row left out: {len(lost)}, the first is line {lost[0]}",)
     header = head[min(k for k in used if k >= 0)][1] if named else ""
     names = names if named else [str(i + 1) for i in range(count)]
     return _without_a_cut_end(TextTable(path, text, names, named, dialect, head[first][0] - 1, header, above, notes))
@@ -306,9 +316,8 @@ def _is_remark(line: str) -> bool:
     return line.lstrip().startswith(REMARKS)
 
 
-def _is_row(dialect: Dialect, line: str, count: int) -> bool:
-    """Whether a line is a row of the table: as many cells, at least half of them numbers, the first one among them."""
-    cells = dialect.cells(line)
+def _are_row(dialect: Dialect, cells: Sequence[str], count: int) -> bool:
+    """Whether cells are a row of the table: as many, at least half of them numbers."""
     return len(cells) == count and dialect.share(cells) >= 0.5 and sum(map(dialect.is_number, cells)) > 0
 
 
