@@ -5,11 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from tests import test_cli
 
+ROOT = Path(__file__).parents[1]
 WHERE, log, start = test_cli.WHERE, test_cli.log, test_cli.start
 
 
@@ -105,3 +107,22 @@ def test_an_interrupt_that_python_loses_comes_again():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=15, check=False)
     assert done.returncode == 130
     assert done.stderr == "truenorth: interrupted; nothing half-written is left\n"
+
+
+def test_little_is_loaded_before_an_interrupt_is_answered():
+    """Until `main` runs an interrupt ends in Python's own traceback: before it nothing slow is loaded."""
+    code = "import sys; before = set(sys.modules); import truenorth.__main__; print(*sorted(set(sys.modules) - before))"
+    bare = [sys.executable, "-S", "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r}); {code}"]
+    done = subprocess.run(bare, capture_output=True, text=True, check=True)
+    ours = {"truenorth", "truenorth.__main__", "truenorth.core", "truenorth.core.lazy", "truenorth.core.version"}
+    light = {
+        "__future__",
+        "importlib",
+        "importlib._bootstrap",
+        "importlib._bootstrap_external",
+        "_warnings",
+        "warnings",
+    }
+    loaded = set(done.stdout.split())
+    assert ours <= loaded
+    assert loaded - ours <= light

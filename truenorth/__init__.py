@@ -6,12 +6,15 @@ The public names load what they need when they are first used, so that ``import 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from truenorth.core.lazy import lazy
 from truenorth.core.version import __version__ as __version__
 
+# `typing` loads slower than all else here, and the command line answers an interrupt only once this package is loaded.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from truenorth import (
         aiding as aiding,
     )
