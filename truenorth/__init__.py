@@ -13,7 +13,7 @@ from truenorth.core.version import __version__ as __version__
 # `typing` loads slower than all else here, and the command line answers an interrupt only once this package is loaded.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Any
+    import typing
 
     from truenorth import (
         aiding as aiding,
@@ -258,7 +258,7 @@ _SUBMODULES = (
 _get, _ = lazy("truenorth", _HOMES)
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> typing.Any:
     return import_module(f"truenorth.{name}") if name in _SUBMODULES else _get(name)
 
 
