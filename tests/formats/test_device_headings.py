@@ -1,6 +1,8 @@
 """From each device's own file to a heading: an IMU of navigation grade at rest, in the resolution that the device writes."""
 
 import struct
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -106,3 +108,11 @@ def test_a_resolution_too_coarse_for_north_is_named(tmp_path):
             file.write(struct.pack(">Q", round(t * 1e6)) + message.pack(link))
     with pytest.raises(AlignmentError, match="all gyros read zero in every row"):
         align(read_imu(path), PLACE, "consumer")
+
+
+def test_a_command_that_read_novatel_ends_without_a_word(tmp_path):
+    """The decoder counts what Python leaves at its end, and called it leaked."""
+    log, _ = novatel(tmp_path)
+    done = subprocess.run([sys.executable, "-m", "truenorth", "inspect", log], capture_output=True, text=True, check=False)
+    assert "leaked" not in done.stderr
+    assert done.stderr.startswith("truenorth: log.gps: the accelerometers show")

@@ -6,6 +6,7 @@ Each command stands in a module of its own and imports its work when it runs, so
 from __future__ import annotations
 
 import atexit
+import functools
 import gc
 import io
 import os
@@ -99,12 +100,18 @@ def _speak_early(arguments: list[str]) -> None:
         speak(asked)
 
 
+@functools.cache
+def _leave_quickly() -> None:
+    """Once in a process: else Python looks through all that is left before it ends, a tenth of `align`."""
+    atexit.register(gc.freeze)
+
+
 def main() -> None:
     """Run the program; errors of ours end in one message and their exit code, an interrupt in 130."""
     # Nothing here is a matrix large enough to share: threads of BLAS would only spin. Set before NumPy is loaded.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(*GARBAGE)
-    atexit.register(gc.freeze)  # else Python looks through all that is left before it ends, a tenth of `align`
+    _leave_quickly()
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by the shell, as by `>&-`
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115

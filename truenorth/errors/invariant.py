@@ -85,7 +85,7 @@ def carried(phi: Any, xi: Any, v: Any, after: Any, p: Any, d: Any) -> Any:
     )
     p = left_jacobian(phi, p)
     forth = cross(after, p)
-    return p, (d[0] + forth[0], d[1] + forth[1], d[2] + forth[2])
+    return (p[0], p[1], p[2]), (d[0] + forth[0], d[1] + forth[1], d[2] + forth[2])
 
 
 @borrowing

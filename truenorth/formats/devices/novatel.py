@@ -6,6 +6,8 @@ first (OEM7 commands and logs reference manual); here they are x, y, z of the IM
 
 from __future__ import annotations
 
+import atexit
+import gc
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,8 @@ AXES = "RFU"
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
     """Counts of rates and forces; position and velocity; the solution of the INS."""
     from novatel_edie import oem
+
+    atexit.unregister(gc.freeze)  # of the command line: the library's own count of what is left would call that leaked
 
     rows: dict[str, list[list[float]]] = {"imu": [], "place": [], "velocity": [], "poses": []}
     for message in oem.FileParser(str(path)):
