@@ -113,6 +113,8 @@ def test_a_resolution_too_coarse_for_north_is_named(tmp_path):
 def test_a_command_that_read_novatel_ends_without_a_word(tmp_path):
     """The decoder counts what Python leaves at its end, and called it leaked."""
     log, _ = novatel(tmp_path)
-    done = subprocess.run([sys.executable, "-m", "truenorth", "inspect", log], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "truenorth", "inspect", log], capture_output=True, text=True, check=False
+    )
     assert "leaked" not in done.stderr
     assert done.stderr.startswith("truenorth: log.gps: the accelerometers show")
