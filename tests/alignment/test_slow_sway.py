@@ -1,24 +1,19 @@
 """A slow sway, and what looks like it: a base that leaves, a bias that steps; each by a log of which the truth is known."""
 
 import math
-from dataclasses import replace
 from zlib import crc32
 
 import numpy as np
 import pytest
 
-from benchmarks.honesty import vehicles
-from benchmarks.honesty.foreign import log, sensed
 from tests.runs import some
 from truenorth.alignment import align
-from truenorth.alignment.drift import Drift
 from truenorth.alignment.slow_sway import is_slow
 from truenorth.campaign.fault import Inputs
 from truenorth.campaign.fault_benches import BENCHES, Truth, misses
 from truenorth.campaign.faults import FAULTS
 from truenorth.core.position import Position
 from truenorth.errors.sway import Oscillator
-from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
 
 
@@ -87,31 +82,6 @@ def test_nor_are_they_where_a_ship_at_her_moorings_goes_in_many_tones(seed: int)
     inputs, _ = _moored(seed, period=80.0, amplitude=0.3, duration=240.0, tones_each=6)
     answer = align(inputs["record"], inputs["place"], inputs["imu"])
     assert not any(item.key.startswith("specification.") for item in answer.evidence)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("run", [3, 5, 6, 12])
-def test_a_ship_on_her_lines_is_aligned(run: int) -> None:
-    """Ships of another world, which swing by decimetres in one to three minutes: 10 of 16 were refused, most as leaving."""
-    rng = np.random.default_rng([31, run, 9])
-    true = vehicles.ship(rng, 400.0, moored=True)
-    record = sensed(rng, true, imu_spec("navigation"))
-    answer = align(record, Position(*true.place.mean(axis=0).tolist()), "navigation")
-    assert answer.status == "aligned", answer.reasons
-    C = true.at(answer.time)[2]
-    off = -log(answer.C_nb @ C.T)
-    off[:2] = answer.C_nb[:2] @ np.cross(answer.C_nb[2], C[2])
-    assert np.all(np.abs(off) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
-
-
-def test_a_drift_of_a_base_that_goes_slowly_is_a_hint() -> None:
-    """There it is looked for again with the motion fitted anew; of another base it may refuse the answer."""
-    drift = Drift(40.0, "ramp", "east", 100.0, 0.05, 1e-3, 1e-5)
-    assert drift.evidence().kind == "bounded"
-    assert drift.sure
-    slow = replace(drift, slow=True)
-    assert slow.evidence().kind == "hint"
-    assert not slow.sure
 
 
 def test_slow_is_few_periods_or_none_at_all() -> None:

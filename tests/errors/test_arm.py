@@ -134,7 +134,7 @@ def test_states_of_arm_and_motion(ship):
     system.P0[12:15, 12:15] = 4.0 * np.eye(3)
     motion = (AxisMotion(1e-3, (Oscillator(2, 0.1, 1.0, 0.1),)), AxisMotion(2e-3), AxisMotion(3e-3))
     full = with_motion(system, 1.0, motion)
-    assert full.states == 43
+    assert full.states == 39
     np.testing.assert_array_equal(full.H[:, :, :15], system.H)
     np.testing.assert_array_equal(np.diag(full.P0)[12:15], 4.0)
     assert math.sqrt(full.H[0, 0, 15:] @ full.P0[15:, 15:] @ full.H[0, 0, 15:]) == pytest.approx(0.1)

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from benchmarks.honesty import vehicles
-from benchmarks.honesty.foreign import sensed
 from benchmarks.once_silent import _late
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.position import Position
 from truenorth.quality.regimes import motion_summary
 from truenorth.quality.tilt import IDENTITY, Tilt, _changes, check_tilt
-from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
 
 
@@ -150,13 +147,3 @@ def test_late_gyros_of_an_imu_that_spins_turn_heading():
     answer = BENCHES["rotary"].align(_late(0.05)(inputs))
     assert any(item.key == "tilt.gyros_late" and item.effect.heading > 0.005 for item in answer.evidence)
     assert answer.status == "inconsistent" or float(np.abs(misses(answer, truth)["heading"]).max()) < 3.0
-
-
-@pytest.mark.slow
-def test_a_delay_that_leaves_more_when_taken_off_is_none():
-    """A moored ship of another world: a straight line through her waves finds .588 s, on two axes, and such gyros turn worse."""
-    rng = np.random.default_rng([31, 17, 9])
-    true = vehicles.ship(rng, 400.0, moored=True)
-    found = check_tilt(sensed(rng, true, imu_spec("navigation")))
-    assert found is not None
-    assert found.evidence() == [], found

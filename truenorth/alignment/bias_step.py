@@ -41,13 +41,12 @@ SIGNATURES = tuple(product(("step", "ramp"), ONSETS))
 SENSORS = slice(BG.start, BA.stop)
 
 
-def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match, *, slow: bool = False) -> list[Evidence]:
+def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list[Evidence]:
     """The step or ramp of a bias that matches the innovations best, if it is likelier than chance, with the error it leaves.
 
     Scale factors and misalignments that are no states of the filter make of two sways of nearly the same period a rate
     that beats slowly. They explain what they can (:func:`matrix_signatures`). An accelerometer's bias
-    wanders by its instability, which stands on the vertical for all to see: so small a step is part of that. On a base that goes
-    slowly to and fro (`slow`) its motion may be what matches: there steps are looked for again, with the motion fitted anew.
+    wanders by its instability, which stands on the vertical for all to see: so small a step is part of that.
     """
     ratio, size, ends = match
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
@@ -68,7 +67,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match, *, slow
         "heading": heading,
         "level": level,
     }
-    kind: Kind = "hint" if slow or may_be_chance(float(ratio[best])) else "bounded"
+    kind: Kind = "hint" if may_be_chance(float(ratio[best])) else "bounded"
     return [Evidence(f"bias.{sensor}_steps", figures, kind, Effect(heading, level), ("still_part",))]
 
 

@@ -42,8 +42,6 @@ class Drift:
     # rad; errors that the drift leaves in the answer: the largest of all signatures that match beyond chance
     heading: float
     level: float  # rad
-    # Whether the base goes slowly to and fro: then a drift is looked for again, with its motion fitted anew (`slow_sway`).
-    slow: bool = False
 
     @property
     def found(self) -> bool:
@@ -52,8 +50,8 @@ class Drift:
 
     @property
     def sure(self) -> bool:
-        """Whether chance is ruled out, and another motion."""
-        return not (self.slow or may_be_chance(self.ratio))
+        """Whether chance is ruled out."""
+        return not may_be_chance(self.ratio)
 
     def evidence(self) -> Evidence:
         """The drift, with its effect: another course of the same size does about as much."""
@@ -70,8 +68,8 @@ class Drift:
         return Evidence(f"drift.{self.kind}", figures, kind, Effect(self.heading, self.level), remedies=("still_part",))
 
 
-def detect_drift(fine: FineAlignment, match: Match, *, slow: bool = False) -> Drift:
-    """The best of the drift signatures, of how they match; `slow`: of a base that goes slowly to and fro."""
+def detect_drift(fine: FineAlignment, match: Match) -> Drift:
+    """The best of the drift signatures, of how they match."""
     courses = list(product(ONSETS, KINDS, AXES))
     ratio, size, left = match
     best = int(np.argmax(ratio))
@@ -79,9 +77,7 @@ def detect_drift(fine: FineAlignment, match: Match, *, slow: bool = False) -> Dr
     start = onset * fine.integrals.time[-1]
     turned = np.where(ratio > limit("hint"), np.abs(left[PHI] * size), 0.0)  # (3, S): E, N, U
     heading, level = turned[2].max(), np.hypot(turned[0], turned[1]).max()
-    return Drift(
-        float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level), slow
-    )
+    return Drift(float(ratio[best]), kind, axis_name, float(start), float(size[best]), float(heading), float(level))
 
 
 def drift_signatures(fine: FineAlignment) -> Signatures:

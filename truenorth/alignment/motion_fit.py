@@ -4,10 +4,7 @@ Each axis by itself. The number of oscillators and their order are chosen by Sch
 take a piece of white noise for an oscillator: the density at zero frequency would be claimed too low. Frequencies and damping are
 searched with the debiased Whittle likelihood: the expected periodogram of a tapered series is computed from the model's
 autocovariance, so that lines narrower than the resolution, and their leakage, are what they are. The best is then
-polished with the exact likelihood, with the errors of the first fit and the sensors' random walks besides it.
-
-A swing that goes round two or three times in a log is in the lowest bins of a periodogram, where those errors hide it. It is
-looked for by the exact likelihood itself: what a line of each of many frequencies would gain.
+polished with the exact likelihood, with a smooth trend and the sensors' random walks besides it.
 
 Sources: G. Schwarz, Estimating the dimension of a model, Ann. Statist. 6, 1978; A. M. Sykulski, S. C. Olhede et al., The
 debiased Whittle likelihood, Biometrika 106 (2), 2019.
@@ -16,8 +13,6 @@ debiased Whittle likelihood, Biometrika 106 (2), 2019.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +25,6 @@ Array = NDArray[np.float64]
 LEAST_DAMPING, MOST_DAMPING = 1e-10, 0.7
 QUIETEST = 1e-7  # m/s: white motion of a base that does not move
 PEAK_WIDTH = 4  # bins on either side of a peak that belong to it
-SLOW = np.arange(1.0, 8.0, 0.25)  # periods in a log, at which a slow oscillator is looked for by the exact likelihood
-SLOW_DAMPING = 0.05  # with which the search for a broad one of them begins
-NARROW = 1e-3  # damping of what is a line in most logs
 LINE = 1e-8  # damping with which the search for a line begins
 SCORINGS, TRIALS, POLISHES = 25, 6, 12  # iterations at most
 DIFFERENCE = 1e-5  # of a logarithm, for derivatives
@@ -47,22 +39,13 @@ def fit_motion(
     residual: Array,  # (K,) m/s: mean velocity of the base over each interval, but for a smooth trend
     interval: float,  # s
     walks: Walks,
-    errors: Array,  # (K, p) m/s: what errors of one sigma of the first fit make of it
     start: AxisMotion | None = None,  # a good guess, which competes with what a search from nothing finds
-    most: int = MOST_OSCILLATORS[0],  # oscillators
+    most: int = MOST_OSCILLATORS,  # oscillators
 ) -> AxisMotion:
     """The motion along one axis."""
-    series = Series(residual, interval, walks, errors)
+    series = Series(residual, interval, walks)
     best = _search(series, most)
     return best if start is None else min(best, _climb(series, start, POLISHES), key=series.score)
-
-
-def refit_motion(
-    residual: Array, interval: float, walks: Walks, errors: Array, starts: Sequence[AxisMotion]
-) -> AxisMotion:
-    """The likeliest motion of those that begin at good guesses alone."""
-    series = Series(residual, interval, walks, errors)
-    return min((_climb(series, start, POLISHES) for start in starts), key=series.score)
 
 
 def _search(series: Series, most: int) -> AxisMotion:
@@ -75,44 +58,19 @@ def _search(series: Series, most: int) -> AxisMotion:
         if found >= score:
             break
         best, score = chosen, found
-    # A line taken before the rest of the motion was known may be a broad peak besides it, and far from it by small steps.
-    others = [_climb(series, other, POLISHES) for other in _broader(best)]
-    return min([best, *others], key=series.score)
-
-
-def _broader(motion: AxisMotion) -> Iterator[AxisMotion]:
-    """The same motion with one of its lines as a broad peak."""
-    for k, item in enumerate(motion.oscillators):
-        if item.damping < NARROW:
-            broad = Oscillator(2, item.sigma, item.frequency, SLOW_DAMPING)
-            yield replace(motion, oscillators=(*motion.oscillators[:k], broad, *motion.oscillators[k + 1 :]))
+    return best
 
 
 def _candidates(series: Series, best: AxisMotion, count: int) -> list[AxisMotion]:
     """Motions of so many oscillators, polished: the best of the broad ones, and all lines."""
     broad = [_with_one_more(best, series, order) for order in (1, 2)]
     lines = [_with_one_more(best, series, 1, LINE)]
-    lines += _slow(best, series)
     if count > 1:  # also all of them anew, each at a peak of its own
         broad += [_at_peaks(series, count, order) for order in (1, 2)]
         lines += [_at_peaks(series, count, 1, LINE)]
     scored = sorted((_score(series, guess) for guess in broad), key=series.score)
     # Whittle's likelihood loses a line's phase: lines are polished from the peak itself.
     return [_climb(series, guess, TRIALS) for guess in (*scored[:1], *lines)]
-
-
-def _slow(motion: AxisMotion, series: Series) -> list[AxisMotion]:
-    """One more slow oscillator, as a line and as a broad one, at the frequency by which the exact likelihood gains most."""
-    frequencies = 2.0 * math.pi / float(series.lags[-1]) * SLOW
-    gain, sigma = series.lines(*parameters(motion), frequencies)
-    best = int(np.argmax(gain))
-    if not np.isfinite(gain[best]):  # the motion so far is no model of this series
-        return []
-    size, w = max(float(sigma[best]), QUIETEST), float(frequencies[best])
-    return [
-        AxisMotion(motion.white, (*motion.oscillators, Oscillator(order, size, w, damping)))
-        for order, damping in ((1, LINE), (2, SLOW_DAMPING))
-    ]
 
 
 def _with_one_more(motion: AxisMotion, series: Series, order: int, damping: float | None = None) -> AxisMotion:

@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from truenorth.alignment.windowed import hann
 from truenorth.core.compiled import compiled
 from truenorth.errors.sway import AxisMotion, Oscillator, add_autocovariance, fill_blocks
-from truenorth.filters.scalar import products, restricted
+from truenorth.filters.scalar import restricted
 
 Array = NDArray[np.float64]
 Orders = NDArray[np.int64]
 
-LOWEST_BIN = 3  # of a periodogram: in slower ones the errors of the first fit take a part of the motion with them
-RIDGE = 1e-9  # of its own square, that the errors leave of a line at least: rounding leaves less
-LEAST_ERROR = 1e-5  # m/s RMS: less than the noise of any sensor over a second
+TREND = 4  # degree of the polynomial that takes what the first fit missed
+LOWEST_BIN = 3  # slower than this is the trend's
 
 
 @dataclass(frozen=True)
@@ -66,16 +65,13 @@ class Series:
     residual : (K,) array, m/s
     interval : float, s
     walks : Walks
-    errors : (K, p) array, m/s
-        What independent errors of the first fit, of one sigma each, make of it.
     """
 
-    def __init__(self, residual: Array, interval: float, walks: Walks, errors: Array) -> None:
+    def __init__(self, residual: Array, interval: float, walks: Walks) -> None:
         K = len(residual)
-        U, size, _ = np.linalg.svd(errors, full_matrices=False)
-        basis = U[:, size > LEAST_ERROR * math.sqrt(K)]
+        basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, K), min(TREND, max(K - 8, 0)))
         self.interval, self.walks = interval, walks.blocks(interval)
-        self.columns = np.column_stack([residual, basis * size[: basis.shape[1]]])
+        self.columns = np.column_stack([residual, basis])
         self.detrended = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
         taper = hann(K)
         taper /= math.sqrt(float(np.sum(taper**2)))
@@ -101,30 +97,10 @@ class Series:
         return float(np.sum(np.log(f) + self.periodogram[LOWEST_BIN:] / f))
 
     def exact(self, orders: Orders, logs: Array) -> Array:
-        """Minus twice the log-likelihoods (m,), the errors of the first fit left open, of motions with logarithms (m, 1 + 3 q)."""
+        """Minus twice the restricted log-likelihoods (m,) of motions with logarithms (m, 1 + 3 q)."""
         found = np.empty(len(logs))
         _deviances(orders, np.exp(logs), self.interval, *self.walks, self.columns, found)
         return found
-
-    def lines(self, orders: Orders, logs: Array, frequencies: Array) -> tuple[Array, Array]:
-        """What lines of frequencies (m,), rad/s, would gain besides a motion, and their sigmas, m/s.
-
-        Of each the cosine and the sine go through the motion's filter as the errors of the first fit do, all in one pass.
-        """
-        phase = np.outer(self.lags, frequencies)
-        p, m = self.columns.shape[1], len(frequencies)
-        columns = np.concatenate([self.columns, np.cos(phase), np.sin(phase)], axis=1)
-        gram = np.zeros((p + 2 * m, p + 2 * m))
-        _products(orders, np.exp(logs), self.interval, *self.walks, columns, gram)
-        gram += np.tril(gram, -1).T
-        errors = slice(1, p)
-        left = gram - gram[:, errors] @ np.linalg.solve(gram[errors, errors] + np.eye(p - 1), gram[errors])
-        pairs = p + np.arange(m)[:, None] + [0, m]
-        normal, known = left[pairs[:, :, None], pairs[:, None]], left[pairs, 0]
-        # A line that the errors explain wholly gains nothing.
-        own = np.abs(np.diag(gram)[pairs]) + 1e-300
-        size = np.linalg.solve(normal + RIDGE * own[..., None] * np.eye(2), known[..., None])[..., 0]
-        return np.sum(size * known, axis=1), np.sqrt(0.5 * np.sum(size**2, axis=1))
 
     def score(self, motion: AxisMotion) -> float:
         """Schwarz's criterion."""
@@ -140,28 +116,15 @@ def _autocovariances(orders: Any, values: Any, interval: float, acf: Any) -> Non
 
 
 @compiled
-def _products(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any) -> None:
-    Phi, Q, P, h, first = _model(orders, values, interval, walk_Phi, walk_Q)
-    products(Phi, Q, P, h, values[0] ** 2, Y, first, gram)
-
-
-@compiled
 def _deviances(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, found: Any) -> None:
-    for m in range(len(values)):
-        Phi, Q, P, h, first = _model(orders, values[m], interval, walk_Phi, walk_Q)
-        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first, 1.0)
-
-
-@compiled
-def _model(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any) -> Any:
-    """Transition, noise, first covariance and output row of oscillators and walks, and how many states are the oscillators'."""
     n = 2
     for order in orders:  # np.sum would load a part of Numba that nothing else here needs, .2 s
         n += 2 * order
-    Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-    first = fill_blocks(orders, values[1:].reshape(-1, 3), interval, Phi, Q, P, h)
-    for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
-        for j in range(2):
-            Phi[first + i, first + j], Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
-    h[first] = 1.0
-    return Phi, Q, P, h, first
+    for m in range(len(values)):
+        Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+        first = fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, Phi, Q, P, h)
+        for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
+            for j in range(2):
+                Phi[first + i, first + j], Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
+        h[first] = 1.0
+        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first)

@@ -11,7 +11,6 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.hemisphere import hemisphere_evidence, hemisphere_signature
 from truenorth.alignment.masked import masked_evidence
 from truenorth.alignment.matched import innovations_of, matched
-from truenorth.alignment.slow_sway import goes_slowly
 from truenorth.alignment.sway_noise import sway_noise_evidence
 from truenorth.alignment.swaying import SwayAlignment
 from truenorth.core.position import Position
@@ -37,9 +36,8 @@ def what_begins(
     drift, bias, gravity = matched(
         seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     )
-    slow = isinstance(fine, SwayAlignment) and goes_slowly(fine.motion, float(fine.integrals.time[-1]))
-    steps = bias_step_evidence(fine, spec, bias, slow=slow)
+    steps = bias_step_evidence(fine, spec, bias)
     steps += masked_evidence(fine) if others is None else []
     if isinstance(fine, SwayAlignment):
         steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
-    return detect_drift(fine, drift, slow=slow), steps, hemisphere_evidence(gravity)
+    return detect_drift(fine, drift), steps, hemisphere_evidence(gravity)

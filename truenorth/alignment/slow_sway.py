@@ -4,9 +4,7 @@ The fit of the base's motion may take up what begins within the log as an oscill
 damped within one period; then innovations show nothing any more. So the log is filtered again with such oscillators made
 smaller, and what is left is matched with signatures of what may begin: a velocity that is taken up within some seconds and
 stays, drifts, biases that step or grow. Twice the logarithm of the likelihood ratio against the motion as fitted decides; a
-cause that the log does not rule out moves the answer by what is added to sigma. Where one is surely likelier, the answer without it
-is another one; how far it is, is known, and is added, too: what a ship does on her lines, in less than two periods of a log,
-looks like that. One that would be the largest error by far refuses the answer.
+cause that the log does not rule out moves the answer by what is added to sigma.
 
 The comparison is ours; the ratios are those of :mod:`truenorth.alignment.matched`.
 """
@@ -27,7 +25,7 @@ from truenorth.alignment.drift import KINDS as COURSES
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Innovations, innovations_of, matched
 from truenorth.errors.staying import PHI
-from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
+from truenorth.errors.sway import AXIS_STATES, AxisMotion, Oscillator
 from truenorth.estimate.rivals import RULED_OUT
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, through
@@ -56,11 +54,6 @@ class Cause(NamedTuple):
     seen: Array  # (K, 3): what it makes of the measurements
 
 
-def goes_slowly(motion: Sequence[AxisMotion], duration: float) -> bool:
-    """Whether a part of a level motion is such that a log of that length, s, does not show that it goes to and fro."""
-    return any(is_slow(item, duration) for axis in motion[:2] for item in axis.oscillators)
-
-
 def is_slow(item: Oscillator, duration: float) -> bool:
     """Whether a log of that length, s, does not show that an oscillator goes to and fro."""
     return item.frequency * duration / (2.0 * math.pi) < FEW or item.damping > BROAD
@@ -70,7 +63,7 @@ def slow_sway_evidence(
     fine: FineAlignment,
     system: LinearSystem,
     motion: Sequence[AxisMotion],
-    without: Callable[[Array], tuple[float, float, Array]],
+    without: Callable[[Array], tuple[float, Array]],
 ) -> list[Evidence]:
     """What else may have made the slow part of a base's motion, and what it would do to the answer.
 
@@ -83,10 +76,10 @@ def slow_sway_evidence(
         Along E, N, U; in the last states of `system`.
     without : callable
         What is left if so much (K, 3) is taken off the measurements, and the motion fitted anew: minus twice the logarithm of the
-        likelihood, that of the measurements as they are, fitted in the same way, and the misalignment (3,) at the last epoch.
+        likelihood, and the misalignment (3,) at the last epoch.
     """
     duration = float(fine.integrals.time[-1])
-    if not goes_slowly(motion, duration):
+    if not any(is_slow(item, duration) for axis in motion[:2] for item in axis.oscillators):
         return []
     as_fitted = fine.estimates
     lowest = -2.0 * float(as_fitted.log_likelihood)
@@ -98,11 +91,11 @@ def slow_sway_evidence(
         other = replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
         found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in causes(other)]
-    # Oscillators that were fitted along with what began are not what is left without it.
+    # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
+    lowest = min(lowest, without(np.zeros_like(system.z))[0])
     for kind in {_kind(cause) for _, cause in found}:
         likeliest = min((cause for _, cause in found if _kind(cause) == kind), key=lambda cause: cause.cost)
-        cost, as_it_is, phi = without(likeliest.seen)
-        lowest = min(lowest, as_it_is)
+        cost, phi = without(likeliest.seen)
         found.append((limit("drift"), likeliest._replace(cost=cost, phi=phi)))
     likely = [cause for least, cause in found if lowest - cause.cost > least]
     if not likely:
@@ -126,7 +119,7 @@ def slow_sway_evidence(
         if np.all(np.abs(moved) < limit("negligible") * np.sqrt(np.diag(as_fitted.P[-1])[PHI])):
             return []  # what nobody can rule out, and changes nothing
         return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
-    return [Evidence(best.key, figures, "known", effect, ("still_part",))]
+    return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
 
 
 def _kind(cause: Cause) -> str:
@@ -136,8 +129,9 @@ def _kind(cause: Cause) -> str:
 def _smaller(system: LinearSystem, motion: Sequence[AxisMotion], duration: float, share: float) -> LinearSystem:
     """The system with the slow oscillators of its base so many times as large."""
     Q, P0 = system.Q.copy(), system.P0.copy()
+    first = system.states - 3 * AXIS_STATES
     for axis, item in enumerate(motion):
-        at = motion_first(system.states, axis)
+        at = first + axis * AXIS_STATES
         for part in item.oscillators:
             states = slice(at, at + part.states)
             if is_slow(part, duration):

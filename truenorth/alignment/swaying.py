@@ -8,7 +8,7 @@ attitude, biases, lever arm and motion together, twice: the second time about th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from truenorth.alignment.bias_step import bias_signatures
 from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.matched import innovations_of, matched
-from truenorth.alignment.motion_fit import fit_motion, refit_motion
+from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.sway_noise import noisier_sensors
-from truenorth.alignment.windowed import BASE_VELOCITY, response, windowed_fit
+from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import normal_gravity
 from truenorth.core.position import Position
-from truenorth.errors.staying import PHI, QUIETEST_BASE, STATES
+from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
@@ -77,47 +77,28 @@ class _Fitted:
 
     end: Array
     residual: Array
-    errors: Array
 
 
 class _MotionFilter:
     """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answer."""
 
-    def __init__(self, residual: Array, errors: Array, interval: float, walks: Walks) -> None:
-        self.interval, self.walks, self.passes, self.errors = interval, walks, 0, errors
-        self.motion = _fit(residual, interval, walks, errors)
+    def __init__(self, residual: Array, interval: float, walks: Walks) -> None:
+        self.interval, self.walks, self.passes = interval, walks, 0
+        self.motion = _fit(residual, interval, walks)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
         if self.passes == 2:  # about a good attitude: what was in the first residual besides the motion is gone
-            self.errors = _errors(response(system)[0], system)
-            self.motion = _fit(system.z, self.interval, self.walks, self.errors, self.motion)
+            self.motion = _fit(system.z, self.interval, self.walks, self.motion)
         full = with_motion(system, self.interval, self.motion)
         return Filtered(full, kalman(full, history="full"))
 
-    def without(self, seen: Array) -> tuple[float, float, Array]:
-        """With so much (K, 3) off the measurements, the motion fitted anew.
-
-        Returns
-        -------
-        cost, as_it_is : float
-            Minus twice the log-likelihood, and that of the measurements as they are, whose motion may be the one found so.
-        phi : (3,) array
-            At the last epoch.
-        """
+    def without(self, seen: Array) -> tuple[float, Array]:
+        """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
         left = self.base.with_arrays(z=self.base.z - seen)
-        motion = _fit(left.z, self.interval, self.walks, self.errors, self.motion)
+        motion = _fit(left.z, self.interval, self.walks, self.motion)
         estimates = kalman(with_motion(left, self.interval, motion), history="full")
-        same = tuple(
-            refit_motion(self.base.z[:, k], self.interval, self.walks, self.errors[:, k], (item, self.motion[k]))
-            for k, item in enumerate(motion)
-        )
-        as_it_is = kalman(with_motion(self.base, self.interval, _no_quieter(same)))
-        return (
-            -2.0 * float(estimates.log_likelihood),
-            -2.0 * float(as_it_is.log_likelihood),
-            np.asarray(estimates.x[-1][PHI]),
-        )
+        return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
 
 
 def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
@@ -131,11 +112,11 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
     """
-    log, residual, errors = _settled(start, mount, turned)
+    log, residual = _settled(start, mount, turned)
     step = float(np.mean(log.integrals.intervals))
     model, position = start.model, start.position
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
-    estimator = _MotionFilter(residual, errors, step, walks)
+    estimator = _MotionFilter(residual, step, walks)
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
     arm = log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
@@ -181,11 +162,11 @@ def windowed_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM) -> tuple[Arra
     integrals : InertialIntegrals
         With the estimated biases taken off: ``C_n0_i @ integrals.C_ib`` is the attitude at their times.
     """
-    log, _, _ = _settled(start, mount)
+    log, _ = _settled(start, mount)
     return log.C_n0_i, log.integrals
 
 
-def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) -> tuple[StayingLog, Array, Array]:
+def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) -> tuple[StayingLog, Array]:
     """A log about windowed fits until the attitude stands still, and what the last fit leaves of its measurements.
 
     The fit knows no random walk. Of gyros that make a large one it takes the wander for signal, and its passes may run away:
@@ -206,31 +187,22 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
         last = settle(log, partial(_fitted, speed), turn, enough=SMALL_TURN, most=WINDOWED_PASSES)
         if last.moved < DIVERGED:
             break
-    return log, last.found.residual, last.found.errors
+    return log, last.found.residual
 
 
 def _fitted(base_velocity: float, system: LinearSystem) -> _Fitted:
     found = windowed_fit(system, base_velocity)
-    return _Fitted(found.x, found.residual, _errors(found.response, system))
+    return _Fitted(found.x, found.residual)
 
 
 def _fit(
-    residual: Array, interval: float, walks: Walks, errors: Array, start: Sequence[AxisMotion] | None = None
+    residual: Array, interval: float, walks: Walks, start: tuple[AxisMotion, ...] | None = None
 ) -> tuple[AxisMotion, ...]:
     """Motion along E, N, U; no quieter than bedrock."""
     fits = []
     for axis in range(3):
-        most, guess = MOST_OSCILLATORS[axis], None if start is None else start[axis]
-        fits.append(fit_motion(residual[:, axis], interval, walks, errors[:, axis], guess, most))
-    return _no_quieter(fits)
-
-
-def _no_quieter(motion: Iterable[AxisMotion]) -> tuple[AxisMotion, ...]:
-    """The same motions, no quieter than bedrock."""
-    return tuple(replace(item, white=max(item.white, QUIETEST_BASE)) for item in motion)
-
-
-def _errors(response: Array, system: LinearSystem) -> Array:
-    """(K, 3, 12) what independent errors of attitude, velocity and biases, one sigma each, make of the measurements."""
-    values, vectors = np.linalg.eigh(system.P0[:STATES, :STATES])
-    return np.asarray(response[:, :, :STATES] @ (vectors * np.sqrt(np.maximum(values, 0.0))))
+        # The vertical carries no attitude: its strongest motion is enough.
+        most = 1 if axis == 2 else MOST_OSCILLATORS
+        item = fit_motion(residual[:, axis], interval, walks, None if start is None else start[axis], most)
+        fits.append(replace(item, white=max(item.white, QUIETEST_BASE)))
+    return tuple(fits)

@@ -16,9 +16,7 @@ from contextlib import suppress
 from typing import Any
 
 LAST = "truenorth.alignment.matched._sum_back"  # where it is on the disk, no first alignment waits any more
-SWAY_STATES = (
-    43  # of a base with its motion along three axes (`errors.sway`); what is padded to the same size shares its kernel
-)
+SWAY_STATES = 39  # of a base with two oscillations along each axis; what is padded to the same size shares its kernel
 STATES = 12  # of a base that stays
 NAME = "ahead"  # of the lock that a second process holds
 EPOCHS, ROWS = 2, 3  # of nothing
@@ -104,7 +102,7 @@ def sway() -> None:
 
     motion = AxisMotion(1.0, (Oscillator(1, 1.0, 1.0, 0.1),))
     orders, logs = parameters(motion)
-    Series(np.zeros(16), 1.0, Walks(1.0, 1.0), np.ones((16, 1))).expected(orders, logs[None])
+    Series(np.zeros(16), 1.0, Walks(1.0, 1.0)).expected(orders, logs[None])
     motion.blocks(1.0)
 
 

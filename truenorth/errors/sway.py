@@ -31,10 +31,8 @@ from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
 
-# Along E, N, U; always as many states, the unused ones zero: one compiled filter serves all. The sea is one or two, a ship's swing
-# on her lines is another; the vertical carries no attitude: its strongest motion is enough.
-MOST_OSCILLATORS = (3, 3, 1)
-MOTION_STATES = 4 * sum(MOST_OSCILLATORS)
+MOST_OSCILLATORS = 2  # along an axis; always as many states, the unused ones zero: one compiled filter serves all
+AXIS_STATES = 4 * MOST_OSCILLATORS
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
@@ -187,11 +185,6 @@ def add_autocovariance(orders: Any, values: Any, interval: float, acf: Any) -> N
             c, s = c * c_step - s * s_step, c * s_step + s * c_step
 
 
-def motion_first(states: int, axis: int) -> int:
-    """The first state of the motion along an axis, of a system of so many states with its base's motion."""
-    return states - MOTION_STATES + 4 * sum(MOST_OSCILLATORS[:axis])
-
-
 def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMotion]) -> LinearSystem:
     """The system with the motion of its base as states.
 
@@ -206,12 +199,13 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     Returns
     -------
     LinearSystem
-        Of `MOTION_STATES` more states.
+        Of 24 more states.
     """
-    bigger = grown(system, system.states + MOTION_STATES)
+    n = system.states
+    bigger = grown(system, n + 3 * AXIS_STATES)
     white = np.zeros(3)
     for axis, item in enumerate(motion):
-        first = motion_first(bigger["Phi"].shape[-1], axis)
+        first = n + axis * AXIS_STATES
         part = slice(first, first + item.states)
         Phi, Q, P, h = item.blocks(interval)
         bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q

@@ -1,9 +1,9 @@
 """Likelihood of one measured series under a small model, with what is linear in it taken out: compiled, for fits.
 
-The series is ``y = B beta + h x + v``, with states x that are stationary or begin at zero, white v and unknown
-coefficients beta, unbounded or of a known size. The filter's gains do not depend on the data: y and the columns of B go
-through the same filter, and the normal equations of the whitened columns give beta and the likelihood of what is left
-(restricted: that of the contrasts free of B).
+The series is ``y = B beta + h x + v``, with states x that are stationary or begin at zero, white v and unknown, unbounded
+coefficients beta. The filter's gains do not depend on the data: y and the columns of B go through the same filter, and the
+normal equations of the whitened columns give beta and the likelihood of what is left (restricted: that of the contrasts free
+of B).
 
 In a model that does not change with time the covariance changes from step to step by a matrix of low rank,
 ``P_k+1 - P_k = L_k M_k L_k'``, and the columns of L go through the very filter of the data (as columns that measure zero). So
@@ -30,9 +30,7 @@ Array = NDArray[np.float64]
 RICCATI = 4  # steps for each state
 
 
-def deviance(
-    Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stationary: int, known: float = 0.0
-) -> float:
+def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stationary: int) -> float:
     """Minus twice the restricted log-likelihood, but for a constant.
 
     Parameters
@@ -45,30 +43,26 @@ def deviance(
         The series, and the columns of B.
     stationary : int
         Number of the first states; nothing connects them with the others.
-    known : float
-        Inverse variance of the coefficients beta about zero; zero where nothing is known of them.
 
     Returns
     -------
     float
         Infinite where the model is degenerate.
     """
-    return float(restricted(Phi, Q, P0.copy(), h, r, np.ascontiguousarray(Y), stationary, known))
+    return float(restricted(Phi, Q, P0.copy(), h, r, np.ascontiguousarray(Y), stationary))
 
 
 @compiled
-def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int, known: float) -> float:
+def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int) -> float:
     """:func:`deviance` for kernels; `P` stands at the first epoch on entry, and is work space."""
     gram = np.zeros((Y.shape[1], Y.shape[1]))
-    for i in range(1, len(gram)):
-        gram[i, i] = known
-    value = products(Phi, Q, P, h, r, Y, stationary, gram) + _left(gram)
+    value = _whiten(Phi, Q, P, h, r, Y, stationary, gram) + _left(gram)
     return value if math.isfinite(value) else math.inf
 
 
 @compiled
-def products(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int, gram: Any) -> float:
-    """Sum of ``log F``; the products of the whitened columns of `Y` are added to `gram`, its lower half."""
+def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int, gram: Any) -> float:
+    """Sum of ``log F``; `gram` gets the products of the whitened columns of `Y`, its lower half."""
     n, columns = len(h), Y.shape[1]
     rank = n - stationary + 1
     width = columns + rank

@@ -188,9 +188,6 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
         return Tilt(given, unturned, best, axes, 0.0, 0.0, 0.0)
     little, sigma = bench.small(theta)
     late = float(little[0])
-    # A delay is fitted on a straight line, with scale factors besides it. One that is there leaves less when it is taken off.
-    if abs(late) >= LEAST_DELAY and bench.left(_shifted(theta, late / interval)) >= given:
-        sigma[0] = np.inf
     tilt = abs(late) * bench.rate(theta)
     # Scale factors are fitted on a straight line, and the base's motion along the sway may pass for them. With half of what was
     # found taken off, and with all, the gyros must turn better and better.
