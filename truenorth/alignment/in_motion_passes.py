@@ -108,7 +108,10 @@ def once_more(task: MovingTask, before: Pass, first: Guess) -> Pass:
 
 
 def _response(task: MovingTask, guess: Guess, track: Track, back: Array, before: Pass | None, first: Guess) -> float:
-    """By the secant of two passes of one task; before there are two, by the filter's own sigma."""
+    """By the secant of two passes of one task; before there are two, by the filter's own sigma.
+
+    That one counts what gyro biases do to heading until the end, too: it alone makes no guess wider.
+    """
     if guess.heading_sigma >= first.heading_sigma:
         return 0.0
     if before is not None and guess.heading_sigma == before.guess.heading_sigma:

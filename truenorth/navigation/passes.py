@@ -47,10 +47,15 @@ class Plan:
     def run(self, sensors: Sequence[Aiding], **options: Any) -> Track:
         """Filter (and smooth) with these measurements."""
         used = [*sensors, *self.always]
-        model, every = with_states(self.model, used), self.every
-        turns = turns_velocity(self.altitude)
         return navigate_track(
-            self.record, self.start, model, used, interval=self.interval, every=every, invariant=turns, **options
+            self.record,
+            self.start,
+            with_states(self.model, used),
+            used,
+            interval=self.interval,
+            every=self.every,
+            invariant=turns_velocity(self.altitude),
+            **options,
         )
 
     def finest(self) -> Track:
