@@ -17,9 +17,8 @@ from pathlib import Path
 from truenorth.core.errors import UsageError
 
 _renaming = threading.RLock()  # a set of several folders takes it for each
-_kept: dict[Path, bool] | None = (
-    None  # what the running command does not replace, and whether it reads it; None outside of one
-)
+# What the running command does not replace, and whether it reads it; None outside of one.
+_kept: dict[Path, bool] | None = None
 
 
 @contextmanager
@@ -153,10 +152,9 @@ def _put_in_place(written: Mapping[Path, Path], removed: Iterable[Path]) -> None
     """Write all temporary files out, then rename them to their targets."""
     for path in written.values():
         _onto_disk(path)
+    folders = {target.resolve().parent for target in (*written, *removed)}
     with ExitStack() as locks:
-        for folder in sorted(
-            {target.resolve().parent for target in (*written, *removed)}
-        ):  # one order: none waits for another
+        for folder in sorted(folders):  # one order: none waits for another
             locks.enter_context(_alone(folder))
         _rename(written, removed)
 
@@ -166,9 +164,8 @@ def _alone(folder: Path) -> Iterator[None]:
     """Hold back the other threads and processes that put their set into this folder: it ends with one whole set of either."""
     with _renaming:
         number = None
-        with suppress(
-            ImportError, OSError
-        ):  # Windows, and file systems without locks: the threads of this process at least
+        # On Windows, and on file systems without locks, the threads of this process are held back at least.
+        with suppress(ImportError, OSError):
             import fcntl
 
             number = os.open(folder, os.O_RDONLY)
