@@ -43,7 +43,7 @@ def find_epoch(record: ImuRecord, at: float | None) -> Epoch:
         return Epoch(float(record.time[-1]), float(record.time[-1]) - start, last, np.zeros(3))
     if not record.time[0] <= at <= record.time[-1]:
         raise UsageError(
-            f"`at` {at:g} s lies outside the log, which runs from {record.time[0]:g} s to {record.time[-1]:g} s"
+            f"`at` {at:.12g} s lies outside the log, which runs from {record.time[0]:.12g} s to {record.time[-1]:.12g} s"
         )
     row = int(np.searchsorted(record.time, at, "right")) - 1
     turn = np.zeros(3)

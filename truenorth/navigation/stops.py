@@ -190,7 +190,7 @@ def zero_updates(
         seconds = []
         for start, stop in stops:
             if not stop > start:
-                raise UsageError(f"stop from {start:g} s to {stop:g} s; expected its end after its beginning")
+                raise UsageError(f"stop from {start:.12g} s to {stop:.12g} s; expected its end after its beginning")
             seconds.append(np.arange(start, stop, 1.0) + 0.5)
         still, disturbed = np.empty(0), np.concatenate(seconds) if seconds else np.empty(0)
     return updates_at(record, still, disturbed, shaken)

@@ -146,9 +146,11 @@ class Record(_Ordered):
         first = 0 if start is None else int(np.searchsorted(self.time, start, "left"))
         last = len(self) if stop is None else int(np.searchsorted(self.time, stop, "right"))
         if last - first < 2:
+            begin, end = self.time[0], self.time[-1]
+            wanted = begin if start is None else start, end if stop is None else stop
             raise DataError(
-                f"{self.source}: no samples between {start} s and {stop} s; the record runs from "
-                f"{self.time[0]:g} s to {self.time[-1]:g} s, choose a window inside it"
+                f"{self.source}: fewer than two samples from {wanted[0]:.12g} s to {wanted[1]:.12g} s; the record runs from "
+                f"{begin:.12g} s to {end:.12g} s, choose a window inside it"
             )
         return self[first:last]
 
