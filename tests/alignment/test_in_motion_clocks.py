@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.honesty.foreign_rows import CASES
 from truenorth.aiding.aids import Gnss, Odometer
+from truenorth.aiding.sensors import from_odometer
 from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.position import Position
-from truenorth.estimate.sensor_delay import gyro_delay_evidence, gyros_later
+from truenorth.estimate.sensor_delay import gyro_delay_evidence, gyros_later, on_springs
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.layout import Layout
+from truenorth.state.mounting import Mounting
 from truenorth.state.track import Residuals, Track
 
 SEED = 9305
@@ -74,6 +77,24 @@ def test_gyros_do_not_speak_of_their_own_delay(name):
 
     evidence = gyro_delay_evidence(run, run(late), late)
     assert [item.key for item in evidence] == (["delay.gyros_late"] if name == "odometer" else [])
+
+
+@pytest.mark.slow
+def test_a_tractor_that_pitches_on_its_springs_has_gyros_of_one_moment():
+    """Up and down the body moves with its pitch, which gyros that are .02 s late would show by the arm: a ratio of 59, refused."""
+    case = next(case for case in CASES if case.name == "by odometer, navigation, tractor")
+    assert case.run(1, 12).refused == ""
+
+
+def test_a_wheel_says_nothing_of_the_road_to_clocks():
+    """Sideways and forward it counts as before, and so do other sensors."""
+    inputs, _ = BENCHES["odometer"].draw(SEED, 0)
+    (wheel,) = from_odometer(inputs["odometer"], Mounting())
+    log = replace(wheel, name="velocity log", figures=())
+    loose, same = on_springs([wheel, log])
+    assert np.array_equal(loose.sigma[:, :2], wheel.sigma[:, :2])
+    assert np.all(loose.sigma[:, 2] > 100.0 * wheel.sigma[:, 2])
+    assert same is log
 
 
 @pytest.mark.slow

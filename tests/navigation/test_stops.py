@@ -8,7 +8,7 @@ import pytest
 from truenorth.aiding.aids import Odometer
 from truenorth.core.position import Position
 from truenorth.navigation import Start, navigate
-from truenorth.navigation.stops import DISTURBED_VELOCITY, seconds_at_rest, velocity_at_rest
+from truenorth.navigation.stops import DISTURBED_VELOCITY, seconds_at_rest, updates_at, velocity_at_rest
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import imu_spec
@@ -114,6 +114,19 @@ def test_an_engine_that_idles_turns_nothing(standing):
     assert np.count_nonzero(seen) > 50
     assert np.mean(turns.nis[seen] > 21.0) < 0.02  # .999 of sound ones of three rows lie below 16
     assert result.status == "navigated"
+
+
+@pytest.mark.parametrize("hertz", [10.0, 13.0, 30.0])
+def test_an_engine_in_phase_with_the_rows_is_no_bias(standing, hertz):
+    """Turned so far in the .05 s before each row: the mean of independent angles, however many turns a second are whole."""
+    rows = {a.name: a for a in updates_at(standing, np.arange(0.5, 200.0), np.empty(0))}
+    time = rows[NO_ROTATION].time
+    assert np.array_equal(time, rows["zero velocity"].time)
+    assert np.abs(time - np.arange(0.5, 200.0)).max() < 0.5 - 0.2  # a step of the filter before it is at rest, too
+    for phase in np.linspace(0.0, np.pi, 7):
+        angle = np.sin(2.0 * np.pi * hertz * time + phase) - np.sin(2.0 * np.pi * hertz * (time - 0.05) + phase)
+        # At the middles of the seconds each angle is the same: a mean of up to 2, not of some tenths
+        assert abs(angle.mean()) < 4.0 * np.sqrt(np.mean(angle**2) / len(time))
 
 
 def test_an_ins_that_falls_for_minutes_is_no_fault_of_the_aiding(standing):

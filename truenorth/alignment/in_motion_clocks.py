@@ -24,7 +24,7 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
 
     A receiver that is later than it is said to be looks like gyros that are early, and so does a wheel, whose slip goes with
     acceleration as a delay does: their lags are left open first. Rivals of the gyros have two passes: the guess is that of the log
-    as it is, and `first` that of its first pass.
+    as it is, and `first` that of its first pass. Neither they nor the log as it is have a wheel say that it stays on the road.
     """
     found: list[Evidence] = []
     shut = {"GNSS": ("gnss", task.antenna)} if task.gnss is not None else {}
@@ -53,6 +53,10 @@ def clock_evidence(task: MovingTask, track: Track, guess: Guess, first: Guess, *
         if antenna is not task.antenna:
             task = replace(task, antenna=antenna)
             track = task.run(guess, gated=gated)
+
+    if isinstance(task.odometer, OdometerRecord):
+        task = replace(task, sprung=True)
+        track = task.run(guess, gated=gated)
 
     def other(record: ImuRecord) -> Track:
         rival = replace(task, record=record)

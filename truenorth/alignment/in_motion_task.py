@@ -25,6 +25,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.run import navigate_track, with_states
+from truenorth.estimate.sensor_delay import on_springs
 from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_rest
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.absolute import known_as_fixes
@@ -90,6 +91,7 @@ class MovingTask:
     wanders: Sequence[Evidence] = ()  # and what is to be said of them
     # Scale factors and misalignments of the gyros are the constants that the specification says; else noise in turns besides
     steady: bool = False
+    sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
         """The task with what a pass has taught of its sensors, and whether that is much."""
@@ -150,7 +152,8 @@ class MovingTask:
         if self.gnss is not None:
             found += from_gnss(self.gnss, antenna)
         found += [source if gated else replace(source, gate=0.0) for source in self.more]
-        return with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
+        found = with_scatter(louder(with_slow(found, self.lasting), self.factors), self.scattered)
+        return on_springs(found) if self.sprung else found
 
     def run(self, guess: Guess, *, gated: bool, until: float | None = None) -> Track:
         """One pass from a guess of the attitude at the start."""

@@ -6,18 +6,22 @@ Twice the logarithm of a likelihood ratio is a parabola of the delay as long as 
 ladder of delays it leads to the likeliest one. Each rival is one fixed shift: by chance it exceeds c in less than exp(-c / 2) of
 sound logs (Markov's inequality). That holds of measurements that are the same for all rivals. The mean rates of the gyros
 themselves while nothing turns are not: each shift averages other rows of their noise. A delay does nothing to them, and they do
-not count.
+not count. Nor does it hold where the error of a measurement goes with the delay: a body that pitches on its springs by p at w rad/s
+moves up and down by ``v p`` at a speed v, which no wheel shows, and gyros that are late by d, of an IMU on an arm l, by
+``l d p'' = -l d w^2 p``. So that a wheel does not leave the road is no evidence of clocks (:func:`on_springs`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.body_velocity import COUNTED_FORWARD
+from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import RULED_OUT, likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION
@@ -29,6 +33,7 @@ from truenorth.state.track import Residuals, Track
 Array = NDArray[np.float64]
 
 LADDER = (0.05, 0.1, 0.2, 0.4)  # s; sensors' own filters differ by less than .02 s
+LOOSE = 1e3  # times as noisy as it is: it counts for nothing
 CLIMBS = 3  # from one delay to a likelier one: with the first taken off fewer measurements seem to be outliers
 
 
@@ -57,6 +62,13 @@ def gyro_delay_evidence(run: Callable[[ImuRecord], Track], first: Track, record:
         return []
     key, delay = f"delay.gyros_{'late' if rows > 0 else 'early'}", abs(rows) * record.interval
     return [rival(key, {"delay": delay}, ratio, moved(first, track), "common_clock")]
+
+
+def on_springs(aiding: Sequence[Aiding]) -> list[Aiding]:
+    """The same sources, but for wheels that do not leave the road: the body above them goes up and down."""
+    return [
+        replace(a, sigma=a.sigma * np.array([1.0, 1.0, LOOSE])) if a.figures == COUNTED_FORWARD else a for a in aiding
+    ]
 
 
 def _likelier(

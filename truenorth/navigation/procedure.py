@@ -22,7 +22,7 @@ from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
-from truenorth.estimate.sensor_delay import gyro_delay_evidence
+from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
 from truenorth.navigation.given import (
     by_key,
     kept_altitude,
@@ -247,7 +247,7 @@ def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evide
     if not seen:
         return []
     open_ = mounted_as(given, own | seen)
-    aiding = plan.sources(open_)
+    aiding = on_springs(plan.sources(open_))
 
     def run(record: ImuRecord) -> Track:
         return replace(plan, record=record).run(aiding)
@@ -257,7 +257,7 @@ def _gyros_of_another_moment(plan: Plan, given: Mapping[str, Any]) -> list[Evide
         track = run(part)
         later = delayed(replace(plan, record=part), open_, track)
         if later is not open_:
-            aiding = plan.sources(later)
+            aiding = on_springs(plan.sources(later))
             track = run(part)
     except DataError:  # the filter broke down: no explanation
         return []

@@ -27,6 +27,7 @@ SHARP = 0.4  # of the speed of standing: one sigma of a slope that is sharp enou
 STANDING_PULSES = 1.5  # pulses of an odometer in a second: no more is standing
 LEAST_ANGLE = 1e-9  # rad: of a simulated IMU that nothing shakes
 NEAR = 1.0  # s, within which a second of rest must have been seen by a sensor
+SPREAD = 0.25  # s before and after the middle of a second at rest, between which its row is drawn
 
 
 def stops_in(record: ImuRecord) -> tuple[Array, Array]:
@@ -159,6 +160,18 @@ def angle_scatter(record: ImuRecord, seconds: Array) -> Array:
     return np.asarray(np.sqrt(2.0 * np.mean(left**2, axis=(0, 1))))
 
 
+def uneven(seconds: Array) -> Array:
+    """Times drawn about the middles of these seconds, s: the same for the same seconds, and uneven.
+
+    A mean rate errs by the angle of a vibration at both ends of its interval. Of an engine at a whole number of turns a second,
+    rows a second apart meet the same phase: the error is a constant, like a bias, and many rows show no more than one, though
+    the filter takes them for independent. At drawn times the phase is drawn, whatever the engine's speed; no even steps do that.
+
+    Source: H. S. Shapiro and R. A. Silverman, "Alias-free sampling of random noise", J. SIAM 8 (1960).
+    """
+    return np.asarray(seconds + np.random.default_rng(0).uniform(-SPREAD, SPREAD, len(seconds)))
+
+
 def zero_updates(
     record: ImuRecord,
     stops: str | Sequence[tuple[float, float]],
@@ -201,7 +214,8 @@ def updates_at(record: ImuRecord, still: Array, disturbed: Array, shaken: float 
 
     `shaken` is the one-sigma velocity of the disturbed ones, m/s.
     """
-    time = np.concatenate([still, disturbed])
+    drawn = uneven(still)
+    time = np.concatenate([drawn, disturbed])
     if time.size == 0:
         return []
     sigma = np.concatenate([np.full(still.size, STILL_VELOCITY), np.full(disturbed.size, shaken)])
@@ -209,5 +223,5 @@ def updates_at(record: ImuRecord, still: Array, disturbed: Array, shaken: float 
     found = [Aiding("zero velocity", "velocity", time, zero, np.tile(sigma[:, None], 3))]
     if still.size:
         angle = np.tile(np.maximum(angle_scatter(record, still), LEAST_ANGLE), (still.size, 1))
-        found.append(Aiding(NO_ROTATION, "rotation", still, np.zeros((still.size, 3)), angle))
+        found.append(Aiding(NO_ROTATION, "rotation", drawn, np.zeros((still.size, 3)), angle))
     return found
