@@ -37,7 +37,7 @@ def what_begins(
         seen, drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
     )
     steps = bias_step_evidence(fine, spec, bias)
-    steps += masked_evidence(fine) if others is None else []
+    steps += masked_evidence(fine, spec) if others is None else []
     if isinstance(fine, SwayAlignment):
         steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
     return detect_drift(fine, drift), steps, hemisphere_evidence(gravity)

@@ -76,16 +76,21 @@ class VelocityNoise:
         Filter runs at the most, for white and for coloured motion each.
     history : bool
         Whether the estimates of every epoch are wanted, or those of the last alone.
+    coloured : bool
+        Whether the variance covers a base that wanders slowly, too. It is larger then than the likeliest.
     """
 
-    def __init__(self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int, *, history: bool = True) -> None:
+    def __init__(
+        self, R: Array, parts: Sequence[NDArray[np.bool_]], most: int, *, history: bool = True, coloured: bool = True
+    ) -> None:
         self.R, self.parts, self.most, self.history = R, parts, most, history
+        self.colours = (False, True) if coloured else (False,)
 
     def __call__(self, quiet: LinearSystem) -> Filtered:
         """Filter a system that holds the variance of the quietest base so far."""
         system = self._with_motion(quiet)
         estimates = self._filtered(system)
-        for colour in (False, True):
+        for colour in self.colours:
             for _ in range(self.most):
                 R, same = self.R.copy(), True
                 for part in self.parts:
