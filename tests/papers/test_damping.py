@@ -110,7 +110,7 @@ def test_random_signs_and_consistency(voyage):
     signs = random_signs(voyage, -0.3, 4, 11, 1, lambda stage: None)
     fused, one = (np.sqrt(np.mean(run_rms(signs, m, (18, 24))[:, PHI_U] ** 2)) for m in ("fused", "filter1"))
     assert fused < one
-    assert signs.correlation.shape == (voyage.truth.epochs - round(SWITCH / 5.0), 7)
+    assert signs.correlation.shape == (len(voyage.truth.time) - 1 - round(SWITCH / 5.0), 7)
     nees, _ = consistency(voyage, 4, 11, lambda stage: None)
     assert abs(nees.mean() - 1) < 3.3 * math.sqrt(2 / 60)
 
