@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.compiled import compiled
+from truenorth.simulation.normals import Normals, draw, normals_of, words_of
 from truenorth.simulation.streams import stream
 
 Array = NDArray[np.float64]
-BLOCK = 256  # rows whose random numbers are drawn at once
+BLOCK = 256  # rows that are worked on at once
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
@@ -91,7 +92,7 @@ def add_errors(
 
     The bits are those of one after the other: what wanders takes no memory.
     """
-    _recur(recursion, rng, bias, white, walk, out)
+    _recur(recursion, normals_of(rng), bias, normals_of(white), walk, out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +133,10 @@ class Wander:
 
 def _drawn(recursion: Recursion, count: int, rng: np.random.Generator) -> Array:
     """Integrals of three axes, (count, 3)."""
-    x = np.zeros((count, 3))
-    _recur(recursion, rng, np.zeros(3), rng, 0.0, x)
+    x, steps = np.zeros((count, 3)), normals_of(rng)
+    _recur(recursion, steps, np.zeros(3), steps, 0.0, x)
+    generator: Any = rng.bit_generator
+    generator.advance(words_of(steps))
     return x
 
 
@@ -155,30 +158,27 @@ def _ramp(v: Array, tau: float) -> Array:
 
 
 @compiled
-def _recur(recursion: Any, rng: Any, bias: Any, white: Any, walk: float, out: Any) -> None:
-    """Add ``bias``, the recursion and white noise; what is drawn are the numbers of ``standard_normal((count + 1, 3))``.
-
-    Some rows' numbers at a time, since what stands in registers is put away at each draw.
-    """
+def _recur(recursion: Any, steps: Normals, bias: Any, white: Normals, walk: float, out: Any) -> None:
+    """Add ``bias``, the recursion and white noise; what is drawn are the numbers of ``standard_normal((count + 1, 3))``."""
     d, alpha, beta, before = recursion.decay, recursion.alpha, recursion.beta, recursion.before
-    last, at = np.empty(3), np.empty(3)
-    e, w = np.empty((BLOCK, 3)), np.zeros((BLOCK, 3))
-    for i in range(3):
-        at[i] = before * rng.standard_normal()
-        last[i] = 0.0
+    e, w, e0 = np.empty((BLOCK, 3)), np.zeros((BLOCK, 3)), np.empty(3)
+    flat, flat_w = e.reshape(-1), w.reshape(-1)
+    draw(steps, e0)
+    x, y, z = before * e0[0], before * e0[1], before * e0[2]
+    a, b, c = 0.0, 0.0, 0.0  # numbers of the row before
     decay = 1.0  # none before the first
     for first in range(0, len(out), BLOCK):
         count = min(BLOCK, len(out) - first)
-        for k in range(count):
-            for i in range(3):
-                e[k, i] = rng.standard_normal()
+        draw(steps, flat[: 3 * count])
         if walk > 0.0:
-            for k in range(count):
-                for i in range(3):
-                    w[k, i] = white.standard_normal() * walk
+            draw(white, flat_w[: 3 * count])
+        rows = out[first : first + count]
         for k in range(count):
-            for i in range(3):
-                at[i] = decay * at[i] + alpha * e[k, i] + beta * last[i]
-                last[i] = e[k, i]
-                out[first + k, i] = ((out[first + k, i] + bias[i]) + at[i]) + w[k, i]
+            x = decay * x + alpha * e[k, 0] + beta * a
+            y = decay * y + alpha * e[k, 1] + beta * b
+            z = decay * z + alpha * e[k, 2] + beta * c
+            a, b, c = e[k, 0], e[k, 1], e[k, 2]
+            rows[k, 0] = ((rows[k, 0] + bias[0]) + x) + walk * w[k, 0]
+            rows[k, 1] = ((rows[k, 1] + bias[1]) + y) + walk * w[k, 1]
+            rows[k, 2] = ((rows[k, 2] + bias[2]) + z) + walk * w[k, 2]
             decay = d

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.compiled import compiled
 from truenorth.records.specs import ImuSpec
 from truenorth.simulation.drift import Recursion, Wander, add_errors, of_gauss_markov, of_random_walk
+from truenorth.simulation.normals import BLOCK, Normals, draw, normals_of
 from truenorth.simulation.response import respond
 from truenorth.simulation.streams import STREAMS, stream
 from truenorth.simulation.true_errors import SensorErrors, TrueErrors, drawn_errors
@@ -57,7 +58,7 @@ def apply_errors(
     results = []
     for group, ideal in (("gyro", dtheta), ("accel", dvel)):
 
-        def draw(term: str, group: str = group) -> np.random.Generator:
+        def stream_of(term: str, group: str = group) -> np.random.Generator:
             return stream(seed, scenario, run, STREAMS[f"{group}_{term}"])
 
         def value(term: str, group: str = group) -> float:
@@ -82,15 +83,15 @@ def apply_errors(
         wander = Wander(len(dT), interval, terms, warmth, own.bias_temperature)
         if warmth is None and len(terms) == 1:
             ((numbers, recursion),) = terms.items()
-            add_errors(out, bias, recursion, stream(*numbers), draw("random_walk"), walk)
+            add_errors(out, bias, recursion, stream(*numbers), stream_of("random_walk"), walk)
         else:
             out += bias
             if wander:
                 out += wander.integrals()
             if walk > 0.0:
-                _make_noise(out, draw("random_walk"), walk)
+                _make_noise(out.reshape(-1), normals_of(stream_of("random_walk")), walk)
         if value("sample_noise") > 0.0:
-            _make_noise(out, draw("sample_noise"), value("sample_noise") * interval)
+            _make_noise(out.reshape(-1), normals_of(stream_of("sample_noise")), value("sample_noise") * interval)
         full_scale, step = value("range") * interval, value("quantisation")
         if step > 0.0 or math.isfinite(full_scale):
             _put_out(out, full_scale, step)
@@ -148,11 +149,14 @@ def _sense(x: Any, f: Any, dT: Any, matrix: Any, G: Any, by_temperature: Any, as
 
 
 @compiled
-def _make_noise(out: Any, rng: Any, sigma: float) -> None:
-    """Add white noise: the numbers that the generator's own method gives, in a third of its time."""
-    for k in range(len(out)):
-        for i in range(3):
-            out[k, i] += rng.standard_normal() * sigma
+def _make_noise(out: Any, numbers: Normals, sigma: float) -> None:
+    """Add white noise to (N,): the numbers that the generator's own method gives."""
+    e = np.empty(BLOCK)
+    for first in range(0, len(out), BLOCK):
+        count = min(BLOCK, len(out) - first)
+        draw(numbers, e[:count])
+        for k in range(count):
+            out[first + k] += e[k] * sigma
 
 
 @compiled

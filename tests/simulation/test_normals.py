@@ -1,0 +1,38 @@
+"""Normal random numbers in bulk: NumPy's own, to the bit."""
+
+import numpy as np
+import pytest
+
+from truenorth.simulation.normals import BLOCK, Normals, draw, normals_of, words_of
+
+
+def numbers(normals: Normals, count: int) -> np.ndarray:
+    out = np.empty(count)
+    draw(normals, out)
+    return out
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_they_are_those_of_the_generator(seed):
+    """A million: 12,000 go the long way, 270 of them beyond the last layer."""
+    found = numbers(normals_of(np.random.default_rng(seed)), 10**6)
+    np.testing.assert_array_equal(found, np.random.default_rng(seed).standard_normal(10**6))
+    assert np.sum(np.abs(found) > 3.6541528853610088) > 200
+
+
+def test_the_pieces_in_which_they_are_drawn_do_not_matter():
+    rng = np.random.default_rng(3)
+    sizes = [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 3, *rng.integers(0, 3 * BLOCK, 200)]
+    normals = normals_of(np.random.default_rng(4))
+    found = np.concatenate([numbers(normals, size) for size in sizes])
+    np.testing.assert_array_equal(found, np.random.default_rng(4).standard_normal(len(found)))
+
+
+@pytest.mark.parametrize("count", [0, 1, BLOCK, 5000])
+def test_the_generator_can_go_on_behind_them(count):
+    rng, other = np.random.default_rng(5), np.random.default_rng(5)
+    normals = normals_of(rng)
+    numbers(normals, count)
+    rng.bit_generator.advance(words_of(normals))
+    other.standard_normal(count)
+    assert rng.bit_generator.state == other.bit_generator.state
