@@ -71,7 +71,7 @@ class FineAlignment(Filtered):
         P0[kept, kept] = log.prior.P[kept, kept]
         floors, floor = initial_part(gains.step, P0, PHI)
         # What follows needs the noise of the first interval alone; that of all takes memory.
-        system = system.with_arrays(Q=system.Q[:1].copy(), S=None if system.S is None else system.S[:1].copy())
+        system = system.with_made(Q=system.Q[:1].copy(), S=None if system.S is None else system.S[:1].copy())
         return cls(
             integrals=log.integrals,
             C_n0_i=log.C_n0_i,
@@ -110,22 +110,27 @@ class FineAlignment(Filtered):
         """
         J = self._carried_to(time)[PHI]
         C_n0_b = dcm_from_rotation_vector(J @ self.end) @ self.C_n0_i @ C_ib
-        return C_n0_b, self.joint_at(time)[PHI, PHI], J @ self.floor @ J.T
+        return C_n0_b, J @ self.P @ J.T + self._walked(time), J @ self.floor @ J.T
 
     def joint_at(self, time: float) -> Array:
         """(9, 9) covariance of misalignment (``n0``), gyro and accelerometer bias (body axes) at any time of the log."""
         J = self._carried_to(time)
         P = J @ self.P @ J.T
-        apart = abs(self.integrals.time[-1] - time)
-        P[PHI, PHI] += self.system.Q[0, PHI, PHI] / self.integrals.intervals[0] * apart
+        P[PHI, PHI] += self._walked(time)
         return np.asarray(P)
+
+    def _walked(self, time: float) -> Array:
+        """(3, 3) covariance by which the misalignment walks from a time to the last epoch."""
+        apart = abs(self.integrals.time[-1] - time)
+        return np.asarray(self.system.Q[0, PHI, PHI] / self.integrals.intervals[0] * apart)
 
     def _carried_to(self, time: float) -> Array:
         """(9, n) misalignment and biases at a time from the last state: the whole log's knowledge carried back to it."""
         J = np.zeros((9, len(self.end)))
         J[PHI, PHI] = np.eye(3)
         J[PHI, BG] = self._turned_between(time)  # phi(t) = phi_end + int_t^end C_n0_b eps
-        J[PHI, STATES:] = -np.einsum("k,kij->ij", self._after(time), self.system.Phi[:, PHI, STATES:])
+        behind, share = self._behind(time)
+        J[PHI, STATES:] = -np.einsum("k,kij->ij", share, self.system.Phi[behind, PHI, STATES:])
         J[3:6, BG] = J[6:9, BA] = np.eye(3)
         return J
 
@@ -139,13 +144,16 @@ class FineAlignment(Filtered):
 
     def _turned_between(self, time: float) -> Array:
         """``int C_n0_b dt`` from `time` to the last epoch; negative beyond it."""
-        C = self.C_n0_i @ self.integrals.C_mean
-        inside = np.einsum("k,kab->ab", self._after(time) * self.integrals.intervals, C)
-        return inside + min(self.integrals.time[-1] - time, 0.0) * C[-1]
+        behind, share = self._behind(time)
+        T, C = self.integrals.intervals[behind], self.integrals.C_mean
+        beyond = min(self.integrals.time[-1] - time, 0.0)
+        return np.asarray(self.C_n0_i @ (np.einsum("k,kab->ab", share * T, C[behind]) + beyond * C[-1]))
 
-    def _after(self, time: float) -> Array:
-        """(K,) the share of each interval that lies behind a time."""
-        return np.asarray(np.clip((self.integrals.time[1:] - time) / self.integrals.intervals, 0.0, 1.0))
+    def _behind(self, time: float) -> tuple[slice, Array]:
+        """The intervals that end behind a time, and the share of each that lies behind it."""
+        ends, T = self.integrals.time[1:], self.integrals.intervals
+        first = int(np.searchsorted(ends, time, side="right"))
+        return slice(first, None), np.minimum((ends[first:] - time) / T[first:], 1.0)
 
 
 class CoarseStart(NamedTuple):

@@ -241,7 +241,7 @@ def force_system(
     H, R, S = np.empty((count, 3, STATES)), np.empty((count, 3, 3)), np.empty((count, STATES, 3))
     _gains_of_velocity(core.Phi, core.Q, np.ascontiguousarray(C), H, R, S)
     z = (C @ gained_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-    return core.with_made(H=H, R=R, S=S).with_arrays(z=z)
+    return core.with_made(H=H, R=R, S=S, z=z)
 
 
 @compiled

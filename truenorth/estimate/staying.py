@@ -189,7 +189,7 @@ class StayingLog:
             system = with_arm(system, rows, self.taken[groups["offset"]])
         if "rate" in groups:
             system = with_level_rate(system, self.integrals, lat, alt)
-        return system.with_arrays(x0=self.prior.mean - self.taken, P0=P0)
+        return system.with_made(x0=self.prior.mean - self.taken, P0=P0)
 
     def correct(self, x: Array) -> None:
         """Take the errors at the last epoch off: of attitude back at the start, of sensors and arm as they are."""

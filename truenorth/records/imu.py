@@ -71,9 +71,7 @@ class ImuRecord(Record):
         for values, limit, names in zip(
             (self.gyro, self.accel), LARGEST, (COLUMNS[self.kind][:3], COLUMNS[self.kind][3:])
         ):
-            # Where the squares together are below the limit's, so is each.
-            squares = float(np.einsum("i,i->", values.reshape(-1), values.reshape(-1)))
-            if squares > (limit * scale) ** 2 and np.abs(values).max() > limit * scale:
+            if max(values.max(), -values.min()) > limit * scale:
                 row, i = np.argwhere(np.abs(values) > limit * scale)[0]
                 raise DataError(
                     f"{self.source}: row {row + 1}, column {names[i]}: {values[row, i]:g}; no such sensor measures more than "
