@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from truenorth.core.compiled import compiled
+from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.errors import UsageError
+from truenorth.core.linalg import copy_corner, transpose_block
+from truenorth.core.vectors import load8, minus8, plus8, store8, times8, zero8
 from truenorth.filters.stack import Array
 from truenorth.filters.system import Estimates, LinearSystem, runs_of
-
-BLOCK = 512  # epochs that are worked on at once: what stands in between takes memory for these alone
 
 
 class Gains(NamedTuple):
@@ -74,27 +74,34 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
 
 @compiled
 def _fill(runs: Any, P: Any, innovation: Any, covariance: Any, gain: Any, step: Any, H_Phi: Any) -> None:
-    """Gains of each run and epoch, and how an error goes on in it."""
+    """Gains of each run and epoch, and how an error goes on in it; worked out in rows with zeros at their ends."""
     n, m = gain.shape[2], gain.shape[3]
-    seen, cross, W = np.zeros((m, n)), np.zeros((m, n)), np.zeros((m, m))
+    wide = 8 * ((n + 7) // 8)
+    Phi, Phi_t = np.zeros((wide, wide)), np.zeros((wide, wide))
+    Q, before = np.zeros((wide, wide)), np.zeros((wide, wide))
+    own, seen, cross, W = np.zeros((m, wide)), np.zeros((m, wide)), np.zeros((m, wide)), np.zeros((m, m))
     for b in range(gain.shape[0]):
         for k in range(gain.shape[1]):
-            Phi = runs.Phi[min(b, runs.Phi.shape[0] - 1), min(k, runs.Phi.shape[1] - 1)]
-            Q = runs.Q[min(b, runs.Q.shape[0] - 1), min(k, runs.Q.shape[1] - 1)]
+            load_corner(runs.Phi[min(b, runs.Phi.shape[0] - 1), min(k, runs.Phi.shape[1] - 1)], Phi)
+            load_corner(runs.Q[min(b, runs.Q.shape[0] - 1), min(k, runs.Q.shape[1] - 1)], Q)
             H = runs.H[min(b, runs.H.shape[0] - 1), min(k, runs.H.shape[1] - 1)]
             S = runs.S[min(b, runs.S.shape[0] - 1), min(k, runs.S.shape[1] - 1)]
-            times(H, Phi, H_Phi[b, k])
-            # H (Phi P Phi' + Q) + S', of m rows, not n: covariances are symmetric.
             if k == 0:
-                times(H_Phi[b, k], runs.P0[min(b, runs.P0.shape[0] - 1)], seen)
+                load_corner(runs.P0[min(b, runs.P0.shape[0] - 1)], before)
             else:
-                times(H_Phi[b, k], P[b, k - 1], seen)
-            times(H, Q, cross)
+                load_corner(P[b, k - 1], before)
+            for i in range(0, wide, 4):
+                for j in range(0, wide, 4):
+                    transpose_block(Phi, i, j, Phi_t)
+            # H (Phi P Phi' + Q) + S', of m rows, not n: covariances are symmetric.
             for a in range(m):
+                row_times(H, a, n, Phi, own)
+                row_times(own, a, n, before, seen)
+                row_times(seen, a, n, Phi_t, cross)
+                row_times(H, a, n, Q, seen)
                 for i in range(n):
-                    for j in range(n):
-                        cross[a, i] += seen[a, j] * Phi[i, j]
-                    cross[a, i] += S[i, a]
+                    cross[a, i] += seen[a, i] + S[i, a]
+                    H_Phi[b, k, a, i] = own[a, i]
             # An absent row becomes one of its own without information.
             for a in range(m):
                 absent = np.isnan(innovation[b, k, a])
@@ -107,11 +114,28 @@ def _fill(runs: Any, P: Any, innovation: Any, covariance: Any, gain: Any, step: 
             for i in range(n):
                 for a in range(m):
                     gain[b, k, i, a] = cross[a, i]
-                for j in range(n):
-                    step[b, k, i, j] = Phi[i, j]
-                for a in range(m):
-                    for j in range(n):
-                        step[b, k, i, j] -= cross[a, i] * H_Phi[b, k, a, j]
+                for j in range(0, wide, 8):
+                    left = load8(Phi, (i, j))
+                    for a in range(m):
+                        left = minus8(left, times8(cross[a, i], load8(own, (a, j))))
+                    store8(Phi, (i, j), left)
+            copy_corner(Phi, step[b, k], n, n)
+
+
+@borrowing(forceinline=True)
+def load_corner(A: Any, B: Any) -> None:
+    """A square matrix into the corner of a larger one."""
+    copy_corner(A, B, A.shape[0], A.shape[1])
+
+
+@borrowing(forceinline=True)
+def row_times(X: Any, a: int, n: int, A: Any, Y: Any) -> None:
+    """Row a of ``Y = X A``, of n terms; the rows of `A` and `Y` are a multiple of 8 wide."""
+    for j in range(0, A.shape[1], 8):
+        total = zero8()
+        for k in range(n):
+            total = plus8(total, times8(X[a, k], load8(A, (k, j))))
+        store8(Y, (a, j), total)
 
 
 @compiled
@@ -155,15 +179,12 @@ def initial_part(step: Array, P0: Array, states: slice = slice(None)) -> tuple[A
     known = np.flatnonzero(whole.any(axis=0))  # the others make no part
     inner = whole[np.ix_(known, known)]
     part = np.empty((len(step), *whole[states, states].shape))
-    response = np.empty((min(BLOCK, len(step)), size, len(known)))
-    before = np.ascontiguousarray(np.eye(size)[:, known])
-    for first in range(0, len(step), BLOCK):
-        block = response[: min(BLOCK, len(step) - first)]
-        _products(np.ascontiguousarray(step[first : first + BLOCK]), before, block)
-        wanted = block[:, states]
-        part[first : first + BLOCK] = wanted @ inner @ np.swapaxes(wanted, -1, -2)
-        before = block[-1].copy()
-    return part, np.asarray(before @ inner @ before.T)
+    response = np.zeros((size, 8 * ((len(known) + 7) // 8)))
+    response[known, np.arange(len(known))] = 1.0
+    first = range(size)[states].start
+    _parts(np.ascontiguousarray(step), np.ascontiguousarray(inner), first, response, part)
+    last = response[:, : len(known)]
+    return part, np.asarray(last @ inner @ last.T)
 
 
 def through(gains: Gains, signature: Array) -> tuple[Array, Array]:
@@ -188,11 +209,27 @@ def through(gains: Gains, signature: Array) -> tuple[Array, Array]:
 
 
 @compiled
-def _products(step: Any, before: Any, response: Any) -> None:
-    """``response[k] = step[k] ... step[1] step[0] before``, (K, n, p)."""
-    times(step[0], before, response[0])
-    for k in range(1, step.shape[0]):
-        times(step[k], response[k - 1], response[k])
+def _parts(step: Any, inner: Any, first: int, response: Any, part: Any) -> None:
+    """``response = step[k] ... step[0] response``, and ``part[k] = X inner X'`` of its rows from the first one wanted."""
+    n, p, q = response.shape[0], inner.shape[0], part.shape[1]
+    before, now, X = np.zeros((n, response.shape[1])), response, np.empty((q, p))
+    for k in range(step.shape[0]):
+        for i in range(n):
+            for j in range(p):
+                before[i, j] = now[i, j]
+        for i in range(n):
+            row_times(step[k], i, n, before, now)
+        for a in range(q):
+            for r in range(p):
+                X[a, r] = 0.0
+            for s in range(p):
+                for r in range(p):
+                    X[a, r] += now[first + a, s] * inner[s, r]
+            for c in range(q):
+                total = 0.0
+                for r in range(p):
+                    total += X[a, r] * now[first + c, r]
+                part[k, a, c] = total
 
 
 @compiled
