@@ -142,6 +142,25 @@ def test_chance_does_not_touch_the_table():
             assert find_touch(np.arange(count), rng.standard_normal((count, 2)), 9.8) is None
 
 
+def test_gyros_that_walk_touch_no_table():
+    """Force of gravity alone, carried by gyros of .3 deg/sqrt(h): of 600 positions none; a step of 5 mg is found."""
+    rng, walk = np.random.default_rng(1), math.radians(0.3) / 60.0
+    for _ in range(600):
+        carried = 9.8 * np.cumsum(walk * rng.standard_normal((300, 2)), axis=0)
+        assert find_touch(np.arange(300.0), carried, 9.8, walk) is None
+    stepped = carried + 0.05 * (np.arange(300.0) > 150.0)[:, None]
+    assert find_touch(np.arange(300.0), stepped, 9.8, walk).time == pytest.approx(150.0, abs=10.0)
+
+
+@pytest.mark.slow
+def test_industrial_gyros_touch_no_table():
+    """Two positions: two of the first seven were refused for a table that somebody touched."""
+    spec = imu_spec("industrial")
+    for seed in range(7):
+        answer = align_positions(turned([(0, math.pi / 2)], spec, seed, 240.0)[0].record, PLACE, spec)
+        assert answer.status == "level_only", answer.reasons
+
+
 def test_positions_are_found_in_the_gyros():
     made, _ = turned([(0, math.pi / 2), (1, -math.pi / 2)], imu_spec("tactical"), 1, 40.0, duration=200.0)
     found = find_positions(motion_summary(made.record))

@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 HEADING_LIMIT = math.radians(5.0)
 SLEW_RATE = math.radians(0.2)  # rad/s: a table that turns faster is between positions
 SHORTEST_POSITION = 5.0  # s
-MAX_PASSES = 8
+MAX_PASSES = 25  # a heading that gyros hardly see may go round half the circle first, from 3 deg a pass on (17 passes)
 NOISE_PASSES = 4
 FEWEST = 5  # intervals that a variance is fitted to
 ARM_SIGMA = 0.05  # m: of the IMU from the table's axes
@@ -133,7 +133,7 @@ def align_positions(
         answer = replace(
             answer, phi_covariance=without_heading(answer.phi_covariance), phi_floor=without_heading(answer.phi_floor)
         )
-    touch = _touched(task, fine, stretches)
+    touch = _touched(task, fine, stretches, used)
     found = _positions(fine, stretches, position.lat)
     sigma = np.sqrt(np.diag(fine.P))
     answer = replace(
@@ -235,7 +235,7 @@ def _resting(integrals: InertialIntegrals, stretches: list[tuple[float, float]])
     return np.asarray(np.any(inside, axis=0))
 
 
-def _touched(task: Task, fine: FineAlignment, stretches: list[tuple[float, float]]) -> Touch | None:
+def _touched(task: Task, fine: FineAlignment, stretches: list[tuple[float, float]], spec: ImuSpec) -> Touch | None:
     """The largest step of level specific force within a position."""
     time = fine.integrals.time
     gravity = np.diff(gravity_velocity(time, task.position.lat, task.position.alt), axis=0)
@@ -243,7 +243,8 @@ def _touched(task: Task, fine: FineAlignment, stretches: list[tuple[float, float
     found = []
     for stretch in stretches:
         here = _resting(fine.integrals, [stretch])
-        touch = find_touch((fine.integrals.start + time[1:])[here], force[here, :2], task.gravity)
+        at, level = (fine.integrals.start + time[1:])[here], force[here, :2]
+        touch = find_touch(at, level, task.gravity, spec.gyro_random_walk, spec.gyro_bias_instability)
         if touch is not None:
             found.append(touch)
     return max(found, key=lambda touch: touch.size, default=None)

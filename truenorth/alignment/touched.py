@@ -24,6 +24,7 @@ ASIDE = 3  # blocks on either side whose means are compared, ...
 GAP = 2  # ... and between them, for what takes its time
 SETTLED = 5.0  # s after a touch from which the table is at rest again
 FACTOR = 10.0  # of the usual scatter of such differences: a false alarm in less than 1e-5 of logs with Gaussian noise
+CARRIED = 5.0  # of the sigma by which gyros carry the force askew meanwhile: chance passes it in 4e-5 of logs
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,9 @@ class Touch:
         )
 
 
-def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
+def find_touch(
+    time: Array, force: Array, gravity: float, angle_walk: float = 0.0, rate_sigma: float = 0.0
+) -> Touch | None:
     """The largest step within one position, if it is not chance.
 
     Parameters
@@ -61,6 +64,9 @@ def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
     force : (K, 2) array, m/s^2
         Level specific force in axes that do not turn.
     gravity : float, m/s^2
+    angle_walk, rate_sigma : float, rad/sqrt(s) and rad/s
+        Random walk of the gyros that carry these axes, and what their biases wander by: they tilt the axes from the blocks before
+        to those after, more than neighbouring blocks tell.
     """
     length = max(1, len(time) // BLOCKS)
     count = len(time) // length
@@ -75,8 +81,12 @@ def find_touch(time: Array, force: Array, gravity: float) -> Touch | None:
     # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
     usual = median_of_rows(np.abs(blocks[1:] - blocks[:-1]).T)[:, 0] / 0.6745 / math.sqrt(ASIDE)
     scatter = float(np.linalg.norm(usual))
+    # Means of m blocks, g blocks apart, of a walk of q a block differ by a variance of q (g + 2 m/3), from centre to centre m + g.
+    block = length * float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    walk = angle_walk * math.sqrt(block * (GAP + 2.0 * ASIDE / 3.0))
+    carried = gravity * math.hypot(walk, rate_sigma * block * (ASIDE + GAP))
     best = int(np.argmax(size))
-    if size[best] < max(FACTOR * scatter, STILL_ANGLE * gravity):
+    if size[best] < max(math.hypot(FACTOR * scatter, CARRIED * carried), STILL_ANGLE * gravity):
         return None
     middle = (best + ASIDE) * length + GAP * length // 2
     return Touch(float(time[middle]), steps[best], scatter)
