@@ -36,6 +36,7 @@ from truenorth.errors.log import LogErrors
 from truenorth.errors.model import InsModel
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import jump_evidence, likelihood_ratio, misfit, noise_evidence, wandering_evidence
+from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
@@ -271,7 +272,8 @@ def _seen(
     without = [partial(_of_model, less, guess, gated) for less in task.without_slow_errors()]
     found += noise_evidence(again, track, task.model, task.record)
     found += poorer_evidence(lambda spec: task.with_spec(spec).run(guess, gated=gated), track, task.spec)
-    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration, without)
+    warming = partial(warming_rivals, other, track, task.record, task.spec)
+    return found + wandering_evidence(again, track, task.model, task.spec, task.record.duration, without, warming)
 
 
 def _of_model(task: MovingTask, guess: Guess, gated: bool, model: InsModel) -> Track:

@@ -36,6 +36,7 @@ from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.memory import REOPENED, USED
 from truenorth.estimate.rivals import likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
+from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.whiteness import whiteness
@@ -193,7 +194,9 @@ def _rivals(
     def other(model: TransferModel) -> Track:
         return run(part, model=model, start=start)
 
-    found = noise_evidence(other, track, model, part) + wandering_evidence(other, track, model, spec, part.duration)
+    warming = partial(warming_rivals, partial(run, model=model, start=start), track, part, spec)
+    found = noise_evidence(other, track, model, part)
+    found += wandering_evidence(other, track, model, spec, part.duration, warming=warming)
     wide = _any_delay(start, model)
 
     def of_translation(track: Track) -> Track:

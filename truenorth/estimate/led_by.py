@@ -14,13 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.earth import radii
 from truenorth.core.errors import DataError
+from truenorth.estimate.responses import Seen, likeliest, signatures_of
 from truenorth.estimate.rivals import likelihood_ratio
 from truenorth.quality.led_away import (
     BEGINS,
@@ -30,9 +30,7 @@ from truenorth.quality.led_away import (
     larger_than_chance,
     led_away_evidence,
     led_by,
-    no_outlier,
 )
-from truenorth.quality.whiteness import whiteness
 from truenorth.records import GnssRecord
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
@@ -116,29 +114,27 @@ def _asked(
     A response begun some rows earlier is the same response that much earlier, nearly: the likeliest is then asked for itself.
     """
 
-    def signatures(moment: float) -> list[_Seen]:
-        passes = [run(_stepped(receiver, moment, axis)).residuals for axis in (0, 1)]
-        found = [_signature(r, [_same(r, others) for others in passes]) for r in first]
-        return [item for item in found if item is not None]
+    def signatures(moment: float) -> list[Seen]:
+        return signatures_of(first, [run(_stepped(receiver, moment, axis)).residuals for axis in (0, 1)], STEP)
 
     seen = signatures(onset)
     row = int(np.searchsorted(source.time, onset))
     near = source.time[max(row - ROWS, 0) : row + ROWS + 1]
-    tried = [_likeliest([item.begun(float(moment) - onset) for item in seen])[0] for moment in near]
+    tried = [likeliest([item.begun(float(moment) - onset) for item in seen])[0] for moment in near]
     best = float(near[int(np.argmax(tried))])
     seen = seen if best == onset else signatures(best)
-    ratio, step = _likeliest(seen)
+    ratio, step = likeliest(seen)
     return ratio / _usual(seen, step, best, source), step, best
 
 
-def _usual(seen: Sequence[_Seen], step: Array, onset: float, source: Residuals) -> float:
+def _usual(seen: Sequence[Seen], step: Array, onset: float, source: Residuals) -> float:
     """How much larger ratios at other moments, and squares, are than of white innovations, once the step is gone; 1 at least.
 
     Of a receiver that is off in every turn many are, and a step counts by how far it stands out.
     """
     left = [item._replace(z=item.z - item.s @ step) for item in seen]
     moments = source.time[BEGINS :: max(1, len(source.time) // MOMENTS)]
-    ratios = np.array([_likeliest([item.begun(float(moment) - onset) for item in left])[0] for moment in moments])
+    ratios = np.array([likeliest([item.begun(float(moment) - onset) for item in left])[0] for moment in moments])
     squares = [larger_than_chance(np.sum(item.z[:, :2] ** 2, axis=1), LARGE) for item in left if item.z.shape[1] > 1]
     return max(1.0, larger_than_chance(ratios, USUAL), *squares)
 
@@ -156,59 +152,3 @@ def _stepped(receiver: GnssRecord, onset: float, axis: int) -> GnssRecord:
     assert receiver.v_n is not None
     velocity = receiver.v_n - STEP * np.outer(since >= 0.0, np.eye(3)[axis])
     return replace(receiver, lat=lat, lon=lon, v_n=velocity)
-
-
-class _Seen(NamedTuple):
-    """Of the measurements of a source: times (K,), normalised innovations (K, m), what 1 m/s adds to them (K, m, 2)."""
-
-    time: Array
-    z: Array
-    s: Array
-
-    def begun(self, later: float) -> _Seen:
-        """As if the step began so much later (s)."""
-        K = len(self.time)
-        moved = [np.interp(self.time - later, self.time, row, left=0.0) for row in self.s.reshape(K, -1).T]
-        return self._replace(s=np.stack(moved, axis=1).reshape(self.s.shape))
-
-
-def _likeliest(seen: Sequence[_Seen]) -> tuple[float, Array]:
-    """Twice the logarithm of the likelihood ratio of the step (2,) m/s that fits best, and that step.
-
-    A source whose innovations are coloured, or too large, without the step carries so much less information.
-    """
-    shares = [1.0] * len(seen)
-    ratio = 0.0
-    step: Array = np.zeros(2)
-    for _ in range(2):
-        A = sum(
-            (w * np.einsum("kmi,kmj->ij", s, s) for w, (_, _, s) in zip(shares, seen, strict=True)), np.zeros((2, 2))
-        )
-        b = sum((w * np.einsum("kmi,km->i", s, z) for w, (_, z, s) in zip(shares, seen, strict=True)), np.zeros(2))
-        if np.linalg.matrix_rank(A) < 2:
-            return 0.0, step
-        step = np.linalg.solve(A, b).astype(np.float64)
-        ratio = float(b @ step)
-        shares = [1.0 / whiteness(z - s @ step).growth ** 2 for _, z, s in seen]
-    return ratio, step
-
-
-def _same(source: Residuals, others: Sequence[Residuals]) -> Residuals | None:
-    return next((r for r in others if r.name == source.name), None)
-
-
-def _signature(source: Residuals, others: Sequence[Residuals | None]) -> _Seen | None:
-    """What a step adds to the normalised innovations of a source.
-
-    A gate may have taken the first rows of a step for outliers: they count, as one outlier does that is no step.
-    """
-    there = [r for r in others if r is not None and np.array_equal(r.stamp, source.stamp)]
-    if len(there) < len(others) or not len(source.time):
-        return None
-    alike = np.all([(r.used == source.used) & (r.rows == source.rows) for r in there], axis=0) & (source.rows > 0)
-    axes = np.isfinite(source.innovation[alike]).all(axis=0)
-    z, *moved = ((r.innovation[alike] / r.sigma[alike])[:, axes] for r in (source, *there))
-    if not z.size:
-        return None
-    s = np.stack([(z - other) / STEP for other in moved], axis=-1)
-    return _Seen(source.time[alike], no_outlier(z), s)

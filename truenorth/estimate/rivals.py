@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,15 @@ class Walking(Protocol):
 M = TypeVar("M", bound=Walking)
 
 
+class Rival(NamedTuple):
+    """Another course of the biases that fits the measurements better."""
+
+    ratio: float  # twice the logarithm of a likelihood ratio, or of what is as rare by chance
+    key: str
+    figures: Mapping[str, Figure]
+    effect: Effect
+
+
 def wandering_evidence(
     run: Callable[[M], Track],
     first: Track,
@@ -69,6 +78,7 @@ def wandering_evidence(
     spec: ImuSpec,
     span: float,
     without: Sequence[Callable[[M], Track]] = (),
+    warming: Callable[[], list[Rival]] = list,
 ) -> list[Evidence]:
     """Whether biases that wander explain the measurements better, and what that does to the answer.
 
@@ -88,6 +98,8 @@ def wandering_evidence(
         Length of the log.
     without : sequence of callable
         As `run`, each without one of the slow errors that the innovations have shown.
+    warming : callable
+        Biases of another course that fit better (:mod:`truenorth.estimate.warming`).
 
     Returns
     -------
@@ -96,7 +108,7 @@ def wandering_evidence(
     """
     if not any(int(np.sum(r.rows > 0)) >= FEWEST for r in first.residuals):
         return []
-    found: list[tuple[float, str, float, Effect]] = []
+    found = warming()
     for of_other in (run, *without):
         # Without a slow error a log may fit worse, or better: neither is the walk's.
         least = 0.0 if of_other is run else likelihood_ratio(first.residuals, of_other(model).residuals)
@@ -104,11 +116,11 @@ def wandering_evidence(
             found += _climb(of_other, first, model, spec, span, sensor, ladder, least)
     if not found:
         return []
-    ratio, sensor, size, _ = max(found, key=lambda item: item[0])
+    best = max(found, key=lambda item: item.ratio)
     effect = NO_EFFECT
-    for *_, other in found:
-        effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(effect.items(), other.items(), strict=True)))
-    return [rival(f"rival.{sensor}_wanders", {"size": size}, ratio, effect, "specification")]
+    for other in found:
+        effect = Effect(*(max(a, b) for (_, a), (_, b) in zip(effect.items(), other.effect.items(), strict=True)))
+    return [rival(best.key, best.figures, best.ratio, effect, "specification")]
 
 
 def rival(key: str, own: Mapping[str, Figure], ratio: float, effect: Effect, suspect: str) -> Evidence:
@@ -146,23 +158,20 @@ def _climb(
     sensor: str,
     ladder: Sequence[float],
     least: float,
-) -> list[tuple[float, str, float, Effect]]:
-    """Walks of a sensor's biases that the log fits better than the model, and than the same without a walk: its ratio is `least`.
-
-    Ratio, sensor, size of the walk and effect of each.
-    """
+) -> list[Rival]:
+    """Walks of a sensor's biases that the log fits better than the model, and than without a walk: that ratio is `least`."""
     sigma, name = math.sqrt(float(spec.bias_variance[0 if sensor == "gyro" else 3])), f"{sensor}_rate_walk"
     found, before = [], least
     for size in ladder:
         walk = math.hypot(getattr(model, name), size * sigma / math.sqrt(span))
         try:
-            rival = run(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
+            other = run(replace(model, **{name: walk}))  # type: ignore[type-var]  # a dataclass
         except DataError:  # the filter broke down: no explanation
             break
-        ratio = likelihood_ratio(first.residuals, rival.residuals)
+        ratio = likelihood_ratio(first.residuals, other.residuals)
         gained = ratio - max(least, 0.0)
         if gained > limit("rival"):
-            found.append((gained, sensor, size * sigma, _effect(first, rival)))
+            found.append(Rival(gained, f"rival.{sensor}_wanders", {"size": size * sigma}, _effect(first, other)))
         elif ratio < before + RULED_OUT:
             break
         before = max(ratio, before)

@@ -23,6 +23,7 @@ from truenorth.estimate.gaps import bridge_gaps
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
+from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
     by_key,
     kept_altitude,
@@ -213,10 +214,14 @@ def _rivals(plan: Plan, track: Track, given: Mapping[str, Any], spec: ImuSpec, s
         other = replace(plan, model=model, slow=slow)
         return other.run(other.sources(given), smooth=smooth)
 
+    def of_record(record: ImuRecord) -> Track:
+        return replace(plan, record=record).run(aiding, smooth=smooth)
+
     usual = partial(again, plan.slow)
     without = [partial(again, less) for less in one_less(plan.slow)]
     found = noise_evidence(usual, track, plan.model, plan.record)
-    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without)
+    warming = partial(warming_rivals, of_record, track, plan.record, spec)
+    found += wandering_evidence(usual, track, plan.model, spec, plan.record.duration, without, warming)
     found += jump_evidence(lambda record: replace(plan, record=record).run(aiding), track, plan.record)
     found += _led_away(plan, track, given, smooth)
     found += _gyros_of_another_moment(plan, given)

@@ -177,6 +177,11 @@ SENTENCES = {
         "specification (likelihood ratio {ratio:.0f}, chance gives {chance:.0f} at most); heading moves by {heading:angle}, level "
         "by {level:angle}"
     ),
+    "rival.accels_warm_up": (
+        "accelerometer biases that move together by up to {size:ug|} ug, as sensors that warm up within {time:.0f} s, fit the "
+        "measurements better (as rare by chance as a likelihood ratio of {ratio:.0f}, a sound log gives {chance:.0f} at most); "
+        "heading moves by {heading:angle}, level by {level:angle}"
+    ),
     "rival.poorer": (
         "an IMU {factor:.0f} times as poor as the specification fits the measurements as well (likelihood ratio {ratio:.3g}); "
         "heading moves by {heading:angle}, level by {level:angle}"
