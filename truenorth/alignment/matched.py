@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import Size, copy_corner, four_rows, padded, transpose_block
+from truenorth.errors.staying import STARTS
 from truenorth.filters.gains import Gains, through
 
 Array = NDArray[np.float64]
@@ -63,8 +64,8 @@ class Match(NamedTuple):
         Twice the logarithm of each likelihood ratio.
     size : (S,) array
         Of each signature, the most likely.
-    left : (n, S) array
-        Errors of the last estimate that a signature of size one leaves.
+    left : (3, S) array
+        Misalignment of the last estimate that a signature of size one leaves.
     """
 
     ratio: Array
@@ -132,7 +133,7 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     (n, courses), right, gains = state_course.shape, seen.white.shape[2], seen.gains
     behind = np.unique(np.concatenate([bank.epoch for bank in banks]))
     forms = np.empty((len(behind), n + courses, n + courses + right))
-    ends = np.empty((len(behind), n, n + courses))
+    ends = np.empty((len(behind), 3, n + courses))
     arrays = (gains.step, gains.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
     whole = tuple(np.ascontiguousarray(a) for a in arrays)
     sizes = padded(n), padded(n + seen.L.shape[1]), len(padded(n + courses + right))
@@ -151,7 +152,7 @@ def _matches(
     n = state.shape[1]
     e = (gains.step[k] @ state - gains.gain[k] @ measured)[..., 0]
     energy, match = np.sum(first[..., 0] ** 2, axis=1), (np.swapaxes(first, 1, 2) @ seen.white[k])[:, 0]
-    left, at = np.empty((n, len(k))), np.searchsorted(behind, k)
+    left, at = np.empty((3, len(k))), np.searchsorted(behind, k)
     columns, row, course, parts = np.arange(ends.shape[2], forms.shape[2]), 0, n, []
     for bank in banks:
         courses, signatures = bank.after.shape
@@ -192,16 +193,17 @@ def _sum_back(
     forms: Any,
     ends: Any,
 ) -> None:
-    """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last error of it.
+    """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last misalignment of it.
 
     The quadratic form comes first, the linear ones of the innovations are columns behind it. All are `wide`, with zeros at their
     ends; of the states there are as many as `states` says, of states and rows of a measurement as `deep` says, the last zero.
     """
+    misalignment = STARTS[0]
     n, m, used, right = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
     N, rows = len(states), 4 * ((used + 3) // 4)
-    form, end = np.zeros((rows, wide)), np.zeros((N, wide))
-    for i in range(n):
-        end[i, i] = 1.0
+    form, end = np.zeros((rows, wide)), np.zeros((4, wide))
+    for i in range(3):
+        end[i, misalignment + i] = 1.0
     form_before, end_before, T = np.zeros_like(form), np.zeros_like(end), np.zeros_like(form)
     # e goes on as F (e, w), and is seen, made white, as G (e, w); behind G stand the innovations.
     whole, course = np.zeros((N, N)), np.zeros((N, wide))

@@ -258,10 +258,12 @@ def _classify(
 
 def _turns(rate: Array, rate_noise: float) -> NDArray[np.bool_]:
     """Seconds of net rotation: the rate is above noise, and does not cancel over 21 s as a sway does."""
+    fast = np.linalg.norm(rate, axis=0) > TURN_RATE + 5.0 * rate_noise
+    if not fast.any():
+        return fast
     width = min(TURN_WINDOW, rate.shape[1])
     net = np.linalg.norm(box_mean(rate, width), axis=0)
     power = box_mean(np.sum(rate**2, axis=0, keepdims=True), width)[0]
-    fast = np.linalg.norm(rate, axis=0) > TURN_RATE + 5.0 * rate_noise
     turns: NDArray[np.bool_] = fast & (net > TURN_SHARE * np.sqrt(power)) & (net * width > TURN_ANGLE)
     return _closed(turns, 3)
 
@@ -278,6 +280,8 @@ def _in_every_window(active: NDArray[np.bool_], seconds: int) -> NDArray[np.bool
 def _closed(flags: NDArray[np.bool_], pause: int, unless: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
     """Fill the holes of up to `pause` seconds, except holes that `unless` touches."""
     filled = flags.copy()
+    if not filled.any():
+        return filled
     for first, last in _runs(~flags):
         inside = first > 0 and last < flags.size
         if inside and last - first <= pause and not (unless is not None and unless[first:last].any()):

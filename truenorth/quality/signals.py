@@ -151,10 +151,10 @@ def _allan_variances(total: Any, step: int, m: int, group: int, variance: Any) -
         variance[g] = 0.0
         for k in range(g * group * step, (g + 1) * group * step, step):
             for i in range(6):
-                change = (total[k + 2 * step, i] - 2.0 * total[k + step, i] + total[k, i]) / m
+                change = total[k + 2 * step, i] - 2.0 * total[k + step, i] + total[k, i]
                 variance[g, i] += change * change
         for i in range(6):
-            variance[g, i] /= 2.0 * group
+            variance[g, i] /= 2.0 * group * m * m
 
 
 def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
