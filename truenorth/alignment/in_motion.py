@@ -17,6 +17,7 @@ from truenorth.alignment.against import against
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.azimuth import AZIMUTH_METHODS, azimuth_track
 from truenorth.alignment.in_motion_answer import moving_answer
+from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
@@ -257,7 +258,8 @@ def _seen(
     """What the receiver, the log itself, the earth's rate at rest and biases that wander say."""
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
-    found += rest_evidence(task) if gyrocompassed else []
+    if gyrocompassed:
+        found += [*rest_evidence(task), *half_turn_evidence(task, track, gated=gated)]
 
     def other(record: ImuRecord) -> Track:
         return replace(task, record=record).run(guess, gated=gated)

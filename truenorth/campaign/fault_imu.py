@@ -57,6 +57,12 @@ def _unit(sensor: str, units: Mapping[str, float]) -> Fault:
     return of_imu(f"{sensor} in another unit", spoil)
 
 
+def _half_turned(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    """One sensor's x and y look the other way: axes of another drawing, z alike."""
+    sensor = ("gyro", "accel")[int(rng.integers(2))]
+    return replace(record, **{sensor: getattr(record, sensor) * np.array([-1.0, -1.0, 1.0])}), f"{sensor} x and y"
+
+
 # -------------------------------------------------------------------------------------------------------- clock and rows
 
 
@@ -234,6 +240,7 @@ IMU_FAULTS: tuple[Fault, ...] = (
     _exchanged("accel"),
     _scaled("gyro sign", "gyro", lambda rng: -1.0),
     _scaled("accel sign", "accel", lambda rng: -1.0),
+    of_imu("half a turn", _half_turned),
     _scaled("gyro scale", "gyro", lambda rng: 1.0 + either(rng, 0.02, 0.3)),
     _scaled("accel scale", "accel", lambda rng: 1.0 + either(rng, 0.02, 0.3)),
     _unit("gyro", {"deg/s": math.degrees(1.0), "deg/h": math.degrees(3600.0), "mrad/s": 1e3, "rad a row": 0.02}),

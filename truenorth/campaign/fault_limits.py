@@ -79,6 +79,7 @@ REST = ("still", "unspecified")
 UNSEEN: tuple[Unseen, ...] = (
     Unseen(REST, "gyro axes exchanged", "yxz", LEVEL),
     Unseen(REST, "gyro sign", "[xy] ", LEVEL),
+    Unseen(REST, "half a turn", "", LEVEL),
     Unseen(("unspecified",), "accel axes exchanged", "(?!yxz)", ON_A_SIDE),
     Unseen(("unspecified",), "accel sign", "z ", ON_A_SIDE),
     Unseen(("swaying",), "gyro scale", "", IN_THE_ARM),

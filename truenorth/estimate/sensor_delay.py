@@ -85,7 +85,7 @@ def _likelier(
         if rows not in ratios:
             try:
                 tracks[rows] = run(gyros_later(record, -rows))
-                ratios[rows] = likelihood_ratio(_not_of_gyros(base), tracks[rows].residuals)
+                ratios[rows] = likelihood_ratio(not_of_gyros(base), tracks[rows].residuals)
             except DataError:  # the filter broke down: no explanation
                 ratios[rows] = -math.inf
         return ratios[rows]
@@ -100,7 +100,8 @@ def _likelier(
     return (best, tracks[best], ratios[best]) if ratios[best] > limit("rival") else None
 
 
-def _not_of_gyros(track: Track) -> list[Residuals]:
+def not_of_gyros(track: Track) -> list[Residuals]:
+    """What the aids have measured, without the mean rates of the gyros themselves at rest."""
     return [r for r in track.residuals if r.name != NO_ROTATION]
 
 

@@ -139,6 +139,10 @@ SENTENCES = {
         "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
         "gyro columns x y z read as {axes}"
     ),
+    "axes.half_turn": (
+        "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
+        "{ratio:.0f}, chance gives {chance:.0f} at most): gyros and accelerometers have other axes"
+    ),
     "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
     "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
     "tilt.scale": (

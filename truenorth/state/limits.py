@@ -54,6 +54,11 @@ LIMITS: dict[str, Limit] = {
         "1",
         "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 1,800, by Markov's inequality",
     ),
+    "half turn": Limit(
+        15.0,
+        "1",
+        "the same, of gyros reversed about both level axes: sound drives have -120 and less, reversed ones 19 and more",
+    ),
     "rival": Limit(
         10.0,
         "1",
