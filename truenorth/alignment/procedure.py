@@ -23,6 +23,7 @@ from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
+from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
@@ -321,6 +322,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     others = matrix_signatures(fine, used) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
+    steps += late_gyros_evidence(fine, task.record, task.interval, task.position) if sways else []
     way = farthest(fine, task.position) if sways else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)
 

@@ -59,8 +59,10 @@ def _unit(sensor: str, units: Mapping[str, float]) -> Fault:
 
 def _half_turned(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     """One sensor's x and y look the other way: axes of another drawing, z alike."""
-    sensor = ("gyro", "accel")[int(rng.integers(2))]
-    return replace(record, **{sensor: getattr(record, sensor) * np.array([-1.0, -1.0, 1.0])}), f"{sensor} x and y"
+    turn = np.array([-1.0, -1.0, 1.0])
+    if rng.integers(2):
+        return replace(record, accel=record.accel * turn), "accel x and y"
+    return replace(record, gyro=record.gyro * turn), "gyro x and y"
 
 
 # -------------------------------------------------------------------------------------------------------- clock and rows
@@ -85,6 +87,19 @@ def _late_gyros(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
         ImuRecord(record.time[rows:], record.gyro[:-rows], record.accel[rows:], record.kind, record.source),
         f"{rows * record.interval:.3f} s",
     )
+
+
+def gyros_behind(record: ImuRecord, late: float) -> ImuRecord:
+    """The record with its gyros late by so many seconds, parts of a row too."""
+    return replace(
+        record, gyro=np.stack([np.interp(record.time - late, record.time, x) for x in record.gyro.T], axis=1)
+    )
+
+
+def _filtered(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    """Gyros that their own filter delays, by less than a logger does."""
+    late = over_decades(rng, 0.002, 0.05)
+    return gyros_behind(record, late), f"{late:.4f} s"
 
 
 def _held(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
@@ -250,6 +265,7 @@ IMU_FAULTS: tuple[Fault, ...] = (
     of_imu("clock jumps", _clock_jump),
     of_imu("jitter", _jitter),
     of_imu("late gyros", _late_gyros),
+    of_imu("gyros late by a filter", _filtered),
     of_imu("held rows", _held),
     of_imu("dropped rows", _dropped),
     of_imu("doubled rows", _doubled),

@@ -139,6 +139,14 @@ SENTENCES = {
         "the gyros do not turn as gravity does in the accelerometers: {given:.2g} m/s^2 are left, and {best:.2g} m/s^2 with the "
         "gyro columns x y z read as {axes}"
     ),
+    "response.gyros_late": (
+        "gyros {delay:.4f} s late against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
+        "{chance:.0f} at most); level moves by {level:angle} as the base sways"
+    ),
+    "response.gyros_early": (
+        "gyros {delay:.4f} s early against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
+        "{chance:.0f} at most); level moves by {level:angle} as the base sways"
+    ),
     "axes.half_turn": (
         "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
         "{ratio:.0f}, chance gives {chance:.0f} at most): gyros and accelerometers have other axes"
