@@ -54,7 +54,8 @@ class Attitude:
         """Attitudes."""
         m, C = self.mounting, self.record.C_nb
         assert C is not None  # asked before
-        q = np.array([quaternion_from_dcm(each) for each in C])
+        q = np.zeros((len(C), 10))  # linearised with what it says, by the rate of the instant
+        q[:, :4], q[:, 7:] = np.array([quaternion_from_dcm(each) for each in C]), np.nan
         states: dict[Role, Group] = {}
         if m.angle_sigma > 0.0:
             states["mounting"] = Group("attitude mounting", np.full(3, m.angle_sigma), rotation=True, unit="rad")
@@ -67,7 +68,7 @@ class Attitude:
                 "attitude",
                 MASTER_ATTITUDE,
                 self.record.time - m.latency,
-                np.hstack([q, q]),  # the second is what the mounting is linearised with
+                q,
                 np.full((len(q), 3), self.noise),
                 C_mb=m.C_mb,
                 states=states,

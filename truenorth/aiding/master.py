@@ -62,7 +62,7 @@ from truenorth.state.now import (
 )
 from truenorth.strapdown.wander import acceleration, curvature, earth_axis
 
-_PHI, _DP = 0, 6
+_PHI, _DP, _BG = 0, 6, 9
 _BY_CHANCE = 6.0  # of chi-square with three degrees of freedom a tenth is beyond
 
 
@@ -91,10 +91,13 @@ def _beyond_noise(rate: Any, variance: float) -> float:
 
 @row
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    """Measured: velocity; the master's acceleration; the slave's attitude to linearise with (quaternion); all of n or NaN.
+    """Measured: velocity; the master's acceleration, or the slave's spin; the slave's attitude to linearise with; or NaN.
+
+    Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant.
 
     Columns of the arm are of a rate with another noise than that of `z`: one that is in both (4 cm/s of an industrial gyro at
-    37 m) is taken for an arm that is too long, .6 m of it. Its own figure: the variance of a component of that rate.
+    37 m) is taken for an arm that is too long, .6 m of it. Its own figures: the variance of a component of that rate; and 1 where
+    the slave's spin is measured, rad/s^2, 2 where the acceleration is not known (:mod:`truenorth.alignment.transfer_turns`).
     """
     if np.isnan(measured[0]):
         return
@@ -103,9 +106,12 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     earth = vector_of(now, NOW_EARTH)
     still = times_back(C, earth)
     w_eb = (w[0] - still[0], w[1] - still[1], w[2] - still[2])
-    if not np.isnan(measured[3]):
+    push = (0.0, 0.0, 0.0)
+    if not np.isnan(measured[3]) and figures[OWN + 1] == 0.0:
         push = from_north(now, (measured[3], measured[4], measured[5]))
-    else:
+    elif figures[OWN + 1] < 2.0:
+        if not np.isnan(measured[3]):
+            spin = vector_of(measured, 3)
         force = times(C, f)
         if not np.isnan(measured[6]):
             force = rotate(turned_from_north(now, measured, 6), f)
@@ -133,9 +139,10 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 @row
 def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    """Measured: the master's attitude against n, and the one to linearise with (quaternions).
+    """Measured: the master's attitude against n (quaternion); the turn from it to the one to linearise with; a rate of the slave.
 
-    Its own figure: the variance of a component of the rate, (rad/s)^2. A turn within that noise tells of no delay: the squares of
+    The turn is a rotation vector in n; the rate is what its gyros say, body axes, or NaN: that of the instant. Its own figure: the
+    variance of a component of the rate, (rad/s)^2. A turn within that noise tells of no delay: the squares of
     its column would be taken for knowledge, that of 60 ms in 200 s of straight flight of a tactical IMU.
     """
     if np.isnan(measured[0]):
@@ -148,7 +155,8 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     if at[AT_FLEXURE] >= 0:
         bend = vector_of(assumed, at[AT_FLEXURE])
     q_mount, q_bend = quaternion_from_rotation_vector(mount), quaternion_from_rotation_vector(bend)
-    q_m, q_linear = turned_from_north(now, measured, 0), turned_from_north(now, measured, 4)
+    q_m = turned_from_north(now, measured, 0)
+    q_linear = quaternion_product(quaternion_from_rotation_vector(from_north(now, vector_of(measured, 4))), q_m)
     error = (0.0, 0.0, 0.0)
     if at[AT_BIAS] >= 0:
         b = vector_of(assumed, at[AT_BIAS])
@@ -181,6 +189,10 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     turn = times(C, w)
     turn = (turn[0] - w_n[0], turn[1] - w_n[1], turn[2] - w_n[2])
     z[0], z[1], z[2] = scale * zx + lag * turn[0], scale * zy + lag * turn[1], scale * zz + lag * turn[2]
+    if not np.isnan(measured[7]):
+        mean = (measured[7] - assumed[_BG], measured[8] - assumed[_BG + 1], measured[9] - assumed[_BG + 2])
+        turn = times(C, mean)
+        turn = (turn[0] - w_n[0], turn[1] - w_n[1], turn[2] - w_n[2])
     seen = _beyond_noise(turn, figures[OWN])
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
@@ -203,5 +215,5 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 MASTER_VELOCITY = Row("master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1}, width=10, instant=True)
 MASTER_ATTITUDE = Row(
-    "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=8, instant=True, unit="rad"
+    "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"
 )

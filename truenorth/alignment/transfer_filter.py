@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,7 +15,8 @@ from truenorth.aiding.master_position import MASTER_POSITION
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
-from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm
+from truenorth.alignment.transfer_turns import KNOWN, push_of, spins_at, turns_at
+from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.core.errors import DataError
 from truenorth.errors.group import Group
@@ -45,8 +47,7 @@ SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by mo
 WIDER = 3.0  # the same master's velocity and force are not quite news to each other
 TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
-# Variance of the rate at an epoch, of that of a sample, and of the other one in columns of the arm (`describe_instant`).
-RATE_NOISE, OTHER_NOISE = 0.85, 0.4
+OTHER_NOISE = 0.4  # variance of the rate in columns of the arm, of that of a sample (`describe_instant`)
 
 
 @dataclass(frozen=True)
@@ -181,7 +182,8 @@ def master_aiding(
     stamps = master.time - assumed.delay
     patience = max(2, round(matching.patience / master.interval))
     found, place = [], None
-    of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
+    held = stamps - (0.0 if linear is None else linear.delay)  # when they held, as far as is known
+    of_sample, pushed = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval, KNOWN
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
     if place is not None and kind != "position":
@@ -202,7 +204,12 @@ def master_aiding(
         )
     measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
     if measured is not None and kind == "acceleration" and slave is not None:
-        measured[:, 3:] = _slopes(slave, stamps - (0.0 if linear is None else linear.delay))
+        measured[:, 3:] = _slopes(slave, held)
+    elif measured is not None and kind == "velocity" and slave is not None and np.isnan(measured[:, 3:6]).all():
+        assert master.v_n is not None
+        arm = math.hypot(*assumed.lever_arm, math.sqrt(3.0) * assumed.lever_arm_sigma)
+        spins, pushed = spins_at(slave, held, model.gyro_random_walk, arm, push_of(stamps, master.v_n))
+        measured[:, 3:6] = np.nan if spins is None else spins
     has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
     known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
     if measured is not None:
@@ -219,7 +226,7 @@ def master_aiding(
                 assumed.lever_arm,
                 states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
-                figures=(OTHER_NOISE * of_sample,),
+                figures=(OTHER_NOISE * of_sample, pushed),
                 retimed=True,
                 patience=patience if opens is not None else 0,
                 opens=opens,
@@ -227,9 +234,15 @@ def master_aiding(
             )
         )
     if has_C and master.C_nb is not None:
-        measured = np.full((count, 8), np.nan)
+        measured = np.full((count, 10), np.nan)
         measured[:, :4] = _quaternions(master.C_nb)
-        measured[:, 4:] = measured[:, :4] if linear is None else _quaternions(linear.C_nm)
+        measured[:, 4:7] = (
+            0.0 if linear is None else rotation_vector_from_dcm(linear.C_nm @ np.swapaxes(master.C_nb, 1, 2))
+        )
+        of_turn = 0.0
+        if slave is not None:
+            turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.attitude_sigma)
+            measured[:, 7:] = np.nan if turns is None else turns
         roles = {"lag": DELAY, "mounting": MOUNTING, "flexure": FLEXURE, "bias": ATTITUDE_ERROR}
         found.append(
             Aiding(
@@ -241,7 +254,7 @@ def master_aiding(
                 C_mb=assumed.C_mb,
                 states=_states(groups, roles),
                 gate=matching.gate,
-                figures=(RATE_NOISE * of_sample,),
+                figures=(of_turn,),
                 retimed=True,
                 patience=patience,
                 opens=MOUNTING if MOUNTING in groups else PHI.start,

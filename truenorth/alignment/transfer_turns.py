@@ -1,0 +1,109 @@
+"""How a slave turns at the rows of a master, known well enough to tell a delay.
+
+An attitude row tells a delay by ``-w tau``. The tilt that gyros walk between two rows hides slow changes of that product, so what
+tells it is the change of `w` from row to row; and of a noisy gyro that is noise. Its squares count as knowledge: a consumer
+gyro at 100 Hz, on a ship that rolls, knew the delay to 1.5 ms where one with a tenth of its noise knew it to 4, and was nine of
+these off. A velocity row tells it by the master's acceleration, which is the slave's less that of the arm between them,
+``w' x r``: at 30 m four samples of that gyro make 4 m/s^2 of noise.
+
+So rate and spin are means over as long as it takes until they stand out; where none does, such a row tells of no delay. A mean
+that looks ahead and behind makes the column too small in a fast roll, which costs knowledge and no truth: rows are taken at the
+delay found so far. The rule is ours.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.records import ImuRecord
+from truenorth.strapdown.increments import increments
+
+Array = NDArray[np.float64]
+
+INSTANT = 0.85  # variance of the rate at an epoch, of that of a sample (`describe_instant`)
+HALVES = (0.05, 0.1, 0.2, 0.4, 0.8)  # s, before and after
+SHARE = 0.01  # of what tells the delay, that may be noise
+ASKEW = 5e-4  # s: of a false delay, by what the noise of a spin and of a velocity's arm have in common
+KNOWN, MEAN, UNKNOWN = (
+    0.0,
+    1.0,
+    2.0,
+)  # the acceleration of a velocity row: by the master or the instant, by a mean spin, or not
+
+
+def turns_at(slave: ImuRecord, times: Array, walk: float, sigma: float) -> tuple[Array | None, float]:
+    """(M, 3) mean rates about some times, s, and the variance of a component; the rate of the instant does where they are None.
+
+    An infinite variance: no mean stands out of its noise.
+
+    Parameters
+    ----------
+    walk : float, rad/sqrt(s)
+        Angular random walk of the gyros.
+    sigma : float, rad
+        Noise of a row, which hides what the gyros walk until that is as much.
+    """
+    if walk == 0.0 or len(times) < 2:
+        return None, 0.0
+    T, apart = slave.interval, float(np.median(np.diff(times)))
+    rows = max(1, min(len(times) // 4, round(2.0 * (sigma / walk) ** 2 / apart)))
+    apart *= rows
+
+    def stands_out(rate: Array, variance: float, length: float) -> bool:
+        inside = (times > slave.time[0] + length) & (times < slave.time[-1] - length)
+        changes = rate[inside][rows:] - rate[inside][:-rows]
+        # Means that overlap have the noise in common that both hold.
+        noise = 6.0 * variance * min(1.0, apart / length)
+        return len(changes) > 0 and noise < SHARE * float(np.mean(np.sum(changes**2, axis=1)))
+
+    if stands_out(_mean_rate(slave, times, 2.0 * T), INSTANT * walk**2 / T, T):
+        return None, INSTANT * walk**2 / T
+    for half in HALVES:
+        rate, variance = _mean_rate(slave, times, half), walk**2 / (2.0 * half)
+        if half > 2.0 * T and stands_out(rate, variance, 2.0 * half):
+            return rate, variance
+    return None, math.inf
+
+
+def spins_at(slave: ImuRecord, times: Array, walk: float, arm: float, push: float) -> tuple[Array | None, float]:
+    """(M, 3) mean derivatives of the rate about some times, and how the acceleration of a velocity row is known.
+
+    Parameters
+    ----------
+    walk : float, rad/sqrt(s)
+    arm : float, m
+        Length of the lever arm.
+    push : float, m/s^2
+        RMS of the master's acceleration.
+    """
+    T, enough = slave.interval, SHARE * push**2
+    if 2.0 * arm**2 * 0.25 * walk**2 / T**3 <= enough:
+        return None, KNOWN
+    for half in HALVES:
+        # What a spin has in common with a rate off its middle is as a part of it: walk^2 / half^2.
+        common = (walk * arm / half) ** 2
+        if half > 2.0 * T and 4.0 * common / half < enough and common < ASKEW * push**2:
+            late, early = (_mean_rate(slave, times + s, 0.5 * half) for s in (0.5 * half, -0.5 * half))
+            return (late - early) / half, MEAN
+    return None, UNKNOWN
+
+
+def push_of(time: Array, v_n: Array) -> float:
+    """RMS acceleration, m/s^2, of velocities (M, 3), over a second each."""
+    rows = max(1, min(len(time) - 1, round(1.0 / float(np.median(np.diff(time)))))) if len(time) > 1 else 0
+    known = np.isfinite(v_n).all(axis=1)
+    if rows == 0 or np.count_nonzero(known) <= rows:
+        return 0.0
+    t, v = time[known], v_n[known]
+    return math.sqrt(float(np.mean(np.sum(((v[rows:] - v[:-rows]) / (t[rows:] - t[:-rows])[:, None]) ** 2, axis=1))))
+
+
+def _mean_rate(slave: ImuRecord, times: Array, half: float) -> Array:
+    """(M, 3) over so long before and after."""
+    edges = np.append(slave.time[0] - slave.steps[0], slave.time)
+    angle = np.vstack([np.zeros(3), np.cumsum(increments(slave)[0], axis=0)])
+    late, early = (np.stack([np.interp(times + s, edges, a) for a in angle.T], axis=1) for s in (half, -half))
+    return np.asarray((late - early) / (2.0 * half))
