@@ -1,5 +1,7 @@
 """A specification that is too good: a poorer one that fits as well is in sigma, one that is ruled out is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,8 @@ from benchmarks.honesty.frame import run_case
 from benchmarks.honesty.harness import framed
 from benchmarks.honesty.moving import CASES
 from truenorth.alignment.suspect import FACTORS, poorer_evidence
+from truenorth.alignment.verdict import bias_evidence, claimed
+from truenorth.campaign.fault_benches import BENCHES
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track
@@ -42,6 +46,33 @@ def test_a_poorer_imu_counts_unless_the_measurements_rule_it_out(size, found):
     assert [item.kind for item in evidence] == ([] if found is None else [found])
     if found is not None:
         assert evidence[0].effect.level == pytest.approx(0.004, rel=0.01)
+
+
+def test_biases_that_are_together_too_large_are_in_sigma():
+    """Each of six at 2.7 of its sigmas: none alone is beyond the specification, all together are."""
+    bench = BENCHES["gnss"]
+    sound = bench.align(bench.draw(9305, 0)[0])
+    gyro, accel = sound.gyro_bias_prior, sound.accel_bias_prior
+
+    def found(size, sigma=0.05):
+        answer = replace(
+            sound,
+            gyro_bias=size * gyro,
+            accel_bias=size * accel,
+            gyro_bias_sigma=sigma * gyro,
+            accel_bias_sigma=sigma * accel,
+        )
+        return bias_evidence(answer), claimed(answer)
+
+    assert found(1.0) == ([], found(1.0)[1])
+    assert found(2.7, sigma=0.95)[0] == []  # what the specification alone says shows nothing
+    (item,), claim = found(2.7)
+    assert (item.key, item.figures["count"]) == ("bias.together", 6)
+    # The accelerometers' prior counts what scale factors make of gravity twice: they say less
+    assert 2.0 < item.figures["factor"] <= 2.7
+    grows = np.sqrt(item.figures["factor"] ** 2 - 1.0)
+    assert item.effect.level == pytest.approx(grows * claim.level)
+    assert item.effect.heading == pytest.approx(grows * claim.heading)
 
 
 @pytest.mark.slow

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
-from truenorth.alignment.result import Alignment, Status
+from truenorth.alignment.result import NOT_ESTIMATED, Alignment, Status
+from truenorth.analysis.chi_square import tail
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
 from truenorth.core.errors import AlignmentError
@@ -236,7 +237,32 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
                 "imu": answer.imu_source,
             }
             found.append(Evidence(f"bias.{kind}", figures, "bounded", effect, ("specification",)))
-    return found
+    return found + _biases_together(answer, gravity) if answer.moving is not None else found
+
+
+def _biases_together(answer: Alignment, gravity: Array) -> list[Evidence]:
+    """Biases found on the move that are together larger than the specification allows, though none of them alone is.
+
+    Normalised they are a chi-square of as many degrees of freedom as were found. Where chance does not give it, the IMU is as many
+    times as poor as they are large in the mean, and so much larger is the sigma of heading and level: what nothing has shown of its
+    biases and noise is as poor.
+    """
+    prior = np.concatenate([answer.gyro_bias_prior**2, answer.accel_bias_prior**2 + gravity])
+    own = np.concatenate([answer.gyro_bias_sigma, answer.accel_bias_sigma]) ** 2
+    seen = np.sqrt(own) < NOT_ESTIMATED * np.sqrt(prior)
+    count = int(seen.sum())
+    if not count:
+        return []
+    bias = np.concatenate([answer.gyro_bias, answer.accel_bias])
+    total = float(np.sum((bias**2 / (prior + own))[seen]))
+    if tail(total, count) > math.erfc(limit("doubt") / math.sqrt(2.0)):
+        return []
+    factor = math.sqrt(total / count)
+    grows = math.sqrt(factor**2 - 1.0)
+    claims = claimed(answer)
+    effect = Effect(heading=grows * claims.heading, level=grows * claims.level)
+    figures: dict[str, Figure] = {"count": count, "factor": factor, "imu": answer.imu_source}
+    return [Evidence("bias.together", figures, "known", effect, ("specification",))]
 
 
 def leaves(time: float | None) -> list[Evidence]:

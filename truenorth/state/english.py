@@ -162,6 +162,10 @@ SENTENCES = {
     "bias.accel": (
         "the {axis} accelerometer's bias comes out {bias:ug|} ug, where the specification ({imu:imu}) allows {allowed:ug|} ug"
     ),
+    "bias.together": (
+        "the {count} biases that the measurements show are together {factor:.1f} times as large as the specification ({imu:imu}) "
+        "allows"
+    ),
     "aids.late": "the vehicle drives for {waited:.0f} s before anything aids: the log is used from then on",
     "answers.differ": (
         "the method that the library chooses finds another attitude in the same logs: heading differs by {heading:angle}, level by "
