@@ -1,6 +1,7 @@
 """Axes of gyros on the move: constants as the specification says, unless the log speaks against them. They count once."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from benchmarks.honesty import moving
 from benchmarks.honesty.harness import Log, simulated
 from tests.alignment.test_in_motion_learnt import track_of
 from truenorth.alignment import in_motion
+from truenorth.quality.slow_aids import FIXES, SPEEDS
 
 SEED = 61  # any
 
@@ -62,6 +64,20 @@ def test_axes_of_gyros_that_change_are_noise_in_turns(monkeypatch, turning):
     _, task = seen_by(monkeypatch, replace(turning, record=replace(record, gyro=gyro)))
     assert not task.steady
     assert max(task.model.turn_noise) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "steady"), [(FIXES, True), (SPEEDS, True), ("odometer", False), ("velocity log", False)]
+)
+def test_slow_errors_of_a_receiver_hide_no_axes(monkeypatch, name, steady):
+    """They do not turn with the vehicle; a wheel's slip does. With fixes that wander, three quarters of heading's variance was
+    noise in turns that its states count already."""
+    one = np.ones((400, 3))
+    found = SimpleNamespace(track=track_of(one, one), settled=True)
+    constant = SimpleNamespace(steady=True)
+    task = SimpleNamespace(steady=False, lasting={name: None}, with_constant_axes=lambda: constant)
+    monkeypatch.setattr(in_motion, "once_more", lambda task, before, first: found)
+    assert in_motion._as_specified(task, found, None)[0].steady is steady
 
 
 def test_the_log_decides():

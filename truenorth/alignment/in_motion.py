@@ -40,6 +40,7 @@ from truenorth.estimate.rivals import jump_evidence, likelihood_ratio, misfit, n
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.record_evidence import moving_evidence
+from truenorth.quality.slow_aids import FIXES, SPEEDS
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
@@ -225,11 +226,12 @@ def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTa
     """Passes with axes of the gyros that are constants, where the log does not speak against them: task, the last pass.
 
     Noise in turns besides states of the axes is the same error twice. It carries the first passes, of which nobody knows yet
-    whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose aids
-    have shown slow errors that nobody spoke of is not as specified: these may hide what the axes do.
+    whether the axes are constants; heading of a vehicle that turns all the time had three times its sigma by it. A log whose wheel
+    or velocity log has shown slow errors that nobody spoke of is not as specified: these turn with the vehicle, and may hide what
+    the axes do. Those of a receiver do not turn with it.
     """
     constant = task.with_constant_axes()
-    if constant is task or task.lasting:
+    if constant is task or task.lasting.keys() - {FIXES, SPEEDS}:
         return task, found
     other = found
     for number in range(MORE_PASSES):
