@@ -9,7 +9,7 @@ from truenorth.coarse.lever_arm import arm_velocity
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.errors.arm import arm_rows, with_arm
+from truenorth.errors.arm import arm_rows, slow_arm_rows, with_arm
 from truenorth.errors.staying import BA, BG, DV, PHI, StaticModel
 from truenorth.errors.sway import AxisMotion, Oscillator, with_motion, without_sway
 from truenorth.estimate.staying import Prior
@@ -18,7 +18,7 @@ from truenorth.papers.rotary.model import RotaryLog, earth_axes
 from truenorth.papers.rotary.truth import INDEXER_RATES
 from truenorth.records import ImuRecord
 from truenorth.simulation import Axis, Indexed, Indexer, Spin, Sway, Tone, simulate
-from truenorth.strapdown.inertial import earth_rotation, integrate
+from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 PLACE = Position.from_degrees(40.0, 118.0)
 INDEXER = Indexer(tuple(Axis(name, Spin(rate)) for name, rate in zip("zx", INDEXER_RATES, strict=True)))
@@ -156,3 +156,24 @@ def test_without_sway_an_indexer_still_turns():
     full = integrals.C_mean @ middle
     assert np.std(spread) < 0.1 * np.std(full - full.mean(axis=0))
     assert np.std(slow.C_mean[:, 0, 0]) > 0.3
+
+
+def test_the_slow_arm_has_the_swing_and_no_sea():
+    """A heading that swings in 72 s, and yaws in 8 s: the rows are those of the swing; at the ends the sea leaks in."""
+    time = np.arange(401.0)
+
+    def attitude(heading):
+        c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+        rows = [[c, s, zero], [-s, c, zero], [zero, zero, zero + 1.0]]
+        return np.moveaxis(np.array(rows), 2, 0)
+
+    def rows(heading):
+        C_n0_b = earth_rotation(time, PLACE.lat) @ attitude(heading)
+        log = InertialIntegrals(0.0, time, C_n0_b, *np.zeros((2, 401, 3)), *np.zeros((2, 400, 3, 3)), np.zeros((0, 3, 3)))
+        return slow_arm_rows(log, np.eye(3), PLACE.lat)
+
+    swing, sea = 0.014 * np.sin(2.0 * np.pi / 72.0 * time), 0.003 * np.sin(2.0 * np.pi / 8.0 * time)
+    expected = np.diff(attitude(0.6 + swing)[:, :, :2], axis=0)
+    assert np.max(np.abs(expected)) > 1e-3
+    assert np.max(np.abs(rows(0.6 + swing) - expected)) < 2e-4  # without a cubic 1e-3: .05 m/s of an arm of 50 m
+    assert np.max(np.abs(rows(0.6 + swing + sea) - expected)[20:-20]) < 5e-5

@@ -46,6 +46,11 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
     """The filter's end, from which it goes on."""
     integrals = fine.integrals
     sways = isinstance(fine, SwayAlignment)
+    kept = np.arange(fine.system.states)
+    if (
+        isinstance(fine, SwayAlignment) and fine.slow_arm is not None
+    ):  # what is slow in a heading shows itself afterwards only
+        kept = np.delete(kept, fine.slow_arm)
     return Ongoing(
         position=task.position,
         noise=noise,
@@ -64,7 +69,7 @@ def go_on(task: Task, fine: FineAlignment, noise: StaticModel) -> Ongoing:
         C_ib=integrals.C_ib[-1].copy(),  # not the whole log's, which a view would hold
         velocity=integrals.velocity[-1].copy(),
         place=integrals.position[-1].copy(),
-        x=fine.end.copy(),
-        P=fine.P.copy(),
+        x=fine.end[kept],
+        P=fine.P[np.ix_(kept, kept)],
         largest=block_limits(fine.estimates),
     )

@@ -31,6 +31,7 @@ DIFFERENCE = 1e-5  # of a logarithm, for derivatives
 LONGEST = 2.0  # step of a logarithm, or of a phase in rad
 SHORTEST = 1e-4  # part of a step that is tried
 WIDER = 1e-3  # difference for second derivatives
+LEAST_LEVENBERG = 1e-13  # of the diagonal: with less than rounding leaves, two parameters that do the same make a singular matrix
 CLOSE = 0.02  # of twice the log-likelihood: nearer than this is the maximum
 FARTHEST = 30.0  # rad: phase over the log by which a search may move a frequency
 
@@ -40,20 +41,22 @@ def fit_motion(
     interval: float,  # s
     walks: Walks,
     start: AxisMotion | None = None,  # a good guess, which competes with what a search from nothing finds
-    most: int = MOST_OSCILLATORS,  # oscillators
+    most: int = MOST_OSCILLATORS[0],  # oscillators
+    others: Array | None = None,  # (K, p) what is taken out besides the trend
 ) -> AxisMotion:
     """The motion along one axis."""
-    series = Series(residual, interval, walks)
-    best = _search(series, most)
-    return best if start is None else min(best, _climb(series, start, POLISHES), key=series.score)
+    series = Series(residual, interval, walks, others)
+    best = search(series, most)
+    return best if start is None else min(best, climb(series, start, POLISHES), key=series.score)
 
 
-def _search(series: Series, most: int) -> AxisMotion:
-    """One oscillator after the other, as long as the criterion falls."""
-    best = _climb(series, AxisMotion(max(float(np.std(series.detrended)), QUIETEST)), POLISHES)
+def search(series: Series, most: int, start: AxisMotion | None = None) -> AxisMotion:
+    """One oscillator after the other, as long as the criterion falls; from nothing, or besides those of a good guess."""
+    white = AxisMotion(max(float(np.std(series.detrended)), QUIETEST))
+    best = climb(series, white if start is None else start, POLISHES)
     score = series.score(best)
-    for count in range(1, most + 1):
-        chosen = _climb(series, min(_candidates(series, best, count), key=series.score), POLISHES)
+    for count in range(len(best.oscillators) + 1, most + 1):
+        chosen = climb(series, min(_candidates(series, best, count), key=series.score), POLISHES)
         found = series.score(chosen)
         if found >= score:
             break
@@ -70,7 +73,7 @@ def _candidates(series: Series, best: AxisMotion, count: int) -> list[AxisMotion
         lines += [_at_peaks(series, count, 1, LINE)]
     scored = sorted((_score(series, guess) for guess in broad), key=series.score)
     # Whittle's likelihood loses a line's phase: lines are polished from the peak itself.
-    return [_climb(series, guess, TRIALS) for guess in (*scored[:1], *lines)]
+    return [climb(series, guess, TRIALS) for guess in (*scored[:1], *lines)]
 
 
 def _with_one_more(motion: AxisMotion, series: Series, order: int, damping: float | None = None) -> AxisMotion:
@@ -173,7 +176,7 @@ def _score(series: Series, guess: AxisMotion) -> AxisMotion:
             f_trial = expected(trial[None])[0]
             value = series.whittle(f_trial)
             if value < cost:
-                u, f, cost, damping = trial, f_trial, value, 0.2 * damping
+                u, f, cost, damping = trial, f_trial, value, max(0.2 * damping, LEAST_LEVENBERG)
                 break
             damping *= 5.0
         if before - cost < CLOSE:
@@ -181,7 +184,7 @@ def _score(series: Series, guess: AxisMotion) -> AxisMotion:
     return scale.motion(u)
 
 
-def _climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
+def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
     """Quasi-Newton (BFGS) on the exact likelihood."""
     scale = _Scale(guess, float(series.lags[-1]))
     size = len(scale.centre)
@@ -199,9 +202,10 @@ def _climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
 
     u = np.zeros(size)
     value = cost(u[None])[0]
-    slope, inverse = gradient(u, value), inverse_curvatures(u, value)
+    slope = gradient(u, value) if np.isfinite(value) else np.full(size, np.nan)
     if not np.isfinite(slope).all():  # the guess stands at the edge of what is a model at all: nothing says where to go
         return guess
+    inverse = inverse_curvatures(u, value)
     for _ in range(iterations):
         held = ((u <= scale.low) & (slope > 0)) | ((u >= scale.high) & (slope < 0))
         step = -np.where(held, 0.0, inverse @ np.where(held, 0.0, slope))

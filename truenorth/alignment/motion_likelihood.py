@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from truenorth.alignment.windowed import hann
 from truenorth.core.compiled import compiled
 from truenorth.errors.sway import AxisMotion, Oscillator, add_autocovariance, fill_blocks
-from truenorth.filters.scalar import restricted
+from truenorth.filters.scalar import products, restricted
 
 Array = NDArray[np.float64]
 Orders = NDArray[np.int64]
 
 TREND = 4  # degree of the polynomial that takes what the first fit missed
 LOWEST_BIN = 3  # slower than this is the trend's
+LINES = 16  # that go through a filter at once: each is multiplied by all others
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,15 @@ class Series:
     residual : (K,) array, m/s
     interval : float, s
     walks : Walks
+    others : (K, p) array, optional
+        What is taken out besides the trend, each of unknown size.
     """
 
-    def __init__(self, residual: Array, interval: float, walks: Walks) -> None:
+    def __init__(self, residual: Array, interval: float, walks: Walks, others: Array | None = None) -> None:
         K = len(residual)
         basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, K), min(TREND, max(K - 8, 0)))
+        if others is not None:
+            basis = np.column_stack([basis, others])
         self.interval, self.walks = interval, walks.blocks(interval)
         self.columns = np.column_stack([residual, basis])
         self.detrended = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
@@ -102,6 +107,29 @@ class Series:
         _deviances(orders, np.exp(logs), self.interval, *self.walks, self.columns, found)
         return found
 
+    def lines(self, motion: AxisMotion, frequencies: Array) -> tuple[Array, Array]:
+        """What lines of frequencies (m,), rad/s, would gain besides a motion and what is taken out, and their sigmas (m,), m/s.
+
+        Of each the cosine and the sine go through the motion's filter as the columns that are taken out do.
+        """
+        orders, logs = parameters(motion)
+        gain, sigma = np.empty((2, len(frequencies)))
+        for first in range(0, len(frequencies), LINES):
+            part = slice(first, first + LINES)
+            phase = np.outer(self.lags, frequencies[part])
+            p, m = self.columns.shape[1], phase.shape[1]
+            columns = np.concatenate([self.columns, np.cos(phase), np.sin(phase)], axis=1)
+            gram = np.zeros((p + 2 * m, p + 2 * m))
+            _products(orders, np.exp(logs), self.interval, *self.walks, columns, gram)
+            gram += np.tril(gram, -1).T
+            out = slice(1, p)
+            left = gram - gram[:, out] @ np.linalg.solve(gram[out, out], gram[out])
+            pairs = p + np.arange(m)[:, None] + [0, m]
+            normal, match = left[pairs[:, :, None], pairs[:, None]], left[pairs, 0]
+            size = np.linalg.solve(normal, match[..., None])[..., 0]
+            gain[part], sigma[part] = np.sum(size * match, axis=1), np.sqrt(0.5 * np.sum(size**2, axis=1))
+        return gain, sigma
+
     def score(self, motion: AxisMotion) -> float:
         """Schwarz's criterion."""
         orders, logs = parameters(motion)
@@ -116,15 +144,28 @@ def _autocovariances(orders: Any, values: Any, interval: float, acf: Any) -> Non
 
 
 @compiled
+def _products(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any) -> None:
+    Phi, Q, P, h, first = _model(orders, values, interval, walk_Phi, walk_Q)
+    products(Phi, Q, P, h, values[0] ** 2, Y, first, gram)
+
+
+@compiled
 def _deviances(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, found: Any) -> None:
+    for m in range(len(values)):
+        Phi, Q, P, h, first = _model(orders, values[m], interval, walk_Phi, walk_Q)
+        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first)
+
+
+@compiled
+def _model(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any) -> Any:
+    """Transition, noise, first covariance and output row of a motion and the walks behind it, and the motion's states."""
     n = 2
     for order in orders:  # np.sum would load a part of Numba that nothing else here needs, .2 s
         n += 2 * order
-    for m in range(len(values)):
-        Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-        first = fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, Phi, Q, P, h)
-        for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
-            for j in range(2):
-                Phi[first + i, first + j], Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
-        h[first] = 1.0
-        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first)
+    Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+    first = fill_blocks(orders, values[1:].reshape(-1, 3), interval, Phi, Q, P, h)
+    for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
+        for j in range(2):
+            Phi[first + i, first + j], Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
+    h[first] = 1.0
+    return Phi, Q, P, h, first

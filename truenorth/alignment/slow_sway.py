@@ -25,7 +25,7 @@ from truenorth.alignment.drift import KINDS as COURSES
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Innovations, innovations_of, matched
 from truenorth.errors.staying import PHI
-from truenorth.errors.sway import AXIS_STATES, AxisMotion, Oscillator
+from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
 from truenorth.estimate.rivals import RULED_OUT
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, through
@@ -129,9 +129,8 @@ def _kind(cause: Cause) -> str:
 def _smaller(system: LinearSystem, motion: Sequence[AxisMotion], duration: float, share: float) -> LinearSystem:
     """The system with the slow oscillators of its base so many times as large."""
     Q, P0 = system.Q.copy(), system.P0.copy()
-    first = system.states - 3 * AXIS_STATES
     for axis, item in enumerate(motion):
-        at = first + axis * AXIS_STATES
+        at = motion_first(system.states, axis)
         for part in item.oscillators:
             states = slice(at, at + part.states)
             if is_slow(part, duration):

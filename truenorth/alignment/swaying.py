@@ -8,7 +8,7 @@ attitude, biases, lever arm and motion together, twice: the second time about th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -22,6 +22,8 @@ from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
 from truenorth.alignment.slow_sway import slow_sway_evidence
 from truenorth.alignment.sway_noise import noisier_sensors
+from truenorth.alignment.swing import may_swing, swing_note, swings
+from truenorth.alignment.swing_fit import ARM, fit_swing
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import normal_gravity
@@ -29,7 +31,7 @@ from truenorth.core.position import Position
 from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
-from truenorth.estimate.staying import StayingLog, prior_of
+from truenorth.estimate.staying import Prior, StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
@@ -69,6 +71,7 @@ class SwayAlignment(FineAlignment):
     arm_sigma: Array  # (3,) m
     begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
     noisier: Mapping[str, float] = field(default_factory=dict)  # times its specification, by sensor
+    slow_arm: slice | None = None  # states of the arm of a base that swings on lines; None of another
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,10 @@ class _MotionFilter:
         self.passes, self.base = self.passes + 1, system
         if self.passes == 2:  # about a good attitude: what was in the first residual besides the motion is gone
             self.motion = _fit(system.z, self.interval, self.walks, self.motion)
+        return self.filtered(system)
+
+    def filtered(self, system: LinearSystem) -> Filtered:
+        """With the motion as fitted."""
         full = with_motion(system, self.interval, self.motion)
         return Filtered(full, kalman(full, history="full"))
 
@@ -99,6 +106,27 @@ class _MotionFilter:
         motion = _fit(left.z, self.interval, self.walks, self.motion)
         estimates = kalman(with_motion(left, self.interval, motion), history="full")
         return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
+
+
+class _SwingFilter(_MotionFilter):
+    """The same of a base that swings on lines, about an attitude that is good already: fitted once."""
+
+    def __init__(self, plain: _MotionFilter, turns: slice) -> None:
+        self.interval, self.walks, self.passes, self.motion, self.turns = (
+            plain.interval,
+            plain.walks,
+            0,
+            plain.motion,
+            turns,
+        )
+
+    def __call__(self, system: LinearSystem) -> Filtered:
+        self.passes, self.base = self.passes + 1, system
+        if self.passes == 1:
+            self.motion = _no_quieter(
+                fit_swing(system, self.interval, self.walks, self.motion, system.H[:, :, self.turns])
+            )
+        return self.filtered(system)
 
 
 def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
@@ -117,8 +145,35 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     model, position = start.model, start.position
     walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
     estimator = _MotionFilter(residual, step, walks)
+    plain = _filtered(log, estimator)
+    suspect = bool(plain.noisier) or any(item.kind != "hint" for item in plain.begun)
+    if not may_swing(plain, plain.motion, position, suspect=suspect):
+        return plain
+    prior = _prior(start, mount, turned, ARM)
+    on_lines = StayingLog(
+        log.record,
+        log.C_n0_i,
+        position,
+        model,
+        prior,
+        log.interval,
+        log.rows,
+        integrals=log.integrals,
+        sways=True,
+        C_sb=mount.C_sb,
+        taken=np.append(log.taken, np.zeros(len(prior.mean) - len(log.taken))),
+    )
+    swung = _filtered(on_lines, _SwingFilter(estimator, prior.groups["slow arm"]))
+    clean = not swung.noisier and all(item.kind == "hint" for item in swung.begun)
+    if not (clean and swings(swung, swung.motion, plain, plain.begun, position)):
+        return plain
+    return replace(swung, begun=(*swung.begun, swing_note(swung.motion)))
+
+
+def _filtered(log: StayingLog, estimator: _MotionFilter) -> SwayAlignment:
+    """The log about its last pass, and what may have begun in it."""
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
-    arm = log.prior.groups["arm"]
+    position, arm = log.position, log.prior.groups["arm"]
     # The sigma of a slow model is that of its whole life: no more than what the IMU itself did in this log.
     seen = np.sqrt(np.mean(base_velocity(log.integrals, log.C_n0_i, position.lat, position.alt) ** 2, axis=0))
     fine = SwayAlignment.of(
@@ -129,11 +184,12 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         motion=estimator.motion,
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
+        slow_arm=log.prior.groups.get("slow arm"),
     )
     return replace(
         fine,
         begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion, estimator.without)),
-        noisier=noisier_sensors(log, estimator.motion, step, partial(begun, fine)),
+        noisier=noisier_sensors(log, estimator.motion, estimator.interval, partial(begun, fine)),
     )
 
 
@@ -172,8 +228,8 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     The fit knows no random walk. Of gyros that make a large one it takes the wander for signal, and its passes may run away:
     then the log is fitted with as little weight as the walk leaves it.
     """
-    record, C_n0_i, position, model, P_bias, interval, rows_at = start
-    prior = prior_of(P_bias, spec=turned, arm=mount.arm, arm_sigma=mount.arm_sigma, offset_sigma=mount.offset_sigma)
+    record, C_n0_i, position, model, _, interval, rows_at = start
+    prior = _prior(start, mount, turned)
     g = float(normal_gravity(position.lat, position.alt))
     walked = math.sqrt(record.duration / 3.0) * math.hypot(
         model.accel_random_walk, g * model.gyro_random_walk * record.duration
@@ -195,14 +251,28 @@ def _fitted(base_velocity: float, system: LinearSystem) -> _Fitted:
     return _Fitted(found.x, found.residual)
 
 
+def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: float = 0.0) -> Prior:
+    return prior_of(
+        start.P_bias,
+        spec=turned,
+        arm=mount.arm,
+        arm_sigma=mount.arm_sigma,
+        offset_sigma=mount.offset_sigma,
+        slow_arm_sigma=slow_arm,
+    )
+
+
 def _fit(
-    residual: Array, interval: float, walks: Walks, start: tuple[AxisMotion, ...] | None = None
+    residual: Array, interval: float, walks: Walks, start: Sequence[AxisMotion] | None = None
 ) -> tuple[AxisMotion, ...]:
     """Motion along E, N, U; no quieter than bedrock."""
     fits = []
     for axis in range(3):
-        # The vertical carries no attitude: its strongest motion is enough.
-        most = 1 if axis == 2 else MOST_OSCILLATORS
-        item = fit_motion(residual[:, axis], interval, walks, None if start is None else start[axis], most)
-        fits.append(replace(item, white=max(item.white, QUIETEST_BASE)))
-    return tuple(fits)
+        guess = None if start is None else start[axis]
+        fits.append(fit_motion(residual[:, axis], interval, walks, guess, MOST_OSCILLATORS[axis]))
+    return _no_quieter(fits)
+
+
+def _no_quieter(motion: Iterable[AxisMotion]) -> tuple[AxisMotion, ...]:
+    """The same motions, no quieter than bedrock."""
+    return tuple(replace(item, white=max(item.white, QUIETEST_BASE)) for item in motion)

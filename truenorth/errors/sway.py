@@ -31,8 +31,10 @@ from truenorth.strapdown.inertial import InertialIntegrals
 
 Array = NDArray[np.float64]
 
-MOST_OSCILLATORS = 2  # along an axis; always as many states, the unused ones zero: one compiled filter serves all
-AXIS_STATES = 4 * MOST_OSCILLATORS
+# Along an axis; always as many states, the unused ones zero: one compiled filter serves all. The vertical carries no attitude: its
+# strongest motion is enough there. Level, a ship may also swing on her lines, by one oscillator of the first order.
+MOST_OSCILLATORS = (2, 2, 1)
+AXIS_STATES = (10, 10, 4)
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)  # over a step of up to half a period: exact to rounding
 
@@ -185,6 +187,11 @@ def add_autocovariance(orders: Any, values: Any, interval: float, acf: Any) -> N
             c, s = c * c_step - s * s_step, c * s_step + s * c_step
 
 
+def motion_first(states: int, axis: int) -> int:
+    """The first state of the motion along an axis, of a system of so many states whose last ones are its base's motion."""
+    return states - sum(AXIS_STATES[axis:])
+
+
 def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMotion]) -> LinearSystem:
     """The system with the motion of its base as states.
 
@@ -201,11 +208,11 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
     LinearSystem
         Of 24 more states.
     """
-    n = system.states
-    bigger = grown(system, n + 3 * AXIS_STATES)
+    states = system.states + sum(AXIS_STATES)
+    bigger = grown(system, states)
     white = np.zeros(3)
     for axis, item in enumerate(motion):
-        first = n + axis * AXIS_STATES
+        first = motion_first(states, axis)
         part = slice(first, first + item.states)
         Phi, Q, P, h = item.blocks(interval)
         bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q

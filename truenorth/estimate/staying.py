@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.position import Position
 from truenorth.core.remembered import remembered
-from truenorth.errors.arm import arm_rows, with_arm
+from truenorth.errors.arm import arm_rows, slow_arm_rows, with_arm
 from truenorth.errors.level_rate import LEVEL_RATE, with_level_rate
 from truenorth.errors.matrices import MATRICES, matrices_of, with_matrices, without_errors
 from truenorth.errors.staying import BG, BIASES, PHI, QUIETEST_BASE, STATES, Form, StaticModel, force_system
@@ -56,6 +56,7 @@ def prior_of(
     arm: ArrayLike | None = None,
     arm_sigma: float = 0.0,
     offset_sigma: float = 0.0,
+    slow_arm_sigma: float = 0.0,
     level_rate: float = 0.0,
 ) -> Prior:
     """The prior of a base of whose attitude nothing is known but that it is about level.
@@ -74,6 +75,8 @@ def prior_of(
         One sigma along each axis; zero where it is known.
     offset_sigma : float, m
         One sigma of each component of the way from the axes of an indexer to the IMU, which turns with it; zero: it has none.
+    slow_arm_sigma : float, m
+        One sigma of each component of a level arm by which the slow part of the heading acts, besides the arm; zero: there is none.
     level_rate : float, rad/s
         One sigma, along east and along north, of the earth's level rate where heading is a convention; zero where it is not.
     """
@@ -99,6 +102,11 @@ def prior_of(
         means.append(np.zeros(3))
         blocks.append(np.full(3, offset_sigma))
         size += 3
+    if slow_arm_sigma:
+        groups["slow arm"] = slice(size, size + 2)
+        means.append(np.zeros(2))
+        blocks.append(np.full(2, slow_arm_sigma))
+        size += 2
     if level_rate:
         groups["rate"] = slice(size, size + LEVEL_RATE)
         means.append(np.zeros(LEVEL_RATE))
@@ -187,6 +195,9 @@ class StayingLog:
         if "offset" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat)
             system = with_arm(system, rows, self.taken[groups["offset"]])
+        if "slow arm" in groups:
+            rows = slow_arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)
+            system = with_arm(system, rows, self.taken[groups["slow arm"]])
         if "rate" in groups:
             system = with_level_rate(system, self.integrals, lat, alt)
         return system.with_made(x0=self.prior.mean - self.taken, P0=P0)

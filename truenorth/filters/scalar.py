@@ -56,13 +56,13 @@ def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stat
 def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int) -> float:
     """:func:`deviance` for kernels; `P` stands at the first epoch on entry, and is work space."""
     gram = np.zeros((Y.shape[1], Y.shape[1]))
-    value = _whiten(Phi, Q, P, h, r, Y, stationary, gram) + _left(gram)
+    value = products(Phi, Q, P, h, r, Y, stationary, gram) + _left(gram)
     return value if math.isfinite(value) else math.inf
 
 
 @compiled
-def _whiten(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int, gram: Any) -> float:
-    """Sum of ``log F``; `gram` gets the products of the whitened columns of `Y`, its lower half."""
+def products(Phi: Any, Q: Any, P: Any, h: Any, r: float, Y: Any, stationary: int, gram: Any) -> float:
+    """Sum of ``log F``; the products of the whitened columns of `Y` are added to `gram`, its lower half."""
     n, columns = len(h), Y.shape[1]
     rank = n - stationary + 1
     width = columns + rank

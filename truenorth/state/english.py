@@ -98,6 +98,10 @@ SENTENCES = {
         "such as a base that leaves or a bias that changes, explains the log as well (likelihood ratio {ratio:.0f}); heading moves "
         "by {heading:angle}, level by {level:angle}"
     ),
+    "sway.swing": (
+        "the base swings slowly, as a ship does on her lines: by {east:.2f} m in {east_period:.0f} s along east, by {north:.2f} m "
+        "in {north_period:.0f} s along north"
+    ),
     "place.hemisphere": (
         "gravity turns as in the other hemisphere (likelihood ratio {ratio:.0f}): the latitude has the wrong sign"
     ),

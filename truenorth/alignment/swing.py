@@ -1,0 +1,84 @@
+"""Does a base swing on lines, or did something begin within the log? Only what a swing explains by far the best is taken for one.
+
+A base that leaves, a bias that steps, sensors that are noisier than specified: each looks slow, and a motion with more freedom
+would explain a part of it. So a swing is asked for where something looks as if it had begun, and is
+believed where it is likelier than the usual motion together with the best of all that may have begun, by more than chance
+and its own freedom give (Schwarz), where nothing else is slow, nothing is left that chance does not give, and where it is as
+small as that of a ship which her lines hold. Else the answer and the evidence are those of the usual motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from truenorth.alignment.bias_step import bias_signatures
+from truenorth.alignment.drift import drift_signatures
+from truenorth.alignment.fine import FineAlignment
+from truenorth.alignment.hemisphere import hemisphere_signature
+from truenorth.alignment.matched import innovations_of, matched
+from truenorth.alignment.swing_fit import MOST, is_swing, long_enough
+from truenorth.core.position import Position
+from truenorth.errors.sway import AxisMotion, Oscillator
+from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import limit, may_be_chance
+
+PARAMETERS = 6  # frequency and size of two lines, two components of the arm
+
+
+def may_swing(fine: FineAlignment, motion: Sequence[AxisMotion], position: Position, *, suspect: bool) -> bool:
+    """Whether a swing is worth asking for: something looks as if it had begun, of a motion that is suspect or goes slowly."""
+    if not long_enough(float(fine.integrals.time[-1])):
+        return False
+    slow = any(is_swing(item) for axis in motion[:2] for item in axis.oscillators)
+    return suspect or (slow and not may_be_chance(_likeliest(fine, position)))
+
+
+def swings(
+    fine: FineAlignment,
+    motion: Sequence[AxisMotion],
+    plain: FineAlignment,
+    begun: Sequence[Evidence],
+    position: Position,
+) -> bool:
+    """Whether a base swings on lines.
+
+    Parameters
+    ----------
+    fine : FineAlignment
+        With the swing.
+    motion : three AxisMotion
+        The swing's.
+    plain : FineAlignment
+        With the usual motion.
+    begun : sequence of Evidence
+        What may have begun instead, by a filter with the usual motion.
+    """
+    slow = [[item for item in axis.oscillators if is_swing(item)] for axis in motion[:2]]
+    if any(len(items) != 1 or amplitude(items[0]) > MOST for items in slow):
+        return False
+    ratios = [float(item.figures["ratio"]) for item in begun]
+    rival = 2.0 * float(plain.estimates.log_likelihood) + max([_likeliest(plain, position), *ratios])
+    gained = 2.0 * float(fine.estimates.log_likelihood) - rival
+    freedom = PARAMETERS * math.log(len(fine.integrals.intervals))
+    return fine.settled and gained - freedom > limit("drift") and may_be_chance(_likeliest(fine, position))
+
+
+def amplitude(line: Oscillator) -> float:
+    """Of the displacement, m."""
+    return math.sqrt(2.0) * line.sigma / line.frequency
+
+
+def swing_note(motion: Sequence[AxisMotion]) -> Evidence:
+    """That a base swings, as far and as slowly as this."""
+    lines = zip(("east", "north"), (axis.oscillators[-1] for axis in motion[:2]), strict=True)
+    figures = {}
+    for name, line in lines:
+        figures |= {name: amplitude(line), f"{name}_period": 2.0 * math.pi / line.frequency}
+    return note("sway.swing", **figures)
+
+
+def _likeliest(fine: FineAlignment, position: Position) -> float:
+    """Twice the logarithm of the likelihood ratio of the best of what innovations may show to have begun."""
+    banks = drift_signatures(fine), bias_signatures(fine), hemisphere_signature(fine, position)
+    return max(float(match.ratio.max()) for match in matched(innovations_of(fine), *banks))
