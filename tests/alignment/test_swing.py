@@ -54,7 +54,13 @@ def _still(z):
     K = len(z)
     one = np.eye(1)
     return LinearSystem(
-        one[None], np.zeros((1, 1, 1)), np.zeros((K, 3, 1)), QUIETEST_BASE**2 * np.eye(3)[None], z, np.zeros(1), 1e-9 * one
+        one[None],
+        np.zeros((1, 1, 1)),
+        np.zeros((K, 3, 1)),
+        QUIETEST_BASE**2 * np.eye(3)[None],
+        z,
+        np.zeros(1),
+        1e-9 * one,
     )
 
 
@@ -80,7 +86,9 @@ def test_a_log_must_show_that_the_swing_comes_back():
 
 def _fine(likelihood):
     return SimpleNamespace(
-        estimates=SimpleNamespace(log_likelihood=likelihood), settled=True, integrals=SimpleNamespace(intervals=np.ones(400))
+        estimates=SimpleNamespace(log_likelihood=likelihood),
+        settled=True,
+        integrals=SimpleNamespace(intervals=np.ones(400)),
     )
 
 

@@ -169,7 +169,9 @@ def test_the_slow_arm_has_the_swing_and_no_sea():
 
     def rows(heading):
         C_n0_b = earth_rotation(time, PLACE.lat) @ attitude(heading)
-        log = InertialIntegrals(0.0, time, C_n0_b, *np.zeros((2, 401, 3)), *np.zeros((2, 400, 3, 3)), np.zeros((0, 3, 3)))
+        log = InertialIntegrals(
+            0.0, time, C_n0_b, *np.zeros((2, 401, 3)), *np.zeros((2, 400, 3, 3)), np.zeros((0, 3, 3))
+        )
         return slow_arm_rows(log, np.eye(3), PLACE.lat)
 
     swing, sea = 0.014 * np.sin(2.0 * np.pi / 72.0 * time), 0.003 * np.sin(2.0 * np.pi / 8.0 * time)

@@ -31,7 +31,9 @@ DIFFERENCE = 1e-5  # of a logarithm, for derivatives
 LONGEST = 2.0  # step of a logarithm, or of a phase in rad
 SHORTEST = 1e-4  # part of a step that is tried
 WIDER = 1e-3  # difference for second derivatives
-LEAST_LEVENBERG = 1e-13  # of the diagonal: with less than rounding leaves, two parameters that do the same make a singular matrix
+LEAST_LEVENBERG = (
+    1e-13  # of the diagonal: with less than rounding leaves, two parameters that do the same make a singular matrix
+)
 CLOSE = 0.02  # of twice the log-likelihood: nearer than this is the maximum
 FARTHEST = 30.0  # rad: phase over the log by which a search may move a frequency
 

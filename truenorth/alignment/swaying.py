@@ -157,7 +157,7 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         model,
         prior,
         log.interval,
-        log.rows,
+        start.rows_at,
         integrals=log.integrals,
         sways=True,
         C_sb=mount.C_sb,

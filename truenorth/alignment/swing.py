@@ -20,7 +20,7 @@ from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.swing_fit import MOST, is_swing, long_enough
 from truenorth.core.position import Position
 from truenorth.errors.sway import AxisMotion, Oscillator
-from truenorth.state.evidence import Evidence, note
+from truenorth.state.evidence import Evidence, Figure
 from truenorth.state.limits import limit, may_be_chance
 
 PARAMETERS = 6  # frequency and size of two lines, two components of the arm
@@ -72,10 +72,10 @@ def amplitude(line: Oscillator) -> float:
 def swing_note(motion: Sequence[AxisMotion]) -> Evidence:
     """That a base swings, as far and as slowly as this."""
     lines = zip(("east", "north"), (axis.oscillators[-1] for axis in motion[:2]), strict=True)
-    figures = {}
+    figures: dict[str, Figure] = {}
     for name, line in lines:
         figures |= {name: amplitude(line), f"{name}_period": 2.0 * math.pi / line.frequency}
-    return note("sway.swing", **figures)
+    return Evidence("sway.swing", figures)
 
 
 def _likeliest(fine: FineAlignment, position: Position) -> float:

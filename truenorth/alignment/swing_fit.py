@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.matched import whitened
 from truenorth.alignment.motion_fit import search
 from truenorth.alignment.motion_likelihood import Series, Walks
 from truenorth.errors.arm import SLOWEST_SEA
@@ -115,9 +116,10 @@ def _together(
     lines = lines.copy()
     full = with_motion(system, interval, seas)
     estimates = kalman(full, history="full")
-    gains, L = filter_gains(full, estimates), np.linalg.cholesky(estimates.innovation_covariance)
-    nu = np.linalg.solve(L, estimates.innovation[..., None]).ravel()
-    t = interval * (np.arange(len(system.z)) + 0.5)
+    gains = filter_gains(full, estimates)
+    L: Array = np.asarray(np.linalg.cholesky(estimates.innovation_covariance), dtype=np.float64)
+    nu = whitened(L, estimates.innovation[..., None]).ravel()
+    t: Array = interval * (np.arange(len(system.z), dtype=np.float64) + 0.5)
     spacing = CELL / float(t[-1]) / 3.0
     for _ in range(LEVELS):
         for axis in (0, 1, 0, 1):
@@ -137,7 +139,7 @@ def _whitened(gains: Gains, L: Array, t: Array, axis: int, frequencies: Array) -
     signature = np.zeros((len(t), 3, 2 * len(frequencies)))
     phase = np.outer(t, frequencies)
     signature[:, axis, 0::2], signature[:, axis, 1::2] = np.cos(phase), np.sin(phase)
-    return np.linalg.solve(L, through(gains, signature)[0]).reshape(-1, len(frequencies), 2)
+    return whitened(L, through(gains, signature)[0]).reshape(-1, len(frequencies), 2)
 
 
 def _gained(columns: Array, other: Array, nu: Array) -> Array:
