@@ -147,7 +147,8 @@ def test_a_ship_on_her_lines_is_aligned(seed, run):
     off[:2] = answer.C_nb[:2] @ np.cross(answer.C_nb[2], C[2])
     assert np.all(np.abs(off) < 4.0 * np.sqrt(np.diag(answer.phi_covariance)))
     assert any(item.key == "sway.swing" for item in answer.evidence)
-    assert answer.ongoing.P.shape == (39, 39)  # the slow arm stays behind: which part of a heading is slow shows itself afterwards
+    # The slow arm stays behind: which part of a heading is slow shows itself afterwards.
+    assert answer.ongoing.P.shape == (39, 39)
 
 
 @pytest.mark.slow
