@@ -301,9 +301,11 @@ def _reached(answer: Alignment, verdict: Verdict, wanted: float, remedies: tuple
         needed = horizontal * math.tan(min(wanted, 1.0))
         source = answer.imu_source
         return [note("heading.bias", bias=bias, imu=source, limit=wanted, lat=lat, needed=needed), good_level]
+    if floor > wanted:  # by what evidence has added to it, which says what to do; a longer log does not take it off
+        return [note("heading.wanted", *remedies, sigma=sigma, duration=answer.duration, limit=wanted), good_level]
     figures = {"sigma": sigma, "duration": answer.duration, "limit": wanted, "floor": floor}
     key = "heading.short"
-    if answer.pays_until is not None:
+    if answer.pays_until is not None and answer.pays_until > answer.duration:
         key, figures = "heading.short_until", figures | {"pays_until": answer.pays_until}
     return [Evidence(key, figures, remedies=("record_longer",)), good_level]
 
