@@ -93,6 +93,22 @@ def test_rows_and_cells_in_quotes_stay_what_they_are(read):
         assert NOTE not in notes(record)
 
 
+@pytest.mark.parametrize("quote", "\"'")
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_rows_that_stand_in_quotes_as_one_cell(read, quote, mark, end):
+    """Double ones were refused: no line of numbers."""
+    lines = [f"{quote}{line.replace(',', mark)}{quote}" for line in (HEADER, *ROWS)]
+    sound = read([HEADER, *ROWS])
+    assert same(read(lines, end), sound)
+    assert same(read([HEADER.replace(",", mark), *lines[1:]], end), sound)
+    assert len(read([*lines[:-1], lines[-1][:20]], end, last=False)) == len(ROWS) - 1
+
+
+def test_rows_of_which_one_stands_in_quotes_are_left_to_the_rules_of_stray_ones(read):
+    assert same(read(changed(30, f'"{ROWS[30]}"')), read([HEADER, *ROWS]))
+
+
 def test_a_quoted_cell_may_hold_separators_and_line_ends(read):
     lines = [HEADER + ",remark", *(row + ',"calm, warm"' for row in ROWS)]
     record = read(lines)

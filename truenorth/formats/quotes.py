@@ -14,7 +14,14 @@ from truenorth.core.errors import DataError
 from truenorth.formats.content import REMARKS_BYTES
 
 NUMBER_OR_STAMP = rb"[+-]?\.?\d[\w.:/+-]*(?: \d\d?:[\d:.]+)?"
+# A line that one pair of quotes holds, with its separators.
+WHOLE_ROW = re.compile(rb"""(?m)^[ \t]*(["'])([^"'\r\n]*[,;\t| ][^"'\r\n]*)\1[ \t]*(?=\r?$)""")
 SINGLE_WITH_COMMA = re.compile(rb"'[+-]?\d+,\d+'")  # a decimal comma inside quotes: not to be cut
+
+
+def without_outer_quotes(text: bytes) -> bytes:
+    """Take off the quotes around whole rows, and single ones at numbers."""
+    return without_single_quotes(without_row_quotes(text))
 
 
 def without_single_quotes(text: bytes) -> bytes:
@@ -26,6 +33,21 @@ def without_single_quotes(text: bytes) -> bytes:
     number = rb"(" + NUMBER_OR_STAMP + rb")"
     either = before + rb"'" + number + rb"'?" + after + rb"|" + before + number + rb"'" + after
     return re.sub(rb"(?m)" + either, rb"\1\2\3\4", text)
+
+
+def without_row_quotes(text: bytes) -> bytes:
+    """Take off the quotes of a table each of whose rows stands in one pair of them: ``"0.01,1.0,2.0"``.
+
+    By the rules of CSV that is a table of one column of text, which no log is: some loggers write their rows as one cell. All rows
+    from the first such line on have to be of it, but for a last one that is cut short.
+    """
+    first = WHOLE_ROW.search(text) if b'"' in text or b"'" in text else None
+    if first is None:
+        return text
+    above, table = text[: first.start()], text[first.start() :]
+    bare, count = WHOLE_ROW.subn(rb"\2", table)
+    rows = sum(bool(line.strip()) and not line.lstrip().startswith(REMARKS_BYTES) for line in table.splitlines())
+    return above + bare if count >= max(2, rows - 1) else text
 
 
 def is_open(line: str, delimiter: str | None) -> bool:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from truenorth.core.errors import DataError
 from truenorth.formats.arrow import table_of, to_numpy
 from truenorth.formats.content import REMARKS, REMARKS_BYTES, text_of
-from truenorth.formats.quotes import is_open, plain_cells, without_single_quotes, without_stray_quotes
+from truenorth.formats.quotes import is_open, plain_cells, without_outer_quotes, without_stray_quotes
 from truenorth.records import Record
 
 if TYPE_CHECKING:
@@ -237,7 +237,7 @@ def open_table(path: Path) -> TextTable:
         No line of numbers, lines that fit no dialect, or a header of another number of columns.
     """
     text, note = text_of(path)
-    text = without_single_quotes(text)
+    text = without_outer_quotes(text)
     head = _head(path, text)
     if not head:
         raise DataError(f"{path.name}: no header and no numbers; the file holds empty lines only")
