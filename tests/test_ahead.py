@@ -14,7 +14,7 @@ from truenorth.core import kernel_store
 from truenorth.core.kernel_lock import KernelLock
 from truenorth.core.position import Position
 from truenorth.errors.sway import fill_blocks
-from truenorth.filters.gains import _fill, _products, _through
+from truenorth.filters.gains import _fill, _parts, _through
 from truenorth.filters.linear import linear_runs
 from truenorth.simulation import Sway, Tone, simulate
 from truenorth.strapdown.inertial_integration import _integrate_attitude
@@ -27,7 +27,7 @@ KERNELS = (
     fill_blocks,
     _sum_back,
     _fill,
-    _products,
+    _parts,
     _through,
     _follow,
     _integrate_attitude,
