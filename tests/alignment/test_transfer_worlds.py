@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.honesty.transfer import ERRORS, aircraft
 from tests.alignment.test_transfer import ARCMIN, DEG, MASTER, TACTICAL
 from truenorth.alignment.transfer import _colour, align_transfer
 from truenorth.alignment.transfer_answer import _bent
@@ -43,6 +44,22 @@ def test_gyros_that_are_late_are_found_though_the_master_seems_early(late):
     found = [item.figures["delay"] for item in answer.evidence if item.key == "delay.gyros_late"]
     assert found == ([pytest.approx(0.2, abs=0.021)] if late else [])
     assert (answer.status == "aligned") == (late == 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [0.0, 10.0])
+def test_errors_of_the_master_are_no_wander_of_the_gyros(step):
+    """In each sound flight gyros that wander followed the master and were likelier by 12 to 30; a step of 10 deg/h is one."""
+    way, spec = aircraft(), imu_spec("tactical")
+    own = MasterSpec(
+        level=0.3 * ARCMIN, heading=2.0 * ARCMIN, velocity=0.05, velocity_noise=0.05, attitude_noise=ARCMIN
+    )
+    slave = simulate(way, rate=100.0, duration=200.0, imu=spec, seed=8825).record
+    master = simulate_sensor(way, own, duration=200.0, seed=8825).record
+    off = np.outer(slave.time > 100.0, [slave.interval * math.radians(step / 3600.0), 0.0, 0.0])
+    answer = align_transfer(replace(slave, gyro=slave.gyro + off), master, spec, master_errors=ERRORS)
+    found = [item.key for item in answer.evidence if item.key.startswith("rival.")]
+    assert found == (["rival.gyro_wanders"] if step else [])
 
 
 def test_an_arm_on_a_seat_that_bends_is_known_as_well_as_the_rates_are_rigid():

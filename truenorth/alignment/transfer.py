@@ -189,11 +189,19 @@ def _rivals(
     start: Start,
     spec: ImuSpec,
 ) -> list[Evidence]:
-    """What else would explain the log; `run` with a slave, a model and a start."""
+    """What else would explain the log; `run` with a slave, a model and a start.
+
+    A likelihood is that of innovations which are white. Those of a filter that considers the master's errors are not: the errors
+    are in all of them alike. A rival that follows the master more closely has them in none, and is likelier however sound the
+    slave is. So all are compared with these errors estimated.
+    """
 
     def other(model: TransferModel) -> Track:
         return run(part, model=model, start=start)
 
+    if model.master != MasterErrors():
+        model = replace(model, considered=False)
+        track = other(model)
     warming = partial(warming_rivals, partial(run, model=model, start=start), track, part, spec)
     found = noise_evidence(other, track, model, part)
     found += wandering_evidence(other, track, model, spec, part.duration, warming=warming)

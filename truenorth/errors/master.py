@@ -196,6 +196,7 @@ class TransferModel(Walks):
     flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
     flexure_beta: float = 1.0  # rad/s; natural frequency of its critically damped processes
     master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
+    considered: bool = True  # whether the master's errors count in the covariance alone; else they are estimated
     misalignment: float = 0.0  # rad; of the gyros' axes: what turns them all alike is a group, the rest noise in turns
 
     def __post_init__(self) -> None:
@@ -222,11 +223,11 @@ class TransferModel(Walks):
         rate = math.sqrt(2.0 / of.correlation_time)
         if of.velocity > 0.0 or of.velocity_drift > 0.0:
             sigma, walk = np.full(3, math.hypot(of.velocity, of.velocity_drift)), rate * of.velocity_drift
-            found.append(Group(VELOCITY_ERROR, sigma, walk=walk, considered=True, unit="m/s"))
+            found.append(Group(VELOCITY_ERROR, sigma, walk=walk, considered=self.considered, unit="m/s"))
         if of.level > 0.0 or of.heading > 0.0 or of.attitude_drift > 0.0:
             sigma = np.hypot([of.level, of.level, of.heading], of.attitude_drift)
             walk = rate * of.attitude_drift
-            found.append(Group(ATTITUDE_ERROR, sigma, walk=walk, considered=True, unit="rad"))
+            found.append(Group(ATTITUDE_ERROR, sigma, walk=walk, considered=self.considered, unit="rad"))
         return {group.name: group for group in found}
 
     @cached_property
