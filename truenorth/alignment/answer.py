@@ -13,7 +13,7 @@ from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import Task
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, radii
-from truenorth.errors.staying import BA, BIASES
+from truenorth.errors.staying import BA, BG, BIASES
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.inertial import earth_rotation
 
@@ -83,9 +83,9 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
     if sways:
         covariance = covariance + creep(task, fine.integrals.time[1:])
     e = fine.estimates
-    bias, variance = fine.nominal_bias + e.x[:, BIASES], np.einsum("kii->ki", e.P)[:, BIASES]
+    bias, variance = fine.nominal_bias + e.x[:, BIASES], np.einsum("kii->ki", e.P[:, BA, BA])
     prior = np.diag(fine.system.P0)[BA]
-    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance[:, 3:], prior, used.bias_variance[3:])
+    accel_bias, accel_sigma = true_bias(bias[:, 3:], variance, prior, used.bias_variance[3:])
     return History(
         time=fine.integrals.start + fine.integrals.time[1:],
         C_nb=C_nb,
@@ -95,7 +95,7 @@ def make_history(task: Task, fine: FineAlignment, used: ImuSpec, sways: bool = F
             "kji,kj->ki", earth_rotation(fine.integrals.time[1:], task.position.lat), fine.departures()
         ),
         gyro_bias=bias[:, :3],
-        gyro_bias_sigma=np.sqrt(variance[:, :3]),
+        gyro_bias_sigma=e.sigma[:, BG].copy(),
         accel_bias=accel_bias,
         accel_bias_sigma=accel_sigma,
         innovation=e.innovation,

@@ -158,11 +158,11 @@ def _matches(
         courses, signatures = bank.after.shape
         part, own = slice(row, row + signatures), np.r_[0:n, course : course + courses]  # e, and this bank's courses
         begun = np.concatenate([e[part], bank.after.T], axis=1)
-        form = forms[at[part]][:, own[:, None], np.concatenate([own, columns])]
+        form = forms[:, own[:, None], np.concatenate([own, columns])][at[part]]
         after = (begun[:, None] @ form)[:, 0]
         energy[part] += np.sum(after[:, : len(own)] * begun, axis=1)
         match[part] += after[:, len(own) :]
-        left[:, part] = (ends[at[part]][:, :, own] @ begun[..., None])[..., 0].T
+        left[:, part] = (ends[:, :, own][at[part]] @ begun[..., None])[..., 0].T
         row, course = row + signatures, course + courses
         parts.append(part)
     of_innovations = match[:, 0]

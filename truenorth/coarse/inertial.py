@@ -100,8 +100,8 @@ def oba(
     starts = ends // 2
     db, dr = b[1:] - b[starts], r[1:] - r[starts]
     weights = np.ones(len(ends))
-    sums = np.cumsum(davenport_matrices(db, dr, weights), axis=0)
-    found = rotation_from_davenport(sums if history else sums[-1:])
+    each = davenport_matrices(db, dr, weights)
+    found = rotation_from_davenport(np.cumsum(each, axis=0) if history else each.sum(axis=0, keepdims=True))
     if not gains:
         return _as_coarse(found[-1], np.zeros((0, 3, 3)), form)
     pair_gain = error_gain(dr, weights)

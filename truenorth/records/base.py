@@ -96,7 +96,11 @@ class Record(_Ordered):
         _check_shapes(self, groups)
         _check_time(self.time, self.source)
         for name, columns in groups.items():
-            _check_finite(getattr(self, name), columns, self.source, name in self.PARTIAL)
+            self._check_numbers(name, columns)
+
+    def _check_numbers(self, name: str, columns: Sequence[str]) -> None:
+        """Refuse an array whose numbers cannot be."""
+        _check_finite(getattr(self, name), columns, self.source, name in self.PARTIAL)
 
     def _holds(self, name: str) -> bool:
         """Whether an array is there."""

@@ -15,7 +15,7 @@ from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
-LARGEST = (1e6, 1e8)  # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
+LARGEST = {"gyro": 1e6, "accel": 1e8}  # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
 SLOWEST = 1.0  # s between two rows
 Kind = Literal["rates", "increments"]
 
@@ -67,16 +67,18 @@ class ImuRecord(Record):
         if not isinstance(self.kind, str) or self.kind not in COLUMNS:
             raise DataError(f"{self.source}: kind {self.kind!r} is not known; use 'rates' or 'increments'")
         super().__post_init__()
-        scale = self.interval if self.kind == "increments" else 1.0
-        for values, limit, names in zip(
-            (self.gyro, self.accel), LARGEST, (COLUMNS[self.kind][:3], COLUMNS[self.kind][3:])
-        ):
-            if max(values.max(), -values.min()) > limit * scale:
-                row, i = np.argwhere(np.abs(values) > limit * scale)[0]
-                raise DataError(
-                    f"{self.source}: row {row + 1}, column {names[i]}: {values[row, i]:g}; no such sensor measures more than "
-                    f"{limit * scale:g}: check the units, or repair the row"
-                )
+
+    def _check_numbers(self, name: str, columns: Sequence[str]) -> None:
+        """Refuse what is not finite, and what no sensor measures."""
+        values, limit = getattr(self, name), LARGEST[name] * (self.interval if self.kind == "increments" else 1.0)
+        if max(values.max(), -values.min()) <= limit:
+            return
+        super()._check_numbers(name, columns)
+        row, i = np.argwhere(np.abs(values) > limit)[0]
+        raise DataError(
+            f"{self.source}: row {row + 1}, column {columns[i]}: {values[row, i]:g}; no such sensor measures more than "
+            f"{limit:g}: check the units, or repair the row"
+        )
 
     def check_rate(self) -> None:
         """Refuse a record whose rows are too far apart to be integrated; increments may be, where they add up to gravity.
