@@ -261,8 +261,8 @@ def quaternion_from_rotation_vector(rotation: Any) -> Any:
     x, y, z = rotation
     square = x * x + y * y + z * z
     if square < SMALL_ANGLE_SQUARED:
-        w = 1.0 - square / 8.0 * (1.0 - square / 48.0)
-        s = 0.5 - square / 48.0 * (1.0 - square / 80.0)
+        w = 1.0 - 0.125 * square * (1.0 - (1.0 / 48.0) * square)
+        s = 0.5 - (1.0 / 48.0) * square * (1.0 - (1.0 / 80.0) * square)
     else:
         angle = math.sqrt(square)
         w = math.cos(0.5 * angle)

@@ -85,8 +85,9 @@ def velocity_increment(K: Any, A: Any, a: Any, L: Any, B: Any, b: Any) -> Any:
     """Velocity increment of an update in body axes at its beginning: rotation and sculling corrected."""
     square = A[0] * A[0] + A[1] * A[1] + A[2] * A[2]
     if square < 1e-2:
-        c1 = 0.5 - square / 24.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0))
-        c2 = 1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))
+        # By factors: a division takes as long as five products.
+        c1 = 0.5 - (1.0 / 24.0) * square * (1.0 - (1.0 / 30.0) * square * (1.0 - (1.0 / 56.0) * square))
+        c2 = 1.0 / 6.0 - (1.0 / 120.0) * square * (1.0 - (1.0 / 42.0) * square * (1.0 - (1.0 / 72.0) * square))
     else:
         angle = math.sqrt(square)
         c1 = (1.0 - math.cos(angle)) / square

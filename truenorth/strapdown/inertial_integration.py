@@ -24,6 +24,7 @@ from truenorth.strapdown.coning import Algorithm, coefficients, rotation_vector,
 from truenorth.strapdown.increments import read_only
 
 Array = NDArray[np.float64]
+END = 1.0 / 12.0  # of Euler and Maclaurin's end correction
 
 
 def integrate_attitude(dtheta: ArrayLike, q0: ArrayLike | None = None, algorithm: Algorithm = "previous") -> Array:
@@ -159,9 +160,9 @@ def _inertial_integrals(
             f = rotate(q, velocity_increment(K, a, a, L, b, b))
             if math.isnan(before[0]):
                 before = f
-            px += (vx + 0.5 * f[0] - (f[0] - before[0]) / 12.0) * T
-            py += (vy + 0.5 * f[1] - (f[1] - before[1]) / 12.0) * T
-            pz += (vz + 0.5 * f[2] - (f[2] - before[2]) / 12.0) * T
+            px += (vx + 0.5 * f[0] - END * (f[0] - before[0])) * T
+            py += (vy + 0.5 * f[1] - END * (f[1] - before[1])) * T
+            pz += (vz + 0.5 * f[2] - END * (f[2] - before[2])) * T
             before = f
             vx += f[0]
             vy += f[1]
