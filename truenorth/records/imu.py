@@ -15,7 +15,8 @@ from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records.base import Guess, Record
 
 Array = NDArray[np.float64]
-LARGEST = {"gyro": 1e6, "accel": 1e8}  # rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
+# rad/s and m/s^2: far beyond any IMU; squares of what is larger overflow in the end
+LARGEST = {"gyro": 1e6, "accel": 1e8}
 SLOWEST = 1.0  # s between two rows
 Kind = Literal["rates", "increments"]
 
