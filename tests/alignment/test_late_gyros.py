@@ -19,10 +19,20 @@ def test_gyros_that_a_filter_delays_are_in_the_sigma_of_level(run, late):
 
 
 @pytest.mark.slow
-def test_sound_sways_have_gyros_of_one_moment():
+def test_gyros_of_an_indexed_imu_that_a_filter_delays_are_in_sigma():
+    """Seed 5: before, level was 19 sigmas off."""
+    inputs, truth = BENCHES["rotary"].draw(5, 1)
+    answer = BENCHES["rotary"].align(inputs | {"record": gyros_behind(inputs["record"], 0.01)})
+    assert "response.gyros_late" in {item.key for item in answer.evidence}
+    assert max(np.abs(x).max() for x in misses(answer, truth).values()) < 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bench", ["swaying", "rotary"])
+def test_sound_sways_have_gyros_of_one_moment(bench):
     """Of 20 sound logs, of one in 2000 by chance."""
     keys = set()
     for run in range(20):
-        inputs, _ = BENCHES["swaying"].draw(515, run)
-        keys |= {item.key for item in BENCHES["swaying"].align(inputs).evidence}
+        inputs, _ = BENCHES[bench].draw(515, run)
+        keys |= {item.key for item in BENCHES[bench].align(inputs).evidence}
     assert not {"response.gyros_late", "response.gyros_early"} & keys

@@ -1,4 +1,4 @@
-"""Are the gyros of a base that sways late against its accelerometers? By the filter's own response to gyros that are.
+"""Are the gyros of a base that sways, or of an IMU that turns on it, late? By the filter's own response to gyros that are.
 
 Gravity carried by gyros that are late by ``d`` is askew by the rate times ``d``, and the attitude is that much behind. The fit of
 all signed orders and delays (:mod:`truenorth.quality.tilt`) needs no filter and sees .03 s and more: what the base itself does is
@@ -9,7 +9,7 @@ freedom where the clocks agree: one of 2000 sound logs exceeds the limit of a hi
 delay, .6 to 1 of it.
 
 A moored ship, whose waves carry her as they roll her, looks like delays of .03 to .3 s (see `tilt.py`), and the axes do not tell
-the two apart. So this refuses no log: the tilt is in the level's sigma, however large.
+the two apart. So this refuses no log: tilt and turn are in sigma, however large.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SHOWN = 0.6  # of a delay, that the fit of the base's motion leaves at least
 
 
 def late_gyros_evidence(fine: FineAlignment, record: ImuRecord, interval: float, position: Position) -> list[Evidence]:
-    """A delay of the gyros that is likelier than chance, with the tilt that it makes.
+    """A delay of the gyros that is likelier than chance, with the tilt, and the turn about the vertical, that it makes.
 
     Parameters
     ----------
@@ -59,7 +59,17 @@ def late_gyros_evidence(fine: FineAlignment, record: ImuRecord, interval: float,
         return []
     delay = float(size[0])
     rate = record.gyro / (record.interval if record.kind == "increments" else 1.0)
-    tilt = abs(delay) / SHOWN * math.sqrt(float(np.mean(np.sum((rate - rate.mean(axis=0)) ** 2, axis=1))))
-    figures: dict[str, Figure] = {"delay": abs(delay), "ratio": ratio, "chance": limit("hint"), "level": tilt}
+    up = record.accel / np.linalg.norm(record.accel, axis=1, keepdims=True)
+    about = np.sum(rate * up, axis=1)
+    turned = abs(delay) / SHOWN
+    tilt = turned * math.sqrt(max(float(np.mean(np.sum(rate**2, axis=1) - about**2)), 0.0))
+    turn = turned * math.sqrt(float(np.mean(about**2)))
+    figures: dict[str, Figure] = {
+        "delay": abs(delay),
+        "ratio": ratio,
+        "chance": limit("hint"),
+        "heading": turn,
+        "level": tilt,
+    }
     side = "late" if delay > 0.0 else "early"
-    return [Evidence(f"response.gyros_{side}", figures, "hint", Effect(level=tilt), ("common_clock",))]
+    return [Evidence(f"response.gyros_{side}", figures, "hint", Effect(heading=turn, level=tilt), ("common_clock",))]

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.fine import CoarseStart, FineAlignment
+from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
@@ -163,6 +164,7 @@ def align_rotary(
     drift, steps, hemisphere = what_begins(fine, spec, task.position)
     evidence = model_evidence(drift, settled=fine.settled)
     evidence += base_speed(answer) + steps + bad_stretches(fine, record) + hemisphere
+    evidence += [] if own in FADING else late_gyros_evidence(fine, record, task.interval, task.position)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     return judged(answer, _of_encoder(record, encoder, axes, task) + evidence + notes(encoder.notes), heading_limit)

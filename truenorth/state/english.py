@@ -145,11 +145,11 @@ SENTENCES = {
     ),
     "response.gyros_late": (
         "gyros {delay:.4f} s late against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
-        "{chance:.0f} at most); level moves by {level:angle} as the base sways"
+        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
     ),
     "response.gyros_early": (
         "gyros {delay:.4f} s early against the accelerometers fit the log better (likelihood ratio {ratio:.0f}, chance gives "
-        "{chance:.0f} at most); level moves by {level:angle} as the base sways"
+        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
     ),
     "axes.half_turn": (
         "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
