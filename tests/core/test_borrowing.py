@@ -22,13 +22,16 @@ OF_NUMBERS = {
     "cos",
     "tan",
     "log",
+    "log1p",
     "exp",
     "abs",
     "inf",
     "nan",
     "pi",
     "arctan2",
+    "float64",
     "int64",
+    "uint64",
     "bool_",
 }
 
