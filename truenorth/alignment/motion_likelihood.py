@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from truenorth.alignment.windowed import hann
 from truenorth.core.compiled import compiled
 from truenorth.errors.sway import AxisMotion, Oscillator, add_autocovariance, fill_blocks
-from truenorth.filters.scalar import products, restricted
+from truenorth.filters.scalar import LANES, in_lanes, products, restricted
 
 Array = NDArray[np.float64]
 Orders = NDArray[np.int64]
 
 TREND = 4  # degree of the polynomial that takes what the first fit missed
 LOWEST_BIN = 3  # slower than this is the trend's
-LINES = 16  # that go through a filter at once: each is multiplied by all others
+LINES = 16  # that go through a lane of a filter at once: each is multiplied by all others
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,7 @@ class Series:
             basis = np.column_stack([basis, others])
         self.interval, self.walks = interval, walks.blocks(interval)
         self.columns = np.column_stack([residual, basis])
+        self.lanes = in_lanes(self.columns)
         self.detrended = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
         taper = hann(K)
         taper /= math.sqrt(float(np.sum(taper**2)))
@@ -104,7 +105,7 @@ class Series:
     def exact(self, orders: Orders, logs: Array) -> Array:
         """Minus twice the restricted log-likelihoods (m,) of motions with logarithms (m, 1 + 3 q)."""
         found = np.empty(len(logs))
-        _deviances(orders, np.exp(logs), self.interval, *self.walks, self.columns, found)
+        _deviances(orders, np.exp(logs), self.interval, *self.walks, self.lanes, found)
         return found
 
     def lines(self, motion: AxisMotion, frequencies: Array) -> tuple[Array, Array]:
@@ -114,26 +115,37 @@ class Series:
         """
         orders, logs = parameters(motion)
         gain, sigma = np.empty((2, len(frequencies)))
-        for first in range(0, len(frequencies), LINES):
-            part = slice(first, first + LINES)
-            phase = np.outer(self.lags, frequencies[part])
-            p, m = self.columns.shape[1], phase.shape[1]
-            columns = np.concatenate([self.columns, np.cos(phase), np.sin(phase)], axis=1)
-            gram = np.zeros((p + 2 * m, p + 2 * m))
-            _products(orders, np.exp(logs), self.interval, *self.walks, columns, gram)
-            gram += np.tril(gram, -1).T
-            out = slice(1, p)
-            left = gram - gram[:, out] @ np.linalg.solve(gram[out, out], gram[out])
-            pairs = p + np.arange(m)[:, None] + [0, m]
-            normal, match = left[pairs[:, :, None], pairs[:, None]], left[pairs, 0]
-            size = np.linalg.solve(normal, match[..., None])[..., 0]
-            gain[part], sigma[part] = np.sum(size * match, axis=1), np.sqrt(0.5 * np.sum(size**2, axis=1))
+        p = self.columns.shape[1]
+        for first in range(0, len(frequencies), LANES * LINES):
+            part = slice(first, first + LANES * LINES)
+            # Shared out evenly; the last ones stand in a lane twice.
+            m = -(-len(frequencies[part]) // LANES)
+            own = np.minimum(first + np.arange(LANES * m), len(frequencies) - 1).reshape(LANES, m)
+            phase = self.lags[:, None, None] * frequencies[own]
+            pairs = np.swapaxes(np.concatenate([np.cos(phase), np.sin(phase)], axis=2), 1, 2)
+            columns = np.concatenate([self.lanes, pairs], axis=1)
+            grams = np.zeros((p + 2 * m, p + 2 * m, LANES))
+            _products(orders, np.tile(np.exp(logs), (LANES, 1)), self.interval, *self.walks, columns, grams)
+            for lane, which in enumerate(own):
+                gain[which], sigma[which] = _gained(grams[..., lane], p)
         return gain, sigma
 
     def score(self, motion: AxisMotion) -> float:
         """Schwarz's criterion."""
         orders, logs = parameters(motion)
         return float(self.exact(orders, logs[None])[0]) + math.log(len(self.lags)) * len(logs)
+
+
+def _gained(lower: Array, p: int) -> tuple[Array, Array]:
+    """What m pairs of columns gain, and their sigmas, of the products of p others and of theirs; the lower half."""
+    gram = lower + np.tril(lower, -1).T
+    m = (len(gram) - p) // 2
+    out = slice(1, p)
+    left = gram - gram[:, out] @ np.linalg.solve(gram[out, out], gram[out])
+    pairs = p + np.arange(m)[:, None] + [0, m]
+    normal, match = left[pairs[:, :, None], pairs[:, None]], left[pairs, 0]
+    size = np.linalg.solve(normal, match[..., None])[..., 0]
+    return np.sum(size * match, axis=1), np.sqrt(0.5 * np.sum(size**2, axis=1))
 
 
 @compiled
@@ -145,27 +157,45 @@ def _autocovariances(orders: Any, values: Any, interval: float, acf: Any) -> Non
 
 @compiled
 def _products(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any) -> None:
-    Phi, Q, P, h, first = _model(orders, values, interval, walk_Phi, walk_Q)
-    products(Phi, Q, P, h, values[0] ** 2, Y, first, gram)
+    Phi, Q, P, h, r, first = _models(orders, values, 0, interval, walk_Phi, walk_Q)
+    products(Phi, Q, P, h, r, Y, first, gram, np.empty(LANES))
 
 
 @compiled
 def _deviances(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, found: Any) -> None:
-    for m in range(len(values)):
-        Phi, Q, P, h, first = _model(orders, values[m], interval, walk_Phi, walk_Q)
-        found[m] = restricted(Phi, Q, P, h, values[m, 0] ** 2, Y, first)
+    in_lanes = np.empty(LANES)
+    for begin in range(0, len(values), LANES):
+        Phi, Q, P, h, r, first = _models(orders, values, begin, interval, walk_Phi, walk_Q)
+        restricted(Phi, Q, P, h, r, Y, first, in_lanes)
+        for lane in range(min(LANES, len(values) - begin)):
+            found[begin + lane] = in_lanes[lane]
 
 
 @compiled
-def _model(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any) -> Any:
-    """Transition, noise, first covariance and output row of a motion and the walks behind it, and the motion's states."""
+def _models(orders: Any, values: Any, begin: int, interval: float, walk_Phi: Any, walk_Q: Any) -> Any:
+    """Motions from one on, a lane each, and the walks behind them; where there are none left, the last one again.
+
+    Transition, noise, first covariance, output row (of all), variance of what is white, and the states of a motion.
+    """
     n = 2
     for order in orders:  # np.sum would load a part of Numba that nothing else here needs, .2 s
         n += 2 * order
-    Phi, Q, P, h = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-    first = fill_blocks(orders, values[1:].reshape(-1, 3), interval, Phi, Q, P, h)
-    for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
-        for j in range(2):
-            Phi[first + i, first + j], Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
+    Phi, Q, P = np.zeros((n, n, LANES)), np.zeros((n, n, LANES)), np.zeros((n, n, LANES))
+    h, r, first = np.zeros(n), np.zeros(LANES), n - 2
+    one_Phi, one_Q, one_P = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    for lane in range(LANES):
+        m = min(begin + lane, len(values) - 1)
+        if lane == 0 or begin + lane < len(values):
+            for i in range(n):
+                for j in range(n):
+                    one_Phi[i, j] = one_Q[i, j] = one_P[i, j] = 0.0
+            fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, one_Phi, one_Q, one_P, h)
+            for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
+                for j in range(2):
+                    one_Phi[first + i, first + j], one_Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
+        for i in range(n):
+            for j in range(n):
+                Phi[i, j, lane], Q[i, j, lane], P[i, j, lane] = one_Phi[i, j], one_Q[i, j], one_P[i, j]
+        r[lane] = values[m, 0] ** 2
     h[first] = 1.0
-    return Phi, Q, P, h, first
+    return Phi, Q, P, h, r, first

@@ -202,6 +202,7 @@ load4, load8 = VectorStep(_make_load, 4), VectorStep(_make_load, 8)
 store4, store8 = VectorStep(_make_store, 4), VectorStep(_make_store, 8)
 spread4, spread8 = VectorStep(_make_spread, 4), VectorStep(_make_spread, 8)  # a number in every lane
 times4, times8 = VectorStep(_make_times, 4), VectorStep(_make_times, 8)  # of a number and a vector
+product8 = VectorStep(_make_of_two("fmul"), 8)  # of two vectors, lane by lane
 plus4, plus8 = VectorStep(_make_of_two("fadd"), 4), VectorStep(_make_of_two("fadd"), 8)
 minus4, minus8 = VectorStep(_make_of_two("fsub"), 4), VectorStep(_make_of_two("fsub"), 8)
 over4, over8 = VectorStep(_make_of_two("fdiv"), 4), VectorStep(_make_of_two("fdiv"), 8)
