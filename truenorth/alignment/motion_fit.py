@@ -160,26 +160,31 @@ class _Scale:
 def _score(series: Series, guess: AxisMotion) -> AxisMotion:
     """Fisher scoring of the Whittle likelihood, damped as Levenberg's."""
     scale = _Scale(guess, float(series.lags[-1]))
-    u, damping = np.zeros(len(scale.centre)), 1e-2
+    size = len(scale.centre)
+    u, damping = np.zeros(size), 1e-2
+    around = np.vstack([np.zeros(size), DIFFERENCE * np.eye(size)])
 
-    def expected(points: Array) -> Array:
-        return series.expected(scale.orders, scale.logs(points))
+    def expected(u: Array) -> Array:
+        return series.expected(scale.orders, scale.logs(u + around))
 
-    f = expected(u[None])[0]
-    cost = series.whittle(f)
+    f = expected(u)
+    cost = series.whittle(f[0])
     for _ in range(SCORINGS):
-        J = ((expected(u + DIFFERENCE * np.eye(len(u))) - f) / (DIFFERENCE * f)).T[LOWEST_BIN:]
-        slope = J.T @ (1.0 - series.periodogram[LOWEST_BIN:] / f[LOWEST_BIN:])
+        J = ((f[1:] - f[0]) / (DIFFERENCE * f[0])).T[LOWEST_BIN:]
+        slope = J.T @ (1.0 - series.periodogram[LOWEST_BIN:] / f[0, LOWEST_BIN:])
         fisher = J.T @ J
+        diagonal = np.diag(np.diag(fisher)) + 1e-6 * np.eye(size)
         before = cost
-        while damping < 1e6:
-            step = np.linalg.solve(fisher + damping * (np.diag(np.diag(fisher)) + 1e-6 * np.eye(len(u))), slope)
+        while True:
+            step = np.linalg.solve(fisher + damping * diagonal, slope)
             trial = scale.clipped(u - np.clip(step, -LONGEST, LONGEST))
-            f_trial = expected(trial[None])[0]
-            value = series.whittle(f_trial)
-            if value < cost:
-                u, f, cost, damping = trial, f_trial, value, max(0.2 * damping, LEAST_LEVENBERG)
+            f = expected(trial)
+            cost = series.whittle(f[0])
+            if cost < before:
+                u, damping = trial, max(0.2 * damping, LEAST_LEVENBERG)
                 break
+            if slope @ step < CLOSE:  # nor would a shorter step gain more
+                return scale.motion(u)
             damping *= 5.0
         if before - cost < CLOSE:
             break
@@ -190,21 +195,23 @@ def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
     """Quasi-Newton (BFGS) on the exact likelihood."""
     scale = _Scale(guess, float(series.lags[-1]))
     size = len(scale.centre)
+    around = np.vstack([np.zeros(size), DIFFERENCE * np.eye(size)])
+    farther = WIDER * np.vstack([np.eye(size), -np.eye(size)])
 
     def cost(points: Array) -> Array:
         return series.exact(scale.orders, scale.logs(points))
 
-    def gradient(u: Array, value: float) -> Array:
-        return (cost(u + DIFFERENCE * np.eye(size)) - value) / DIFFERENCE
+    def with_slope(u: Array) -> tuple[float, Array]:
+        values = cost(u + around)  # in the lanes of one pass
+        return float(values[0]), (values[1:] - values[0]) / DIFFERENCE
 
     def inverse_curvatures(u: Array, value: float) -> Array:
         """Of the axes; no curvature so small that a step would leave all bounds."""
-        both = cost(u + WIDER * np.eye(size)) + cost(u - WIDER * np.eye(size)) - 2.0 * value
-        return np.diag(1.0 / np.maximum(np.abs(both) / WIDER**2, 0.1))
+        above, below = cost(u + farther).reshape(2, size)
+        return np.diag(1.0 / np.maximum(np.abs(above + below - 2.0 * value) / WIDER**2, 0.1))
 
     u = np.zeros(size)
-    value = cost(u[None])[0]
-    slope = gradient(u, value) if np.isfinite(value) else np.full(size, np.nan)
+    value, slope = with_slope(u)
     if not np.isfinite(slope).all():  # the guess stands at the edge of what is a model at all: nothing says where to go
         return guess
     inverse = inverse_curvatures(u, value)
@@ -218,14 +225,13 @@ def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
         length = 1.0
         while length > SHORTEST:
             trial = scale.clipped(u + length * step)
-            found = cost(trial[None])[0]
+            found, after = with_slope(trial)
             if found < value + 1e-4 * slope @ (trial - u):
                 break
             length *= 0.3
         else:
             break
         gain = value - found
-        after = gradient(trial, found)
         s, y = trial - u, after - slope
         u, value, slope = trial, found, after
         if gain < CLOSE or not np.isfinite(y).all():  # at the edge of what is a model at all

@@ -190,7 +190,9 @@ def _models(orders: Any, values: Any, begin: int, interval: float, walk_Phi: Any
                 for j in range(n):
                     one_Phi[i, j] = one_Q[i, j] = one_P[i, j] = 0.0
             fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, one_Phi, one_Q, one_P, h)
-            for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
+            for i in range(
+                2
+            ):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
                 for j in range(2):
                     one_Phi[first + i, first + j], one_Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
         for i in range(n):

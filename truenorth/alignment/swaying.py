@@ -82,17 +82,21 @@ class _Fitted:
     residual: Array
 
 
+_Known = dict[tuple[int, AxisMotion | None, bytes], AxisMotion]  # motions that were fitted, by axis, guess and velocity
+
+
 class _MotionFilter:
     """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answer."""
 
     def __init__(self, residual: Array, interval: float, walks: Walks) -> None:
         self.interval, self.walks, self.passes = interval, walks, 0
-        self.motion = _fit(residual, interval, walks)
+        self.known: _Known = {}
+        self.motion = _fit(residual, interval, walks, None, self.known)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
         if self.passes == 2:  # about a good attitude: what was in the first residual besides the motion is gone
-            self.motion = _fit(system.z, self.interval, self.walks, self.motion)
+            self.motion = _fit(system.z, self.interval, self.walks, self.motion, self.known)
         return self.filtered(system)
 
     def filtered(self, system: LinearSystem) -> Filtered:
@@ -103,7 +107,7 @@ class _MotionFilter:
     def without(self, seen: Array) -> tuple[float, Array]:
         """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
         left = self.base.with_arrays(z=self.base.z - seen)
-        motion = _fit(left.z, self.interval, self.walks, self.motion)
+        motion = _fit(left.z, self.interval, self.walks, self.motion, self.known)
         estimates = kalman(with_motion(left, self.interval, motion), history="full")
         return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
 
@@ -112,13 +116,8 @@ class _SwingFilter(_MotionFilter):
     """The same of a base that swings on lines, about an attitude that is good already: fitted once."""
 
     def __init__(self, plain: _MotionFilter, turns: slice) -> None:
-        self.interval, self.walks, self.passes, self.motion, self.turns = (
-            plain.interval,
-            plain.walks,
-            0,
-            plain.motion,
-            turns,
-        )
+        self.interval, self.walks, self.motion, self.turns = plain.interval, plain.walks, plain.motion, turns
+        self.passes, self.known = 0, {}
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
@@ -263,13 +262,20 @@ def _prior(start: CoarseStart, mount: Mount, turned: ImuSpec | None, slow_arm: f
 
 
 def _fit(
-    residual: Array, interval: float, walks: Walks, start: Sequence[AxisMotion] | None = None
+    residual: Array,
+    interval: float,
+    walks: Walks,
+    start: Sequence[AxisMotion] | None,
+    known: _Known,
 ) -> tuple[AxisMotion, ...]:
-    """Motion along E, N, U; no quieter than bedrock."""
+    """Motion along E, N, U; no quieter than bedrock. What is `known` is not fitted again."""
     fits = []
     for axis in range(3):
         guess = None if start is None else start[axis]
-        fits.append(fit_motion(residual[:, axis], interval, walks, guess, MOST_OSCILLATORS[axis]))
+        asked = axis, guess, residual[:, axis].tobytes()
+        if asked not in known:
+            known[asked] = fit_motion(residual[:, axis], interval, walks, guess, MOST_OSCILLATORS[axis])
+        fits.append(known[asked])
     return _no_quieter(fits)
 
 
