@@ -6,7 +6,7 @@ from scipy.special import chdtrc, chdtri
 from truenorth.analysis.chi_square import chi_square_limit, tail
 
 
-@pytest.mark.parametrize("dof", [1, 2, 3, 4, 7, 12, 39, 300])
+@pytest.mark.parametrize("dof", [1, 2, 3, 4, 7, 12, 39, 300, 4001])
 @pytest.mark.parametrize("chance", [0.999, 0.5, 0.05, 1e-3, 1e-6, 1e-12, 1e-30])
 def test_limits_are_as_scipy_has_them(dof, chance):
     limit = chi_square_limit(chance, dof)

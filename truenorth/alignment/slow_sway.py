@@ -23,7 +23,7 @@ from truenorth.alignment.bias_step import bias_signatures, seen_of
 from truenorth.alignment.drift import AXES, ONSETS, drift_signatures
 from truenorth.alignment.drift import KINDS as COURSES
 from truenorth.alignment.fine import FineAlignment
-from truenorth.alignment.matched import Innovations, innovations_of, matched
+from truenorth.alignment.matched import Innovations, innovations_of, matched, whitened
 from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
 from truenorth.estimate.rivals import RULED_OUT
@@ -85,10 +85,8 @@ def slow_sway_evidence(
     lowest = -2.0 * float(as_fitted.log_likelihood)
     found = []
     for share in SMALLER:
-        less = _smaller(system, motion, duration, share)
-        estimates = kalman(less, history="full")
-        lowest = min(lowest, -2.0 * float(estimates.log_likelihood))
-        other = replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
+        other = fine if share == 1.0 else _with_less(fine, _smaller(system, motion, duration, share))
+        lowest = min(lowest, -2.0 * float(other.estimates.log_likelihood))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
         found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in causes(other)]
     # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
@@ -120,6 +118,12 @@ def slow_sway_evidence(
             return []  # what nobody can rule out, and changes nothing
         return [Evidence("sway.slow", figures, "hint", effect, ("record_longer",))]
     return [Evidence(best.key, figures, "bounded", effect, ("still_part",))]
+
+
+def _with_less(fine: FineAlignment, less: LinearSystem) -> FineAlignment:
+    """The log filtered with less of a motion."""
+    estimates = kalman(less, history="full")
+    return replace(fine, system=less, estimates=estimates, gains=filter_gains(less, estimates))
 
 
 def _kind(cause: Cause) -> str:
@@ -186,7 +190,7 @@ def _departure(fine: FineAlignment, seen: Innovations, onsets: Sequence[float]) 
         for axis in (0, 1):
             signature[:, axis, 2 * k + axis] = v if fine.form == "velocity" else np.diff(v, prepend=0.0)
     through_filter, left = through(fine.gains, signature)
-    white = np.linalg.solve(seen.L, through_filter).reshape(-1, len(when), 2)
+    white = whitened(seen.L, through_filter).reshape(-1, len(when), 2)
     nu = seen.white[:, :, 0].ravel()
     energy = np.einsum("ika,ikb->kab", white, white) + 1e-300 * np.eye(2)
     match = np.einsum("ika,i->ka", white, nu)

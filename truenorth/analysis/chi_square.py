@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
+MANY = 20_000  # degrees of freedom: their sums take longer than `scipy.special` to load
 STEPS = 200  # of Newton's method, at the most; it takes some ten
 
 
@@ -38,6 +39,10 @@ def chi_square_limit(chance: float, dof: int) -> float:
     """
     if dof <= 0 or chance >= 1.0:
         return 0.0
+    if dof > MANY:
+        from scipy.special import chdtri
+
+        return float(chdtri(dof, chance))
     # The logarithm of the tail is concave: Newton's method comes to the root from one side. From below the first step is too long.
     wanted, norm = math.log(chance), -0.5 * dof * math.log(2.0) - math.lgamma(0.5 * dof)
     x = float(dof)

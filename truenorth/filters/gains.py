@@ -29,6 +29,8 @@ class Gains(NamedTuple):
         ``(I - K_k H_k) Phi_k``: how an error goes on.
     H : (..., K, m, n) array
         The system's own; of one epoch where all are the same.
+    Phi : (..., K, n, n) array
+        The same.
     H_Phi : (..., K, m, n) array
         ``H_k Phi_k``: how an error of the epoch before is measured.
     """
@@ -36,6 +38,7 @@ class Gains(NamedTuple):
     gain: Array
     step: Array
     H: Array
+    Phi: Array
     H_Phi: Array
 
     @property
@@ -66,7 +69,8 @@ def filter_gains(system: LinearSystem, estimates: Estimates) -> Gains:
         )
     shape, K = estimates.P.shape[:-3], system.epochs
     runs = runs_of(system, shape)
-    found = Gains(np.empty((*shape, K, n, m)), np.empty((*shape, K, n, n)), system.H, np.empty((*shape, K, m, n)))
+    gain, step, H_Phi = (np.empty((*shape, K, *size)) for size in ((n, m), (n, n), (m, n)))
+    found = Gains(gain, step, system.H, system.Phi, H_Phi)
     given = (estimates.P, estimates.innovation, estimates.innovation_covariance, found.gain, found.step, found.H_Phi)
     _fill(runs, *(np.ascontiguousarray(a).reshape(-1, K, *a.shape[len(shape) + 1 :]) for a in given))
     return found
@@ -203,7 +207,7 @@ def through(gains: Gains, signature: Array) -> tuple[Array, Array]:
         The state at the last epoch.
     """
     innovation, x = np.empty_like(signature), np.zeros((gains.step.shape[-1], signature.shape[2]))
-    arrays = (gains.H_Phi, gains.gain, gains.step, signature)
+    arrays = (gains.H_Phi, gains.gain, gains.Phi, signature)
     _through(*(np.ascontiguousarray(a) for a in arrays), innovation, x, np.empty_like(x))
     return innovation, x
 
@@ -233,17 +237,41 @@ def _parts(step: Any, inner: Any, first: int, response: Any, part: Any) -> None:
 
 
 @compiled
-def _through(H_Phi: Any, gain: Any, step: Any, signature: Any, innovation: Any, x: Any, work: Any) -> None:
+def _through(H_Phi: Any, gain: Any, Phi: Any, signature: Any, innovation: Any, x: Any, work: Any) -> None:
+    """``y = signature - H Phi x`` and ``x = Phi x + K y``: most of Phi is zero, where of ``(I - K H) Phi`` hardly anything is.
+
+    What is all zero up to an epoch is left out: signatures that begin one after the other stand in that order.
+    """
+    m, begun = signature.shape[1], 0
     for k in range(signature.shape[0]):
-        times(H_Phi[k], x, innovation[k])
-        for i in range(signature.shape[1]):
+        for s in range(signature.shape[2] - 1, begun - 1, -1):
+            there = False
+            for i in range(m):
+                there |= signature[k, i, s] != 0.0
+            if there:
+                begun = s + 1
+                break
+        for i in range(m):
             for s in range(signature.shape[2]):
-                innovation[k, i, s] = signature[k, i, s] - innovation[k, i, s]
-        times(step[k], x, work)
-        times(gain[k], signature[k], x)
-        for i in range(x.shape[0]):
-            for s in range(x.shape[1]):
-                x[i, s] += work[i, s]
+                innovation[k, i, s] = signature[k, i, s]
+            for j in range(len(x)):
+                if H_Phi[k, i, j] != 0.0:
+                    for s in range(begun):
+                        innovation[k, i, s] -= H_Phi[k, i, j] * x[j, s]
+        for i in range(len(x)):
+            for s in range(begun):
+                work[i, s] = 0.0
+            for j in range(len(x)):
+                factor = Phi[min(k, len(Phi) - 1), i, j]
+                if factor != 0.0:
+                    for s in range(begun):
+                        work[i, s] += factor * x[j, s]
+        for i in range(len(x)):
+            for s in range(begun):
+                x[i, s] = work[i, s]
+            for j in range(m):
+                for s in range(begun):
+                    x[i, s] += gain[k, i, j] * innovation[k, j, s]
 
 
 @compiled

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.quality.led_away import led_away_evidence
 from truenorth.quality.whiteness import CHANCE, FEWEST, whiteness
 from truenorth.state.evidence import OUTPUTS, Effect, Evidence, Figure, contradiction, note
@@ -32,9 +33,7 @@ def mean_nis(source: Residuals) -> float | None:
 
 def largest_nis(rows: int) -> float:
     """Beyond which a mean NIS of so many rows is neither of a sound model nor chance: a few rows scatter."""
-    from truenorth.analysis.consistency import chi_square_quantile
-
-    return max(limit("nis"), float(chi_square_quantile(1.0 - CHANCE, rows)) / rows)
+    return max(limit("nis"), chi_square_limit(CHANCE, rows) / rows)
 
 
 def innovation_evidence(sources: Iterable[Residuals], sigma: Effect, *, by_motion: bool = False) -> list[Evidence]:
@@ -91,8 +90,6 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
     memory : float, s
         For which residuals are correlated: so many of them are independent; a constant or Schuler's period at least.
     """
-    from truenorth.analysis.consistency import chi_square_quantile
-
     found = []
     for source in sources:
         if len(source.time) < FEWEST:
@@ -102,7 +99,7 @@ def residual_evidence(sources: Iterable[Residuals], sigma: Effect, memory: float
         length = float(source.time[-1] - source.time[0])
         apart = min(max(memory, SCHULER), length)
         rows = max(round(2.0 * length / apart), 1)
-        if size**2 > float(chi_square_quantile(1.0 - CHANCE, rows)) / rows:
+        if size**2 > chi_square_limit(CHANCE, rows) / rows:
             grows = math.sqrt(size**2 - 1.0)
             effect = Effect(**{name: grows * own for name, own in sigma.items() if math.isfinite(own)})
             figures: dict[str, Figure] = {"name": source.name, "size": size}

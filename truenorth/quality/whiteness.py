@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -78,13 +79,11 @@ def scatter_of_means(e: Array) -> float:
     Correlations that are too small to be seen at any one lag are seen in their sum: a slow error of a tenth of the noise's power
     makes means over a hundred rows err three times as much.
     """
-    from truenorth.analysis.consistency import chi_square_quantile
-
     power, most = float(np.mean(e**2)), 1.0
     lengths = [4 * 2**k for k in range(len(e).bit_length()) if len(e) >= FEWEST_BLOCKS * 4 * 2**k]
     for length in lengths if power > 0.0 else ():
         means = e[: len(e) // length * length].reshape(-1, length, e.shape[1]).mean(axis=1)
         larger = length * float(np.mean(means**2)) / power
-        if larger > float(chi_square_quantile(1.0 - CHANCE / len(lengths), means.size)) / means.size:
+        if larger > chi_square_limit(CHANCE / len(lengths), means.size) / means.size:
             most = max(most, larger)
     return math.sqrt(most)
