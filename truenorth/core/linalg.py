@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.compiled import borrowing
 from truenorth.core.vectors import (
+    each4,
     load4,
     load8,
     minus4,
@@ -157,14 +158,20 @@ def multiply(size: Size, A: Array, B: Array, C: Array) -> None:
 
 @borrowing(forceinline=True)
 def four_rows(size: Size, A: Array, B: Array, Q: Array | None, i: int, columns: int, C: Array) -> None:
-    """Rows ``i .. i + 3`` of ``C = A B + Q``, as many columns as asked for, a multiple of 4.
+    """Rows ``i .. i + 3`` of ``C = A B + Q``, as many columns as asked for, a multiple of 4."""
+    four_rows_within(len(size), A, B, Q, i, 0, columns, C)
+
+
+@borrowing(forceinline=True)
+def four_rows_within(inner: int, A: Array, B: Array, Q: Array | None, i: int, first: int, stop: int, C: Array) -> None:
+    """Rows ``i .. i + 3`` of ``C = A B + Q``, columns from `first` to before `stop`, multiples of 4; `inner` terms of each sum.
 
     Four rows by eight columns stand in registers: each row of `B` is read once for four of `C`.
     """
-    j = 0
-    while j + 8 <= columns:
+    j = first
+    while j + 8 <= stop:
         a, b, c, d = zero8(), zero8(), zero8(), zero8()
-        for k in range(len(size)):
+        for k in range(inner):
             row = load8(B, (k, j))
             a = plus8(a, times8(A[i, k], row))
             b = plus8(b, times8(A[i + 1, k], row))
@@ -178,9 +185,9 @@ def four_rows(size: Size, A: Array, B: Array, Q: Array | None, i: int, columns: 
         store8(C, (i + 2, j), c)
         store8(C, (i + 3, j), d)
         j += 8
-    if j < columns:
+    if j < stop:
         e, f, g, h = zero4(), zero4(), zero4(), zero4()
-        for k in range(len(size)):
+        for k in range(inner):
             part = load4(B, (k, j))
             e = plus4(e, times4(A[i, k], part))
             f = plus4(f, times4(A[i + 1, k], part))
@@ -213,6 +220,31 @@ def mirror(size: Size, P: Array) -> None:
         for r in range(i + 1, i + 4):
             for c in range(i, r):
                 P[c, r] = P[r, c]
+
+
+@borrowing(forceinline=True)
+def mirror_upper(rows: int, P: Array) -> None:
+    """Make the first rows and columns of `P`, a multiple of 4, symmetric: the upper triangle is that of both."""
+    for i in range(0, rows, 4):
+        for j in range(i + 4, rows, 4):
+            transpose_block(P, i, j, P)
+        for r in range(i + 1, i + 4):
+            for c in range(i, r):
+                P[r, c] = P[c, r]
+
+
+@borrowing(forceinline=True)
+def scale_row(A: Array, i: int, first: int, stop: int, factor: float, B: Array) -> None:
+    """Row i of ``B = factor A``, columns from `first` to before `stop`, multiples of 4."""
+    for j in range(first, stop, 4):
+        store4(B, (i, j), times4(factor, load4(A, (i, j))))
+
+
+@borrowing(forceinline=True)
+def scale_columns(A: Array, i: int, first: int, stop: int, factors: Array, Q: Array, B: Array) -> None:
+    """Row i of ``B = A diag(factors) + Q``, columns from `first` to before `stop`, multiples of 4."""
+    for j in range(first, stop, 4):
+        store4(B, (i, j), plus4(each4(load4(A, (i, j)), load4(factors, (j,))), load4(Q, (i, j))))
 
 
 @borrowing(forceinline=True)

@@ -205,5 +205,6 @@ times4, times8 = VectorStep(_make_times, 4), VectorStep(_make_times, 8)  # of a 
 product8 = VectorStep(_make_of_two("fmul"), 8)  # of two vectors, lane by lane
 plus4, plus8 = VectorStep(_make_of_two("fadd"), 4), VectorStep(_make_of_two("fadd"), 8)
 minus4, minus8 = VectorStep(_make_of_two("fsub"), 4), VectorStep(_make_of_two("fsub"), 8)
+each4 = VectorStep(_make_of_two("fmul"), 4)  # product lane by lane
 over4, over8 = VectorStep(_make_of_two("fdiv"), 4), VectorStep(_make_of_two("fdiv"), 8)
 transposed4 = VectorStep(_make_turn, 4)  # rows of a 4 x 4 matrix from its columns

@@ -41,6 +41,7 @@ from numpy.typing import NDArray
 from truenorth.core import earth
 from truenorth.core.attitude import cross
 from truenorth.core.compiled import borrowing, compiled
+from truenorth.core.linalg import four_rows_within, transpose_block
 from truenorth.strapdown.wander import curvature
 
 Array = NDArray[np.float64]
@@ -168,19 +169,21 @@ def transition(size: Any, F: Any, decay: Any, T: float, Phi: Any, Phi_t: Any) ->
     Phi, Phi_t : (N, N) arrays
         Filled in; zero beyond the states.
     """
-    half = 0.5 * T * T
-    n = len(decay)
+    half, n = 0.5 * T * T, len(decay)
+    used = 4 * ((n + 3) // 4)
+    for i in range(0, DYNAMIC, 4):  # three rows more, of zeros
+        four_rows_within(DYNAMIC, F, F, None, i, 0, used, Phi)
     for i in range(DYNAMIC):
-        for j in range(len(size)):
-            total = 0.0
-            for k in range(DYNAMIC):
-                total += F[i, k] * F[k, j]
-            Phi[i, j] = F[i, j] * T + half * total
-        for j in range(DYNAMIC, n):  # the sensors' own decay, which stands on the diagonal of their rows
-            Phi[i, j] -= half * F[i, j] * decay[j]
+        for j in range(used):
+            Phi[i, j] = F[i, j] * T + half * Phi[i, j]
         Phi[i, i] += 1.0
-        for j in range(n):
-            Phi_t[j, i] = Phi[i, j]
+    for j in range(DYNAMIC, n):  # the sensors' own decay, which stands on the diagonal of their rows
+        if decay[j] != 0.0:
+            for i in range(DYNAMIC):
+                Phi[i, j] -= half * F[i, j] * decay[j]
+    for i in range(0, DYNAMIC, 4):
+        for j in range(0, used, 4):
+            transpose_block(Phi, i, j, Phi_t)
     for i in range(DYNAMIC, n):
-        Phi[i, i] = math.exp(-decay[i] * T)
+        Phi[i, i] = math.exp(-decay[i] * T) if decay[i] != 0.0 else 1.0
         Phi_t[i, i] = Phi[i, i]

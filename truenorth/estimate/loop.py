@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
-from truenorth.core.linalg import load
+from truenorth.core.linalg import copy_corner, load
 from truenorth.errors.invariant import keep_reset, reset
 from truenorth.estimate.correct import damp_height, feed_back, joint_nis, measure, set_place, update_held
 from truenorth.estimate.memory import (
@@ -148,9 +148,7 @@ def keep(m: Memory, w: Any, time: float, j: int, kept: Kept) -> None:
     for a in range(9, len(m.aux)):
         kept.aux[j, a] = m.aux[a]
     if kept.P.shape[0] > 0:
-        for a in range(len(m.aux)):
-            for b in range(len(m.aux)):
-                kept.P[j, a, b] = w.P[a, b]
+        copy_corner(w.P, kept.P[j], len(m.aux), len(m.aux))
 
 
 @borrowing
