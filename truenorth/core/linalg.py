@@ -150,6 +150,32 @@ def transposed_times(size: Size, A: Array, x: Array, y: Array) -> None:
 
 
 @borrowing(forceinline=True)
+def dot_at(columns: Any, a: Array, b: Array) -> float:
+    """``a' b`` of an `a` that is zero but at some places."""
+    total = 0.0
+    for k in columns:
+        total += a[k] * b[k]
+    return total
+
+
+@borrowing(forceinline=True)
+def transposed_times_at(size: Size, columns: Any, A: Array, x: Array, y: Array) -> None:
+    """``y = A' x`` of an `x` that is zero but at some places: the bits of :func:`transposed_times`."""
+    j = 0
+    while j + 8 <= len(size):
+        total = zero8()
+        for k in columns:
+            total = plus8(total, times8(x[k], load8(A, (k, j))))
+        store8(y, (j,), total)
+        j += 8
+    if j < len(size):
+        rest = zero4()
+        for k in columns:
+            rest = plus4(rest, times4(x[k], load4(A, (k, j))))
+        store4(y, (j,), rest)
+
+
+@borrowing(forceinline=True)
 def multiply(size: Size, A: Array, B: Array, C: Array) -> None:
     """``C = A B``; `C` is neither `A` nor `B`."""
     for i in range(0, len(size), 4):

@@ -11,6 +11,7 @@ from truenorth.aiding.row import row_at
 from truenorth.core import earth
 from truenorth.core.attitude import quaternion_from_rotation_vector, quaternion_product
 from truenorth.core.compiled import borrowing
+from truenorth.core.linalg import dot_at
 from truenorth.estimate.memory import Memory, Model, Sources
 from truenorth.filters.recursion import (
     NO_INNOVATION_VARIANCE,
@@ -44,7 +45,18 @@ def measure(m: Memory, model: Model, sources: Sources, source: int, measured: An
 
 
 @borrowing(forceinline=True)
-def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
+def touched(H: Any, columns: Any) -> int:
+    """Put down the columns of `H` that are not zero, in order; how many there are."""
+    count = 0
+    for j in range(H.shape[1]):
+        if H[0, j] != 0.0 or H[1, j] != 0.0 or H[2, j] != 0.0:
+            columns[count] = j
+            count += 1
+    return count
+
+
+@borrowing(forceinline=True)
+def joint_nis(size: Any, w: Any, columns: Any, S: Any, sigma: Any) -> Any:
     """How many rows are present, and ``nu' S^-1 nu`` of them together, by Cholesky's factor of ``S``."""
     count = 0
     nis = 0.0
@@ -53,16 +65,14 @@ def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
     for i in range(3):
         if np.isnan(w.z[i]):
             continue
-        _, variance, _ = row_variance(size, w, i, False)
+        _, variance, _ = row_variance(size, w, i, False, columns)
         sigma[i] = np.sqrt(variance)
         whitened = w.z[i]
         S[i, i] = variance
         for j in range(i):
             if np.isnan(w.z[j]):
                 continue
-            total = 0.0
-            for k in range(len(size)):
-                total += w.a[k] * w.H[j, k]
+            total = dot_at(columns, w.H[j], w.a)
             for k in range(j):
                 if not np.isnan(w.z[k]):
                     total -= S[i, k] * S[j, k]
@@ -77,7 +87,7 @@ def joint_nis(size: Any, w: Any, S: Any, sigma: Any) -> Any:
 
 
 @borrowing
-def update_held(size: Any, w: Any, held: Any) -> int:
+def update_held(size: Any, w: Any, columns: Any, held: Any) -> int:
     """Condition on all rows with the optimal gain, but none for the states that are considered only (Schmidt).
 
     With ``a = P h`` and ``k = a/s`` where a state is estimated, 0 where not: ``P = (I - k h') P (I - k h')' + k r k'``,
@@ -89,7 +99,7 @@ def update_held(size: Any, w: Any, held: Any) -> int:
     for row in range(w.z.shape[0]):
         if np.isnan(w.z[row]):
             continue
-        nu, variance, _ = row_variance(size, w, row, False)
+        nu, variance, _ = row_variance(size, w, row, False, columns)
         if not variance > 0.0:
             return NO_INNOVATION_VARIANCE
         if variance < (1.0 - ROUNDING) * w.R[row, row]:

@@ -19,7 +19,7 @@ from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
 from truenorth.errors.invariant import keep_reset, reset
-from truenorth.estimate.correct import damp_height, feed_back, joint_nis, measure, set_place, update_held
+from truenorth.estimate.correct import damp_height, feed_back, joint_nis, measure, set_place, touched, update_held
 from truenorth.estimate.memory import (
     ABSENT,
     DISTURB,
@@ -48,7 +48,10 @@ _PHI, _DV = 0, 3
 
 
 class Room(NamedTuple):
-    """What an event is worked out in: `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0)."""
+    """What an event is worked out in.
+
+    `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0); places of `columns` (N,).
+    """
 
     F: Array
     rate: Array
@@ -57,6 +60,7 @@ class Room(NamedTuple):
     now: Array
     Phi: Array
     Q: Array
+    columns: NDArray[np.int64]
 
 
 @borrowing(forceinline=True)
@@ -69,15 +73,13 @@ def correct(
     k: int,
     number: int,
     time: float,
-    now: Any,
     w: Any,
-    R: Any,
-    S: Any,
+    room: Room,
     kept: Kept,
     link: int,
 ) -> int:
     """Take event k, a measurement; `number` is its place in the histories. The failure, if any."""
-    source = events.source[k]
+    source, now, R = events.source[k], room.now, room.R
     for a in range(3):
         R[a] = events.variance[k, a]
     measure(m, model, sources, source, events.measured[k], now, w, R)
@@ -91,7 +93,8 @@ def correct(
             w.z[a] = np.nan
         kept.innovation[number, a] = w.z[a]
     kept.when[number] = time
-    count, nis = joint_nis(size, w, S, kept.sigma[number])
+    columns = room.columns[: touched(w.H, room.columns)]
+    count, nis = joint_nis(size, w, columns, room.S, kept.sigma[number])
     if count == 0:
         return SOUND
     kept.nis[number] = nis
@@ -120,11 +123,11 @@ def correct(
         damp_height(size, m.sums.C_now, min(time - m.heard[0], LONGEST_STEP * loop), loop, w)
         m.heard[0] = time
     elif model.held:
-        failure = update_held(size, w, model.dynamics.held)
+        failure = update_held(size, w, columns, model.dynamics.held)
         if failure != SOUND:
             return failure
     else:
-        failure, _, _ = update(size, w, False, True)
+        failure, _, _ = update(size, w, False, True, columns)
         if failure != SOUND:
             return failure
     if smoothing:
@@ -220,7 +223,7 @@ def put_back(m: Memory, w: Any) -> None:
 def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room) -> Any:
     """The loop of :func:`run`, in what that made room for."""
     samples, start, events, late, sources, model, horizon = task
-    F, rate, S, R, now, Phi, Q = room
+    F, rate, now, Phi, Q = room.F, room.rate, room.now, room.Phi, room.Q
     n, smoothing = len(m.aux), kept.Phi.shape[0] > 0
     set_matrix(m.s, m.sums.C_now)
     s, aux, sums, sensors, fixed_altitude = m.s, m.aux, m.sums, model.sensors, model.fixed_altitude
@@ -277,7 +280,7 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
                 if sources.instant[source]:
                     describe_instant(samples, i, m.done[0], model, m.aux, now)
                 failure = correct(
-                    size, m, model, sources, of, e, number, here if retimed else time, now, w, R, S, kept, link
+                    size, m, model, sources, of, e, number, here if retimed else time, w, room, kept, link
                 )
                 if failure != SOUND:
                     break
@@ -325,6 +328,7 @@ def run(size: Any, task: Task, m: Memory, kept: Kept) -> Any:
         np.zeros(NOW_LENGTH),
         np.zeros((links, links)),
         np.zeros((links, links)),
+        np.zeros(N, dtype=np.int64),
     )
     for a in range(links):
         room.Phi[a, a] = 1.0

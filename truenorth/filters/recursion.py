@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from truenorth.core.linalg import (
     copy_corner,
     divide,
     dot,
+    dot_at,
     load,
     propagate_covariance,
     take_off,
@@ -23,6 +24,7 @@ from truenorth.core.linalg import (
     take_off_pair,
     transpose,
     transposed_times,
+    transposed_times_at,
 )
 from truenorth.filters.system import Runs
 
@@ -197,8 +199,17 @@ def innovate(size: Size, w: Workspace, innovation: Array, covariance: Array) -> 
 
 
 @borrowing(forceinline=True)
-def row_variance(size: Size, w: Workspace, row: int, correlated: bool) -> tuple[float, float, float]:
-    """Innovation of one row, its variance, and ``h' s``; leaves its covariance with x, ``a = P h + s``, in ``w.a``."""
+def row_variance(
+    size: Size, w: Workspace, row: int, correlated: bool, columns: Any = None
+) -> tuple[float, float, float]:
+    """Innovation of one row, its variance, and ``h' s``; leaves its covariance with x, ``a = P h + s``, in ``w.a``.
+
+    `columns` are those of ``H`` that are not zero, where that is known, and no noise is correlated: the bits are the same.
+    """
+    if columns is not None:
+        transposed_times_at(size, columns, w.P, w.H[row], w.a)
+        variance = dot_at(columns, w.H[row], w.a) + w.R[row, row]
+        return w.z[row] - dot_at(columns, w.H[row], w.x), variance, 0.0
     transposed_times(size, w.P, w.H[row], w.a)
     h_s = 0.0
     if correlated:
@@ -300,15 +311,17 @@ def remember_largest(size: Size, w: Workspace) -> None:
 
 
 @borrowing(forceinline=True)
-def update(size: Size, w: Workspace, correlated: bool, joseph: bool) -> tuple[int, float, float]:
-    """Condition on all rows present; the failure if any, NIS and log-likelihood."""
+def update(
+    size: Size, w: Workspace, correlated: bool, joseph: bool, columns: Any = None
+) -> tuple[int, float, float]:
+    """Condition on all rows present; the failure if any, NIS and log-likelihood. For `columns` see :func:`row_variance`."""
     nis = 0.0
     log_likelihood = 0.0
     remember_largest(size, w)
     for row in range(w.z.shape[0]):
         if np.isnan(w.z[row]):
             continue
-        nu, variance, h_s = row_variance(size, w, row, correlated)
+        nu, variance, h_s = row_variance(size, w, row, correlated, columns)
         noise = w.R[row, row]
         fault = fault_before(variance, noise, correlated, joseph)
         if fault != SOUND:
