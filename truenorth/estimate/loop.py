@@ -243,12 +243,10 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
             ahead = time - (samples.end[i] - (1.0 - m.done[0]) * T)
             if ahead < SAME_TIME:
                 break
-            if ahead > (1.0 - m.done[0]) * T - SAME_TIME:
-                take_sample(s, samples, i, 1.0 - m.done[0], True, sensors, fixed_altitude, aux, sums)
-                i, m.done[0] = i + 1, 0.0
-            else:
-                take_sample(s, samples, i, ahead / T, False, sensors, fixed_altitude, aux, sums)
-                m.done[0] += ahead / T
+            ends = ahead > (1.0 - m.done[0]) * T - SAME_TIME
+            part = 1.0 - m.done[0] if ends else ahead / T
+            take_sample(s, samples, i, part, ends, sensors, fixed_altitude, aux, sums)
+            i, m.done[0] = (i + 1, 0.0) if ends else (i, m.done[0] + part)
         if not reached:
             break
         if not retimed and events.source[k] < 0 and not events.output[k] and m.sums.T[0] <= model.spare:

@@ -42,7 +42,7 @@ _PHI, _BG, _BA = 0, 9, 12
 WHOLE = 12  # rows and columns that are summed whole: the dynamic states, and more, as four rows are worked out at a time
 
 
-@borrowing
+@borrowing(forceinline=True)
 def take_sample(
     s: Any,
     samples: Samples,
