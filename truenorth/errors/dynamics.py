@@ -105,7 +105,7 @@ def second_order(omega: float, zeta: float, T: float) -> Any:
     return e * (c + zeta * omega * s), e * s, -e * omega * omega * s, e * (c - zeta * omega * s)
 
 
-@borrowing
+@borrowing(forceinline=True)
 def couple_pairs(d: Dynamics, F: Any, T: float, Phi: Any, Phi_t: Any) -> None:
     """Second-order processes in a transition whose other rows are filled in: their own blocks, and how they drive the INS."""
     half = 0.5 * T * T
@@ -122,7 +122,7 @@ def couple_pairs(d: Dynamics, F: Any, T: float, Phi: Any, Phi_t: Any) -> None:
         Phi_t[i, i], Phi_t[i, j], Phi_t[j, i], Phi_t[j, j] = Phi[i, i], Phi[j, i], Phi[i, j], Phi[j, j]
 
 
-@borrowing
+@borrowing(forceinline=True)
 def noise_of_pairs(d: Dynamics, Phi: Any, Q: Any) -> None:
     """``Q = P - Phi P Phi'`` with the stationary P of each second-order process."""
     for i in range(STATES, len(d.pair)):

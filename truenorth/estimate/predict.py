@@ -14,7 +14,7 @@ from truenorth.core.linalg import (
     scale_columns,
     scale_row,
 )
-from truenorth.errors.dynamics import ALONE, Dynamics, couple_pairs, noise_of_pairs
+from truenorth.errors.dynamics import ALONE, couple_pairs, noise_of_pairs
 from truenorth.errors.group import columns_at
 from truenorth.errors.ins import DYNAMIC, couple_sensors, error_dynamics, transition
 from truenorth.estimate.memory import BACK, Memory, Model, Samples, Sums
@@ -264,17 +264,17 @@ def predict_to_event(
     noise_of_pairs(d, w.Phi, w.Q)
     if len(link) > 0:
         propagate_covariance(size, w.Phi, w.Phi_t, w.Q, Q, w.temporary)
-    propagate_errors(reach_of(model), d, w.Phi, w.Phi_t, w.Q, w.P, w.temporary, w.t)
+    propagate_errors(reach_of(model), d.pair, w.Phi, w.Phi_t, w.Q, w.P, w.temporary, w.t)
 
 
 @borrowing
-def propagate_errors(reach: int, d: Dynamics, Phi: Any, Phi_t: Any, Q: Any, P: Any, work: Any, diagonal: Any) -> None:
+def propagate_errors(reach: int, pair: Any, Phi: Any, Phi_t: Any, Q: Any, P: Any, work: Any, diagonal: Any) -> None:
     """``P = Phi P Phi' + Q``, symmetric to the bit, in a fifth of the work.
 
     Rows of ``Phi`` behind those of phi, dv and dp hold an element of the diagonal, or of a second-order pair; columns from `reach`
     on hold no more either, as those states do not act on the INS. All that lies behind the states is zero and stays so.
     """
-    n = len(d.pair)
+    n = len(pair)
     used = 4 * ((n + 3) // 4)
     for i in range(0, WHOLE, 4):
         four_rows_within(reach, Phi, P, None, i, 0, used, work)
@@ -283,7 +283,7 @@ def propagate_errors(reach: int, d: Dynamics, Phi: Any, Phi_t: Any, Q: Any, P: A
     for i in range(used):
         diagonal[i] = Phi[i, i]
     for v in range(STATES, n):
-        r = d.pair[v]
+        r = pair[v]
         if r >= 0:
             for j in range(WHOLE, used):
                 work[v, j] = Phi[v, v] * P[v, j] + Phi[v, r] * P[r, j]
@@ -293,7 +293,7 @@ def propagate_errors(reach: int, d: Dynamics, Phi: Any, Phi_t: Any, Q: Any, P: A
     for i in range(n):
         scale_columns(work, i, WHOLE, used, diagonal, Q, P)
     for v in range(STATES, n):
-        r = d.pair[v]
+        r = pair[v]
         if r >= 0:
             for i in range(n):
                 P[i, v] = work[i, v] * Phi[v, v] + work[i, r] * Phi[v, r] + Q[i, v]
@@ -301,7 +301,7 @@ def propagate_errors(reach: int, d: Dynamics, Phi: Any, Phi_t: Any, Q: Any, P: A
     mirror_upper(used, P)
 
 
-@borrowing
+@borrowing(forceinline=True)
 def reach_of(model: Model) -> int:
     """The first state from which on none acts on attitude, velocity or position."""
     d, reach = model.dynamics, STATES
