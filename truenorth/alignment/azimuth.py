@@ -22,23 +22,25 @@ Source: M. Wu, X. Tang, X. Huang, odometer-aided alignment on the move by a stro
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.azimuth_filters import METHODS, Begin, Logs, Solution, run_loop
+from truenorth.alignment.azimuth_filters import METHODS, Begin, Logs, run_loop
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import skew
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.in_motion_azimuth import DK, STATES
+from truenorth.errors.in_motion_azimuth import STATES
 from truenorth.errors.walks import Walks
 from truenorth.records import ImuRecord, OdometerRecord
 from truenorth.records.specs import ImuSpec
-from truenorth.state.layout import BA, BG, DV, PHI, Layout
+from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import prior_covariance
-from truenorth.state.track import Residuals, Track
+from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import earth_rotation
 
@@ -79,7 +81,8 @@ def azimuth_track(
     distance = np.interp(edges, odometer.time - wheel.latency, np.cumsum(odometer.distance))
     per_epoch = max(1, round(1.0 / record.interval))
     rows = np.arange(0, len(record) + 1, per_epoch)
-    logs = Logs(record.steps, dtheta[None], dvel[None], np.diff(distance)[None], rows.astype(np.int64))
+    wheel_rows = np.diff(distance)[None]
+    logs = Logs(record.steps, dtheta[None], dvel[None], wheel_rows, rows.astype(np.int64), edges[rows[1:]])
 
     epoch = round(min(COARSE_TIME, COARSE_PART * record.duration) / (per_epoch * record.interval))
     elapsed = float(edges[rows[epoch]] - begin)
@@ -99,14 +102,14 @@ def azimuth_track(
         epoch, C_nm[None], v_n[None], coarse.position[-1], P0[None], Walks.of(spec).density(STATES, PHI, DV, BG, BA)
     )
     name = ALIASES.get(method, method)
-    found = run_loop(logs, np.zeros(1, dtype=np.int64), start, name, gated=True, keep_P=True)
+    found = run_loop(logs, np.zeros(1, dtype=np.int64), start, name, gated=True)
     if found.lost.any():
         raise AlignmentError(
             f"{record.source}: the filter {method} left a tilt of half a radian, where its model has no meaning: choose another "
             "method"
         )
     acted = float(found.acted[0]) if METHODS[name].tracking else None
-    return _track(found, edges[rows[epoch + 1 :]], C_mb, wheel), acted
+    return _of_imu(found.tracks[0], C_mb), acted
 
 
 def _turned(dtheta: Array) -> Array:
@@ -117,33 +120,8 @@ def _turned(dtheta: Array) -> Array:
     return np.asarray(inertial_integrals(dtheta, np.zeros((count, 3)), np.ones(count), [count])[0][-1])
 
 
-def _track(found: Solution, time: Array, C_mb: Array, wheel: Mounting) -> Track:
-    """Of the IMU: attitude, biases and their covariance from vehicle axes back to its own."""
+def _of_imu(track: Track, C_mb: Array) -> Track:
+    """The track of the IMU: attitude, biases and their covariance from vehicle axes back to its own."""
     T = np.eye(STATES)
     T[BG, BG] = T[BA, BA] = C_mb.T
-    errors = found.errors[0]
-    sensors = np.zeros((len(time), STATES))
-    sensors[:, BG], sensors[:, BA], sensors[:, DK] = errors[:, :3] @ C_mb, errors[:, 3:6] @ C_mb, errors[:, 6]
-    residuals = Residuals(
-        "odometer displacement",
-        time,
-        found.innovation[0],
-        found.innovation_sigma[0],
-        found.nis[0],
-        found.used[0],
-        outside=0,
-        stamp=time,
-        jumped=np.zeros(len(time), dtype=bool),
-        unit="m",
-    )
-    layout = Layout(("odometer scale",), ((wheel.scale_sigma,),))
-    return Track(
-        time,
-        found.C_nb[0] @ C_mb,
-        found.v_n[0],
-        found.position[0],
-        sensors,
-        T @ found.P[0] @ T.T,
-        layout,
-        (residuals,),
-    )
+    return replace(track, C_nb=track.C_nb @ C_mb, sensors=track.sensors @ T.T, P=T @ track.P @ T.T)

@@ -9,7 +9,7 @@ of :mod:`truenorth.errors.in_motion_azimuth`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +30,8 @@ from truenorth.filters import (
     unscented,
 )
 from truenorth.filters.system import FilterState
-from truenorth.state.layout import BA, BG, DP, DV
+from truenorth.state.layout import BA, BG, DP, DV, Layout
+from truenorth.state.track import Residuals, Track
 from truenorth.strapdown import wander
 
 Array = NDArray[np.float64]
@@ -104,6 +105,7 @@ class Logs(NamedTuple):
     dvel: Array  # (R, N, 3) m/s
     wheel: Array  # (R, N) m: distance in each sample
     rows: NDArray[np.int64]  # (K+1,): samples before each epoch
+    time: Array  # (K,) s: of the epochs behind the first
 
 
 class Begin(NamedTuple):
@@ -129,23 +131,10 @@ class Begin(NamedTuple):
     noise: Array
 
 
-@dataclass(frozen=True)
-class Solution:
-    """What a filter found for B runs at K epochs after the beginning.
+class Found(NamedTuple):
+    """What a filter found for B runs: the track of each, of the vehicle, whose last state is the odometer's scale."""
 
-    Not a :class:`truenorth.state.track.Track`: many runs at once, with sigmas throughout but a covariance only where asked for.
-    """
-
-    C_nb: Array  # (B, K, 3, 3)
-    v_n: Array  # (B, K, 3) m/s
-    position: Array  # (B, K, 3)
-    errors: Array  # (B, K, 7): gyro and accelerometer bias, relative scale of the odometer
-    sigma: Array  # (B, K, 16)
-    P: Array  # (B, K, 16, 16): K = 0 where it was not asked for
-    innovation: Array  # (B, K, 3) m
-    innovation_sigma: Array  # (B, K, 3) m
-    nis: Array  # (B, K)
-    used: NDArray[np.bool_]  # (B, K): not rejected by the gate
+    tracks: tuple[Track, ...]  # at the epochs after the beginning
     lost: NDArray[np.bool_]  # (B,): given up: a tilt beyond half a radian, where the model has no meaning
     acted: Array  # (B,): share of the epochs in which a factor of strong tracking was above 1
 
@@ -159,8 +148,7 @@ def run_loop(
     gated: bool = False,
     turned: bool = True,
     belief: Belief = NOMINAL,
-    keep_P: bool = False,
-) -> Solution:
+) -> Found:
     """Align B runs.
 
     Parameters
@@ -174,8 +162,6 @@ def run_loop(
     turned : bool
         Turn the covariance of velocity with a correction of the azimuth; see
         :func:`truenorth.errors.in_motion_azimuth.after_correction`.
-    keep_P : bool
-        Keep the covariance of each epoch.
     """
     B, count, first = len(which), len(logs.rows) - 1 - begin.epoch, logs.rows[begin.epoch]
     s = np.stack([wander.state_at(C, v, *begin.place) for C, v in zip(begin.C_nb, begin.v_n, strict=True)])
@@ -184,7 +170,8 @@ def run_loop(
     P = belief.P0 * begin.P0
     start = P.copy()
     p, z, errors = np.zeros((B, model.PARAMETERS)), np.zeros((B, 3)), np.zeros((B, 7))
-    out = _room(B, count, keep_P)
+    tracks = tuple(_room(logs.time[begin.epoch :], float(np.sqrt(P0[DK, DK]))) for P0 in begin.P0)
+    lost, acted = np.zeros(B, dtype=np.bool_), np.zeros(B)
     kind = METHODS[method] if isinstance(method, str) else method
     gate, state, tracking = GATE if gated else None, None, kind.tracking
     system: NonlinearSystem | None = None
@@ -208,16 +195,18 @@ def run_loop(
             system = system.with_arrays(z=z[:, None, :], p=p[:, None, :])
         found = kind.run(system, state, gate)
         if tracking:
-            out.acted[:] += found.adaptation[:, -1, 0] > 1.0
-        if gated:
-            out.used[:, k] = found.adaptation[:, -1, int(tracking)] > 0.0
-        out.innovation[:, k], out.nis[:, k] = found.innovation[:, -1], found.nis[:, -1]
-        out.innovation_sigma[:, k] = np.sqrt(np.einsum("bii->bi", found.innovation_covariance[:, -1]))
+            acted += found.adaptation[:, -1, 0] > 1.0
+        innovation_sigma = np.sqrt(np.einsum("bii->bi", found.innovation_covariance[:, -1]))
+        for b, (said,) in enumerate(track.residuals for track in tracks):
+            said.innovation[k], said.sigma[k] = found.innovation[b, -1], innovation_sigma[b]
+            said.nis[k] = found.nis[b, -1]
+            if gated:
+                said.used[k] = found.adaptation[b, -1, int(tracking)] > 0.0
         x = found.x[:, -1]
         P = model.after_correction(x, found.P[:, -1], velocity=turned)
         gone = ~(np.all(np.isfinite(x), axis=1) & (np.abs(x[:, :2]).max(axis=1) < LOST))
         gone |= ~(np.einsum("bii->bi", P)[:, :2].max(axis=1) < LOST**2)
-        out.lost[:] |= gone
+        lost |= gone
         x[gone], P[gone] = 0.0, start[gone]
         C = model.correction(x) @ dcm_from_quaternion(s[:, wander.ATTITUDE])
         s[:, wander.ATTITUDE] = quaternion_from_dcm(C)
@@ -228,26 +217,36 @@ def run_loop(
         errors[:, 3:6] += x[:, BA]
         errors[:, 6] += x[:, DK]
         state = FilterState(np.zeros((B, STATES)), P, found.state.log_likelihood, found.state.memory)
-        out.C_nb[:, k], out.v_n[:, k], out.position[:, k], _ = wander.north(s)
-        out.errors[:, k], out.sigma[:, k] = errors, np.sqrt(np.einsum("bii->bi", P))
-        if keep_P:
-            out.P[:, k] = P
-    return replace(out, acted=out.acted / max(count, 1))
+        C_nb, v_n, position, _ = wander.north(s)
+        for b, track in enumerate(tracks):
+            track.C_nb[k], track.v_n[k], track.position[k] = C_nb[b], v_n[b], position[b]
+            track.sensors[k, BG.start :], track.P[k] = errors[b], P[b]
+    return Found(tracks, lost, acted / max(count, 1))
 
 
-def _room(B: int, count: int, keep_P: bool) -> Solution:
-    three = (B, count, 3)
-    return Solution(
-        C_nb=np.empty((*three, 3)),
-        v_n=np.empty(three),
-        position=np.empty(three),
-        errors=np.empty((B, count, 7)),
-        sigma=np.empty((B, count, STATES)),
-        P=np.empty((B, count if keep_P else 0, STATES, STATES)),
-        innovation=np.empty(three),
-        innovation_sigma=np.empty(three),
-        nis=np.empty((B, count)),
-        used=np.ones((B, count), dtype=np.bool_),
-        lost=np.zeros(B, dtype=np.bool_),
-        acted=np.zeros(B),
+def _room(time: Array, scale_sigma: float) -> Track:
+    """A track to be filled in; `scale_sigma` is the odometer's at the start."""
+    K = len(time)
+    three, used = (K, 3), np.ones(K, dtype=np.bool_)
+    said = Residuals(
+        "odometer displacement",
+        time,
+        np.empty(three),
+        np.empty(three),
+        np.empty(K),
+        used,
+        outside=0,
+        stamp=time,
+        jumped=np.zeros(K, dtype=np.bool_),
+        unit="m",
+    )
+    return Track(
+        time,
+        np.empty((*three, 3)),
+        np.empty(three),
+        np.empty(three),
+        np.zeros((K, STATES)),
+        np.empty((K, STATES, STATES)),
+        Layout(("odometer scale",), ((scale_sigma,),)),
+        (said,),
     )

@@ -39,7 +39,7 @@ from truenorth.state.now import (
 from truenorth.strapdown.wander import acceleration, advance, azimuth, earth_axis, set_matrix
 
 _PHI, _BG, _BA = 0, 9, 12
-WHOLE = 12  # rows and columns that are summed whole: the dynamic states, and more, as four rows are worked out at a time
+WHOLE = 12  # rows and columns that are summed whole: the dynamic states, and what fills up the last four
 
 
 @borrowing(forceinline=True)

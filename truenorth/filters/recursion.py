@@ -311,9 +311,7 @@ def remember_largest(size: Size, w: Workspace) -> None:
 
 
 @borrowing(forceinline=True)
-def update(
-    size: Size, w: Workspace, correlated: bool, joseph: bool, columns: Any = None
-) -> tuple[int, float, float]:
+def update(size: Size, w: Workspace, correlated: bool, joseph: bool, columns: Any = None) -> tuple[int, float, float]:
     """Condition on all rows present; the failure if any, NIS and log-likelihood. For `columns` see :func:`row_variance`."""
     nis = 0.0
     log_likelihood = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.odometer.scenario import Drives
 from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.prior import prior_covariance
+from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
@@ -94,14 +96,19 @@ def run_method(
     )
     found = run_loop(drives.logs, which, start, method, gated=gated, turned=turned, belief=belief)
     truth = drives.truth[begin + 1 :]
+
+    def of_all(part: Callable[[Track], Array]) -> Array:
+        return np.stack([part(track) for track in found.tracks])
+
+    C_nb = of_all(lambda track: track.C_nb)
     return Errors.with_sigma(
-        misalignment(found.C_nb, truth.C_nb),
-        found.sigma[..., PHI],
+        misalignment(C_nb, truth.C_nb),
+        of_all(lambda track: track.sigma[:, PHI]),
         time=drives.time[begin:],
-        velocity=found.v_n - truth.v_n,
-        gyro_bias=found.errors[..., :3] - drives.gyro_bias[which, None],
-        accel_bias=found.errors[..., 3:6] - drives.accel_bias[which, None],
-        C_nb=found.C_nb[:, -1],
+        velocity=of_all(lambda track: track.v_n - truth.v_n),
+        gyro_bias=of_all(lambda track: track.gyro_bias) - drives.gyro_bias[which, None],
+        accel_bias=of_all(lambda track: track.accel_bias) - drives.accel_bias[which, None],
+        C_nb=C_nb[:, -1],
         lost=found.lost,
         acted=found.acted,
     )

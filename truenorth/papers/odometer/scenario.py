@@ -89,7 +89,7 @@ class Drives:
     @property
     def logs(self) -> Logs:
         """As the loop of the paper's model takes them."""
-        return Logs(self.steps, self.dtheta, self.dvel, self.wheel, self.rows)
+        return Logs(self.steps, self.dtheta, self.dvel, self.wheel, self.rows, self.time)
 
     @property
     def scale_sigma(self) -> float:
