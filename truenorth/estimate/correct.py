@@ -87,7 +87,7 @@ def joint_nis(size: Any, w: Any, columns: Any, S: Any, sigma: Any) -> Any:
 
 
 @borrowing
-def update_held(size: Any, w: Any, columns: Any, held: Any) -> int:
+def update_held(size: Any, w: Any, held: Any, columns: Any = None) -> int:
     """Condition on all rows with the optimal gain, but none for the states that are considered only (Schmidt).
 
     With ``a = P h`` and ``k = a/s`` where a state is estimated, 0 where not: ``P = (I - k h') P (I - k h')' + k r k'``,

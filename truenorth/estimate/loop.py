@@ -123,7 +123,7 @@ def correct(
         damp_height(size, m.sums.C_now, min(time - m.heard[0], LONGEST_STEP * loop), loop, w)
         m.heard[0] = time
     elif model.held:
-        failure = update_held(size, w, columns, model.dynamics.held)
+        failure = update_held(size, w, model.dynamics.held, columns)
         if failure != SOUND:
             return failure
     else:
