@@ -22,21 +22,27 @@ def test_changes_over_cells_are_exact_for_a_cubic():
     assert np.allclose(_changes(means[None, :, None])[0, :, 0], exact, atol=1e-12)
 
 
+def _swaying(tones, duration, *, lat, lon, heading, arm, **more):
+    """A ship that sways in these tones, an IMU of navigation grade aboard; s, deg, m."""
+    scenario = {
+        "name": "ship",
+        "duration": f"{duration} s",
+        "position": {"lat": f"{lat} deg", "lon": f"{lon} deg"},
+        "motion": {"kind": "sway", "heading": f"{heading} deg", "tones": tones},
+        "lever_arm": [f"{x} m" for x in arm],
+        "imu": "navigation",
+    }
+    return read_scenario(scenario | more)
+
+
 def ship(seed, scale=0.0):
     """A ship that sways by 8, 4 and 6 deg, its IMU 14 m from its centre."""
     tones = {
         name: [{"amplitude": f"{a} deg", "period": f"{T} s"}]
         for name, a, T in (("roll", 8.0, 11.2), ("pitch", 4.0, 6.9), ("heading", 6.0, 5.1))
     }
-    scenario = {
-        "name": "ship",
-        "duration": "200 s",
-        "position": {"lat": "-20 deg", "lon": "10 deg"},
-        "motion": {"kind": "sway", "heading": "130 deg", "tones": tones},
-        "lever_arm": ["9 m", "-8 m", "7.2 m"],
-        "imu": "navigation",
-    }
-    record = read_scenario(scenario).simulate(seed=seed).record
+    scenario = _swaying(tones, 200, lat=-20, lon=10, heading=130, arm=(9, -8, 7.2))
+    record = scenario.simulate(seed=seed).record
     gyro = record.gyro * [1.0 + scale, 1.0, 1.0]
     return type(record)(record.time, gyro, record.accel, record.kind, record.source)
 
@@ -82,16 +88,7 @@ def _moored(seed):
             tones[kind].append(
                 {"amplitude": f"{part * size:.4f} {unit}", "period": f"{period:.3f} s", "phase": f"{at:.1f} deg"}
             )
-    scenario = {
-        "name": "moored",
-        "duration": "240 s",
-        "rate": "50 Hz",
-        "position": {"lat": "50 deg", "lon": "1 deg"},
-        "motion": {"kind": "sway", "heading": "70 deg", "tones": tones},
-        "lever_arm": ["1 m", "6 m", "3 m"],
-        "imu": "navigation",
-    }
-    return read_scenario(scenario)
+    return _swaying(tones, 240, lat=50, lon=1, heading=70, arm=(1, 6, 3), rate="50 Hz")
 
 
 @pytest.mark.parametrize("seed", [1, 3, 6])

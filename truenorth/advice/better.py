@@ -27,23 +27,12 @@ Evaluate = Callable[[ImuSpec], tuple[float, Mapping[str, float]]]
 
 @dataclass(frozen=True)
 class Better:
-    """A specification with which the wish is met.
-
-    Attributes
-    ----------
-    imu : ImuSpec
-    factor : float
-        By which the errors of `sources` are smaller.
-    sources : tuple of str
-        Greatest first.
-    chief : int
-        How many of them hold a tenth of the variance and more.
-    """
+    """A specification with which the wish is met."""
 
     imu: ImuSpec
-    factor: float
-    sources: tuple[str, ...]
-    chief: int
+    factor: float  # by which the errors of `sources` are smaller
+    sources: tuple[str, ...]  # greatest first
+    chief: int  # how many of them hold a tenth of the variance and more
 
     @property
     def words(self) -> str:

@@ -20,6 +20,10 @@ GYROS = "gyros"
 
 
 IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first.")]
+IndexerSigma = Annotated[
+    str,
+    option("One-sigma error of the indexer's own angles and axes: '10 arcsec'; the body's attitude has it in full."),
+]
 Baseline = Annotated[
     str | None,
     option(
@@ -113,12 +117,7 @@ class OnIndexer:
         option("Log of the encoder's angles; or 'gyros': the body is still, the gyros show how the IMU turns."),
     ] = None
     indexer_axes: IndexerAxes = "z,x"
-    indexer_sigma: Annotated[
-        str,
-        option(
-            "One-sigma error of the indexer's own angles and axes: '10 arcsec'; the body's attitude has it in full."
-        ),
-    ] = "0 arcsec"
+    indexer_sigma: IndexerSigma = "0 arcsec"
     lever_arm: Annotated[
         str | None,
         option(

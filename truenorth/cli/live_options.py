@@ -6,7 +6,7 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.aiding_options import GYROS, Baseline, IndexerAxes
+from truenorth.cli.aiding_options import GYROS, Baseline, IndexerAxes, IndexerSigma
 from truenorth.cli.attitude_options import (
     AttitudeMounting,
     AttitudeSigma,
@@ -35,7 +35,7 @@ class Turned:
         option("Source of an indexer's angles: CSV; or 'gyros': the body is still, the gyros show how the IMU turns."),
     ] = None
     indexer_axes: IndexerAxes = "z,x"
-    indexer_sigma: Annotated[str, option("One-sigma error of its own angles and axes: '10 arcsec'.")] = "0 arcsec"
+    indexer_sigma: IndexerSigma = "0 arcsec"
     positions: Annotated[str | None, option("auto: a turntable takes the IMU from position to position.")] = None
 
     def sources(self) -> dict[str, str]:

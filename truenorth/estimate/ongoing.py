@@ -38,60 +38,29 @@ STEPS = 50  # points at which an attitude between two epochs is summed up
 
 @dataclass(frozen=True)
 class Ongoing:
-    """A filter's end.
-
-    Attributes
-    ----------
-    position : Position
-    noise : StaticModel
-    interval : float, s
-    form : {"velocity", "force"}
-    C_n0_i : (3, 3) array
-        Nominal attitude; the states are errors of it.
-    bias : (6,) array
-        Gyro and accelerometer bias that are taken off.
-    R : (3,) array, (m/s)^2
-        Variance of the base's own velocity, east, north, up.
-    arm : (3,) array, m, or None
-        Nominal lever arm, where it is a state.
-    motion : tuple of AxisMotion
-        Of the base, where it is a state; else empty.
-    trend : (2, 9) arrays, two of them, or None
-        Of the attitude by which biases act on a base that sways.
-    epochs, fitted : int
-        So far, and of the batch.
-    start, elapsed : float, s
-        When the inertial frame was frozen, and since then.
-    C_ib, velocity, place : (3, 3), (3,) and (3,) arrays
-        The inertial integrals at the last epoch.
-    x, P : (n,) and (n, n) arrays
-    largest : (2,) array
-        Size and colour of a block of innovations, beyond which the base moves more than in the log.
-    disturbed : int
-        Blocks since the batch, in which it did.
-    """
+    """A filter's end."""
 
     position: Position
     noise: StaticModel
-    interval: float
+    interval: float  # s
     form: Form
-    C_n0_i: Array
-    bias: Array
-    R: Array
-    arm: Array | None
-    motion: tuple[AxisMotion, ...]
-    trend: tuple[Array, Array] | None
-    epochs: int
-    fitted: int
-    start: float
-    elapsed: float
-    C_ib: Array
+    C_n0_i: Array  # (3, 3): nominal attitude; the states are errors of it
+    bias: Array  # (6,): gyro and accelerometer bias that are taken off
+    R: Array  # (3,) (m/s)^2: variance of the base's own velocity, east, north, up
+    arm: Array | None  # (3,) m: nominal lever arm, where it is a state
+    motion: tuple[AxisMotion, ...]  # of the base, where it is a state; else empty
+    trend: tuple[Array, Array] | None  # (2, 9) each: of the attitude by which biases act on a base that sways
+    epochs: int  # so far
+    fitted: int  # epochs of the batch
+    start: float  # s: when the inertial frame was frozen
+    elapsed: float  # s: since then
+    C_ib: Array  # (3, 3), with velocity and place (3,) the inertial integrals at the last epoch
     velocity: Array
     place: Array
-    x: Array
-    P: Array
-    largest: Array
-    disturbed: int = 0
+    x: Array  # (n,)
+    P: Array  # (n, n)
+    largest: Array  # (2,): size and colour of a block of innovations, beyond which the base moves more than in the log
+    disturbed: int = 0  # blocks since the batch, in which it did
 
     @property
     def time(self) -> float:

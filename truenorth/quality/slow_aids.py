@@ -35,17 +35,10 @@ USUAL_BIAS, USUAL_TIME = 2.0, 60.0  # m, s
 
 @dataclass(frozen=True)
 class Lasting:
-    """An error of a source that lasts.
-
-    Attributes
-    ----------
-    group : Group
-    white : float
-        How much of the sigma that the source says is white noise.
-    """
+    """An error of a source that lasts."""
 
     group: Group
-    white: float = 1.0
+    white: float = 1.0  # how much of the sigma that the source says is white noise
 
 
 Slow = Mapping[str, Lasting]  # by the source's name
