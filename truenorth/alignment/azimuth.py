@@ -40,6 +40,7 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.mounting import Mounting
 from truenorth.state.prior import prior_covariance
+from truenorth.state.state import Start, State
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial import earth_rotation
@@ -97,12 +98,11 @@ def azimuth_track(
     P = prior_covariance(angles, VELOCITY_SIGMA, position.sigma, spec.bias_variance, wheel.scale_sigma)
     J = np.eye(STATES)
     J[DV, PHI] = skew(v_n)
-    P0 = J @ P @ J.T
-    start = Begin(
-        epoch, C_nm[None], v_n[None], coarse.position[-1], P0[None], Walks.of(spec).density(STATES, PHI, DV, BG, BA)
-    )
+    lat, lon, alt = coarse.position[-1]
+    start = Start.of(State.at(C_nm, lat, lon, alt, v_n, edges[rows[epoch]]), J @ P @ J.T)
+    begin_at = Begin(epoch, [start], Walks.of(spec).density(STATES, PHI, DV, BG, BA))
     name = ALIASES.get(method, method)
-    found = run_loop(logs, np.zeros(1, dtype=np.int64), start, name, gated=True)
+    found = run_loop(logs, np.zeros(1, dtype=np.int64), begin_at, name, gated=True)
     if found.lost.any():
         raise AlignmentError(
             f"{record.source}: the filter {method} left a tilt of half a radian, where its model has no meaning: choose another "

@@ -8,7 +8,7 @@ of :mod:`truenorth.errors.in_motion_azimuth`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -31,6 +31,7 @@ from truenorth.filters import (
 )
 from truenorth.filters.system import FilterState
 from truenorth.state.layout import BA, BG, DP, DV, Layout
+from truenorth.state.state import Start
 from truenorth.state.track import Residuals, Track
 from truenorth.strapdown import wander
 
@@ -109,26 +110,11 @@ class Logs(NamedTuple):
 
 
 class Begin(NamedTuple):
-    """Where B runs begin.
-
-    Attributes
-    ----------
-    epoch : int
-    C_nb : (B, 3, 3) array
-    v_n : (B, 3) array, m/s
-    place : (3,) array
-        Latitude, longitude (rad), height (m).
-    P0 : (B, 16, 16) array
-    noise : (16,) array
-        Density of the process noise.
-    """
+    """Where B runs begin."""
 
     epoch: int
-    C_nb: Array
-    v_n: Array
-    place: Array
-    P0: Array
-    noise: Array
+    starts: Sequence[Start]  # one a run, P of all 16 states
+    noise: Array  # (16,) density of the process noise
 
 
 class Found(NamedTuple):
@@ -164,13 +150,13 @@ def run_loop(
         :func:`truenorth.errors.in_motion_azimuth.after_correction`.
     """
     B, count, first = len(which), len(logs.rows) - 1 - begin.epoch, logs.rows[begin.epoch]
-    s = np.stack([wander.state_at(C, v, *begin.place) for C, v in zip(begin.C_nb, begin.v_n, strict=True)])
+    s = np.stack([wander.state_at(a.C_nb, a.v_n, a.lat, a.lon, a.alt) for a in begin.starts])
     s[:, wander.LAST_ANGLE] = 2.0 * logs.dtheta[which, first] - logs.dtheta[which, first + 1]
     s[:, wander.LAST_VELOCITY] = 2.0 * logs.dvel[which, first] - logs.dvel[which, first + 1]
-    P = belief.P0 * begin.P0
-    start = P.copy()
+    P = belief.P0 * np.stack([start.P for start in begin.starts])
+    P0 = P.copy()
     p, z, errors = np.zeros((B, model.PARAMETERS)), np.zeros((B, 3)), np.zeros((B, 7))
-    tracks = tuple(_room(logs.time[begin.epoch :], float(np.sqrt(P0[DK, DK]))) for P0 in begin.P0)
+    tracks = tuple(_room(logs.time[begin.epoch :], float(np.sqrt(a.P[DK, DK]))) for a in begin.starts)
     lost, acted = np.zeros(B, dtype=np.bool_), np.zeros(B)
     kind = METHODS[method] if isinstance(method, str) else method
     gate, state, tracking = GATE if gated else None, None, kind.tracking
@@ -207,7 +193,7 @@ def run_loop(
         gone = ~(np.all(np.isfinite(x), axis=1) & (np.abs(x[:, :2]).max(axis=1) < LOST))
         gone |= ~(np.einsum("bii->bi", P)[:, :2].max(axis=1) < LOST**2)
         lost |= gone
-        x[gone], P[gone] = 0.0, start[gone]
+        x[gone], P[gone] = 0.0, P0[gone]
         C = model.correction(x) @ dcm_from_quaternion(s[:, wander.ATTITUDE])
         s[:, wander.ATTITUDE] = quaternion_from_dcm(C)
         s[:, wander.VELOCITY] -= x[:, DV]

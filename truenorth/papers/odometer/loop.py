@@ -17,6 +17,7 @@ from truenorth.papers.errors import AttitudeErrors
 from truenorth.papers.odometer.scenario import Drives
 from truenorth.state.layout import BA, BG, DV, PHI
 from truenorth.state.prior import prior_covariance
+from truenorth.state.state import Start, State
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -86,29 +87,26 @@ def run_method(
     P[:, AZIMUTH, AZIMUTH] = azimuth_sigma**2
     J = np.eye(STATES)
     J[DV, PHI] = skew(v)  # dv = C v - v = v x phi
-    start = Begin(
-        begin,
-        off @ drives.truth.C_nb[begin],
-        off @ v,
-        drives.truth.position[begin],
-        J @ P @ J.T,
-        Walks.of(spec).density(STATES, PHI, DV, BG, BA),
-    )
+    C_nb, (lat, lon, alt) = off @ drives.truth.C_nb[begin], drives.truth.position[begin]
+    starts = [
+        Start.of(State.at(C, lat, lon, alt, v_hat), P0) for C, v_hat, P0 in zip(C_nb, off @ v, J @ P @ J.T, strict=True)
+    ]
+    start = Begin(begin, starts, Walks.of(spec).density(STATES, PHI, DV, BG, BA))
     found = run_loop(drives.logs, which, start, method, gated=gated, turned=turned, belief=belief)
     truth = drives.truth[begin + 1 :]
 
     def of_all(part: Callable[[Track], Array]) -> Array:
         return np.stack([part(track) for track in found.tracks])
 
-    C_nb = of_all(lambda track: track.C_nb)
+    computed = of_all(lambda track: track.C_nb)
     return Errors.with_sigma(
-        misalignment(C_nb, truth.C_nb),
+        misalignment(computed, truth.C_nb),
         of_all(lambda track: track.sigma[:, PHI]),
         time=drives.time[begin:],
         velocity=of_all(lambda track: track.v_n - truth.v_n),
         gyro_bias=of_all(lambda track: track.gyro_bias) - drives.gyro_bias[which, None],
         accel_bias=of_all(lambda track: track.accel_bias) - drives.accel_bias[which, None],
-        C_nb=C_nb[:, -1],
+        C_nb=computed[:, -1],
         lost=found.lost,
         acted=found.acted,
     )
