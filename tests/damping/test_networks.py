@@ -9,7 +9,7 @@ from tests.damping.marine_case import ideal_and_truth, paper_errors
 from truenorth.core import earth
 from truenorth.core.errors import UsageError
 from truenorth.damping.course import linearised
-from truenorth.damping.loop import Loop, eigenvalues, network_correction
+from truenorth.damping.loop import Loop, Mode, eigenvalues, in_words, network_correction
 from truenorth.damping.networks import NO_NETWORK, SCHULER_RATE, Network, first_order, second_order
 from truenorth.errors.marine import DP, DV, MOTION, PHI, MarineModel
 from truenorth.state.track import Track
@@ -178,3 +178,10 @@ def test_what_is_refused():
         network_correction(still_course(45.0), Loop(second_order(), 0.5))
     with pytest.raises(UsageError, match="below 85 deg"):
         network_correction(still_course(87.0), Loop(second_order(), 0.5), np.zeros((2, 2)))
+
+
+def test_a_double_pole_that_rounding_splits_does_not_oscillate():
+    """Two equal time constants come out as a pair 1e15 s long."""
+    rate = -1.0 / 300.0
+    said = in_words([Mode("filter", complex(rate, 6e-15)), Mode("filter", complex(rate, 2e-3))])
+    assert said == "5.0 min time constant, 52.4 min with ratio 0.86"

@@ -167,6 +167,7 @@ def modes(M: Array) -> list[Mode]:
 
 
 STILL = 1e9  # s: what moves no faster stands still, but for rounding
+SPLIT = 1e-6  # of a pole: real ones that coincide are split by rounding, and do not oscillate
 
 
 def in_words(modes: Sequence[Mode]) -> str:
@@ -176,7 +177,7 @@ def in_words(modes: Sequence[Mode]) -> str:
         if m.name == "still" or abs(m.eigenvalue) * STILL < 1.0:
             continue
         label = "" if m.name == "filter" else f"{m.name} "
-        if m.eigenvalue.imag:
+        if abs(m.eigenvalue.imag) > SPLIT * abs(m.eigenvalue):
             parts.append(f"{label}{m.period / 60.0:.1f} min with ratio {m.damping:.2f}")
         else:
             parts.append(f"{label}{-1.0 / m.eigenvalue.real / 60.0:.1f} min time constant")

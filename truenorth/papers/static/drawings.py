@@ -17,6 +17,18 @@ from truenorth.papers.static.truth import ARCMIN, Truth
 
 Array = NDArray[np.float64]
 ANGLES = ("phi E (tilt)", "phi N (tilt)", "phi U (heading)")
+METHODS = {
+    "ekf": "EKF",
+    "ukf": "UKF, tilt after azimuth",
+    "ukf_rotation_vector": "UKF, rotation vector",
+    "ukf_quaternion": "UKF, quaternion",
+    "ekf_passes": "EKF, five passes",
+    "gaussian_sum": "twelve EKFs",
+    "particle": "particle filter",
+    "oba": "optimisation-based",
+    "gyrocompass_loop": "gyrocompass loop",
+    "product": "truenorth align",
+}
 
 
 def draw_literal(literal: Mapping[int, tuple[Truth, Array, Array]]) -> Figure:
@@ -116,7 +128,7 @@ def draw_large(found: Mapping[str, tuple[Array, Array | None]], duration: float)
             size = f"{rms:.2f}'" if rms < 60 else f"{rms / 60:.1f} deg"
             ax.text(1.02, row, f"{np.mean(heading <= 60):.0%}, {size}", transform=ax.get_yaxis_transform(), va="center")
         ax.axvline(60.0, color=REFERENCE, linestyle="--", linewidth=1.0)
-        ax.set_yticks(range(len(found)), [name.replace("_", " ") for name in found])
+        ax.set_yticks(range(len(found)), [METHODS[name] for name in found])
         ax.invert_yaxis()
         ax.set(xscale="log", xlabel=f"heading error after {duration:.0f} s, arcmin", xlim=(0.008, 180 * 60))
         ax.set_title(f"From any azimuth, {len(next(iter(found.values()))[0])} runs; right: share below 1 deg, RMS")
