@@ -9,7 +9,7 @@ import numpy as np
 from truenorth.alignment.in_motion_start import departures
 from truenorth.alignment.in_motion_task import MovingTask
 from truenorth.alignment.moving import fifteen, moving_of
-from truenorth.alignment.result import NOT_ESTIMATED, Alignment, History
+from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.task import deflection_covariance
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import normal_gravity
@@ -19,6 +19,7 @@ from truenorth.errors.axes import standing
 from truenorth.estimate.latency import delay_of
 from truenorth.records import OdometerRecord
 from truenorth.state.layout import BA, BG, DP, PHI
+from truenorth.state.limits import is_estimated
 from truenorth.state.track import Track
 
 
@@ -48,7 +49,7 @@ def moving_answer(task: MovingTask, track: Track, method: str, why: str, spread:
     delays = {
         name: (sensor.latency + found[0], found[1])
         for name, sensor in (("GNSS", task.antenna), ("odometer", task.wheel), ("velocity log", task.wheel))
-        if (found := delay_of(track, name)) is not None and found[1] < NOT_ESTIMATED * found[2]
+        if (found := delay_of(track, name)) is not None and is_estimated(found[1], found[2])
     }
     # Navigation goes on from there: what heading is less sure of belongs to it, too.
     less_sure = covariance[2, 2] - history.phi_covariance[-1][2, 2]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from truenorth.alignment.result import NOT_ESTIMATED, Alignment
+from truenorth.alignment.result import Alignment
 from truenorth.alignment.verdict import claimed, judged
 from truenorth.estimate.rivals import counted_once
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import is_estimated
 from truenorth.state.track import Track
 
 
@@ -29,5 +30,5 @@ def _wheel(answer: Alignment) -> list[Evidence]:
     return [
         note("odometer.scale", name=wheel.sensor, scale=wheel.scale, sigma=wheel.scale_sigma)
         for name, prior in zip(layout.names, layout.priors, strict=True)
-        if name == f"{wheel.sensor} scale" and wheel.scale_sigma < NOT_ESTIMATED * prior[0]
+        if name == f"{wheel.sensor} scale" and is_estimated(wheel.scale_sigma, prior[0])
     ]

@@ -15,6 +15,7 @@ from truenorth.core.shown import Shown
 from truenorth.core.units import DEG_PER_HOUR, MICRO_G
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
+from truenorth.state.limits import is_estimated
 from truenorth.state.wording import sentences
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Status = Literal["aligned", "level_only", "not_converged", "not_observable", "inconsistent"]
 
-NOT_ESTIMATED = 0.9  # a bias whose sigma stays above this part of its prior has not been estimated
 SHORT = {"east": "E", "north": "N", "up": "U"}  # of axes, in names of columns
 NEAR_VERTICAL = np.radians(85.0)  # beyond this pitch only the combination of heading and roll is known
 
@@ -258,12 +258,12 @@ class Alignment(Shown):
     @property
     def gyro_bias_estimated(self) -> NDArray[np.bool_]:
         """(3,) whether the data showed this bias, or only the specification does."""
-        return self.gyro_bias_sigma < NOT_ESTIMATED * self.gyro_bias_prior
+        return is_estimated(self.gyro_bias_sigma, self.gyro_bias_prior)
 
     @property
     def accel_bias_estimated(self) -> NDArray[np.bool_]:
         """(3,) whether the data showed this bias, or only the specification does."""
-        return self.accel_bias_sigma < NOT_ESTIMATED * self.accel_bias_prior
+        return is_estimated(self.accel_bias_sigma, self.accel_bias_prior)
 
     def in_brief(self) -> dict[str, str]:
         """Status, method, the angles with their sigmas."""

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.state.limits import is_estimated
 from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
-
-NOT_ESTIMATED = 0.9  # of its prior sigma: what stays above has not been estimated
 
 
 @dataclass(frozen=True)
@@ -96,17 +95,17 @@ class Transfer:
     @property
     def delay_estimated(self) -> bool:
         """Whether the data showed the delay."""
-        return self.delay_sigma < NOT_ESTIMATED * self.delay_prior
+        return is_estimated(self.delay_sigma, self.delay_prior)
 
     @property
     def lever_arm_estimated(self) -> NDArray[np.bool_]:
         """(3,) whether the data showed this component."""
-        return self.lever_arm_sigma < NOT_ESTIMATED * self.lever_arm_prior
+        return is_estimated(self.lever_arm_sigma, self.lever_arm_prior)
 
     @property
     def mounting_estimated(self) -> NDArray[np.bool_]:
         """(3,) whether the data showed this angle."""
-        return self.mounting_sigma < NOT_ESTIMATED * self.mounting_prior
+        return is_estimated(self.mounting_sigma, self.mounting_prior)
 
     def summary(self) -> dict[str, Any]:
         """Flat, in datasheet units, ready for JSON."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.check import LogCheck
 from truenorth.alignment.drift import Drift
-from truenorth.alignment.result import NOT_ESTIMATED, Alignment, Status
+from truenorth.alignment.result import Alignment, Status
 from truenorth.analysis.chi_square import tail
 from truenorth.core.attitude import UNIFORM_SIGMA
 from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
@@ -20,7 +20,7 @@ from truenorth.quality.regimes import SEEN_LATE
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, contradiction, note
 from truenorth.state.judge import Claim, Verdict, judge
 from truenorth.state.layout import DP, DV
-from truenorth.state.limits import limit
+from truenorth.state.limits import is_estimated, limit
 
 Array = NDArray[np.float64]
 
@@ -249,7 +249,7 @@ def _biases_together(answer: Alignment, gravity: Array) -> list[Evidence]:
     """
     prior = np.concatenate([answer.gyro_bias_prior**2, answer.accel_bias_prior**2 + gravity])
     own = np.concatenate([answer.gyro_bias_sigma, answer.accel_bias_sigma]) ** 2
-    seen = np.sqrt(own) < NOT_ESTIMATED * np.sqrt(prior)
+    seen = is_estimated(np.sqrt(own), np.sqrt(prior))
     count = int(seen.sum())
     if not count:
         return []

@@ -11,6 +11,7 @@ from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.report.document import Table
 from truenorth.report.numbers import of_sigma, short
 from truenorth.state.layout import ACCEL_AXES, GYRO_AXES
+from truenorth.state.limits import is_estimated
 
 if TYPE_CHECKING:
     from truenorth.alignment.moving import Moving
@@ -32,7 +33,6 @@ UNITS = {
     "anomaly": ("% of the field", 100.0),
 }
 SCALES = {GYRO_AXES: "gyro scale factors", ACCEL_AXES: "accelerometer scale factors"}
-NOT_ESTIMATED = 0.9  # of its prior: a sigma above it
 AXES = ("x", "y", "z")
 
 
@@ -42,7 +42,7 @@ def estimated_rows(result: Navigation) -> list[tuple[str, str, str]]:
     priors = dict(zip(result.track.layout.names, result.track.layout.priors, strict=True))
     for name, found in result.estimated().items():
         own = slice(None, None, 4) if name in SCALES else slice(None)  # of nine elements by rows the diagonal
-        open_ = np.all(np.array(found["sigma"])[own] > NOT_ESTIMATED * np.array(priors[name])[own])
+        open_ = not np.any(is_estimated(np.array(found["sigma"])[own], np.array(priors[name])[own]))
         if name.startswith("slow") or (open_ and name in (DEFLECTION, *SCALES)):
             continue  # the slow parts of the IMU's biases, which the track holds; what is of earth or IMU and does not show
         name = SCALES.get(name, name)

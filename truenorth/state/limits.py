@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Limit(NamedTuple):
@@ -26,6 +26,11 @@ LIMITS: dict[str, Limit] = {
         math.radians(3.0), "rad", "beyond it the small-angle models of all procedures lose their second digit"
     ),
     "pole": Limit(0.1, "1", "cosine of 84 deg latitude, from which the place, not the gyro, is what hides north"),
+    "not estimated": Limit(
+        0.9,
+        "sigma a priori",
+        "the data took a fifth of its variance at most: what is known of it is what was said of it",
+    ),
     # ---- checks of the sensors against earth and gravity
     "specification": Limit(5.0, "sigma", "a sound IMU misses its specification by that much once in a million"),
     "two answers": Limit(
@@ -87,6 +92,11 @@ LIMITS: dict[str, Limit] = {
 def limit(name: str) -> float:
     """The value of a limit."""
     return LIMITS[name].value
+
+
+def is_estimated(sigma: Any, prior: Any) -> Any:
+    """Whether the data showed a state, by its sigma now and before: floats or arrays."""
+    return sigma < limit("not estimated") * prior
 
 
 def may_be_chance(ratio: float) -> bool:
