@@ -206,7 +206,7 @@ def test_an_attitude_that_jumps_is_refused_for_that_reason(real):
     result = align_transfer(slave, replace(master, C_nb=np.where(after, turned, master.C_nb)))
     assert result.status == "inconsistent"
     assert "align a part without the jump" in result.reasons[0]
-    assert "attitude jumped by 3 deg" in result.reasons[1]
+    assert any("attitude jumped by 3 deg" in reason for reason in result.reasons)
 
 
 @pytest.mark.parametrize("how", ["steps", "runs"])
@@ -345,7 +345,7 @@ def test_only_what_is_unknown_is_estimated(real):
     result = align_transfer(slave, master, delay=0.016, delay_sigma=0.0, lever_arm_sigma=0.0, mounting_sigma=0.0)
     assert result.transfer.delay_sigma == 0.0
     assert not result.transfer.delay_estimated
-    assert "15 states" in result.method_reason
+    assert "24 states" in result.method_reason  # the INS, and axes of gyros
 
 
 def test_ideal_spec_of_the_slave_is_possible(flight, ideal):

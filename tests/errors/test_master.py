@@ -6,18 +6,16 @@ import numpy as np
 import pytest
 
 from truenorth.alignment.transfer_filter import Assumed, Matching, master_aiding
-from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
-from truenorth.core.compiled import compiled
+from truenorth.core.attitude import dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.errors import UsageError
 from truenorth.core.position import Position
-from truenorth.errors.group import columns_at
+from truenorth.errors.dynamics import dynamics_of
 from truenorth.errors.master import (
     ARM,
     ATTITUDE_ERROR,
     DELAY,
     FLEXURE,
     MOUNTING,
-    SKEW,
     VELOCITY_ERROR,
     MasterErrors,
     TransferModel,
@@ -28,8 +26,7 @@ from truenorth.records.motion import MotionStates
 from truenorth.simulation import MasterSpec, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight, turn
-from truenorth.state.layout import BG, DV, PHI
-from truenorth.state.now import NOW_C, NOW_LENGTH, NOW_MEAN_RATE
+from truenorth.state.layout import BG, DV, PHI, STATES
 
 OF_MASTER = MasterErrors(level=1e-4, heading=1e-3, velocity=0.05, correlation_time=200.0)
 ALL = TransferModel(0.0, 0.0, mounting=True, flexure_sigma=(1e-3, 2e-3, 3e-3), flexure_beta=0.7, master=OF_MASTER)
@@ -126,23 +123,18 @@ def test_a_handed_over_attitude_is_wrong_by_mounting_flexure_and_master_together
     np.testing.assert_allclose(J @ P @ J.T, np.diag([1e-10] * 3 + [1e-2] * 3), atol=1e-16)
 
 
-def test_gyros_turned_as_a_whole_turn_the_attitude_by_what_their_group_says():
-    """``phi' = -C (s x w)`` against the turns that gyros along axes turned by s measure."""
-    model = TransferModel(misalignment=1e-3)
-    (group,) = (g for g in model.groups.values() if g.name == SKEW)
-    C, w, s = dcm_from_euler(0.7, 0.1, -0.2), np.array([0.3, -0.2, 0.5]), np.array([1e-4, -2e-4, 3e-4])
-    now, F = np.zeros(NOW_LENGTH), np.zeros((9, 18))
-    now[NOW_C : NOW_C + 9], now[NOW_MEAN_RATE : NOW_MEAN_RATE + 3] = C.ravel(), w
-    run_columns(group.acts.address, now, np.zeros(8), 15, np.zeros(18), F)
-    T = 1e-3
-    measured = dcm_from_rotation_vector(s) @ w  # along axes that are turned by -s, w reads w + s x w
-    off = dcm_from_rotation_vector(T * measured) @ dcm_from_rotation_vector(T * w).T
-    phi = -C @ rotation_vector_from_dcm(off) / T  # C_hat = (I - [phi x]) C
-    np.testing.assert_allclose(measured, w + np.cross(s, w), atol=1e-6)
-    np.testing.assert_allclose(F[:3, 15:] @ s, phi, atol=2e-7)
-    assert not F[3:].any()
-
-
-@compiled
-def run_columns(address, now, figures, first, assumed, F):
-    columns_at(address)(now, figures, first, assumed, F)
+def test_a_constant_and_a_drift_are_one_process():
+    """Of the variance of both at all times; over a short time it changes by as much as the drift alone: ``2 d^2 t/tau``."""
+    own = MasterErrors(
+        level=3e-4, heading=2e-3, velocity=0.05, attitude_drift=1e-4, velocity_drift=0.1, correlation_time=90.0
+    )
+    groups = TransferModel(master=own).groups
+    dynamics = dynamics_of((groups[ATTITUDE_ERROR], groups[VELOCITY_ERROR]), np.zeros(STATES))
+    stays = dynamics.noise[STATES:] / (2.0 * dynamics.decay[STATES:])
+    constant, drift = np.array([3e-4, 3e-4, 2e-3, *[0.05] * 3]), np.repeat([1e-4, 0.1], 3)
+    np.testing.assert_allclose(stays, constant**2 + drift**2)
+    np.testing.assert_allclose(dynamics.noise[STATES:], 2.0 * drift**2 / 90.0)
+    steady = TransferModel(master=replace(own, attitude_drift=0.0)).groups[ATTITUDE_ERROR]
+    assert np.isinf(steady.lasts).all()
+    with pytest.raises(UsageError, match="correlation time"):
+        replace(steady, correlation_time=np.array([1.0, 0.0, 1.0]))

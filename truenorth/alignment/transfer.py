@@ -272,7 +272,7 @@ def _passes(
         part, start = hand_over(slave, master, model, spec, assumed, noise, position)
         # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
         velocity = kind == "acceleration" and number == 0
-        rows = Matching(FIRST_NOISE["velocity"], noise[1]) if velocity else Matching(*noise, kind)
+        rows = Matching(FIRST_NOISE["velocity"], noise[1]) if velocity else Matching(*noise, kind, GATE if number > 0 else 0.0)
         track = transfer_filter(part, master, model, start, rows, assumed, linear=linear)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None

@@ -33,7 +33,7 @@ from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
+from truenorth.state.layout import BA, BG, DP, DV, GYRO_AXES, PHI, STATES
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments, interval_lengths
@@ -63,7 +63,6 @@ WORDS = {
         f"master_phi_{axis}": f"master's attitude error about {side}"
         for axis, side in zip("ENU", ("east", "north", "up"))
     },
-    **{f"skew_{axis}": f"gyros turned about {axis}" for axis in "xyz"},
     "tau": "delay",
     "r_right": "lever arm right",
     "r_forward": "lever arm forward",
@@ -247,7 +246,7 @@ def _open(last: LastPass) -> tuple[str, ...]:
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:
         return ()
-    model = replace(model, master=MasterErrors())  # its groups stand behind all others
+    model = replace(model, master=MasterErrors(), axes=())  # their groups stand behind all others
     middle, at, T = _states(slave, track, k)
     speed = float(np.max(np.linalg.norm(track.v_n, axis=1)))
     P0 = model.prior(
@@ -344,9 +343,12 @@ def _history(slave: ImuRecord, track: Track, said: MasterRows, what: Matched) ->
 
 
 def final_attitudes(slave: ImuRecord, track: Track) -> Array:
-    """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases taken off."""
+    """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases and axes taken off."""
     dtheta, _ = increments(slave)
+    axes = track.layout.slice_of(GYRO_AXES)
+    M = np.zeros((3, 3)) if axes is None else track.sensors[-1, axes].reshape(3, 3)
     dtheta = dtheta - track.sensors[-1, BG] * interval_lengths(slave)[:, None]
+    dtheta = dtheta - dtheta @ M.T
     # The sample that each row falls into, and how much of it is past by then.
     ends, steps_of = slave.time, interval_lengths(slave)
     inside = np.clip(np.searchsorted(ends, track.time - SAME_TIME), 0, len(ends) - 1)

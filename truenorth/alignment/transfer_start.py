@@ -15,12 +15,14 @@ from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.master import ATTITUDE_ERROR, PLACE_SIGMA, MasterErrors, TransferModel, turn_noise
+from truenorth.errors.axes import axis_groups, standing
+from truenorth.errors.ins import TURN_TIME
+from truenorth.errors.master import ATTITUDE_ERROR, PLACE_SIGMA, MasterErrors, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
-from truenorth.state.layout import BG, PHI
+from truenorth.state.layout import BG, GYRO_AXES, PHI
 from truenorth.state.state import Start
 from truenorth.strapdown.increments import increments
 
@@ -89,10 +91,13 @@ def model_from_spec(
     master: MasterErrors | None = None,
 ) -> TransferModel:
     """The error model of a specification; instabilities become random walks of the biases."""
+    axes = tuple(group for group in axis_groups(spec, standing()) if group.name == GYRO_AXES)
+    as_noise = 0.0 if axes else TURN_TIME
     sigma, beta = ((0.0, 0.0, 0.0), 1.0) if flexure is None else (tuple(float(x) for x in flexure[0]), flexure[1])
     return TransferModel.of(
         spec,
-        turn_noise=turn_noise(spec.gyro_scale_factor, spec.gyro_misalignment),
+        turn_noise=(spec.gyro_scale_factor**2 * as_noise, spec.gyro_misalignment**2 * as_noise),
+        axes=axes,
         delay=assumed.delay_sigma > 0.0,
         lever_arm=assumed.lever_arm_sigma > 0.0,
         mounting=attitude and assumed.mounting_sigma > 0.0,
@@ -100,7 +105,6 @@ def model_from_spec(
         flexure_sigma=sigma,
         flexure_beta=beta,
         master=master or MasterErrors(),
-        misalignment=spec.gyro_misalignment if attitude and assumed.mounting_sigma > 0.0 else 0.0,
     )
 
 

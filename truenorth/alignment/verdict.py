@@ -25,7 +25,6 @@ from truenorth.state.limits import is_estimated, limit
 Array = NDArray[np.float64]
 
 
-WALKING = 2.0  # m/s: nobody takes what moves faster for a base that stays
 FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
 HEIGHTS = (-500.0, 9000.0)  # m, at which bases stay
 UPSIDE_DOWN = -0.5  # cosine between z and up, below which z points down
@@ -85,7 +84,8 @@ def judged(
     answer = grown(answer, verdict.added)
     reached = [] if verdict.finding == "inconsistent" else _reached(answer, verdict, heading_limit, remedies)
     status: Status = verdict.status("aligned")  # type: ignore[assignment]  # a finding, its good one so called
-    return replace(answer, status=status, evidence=(*reached, *verdict.evidence))
+    taken = _taken_to_stay(answer) if stays and status == "aligned" else []
+    return replace(answer, status=status, evidence=(*reached, *verdict.evidence, *taken))
 
 
 def claimed(answer: Alignment) -> Effect:
@@ -179,7 +179,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
                 (*_height(place.lat, g + check.force_residual), "units", "specification"),
             )
         )
-    return found + base_speed(answer) + _taken_to_stay(answer) + model_evidence(drift, settled=settled)
+    return found + base_speed(answer) + model_evidence(drift, settled=settled)
 
 
 def _height(lat: float, gravity: float) -> tuple[str, ...]:
@@ -191,8 +191,7 @@ def _height(lat: float, gravity: float) -> tuple[str, ...]:
 def _taken_to_stay(answer: Alignment) -> list[Evidence]:
     """Which steady speed towards north would turn heading by its sigma, and leave nothing to be seen: ``R w_ie cos L sigma``."""
     sigma, lat = azimuth_sigmas(answer)[0], answer.position.lat
-    speed = float(radii(lat)[0]) * EARTH_RATE * math.cos(lat) * sigma
-    return [note("base.stays", speed=speed)] if speed < WALKING else []
+    return [note("base.stays", speed=float(radii(lat)[0]) * EARTH_RATE * math.cos(lat) * sigma)]
 
 
 def base_speed(answer: Alignment) -> list[Evidence]:

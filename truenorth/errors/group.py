@@ -45,7 +45,7 @@ class Group:
         Such as "odometer scale".
     sigma : (n,) array
         One-sigma at the start, and of the stationary process where it has a correlation time.
-    correlation_time : float, s
+    correlation_time : float or (n,) array, s
         Infinite: a constant, or a random walk.
     walk : float
         Density of a random walk, sigma's unit/sqrt(s).
@@ -69,7 +69,7 @@ class Group:
 
     name: str
     sigma: Array
-    correlation_time: float = math.inf
+    correlation_time: float | Array = math.inf
     walk: float = 0.0
     correlation_distance: float = math.inf
     frequency: float = 0.0
@@ -82,7 +82,7 @@ class Group:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sigma", np.atleast_1d(np.asarray(self.sigma, dtype=np.float64)))
-        if not (np.all(self.sigma >= 0.0) and self.correlation_time > 0.0 and self.walk >= 0.0):
+        if not (np.all(self.sigma >= 0.0) and np.all(self.lasts > 0.0) and self.walk >= 0.0):
             raise UsageError(f"{self.name}: a sigma, a correlation time or a walk is negative or not a number")
         if not (self.correlation_distance > 0.0 and 0.0 <= self.frequency < math.inf and 0.0 <= self.damping <= 1.0):
             raise UsageError(
@@ -98,6 +98,11 @@ class Group:
     def prior(self) -> Array:
         """(m,) one-sigma of all its states at the start, rates of a second-order process included."""
         return self.sigma if self.frequency == 0.0 else np.concatenate([self.sigma, self.frequency * self.sigma])
+
+    @property
+    def lasts(self) -> Array:
+        """(n,) correlation times of its states, s."""
+        return np.broadcast_to(np.asarray(self.correlation_time, dtype=np.float64), self.sigma.shape)
 
 
 def groups_of(errors: Sequence[Group | str], spec: ImuSpec) -> tuple[Group, ...]:

@@ -6,13 +6,15 @@
 | `ARM` | lever arm from the master to the slave, slave axes: true minus assumed | m |
 | `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
-| `SKEW` | misalignment of the slave's gyros as a whole, slave axes | rad |
-| `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: constants that wander | m/s, rad |
+| `GYRO_AXES` | scale factors and misalignments of the slave's gyros (:mod:`truenorth.errors.axes`) | 1 |
+| `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: a constant and a drift each | m/s, rad |
 
 (The mounting stands in the *master's* axes, in which it does not turn with what is estimated: in the slave's axes the filter would
 take its own corrections of tilt for knowledge of heading.) Flexure is ``theta'' = -2 beta theta' - beta^2 theta + white noise``.
 The master's own errors are *considered*: they count in the covariance, and the slave is not corrected for them, since a
-slave that takes up its master's motion cannot tell its own tilt from its master's.
+slave that takes up its master's motion cannot tell its own tilt from its master's. Constant and drift of an axis are one
+process, of the variance of both, ``sigma^2``, whose differences over short times are those of the drift: its correlation
+time is that of the drift times ``sigma^2 / drift^2``.
 """
 
 from __future__ import annotations
@@ -20,27 +22,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.core.attitude import cross, times
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
-from truenorth.errors.group import Group, columns
-from truenorth.errors.ins import TURN_TIME
+from truenorth.errors.group import Group
 from truenorth.errors.model import InsModel
 from truenorth.errors.walks import Walks
-from truenorth.state.layout import DV, PHI, Layout
-from truenorth.state.now import NOW_C, NOW_MEAN_RATE, matrix_of, vector_of
+from truenorth.state.layout import DV, GYRO_AXES, PHI, Layout
 from truenorth.state.prior import joined, prior_covariance
 
 Array = NDArray[np.float64]
 
 DELAY, ARM, MOUNTING, FLEXURE = "master delay", "master lever arm", "mounting", "flexure"
 VELOCITY_ERROR, ATTITUDE_ERROR = "master velocity error", "master attitude error"
-SKEW = "gyro skew"
 SIDES = ("right", "forward", "up")
 PLACE_SIGMA = 10.0  # m: the slave's place is set to the master's, its error moves attitude by parts in a million
 _OF_GROUPS = {
@@ -50,7 +47,7 @@ _OF_GROUPS = {
     FLEXURE: (tuple(f"theta_{axis}" for axis in "xyz") + tuple(f"theta'_{axis}" for axis in "xyz"), "rad"),
     VELOCITY_ERROR: (tuple(f"master_dv_{axis}" for axis in "ENU"), "m/s"),
     ATTITUDE_ERROR: (tuple(f"master_phi_{axis}" for axis in "ENU"), "rad"),
-    SKEW: (tuple(f"skew_{axis}" for axis in "xyz"), "rad"),
+    GYRO_AXES: (tuple(f"axes_{i}{j}" for i in "xyz" for j in "xyz"), "1"),
 }
 _OF_INS = (
     ("phi", "ENU", "rad"),
@@ -59,17 +56,6 @@ _OF_INS = (
     ("eps", "xyz", "rad/s"),
     ("nabla", "xyz", "m/s^2"),
 )
-
-
-@columns
-def _skewed(now: Any, figures: Any, first: int, assumed: Any, F: Any) -> None:
-    """``phi' = -C (s x w)``: gyros whose axes are turned by s against the case measure ``w + s x w``."""
-    w = vector_of(now, NOW_MEAN_RATE)
-    for j in range(3):
-        e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
-        turn = times(matrix_of(now, NOW_C), cross(e, w))
-        for i in range(3):
-            F[i, first + j] = -turn[i]
 
 
 @dataclass(frozen=True)
@@ -82,8 +68,9 @@ class MasterErrors:
     velocity : float, m/s
         Constant, of each axis.
     attitude_drift, velocity_drift : float, rad and m/s
-        Of each axis, in the correlation time; taken as a random walk of that rate, which does not turn back.
+        Of each axis: a stationary Gauss-Markov process.
     correlation_time : float, s
+        Of the drift.
     """
 
     level: float = 0.0
@@ -185,8 +172,10 @@ def _median(values: Array) -> float:
 class TransferModel(Walks):
     """Noise of the slave, and which groups there are; one-sigma, SI."""
 
-    # s; what scale factors and misalignments of the gyros do in turns, as noise; see :class:`truenorth.errors.model.InsModel`
-    turn_noise: float = 0.0
+    # (2,) s; what scale factors and misalignments of the gyros do in turns, where they are no states; as of
+    # :class:`truenorth.errors.model.InsModel`
+    turn_noise: tuple[float, float] = (0.0, 0.0)
+    axes: tuple[Group, ...] = ()  # they, as states
     delay: bool = True  # groups for them
     lever_arm: bool = True
     mounting: bool = False
@@ -197,11 +186,10 @@ class TransferModel(Walks):
     flexure_beta: float = 1.0  # rad/s; natural frequency of its critically damped processes
     master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
     considered: bool = True  # whether the master's errors count in the covariance alone; else they are estimated
-    misalignment: float = 0.0  # rad; of the gyros' axes: what turns them all alike is a group, the rest noise in turns
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not all(0.0 <= x < math.inf for x in (self.turn_noise, self.delay_walk, *self.flexure_sigma)):
+        if not all(0.0 <= x < math.inf for x in (*self.turn_noise, self.delay_walk, *self.flexure_sigma)):
             raise UsageError(f"{self}: a random walk or a sigma is negative or not finite")
         if not 0.0 < self.flexure_beta < math.inf:
             raise UsageError(f"flexure_beta is {self.flexure_beta}; expected a positive frequency, rad/s")
@@ -218,16 +206,15 @@ class TransferModel(Walks):
             found.append(Group(MOUNTING, np.zeros(3), rotation=True, unit="rad"))
         if any(self.flexure_sigma):
             found.append(Group(FLEXURE, np.array(self.flexure_sigma), frequency=self.flexure_beta, unit="rad"))
-        if self.misalignment > 0.0:
-            found.append(Group(SKEW, np.full(3, self.misalignment), acts=_skewed, unit="rad"))
-        rate = math.sqrt(2.0 / of.correlation_time)
-        if of.velocity > 0.0 or of.velocity_drift > 0.0:
-            sigma, walk = np.full(3, math.hypot(of.velocity, of.velocity_drift)), rate * of.velocity_drift
-            found.append(Group(VELOCITY_ERROR, sigma, walk=walk, considered=self.considered, unit="m/s"))
-        if of.level > 0.0 or of.heading > 0.0 or of.attitude_drift > 0.0:
-            sigma = np.hypot([of.level, of.level, of.heading], of.attitude_drift)
-            walk = rate * of.attitude_drift
-            found.append(Group(ATTITUDE_ERROR, sigma, walk=walk, considered=self.considered, unit="rad"))
+        found += self.axes
+        for name, constant, drift, unit in (
+            (VELOCITY_ERROR, np.full(3, of.velocity), of.velocity_drift, "m/s"),
+            (ATTITUDE_ERROR, np.array([of.level, of.level, of.heading]), of.attitude_drift, "rad"),
+        ):
+            sigma = np.hypot(constant, drift)
+            if sigma.any():
+                lasts = of.correlation_time * sigma**2 / drift**2 if drift > 0.0 else math.inf
+                found.append(Group(name, sigma, lasts, considered=self.considered, unit=unit))
         return {group.name: group for group in found}
 
     @cached_property
@@ -238,7 +225,7 @@ class TransferModel(Walks):
             self.accel_random_walk,
             self.gyro_rate_walk,
             self.accel_rate_walk,
-            (self.turn_noise, self.turn_noise),
+            self.turn_noise,
             tuple(self.groups.values()),
         )
 
@@ -319,11 +306,3 @@ class TransferModel(Walks):
 
 def _unit(name: str, group: str) -> str:
     return "rad/s" if name.startswith("theta'") else _OF_GROUPS[group][1]
-
-
-def turn_noise(scale_factor: float, misalignment: float) -> float:
-    """What scale factors and misalignments of the gyros do in turns, as noise, for :class:`TransferModel`.
-
-    The larger of both, about every axis: a turn about one axis tilts about the others.
-    """
-    return max(scale_factor, misalignment) ** 2 * TURN_TIME

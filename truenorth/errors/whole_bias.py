@@ -57,7 +57,7 @@ def taken_apart(model: InsModel, P15: Array, bias: Array, whole: WholeBiases) ->
             continue
         s = np.diag(P)[slow].copy()
         process = model.groups[model.layout.names.index(name)]
-        mean, late = time_average(whole.averaged / process.correlation_time)
+        mean, late = time_average(whole.averaged / process.lasts[0])
         said = c + mean * s  # variance a priori of what the data see
         a, b = c / said, late * s / said
         M[group, group], M[slow, group] = np.diag(a), np.diag(b)

@@ -121,7 +121,7 @@ def _correlation(lasting: Lasting, source: Aiding) -> tuple[float, float]:
     """Of rows that follow each other, and sigma of what lasts."""
     size, white = float(lasting.group.sigma[0]), lasting.white * _level(source)
     apart = float(np.median(np.diff(np.sort(source.time))))
-    return size**2 / (size**2 + white**2) * math.exp(-apart / lasting.group.correlation_time), size
+    return size**2 / (size**2 + white**2) * math.exp(-apart / lasting.group.lasts[0]), size
 
 
 def _level(source: Aiding) -> float:
