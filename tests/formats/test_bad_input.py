@@ -187,6 +187,32 @@ def test_damage_inside_an_archive(tmp_path):
     says(path, "damaged")
 
 
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"{'descr': '<f8', 'shape': (3, # \n",
+        b"{'descr': ('<f8',), 'fortran_order': False, 'shape': (3,)}\n",
+        b"(" * 5000,
+    ],
+)
+def test_a_header_of_an_archive_that_says_nothing(tmp_path, header):
+    """NumPy's parser of headers has errors of its own for each."""
+    path = tmp_path / "log.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("time.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(24))
+    says(path, "damaged")
+
+
+def test_an_archive_under_a_password(tmp_path):
+    path = tmp_path / "log.npz"
+    write_imu(ImuRecord(np.arange(1, 400) / 100, np.ones((399, 3)), np.ones((399, 3))), path)
+    data = bytearray(path.read_bytes())
+    for mark, at in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        data[data.index(mark) + at] |= 1
+    path.write_bytes(data)
+    says(path, "damaged", "encrypted")
+
+
 def test_parquet_with_other_types_and_gaps(tmp_path):
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     names = HEADER.split(",")

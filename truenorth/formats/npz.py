@@ -5,10 +5,8 @@ Large arrays stay on the disk (:mod:`truenorth.core.mapped`): a log of days take
 
 from __future__ import annotations
 
-import zlib
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 from truenorth.core.archive import check_size
 from truenorth.core.errors import DataError
@@ -30,7 +28,9 @@ def variables_of(path: Path) -> dict[str, Any]:
         return read_mapped(path)
     except MemoryError:
         raise DataError(f"{path.name}: its arrays do not fit into memory; expected a smaller log") from None
-    except (ValueError, OSError, EOFError, KeyError, NotImplementedError, BadZipFile, zlib.error) as error:
+    except DataError:
+        raise
+    except Exception as error:  # zipfile, its unpackers, NumPy's parser of headers have errors of their own
         raise DataError(f"{path.name}: the NumPy archive is damaged or cut short ({error}); write it anew") from None
 
 
