@@ -4,12 +4,13 @@ The master is late by tau, stands at -r in the slave (r: from master to slave, s
 master axes, ``C_mb true = (I + [mu x]) C_mb assumed``); the slave's seat bends by theta:
 
     velocity   z = v_hat - C_hat (w_hat x r) - v_master
-                 = dv + a tau + C [w x] dr + phi x C (w x r) - C (eps x r) - db
+                 = dv + a tau + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r) - db
     attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C_master mu - C theta - dm
 
 with `a` the *master's* acceleration: the slave's holds that of the arm itself, which would tell a delay from the master's
 smooth motion falsely. The rows are re-timed: they are taken at the stamp less the delay as known now, so that only what
-is left of it is linearised. ``b`` and ``m`` are the master's own slow errors of velocity and attitude, east, north, up.
+is left of it is linearised. ``b`` and ``m`` are the master's own slow errors of velocity and attitude, east, north, up; `M` holds
+scale factors and misalignments of the gyros: of an arm of 30 m one per cent is an arm of 30.3 m.
 
 Sources: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
 and Timing 3 (2016), eq. 6-9, corrected: a zero column is missing in its (9); the sign of tau in its (8) is that of (9) when
@@ -32,9 +33,11 @@ from truenorth.aiding.row import (
     AT_FLEXURE,
     AT_LAG,
     AT_MOUNT,
+    AT_OWN,
     MOUNT,
     OWN,
     Row,
+    by_axes,
     lag_now,
     row,
     with_state,
@@ -105,6 +108,8 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     C, w, spin, f = matrix_of(now, NOW_C), vector_of(now, NOW_RATE), vector_of(now, NOW_SPIN), vector_of(now, NOW_FORCE)
     earth = vector_of(now, NOW_EARTH)
     still = times_back(C, earth)
+    off = by_axes(assumed, at[AT_OWN], w)
+    w = (w[0] - off[0], w[1] - off[1], w[2] - off[2])
     w_eb = (w[0] - still[0], w[1] - still[1], w[2] - still[2])
     push = (0.0, 0.0, 0.0)
     if not np.isnan(measured[3]) and figures[OWN + 1] == 0.0:
@@ -131,6 +136,13 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             x, y = m[0], m[1]
             s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
             H[0, a], H[1, a], H[2, a] = c * x - s * y, s * x + c * y, m[2]
+    if at[AT_OWN] >= 0:  # as biases of the gyros; by a rate of another noise, as the arm
+        other = vector_of(now, NOW_OTHER_RATE)
+        seen = _beyond_noise(other, figures[OWN])
+        for i in range(3):
+            for j in range(3):
+                for k in range(3):
+                    H[i, at[AT_OWN] + 3 * j + k] = seen * H[i, _BG + j] * other[k]
     if at[AT_BIAS] >= 0:
         for j in range(3):
             z[j] += assumed[at[AT_BIAS] + j]
@@ -213,7 +225,9 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             H[j, at[AT_BIAS] + j] = -1.0
 
 
-MASTER_VELOCITY = Row("master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1}, width=10, instant=True)
+MASTER_VELOCITY = Row(
+    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9}, width=10, instant=True
+)
 MASTER_ATTITUDE = Row(
     "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"
 )

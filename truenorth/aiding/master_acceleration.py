@@ -3,12 +3,12 @@
 Of two points of a rigid body, the slave at r from the master (slave axes), the forces differ by
 ``D r = w x (w x r) + w' x r``. With the master late by tau and its attitude wrong by m (east, north, up):
 
-    z = C_hat (f_hat - D_hat r) - C_master f_master = f x phi + C nabla + f' tau - f x m + C D dr
+    z = C_hat (f_hat - D_hat r) - C_master f_master = f x phi + C (nabla + M_a (f - f0)) + f' tau - f x m + C D dr - C dD r
 
-with ``f' = C (w x f + f_b')``. For the columns of arm and delay, w' and f_b' come with the row, taken over some tenths of a
-second: of a few samples w' is noise, and its square would be taken for knowledge. For the same reason the arm should be
-*considered* here, not estimated: what is smoothed is not quite what acts. The slave's force is a mean over six samples; what
-noise and vibration leave of it counts in the noise of the row.
+with ``dD`` by ``M_g w`` and ``M_g w'`` (:mod:`truenorth.errors.axes`), and ``f' = C (w x f + f_b')``. For the columns of arm and
+delay, w' and f_b' come with the row, taken over some tenths of a second: of a few samples w' is noise, and its square would be
+taken for knowledge. For the same reason the arm should be *considered* here, not estimated: what is smoothed is not quite what
+acts. The slave's force is a mean over six samples; what noise and vibration leave of it counts in the noise of the row.
 
 Source: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
 and Timing 3 (2016), eq. 4, for a rigid body; its transformation on the right is the inverse of what its words say.
@@ -22,7 +22,20 @@ import numpy as np
 
 from truenorth.aiding.master import from_north
 from truenorth.aiding.position import into_north
-from truenorth.aiding.row import ARM, AT_ARM, AT_BIAS, AT_LAG, Row, lag_now, row, with_state
+from truenorth.aiding.row import (
+    ARM,
+    AT_ARM,
+    AT_BIAS,
+    AT_LAG,
+    AT_OWN,
+    AT_SCALE,
+    OWN,
+    Row,
+    by_axes,
+    lag_now,
+    row,
+    with_state,
+)
 from truenorth.core.attitude import cross, times
 from truenorth.state.layout import BA, PHI
 from truenorth.state.now import NOW_C, NOW_FORCE, NOW_RATE, NOW_SPIN, matrix_of, vector_of
@@ -32,7 +45,10 @@ _PHI, _BA = PHI.start, BA.start
 
 @row
 def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    """Measured: the master's specific force, east, north, up; the slave's w' and f_b', NaN where its log ends."""
+    """Measured: the master's specific force, east, north, up; the slave's w' and f_b', NaN where its log ends.
+
+    Its own figures: the force at rest besides which the accelerometers' axes act.
+    """
     if np.isnan(measured[0]):
         return
     r = with_state(figures, ARM, assumed, at[AT_ARM])
@@ -40,6 +56,16 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
     said, growth, smooth = from_north(now, (measured[0], measured[1], measured[2])), (0.0, 0.0, 0.0), spin
     if not np.isnan(measured[3]):
         smooth, growth = vector_of(measured, 3), vector_of(measured, 6)
+    still = vector_of(figures, OWN)
+    more = (f[0] - still[0], f[1] - still[1], f[2] - still[2])
+    of_f, of_w, of_spin = (
+        by_axes(assumed, at[AT_SCALE], more),
+        by_axes(assumed, at[AT_OWN], w),
+        by_axes(assumed, at[AT_OWN], spin),
+    )
+    f = (f[0] - of_f[0], f[1] - of_f[1], f[2] - of_f[2])
+    w = (w[0] - of_w[0], w[1] - of_w[1], w[2] - of_w[2])
+    spin = (spin[0] - of_spin[0], spin[1] - of_spin[1], spin[2] - of_spin[2])
     swing, roll = cross(w, cross(w, r)), cross(spin, r)
     at_master = (f[0] - swing[0] - roll[0], f[1] - swing[1] - roll[1], f[2] - swing[2] - roll[2])
     turn = cross(w, at_master)
@@ -57,6 +83,22 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
             H[i, _PHI + j], H[i, _BA + j] = lean[i], C[i, j]
             if at[AT_ARM] >= 0:
                 H[i, at[AT_ARM] + j] = arm[i]
+            if at[AT_SCALE] >= 0:
+                for k in range(3):
+                    H[i, at[AT_SCALE] + 3 * j + k] = C[i, j] * more[k]
+        if at[AT_OWN] >= 0:
+            inner, outer, roll = cross(e, cross(w, r)), cross(w, cross(e, r)), cross(e, r)
+            for k in range(3):
+                turned = times(
+                    C,
+                    (
+                        (inner[0] + outer[0]) * w[k] + roll[0] * smooth[k],
+                        (inner[1] + outer[1]) * w[k] + roll[1] * smooth[k],
+                        (inner[2] + outer[2]) * w[k] + roll[2] * smooth[k],
+                    ),
+                )
+                for i in range(3):
+                    H[i, at[AT_OWN] + 3 * j + k] = -turned[i]
     into_north(now, H, z)
     if at[AT_BIAS] >= 0:  # an error of the master's attitude stands along east, north, up, as what it said
         m, of = (measured[0], measured[1], measured[2]), at[AT_BIAS]
@@ -68,5 +110,10 @@ def _acceleration(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, 
 
 
 MASTER_ACCELERATION = Row(
-    "master acceleration", _acceleration, {"lever arm": 3, "bias": 3, "lag": 1}, width=9, instant=True, unit="m/s^2"
+    "master acceleration",
+    _acceleration,
+    {"lever arm": 3, "bias": 3, "lag": 1, "scale": 9, "own": 9},
+    width=9,
+    instant=True,
+    unit="m/s^2",
 )

@@ -87,6 +87,17 @@ def with_state(values: Any, first: int, assumed: Any, at: int) -> Any:
 
 
 @compiled
+def by_axes(assumed: Any, at: int, x: Any) -> Any:
+    """``M x``, of what is assumed of a matrix of scale factors and misalignments, by rows; zeros where there is none; a tuple."""
+    a, b, c = 0.0, 0.0, 0.0
+    if at >= 0:
+        a = assumed[at] * x[0] + assumed[at + 1] * x[1] + assumed[at + 2] * x[2]
+        b = assumed[at + 3] * x[0] + assumed[at + 4] * x[1] + assumed[at + 5] * x[2]
+        c = assumed[at + 6] * x[0] + assumed[at + 7] * x[1] + assumed[at + 8] * x[2]
+    return a, b, c
+
+
+@compiled
 def state_of(assumed: Any, at: int) -> float:
     """What is assumed in a single state, 0 where there is none."""
     value = 0.0

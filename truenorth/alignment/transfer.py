@@ -17,6 +17,7 @@ from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
+from truenorth.alignment.transfer_axes import slave_axes
 from truenorth.alignment.transfer_filter import (
     TRANSLATIONS,
     Assumed,
@@ -27,10 +28,12 @@ from truenorth.alignment.transfer_filter import (
     delay_found,
     transfer_filter,
 )
-from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
+from truenorth.alignment.transfer_start import as_found, common_clock, hand_over, model_from_spec, parted_clocks
+from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.group import Group
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
 from truenorth.estimate.memory import REOPENED, USED
@@ -45,6 +48,7 @@ from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
+from truenorth.state.layout import ACCEL_AXES
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -154,17 +158,17 @@ def align_transfer(
     C_mb = np.asarray(dcm_from_euler(*angles))
     if what.translation is None:
         lever_arm_sigma = 0.0  # attitude does not see it
-    assumed = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
-    assumed, notes = common_clock(slave, master, assumed)
+    said = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
+    said, notes = common_clock(slave, master, said)
     notes = (*notes, *master.notes)
-    own = own_errors(master.attitude_sigma, master.velocity_sigma) if master_errors is None else None
-    errors = own or errors_of(master_errors)
-    model = _model(spec, assumed, what, flexure, errors)
+    errors = _errors(master, master_errors)
+    model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
-    noise, linear = _passes(slave, master, model, spec, assumed, noise, fitted, what.kind, position, tell)
+    found = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
     tell("aligning")
-    part, start = hand_over(slave, master, model, spec, assumed, noise, position)
+    noise, linear, assumed, biases = found
+    part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
     if part.duration < SHORTEST:
         raise DataError(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
@@ -174,11 +178,18 @@ def align_transfer(
     run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
+    track = as_said_together(track, model, assumed, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
-    last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least)
+    last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least, said)
     answer = assemble_transfer(last, spec, where, notes, heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+
+
+def _errors(master: MasterRecord, given: MasterErrors | str | None) -> MasterErrors:
+    """The master's own slow errors: as given, or as its record says."""
+    own = own_errors(master.attitude_sigma, master.velocity_sigma) if given is None else None
+    return own or errors_of(given)
 
 
 def _rivals(
@@ -237,7 +248,12 @@ def _known_as_well_as(position: Position, answer: Alignment) -> Alignment:
 
 
 def _model(
-    spec: ImuSpec, assumed: Assumed, what: Matched, flexure: FlexureSpec | None, errors: MasterErrors
+    spec: ImuSpec,
+    assumed: Assumed,
+    what: Matched,
+    flexure: FlexureSpec | None,
+    errors: MasterErrors,
+    axes: tuple[Group, ...],
 ) -> TransferModel:
     """States for what is matched; of the master's errors, those that act on it."""
     of_rows = errors
@@ -246,7 +262,7 @@ def _model(
     if not what.attitude and what.translation != "acceleration":
         of_rows = replace(of_rows, attitude_drift=0.0, level=0.0, heading=0.0)
     bend = None if flexure is None else (np.array(flexure.sigma)[[1, 2, 0]], flexure.beta)  # turn, pitch, roll
-    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows)
+    model = model_from_spec(spec, assumed, what.attitude, bend, DELAY_WALK, of_rows, axes)
     if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders
         walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
         model = replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
@@ -264,20 +280,28 @@ def _passes(
     kind: Translation,
     position: Position | None,
     tell: Callable[[str], None],
-) -> tuple[tuple[float, float], Linear | None]:
-    """Passes that fit the noise of the master's rows, and the attitudes to linearise with."""
+) -> tuple[tuple[float, float], Linear | None, Assumed, Array]:
+    """Passes that fit the noise of the master's rows, and find the attitudes to linearise with, and where to begin."""
     linear: Linear | None = None
-    for number in range(PASSES):
+    biases = np.zeros(6)
+    cheap = ACCEL_AXES in model.groups  # then the first pass begins far from where it ends
+    for number in range(PASSES + cheap):
         tell(f"pass {number + 1}")
-        part, start = hand_over(slave, master, model, spec, assumed, noise, position)
+        part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
         # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
         velocity = kind == "acceleration" and number == 0
-        rows = Matching(FIRST_NOISE["velocity"], noise[1]) if velocity else Matching(*noise, kind, GATE if number > 0 else 0.0)
+        rows = (
+            Matching(FIRST_NOISE["velocity"], noise[1])
+            if velocity
+            else Matching(*noise, kind, GATE if number > 0 else 0.0)
+        )
         track = transfer_filter(part, master, model, start, rows, assumed, linear=linear)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None
         linear = _linear(part, master, track, assumed, begin)
-    return noise, linear
+        if cheap and not any(residuals.jumped.any() for residuals in track.residuals):
+            assumed, biases = as_found(track, start, assumed, biases)
+    return noise, linear, assumed, biases
 
 
 def _seen(slave: ImuRecord, master: MasterRecord, model: TransferModel, C_mb: Array) -> list[Evidence]:

@@ -89,6 +89,7 @@ class LastPass(NamedTuple):
     # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     carried: float = 0.0
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
+    said: Assumed | None = None  # what was assumed at first, where the pass begins with another mounting
 
 
 def assemble_transfer(
@@ -131,11 +132,13 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least)
+    return judge_transfer(
+        answer, transfer, track, (last.said or assumed, assumed), heading_limit, of_master, last.least
+    )
 
 
 def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:
-    _, master, model, assumed, _, what, noise, track, carried, _ = last
+    _, master, model, assumed, _, what, noise, track, carried, *_ = last
     sigma, aux, C_mb = track.sigma[-1], track.sensors[-1], axes_along(track, assumed)[-1]
     tau, arm, mount = (model.slice_of(which) for which in (DELAY, ARM, MOUNTING))
     silent = master.gaps[master.steps[master.gaps] > max(1.0, LONG_SILENCE * master.interval)]

@@ -33,7 +33,7 @@ from truenorth.errors.master import (
 from truenorth.estimate.memory import ABSENT, REJECTED, REOPENED, USED
 from truenorth.estimate.run import navigate_track
 from truenorth.records import ImuRecord, MasterRecord
-from truenorth.state.layout import BA, BG, DP, DV, PHI
+from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
@@ -137,6 +137,8 @@ def transfer_filter(
     values = np.zeros(model.states)
     values[BG], values[BA] = start.gyro_bias, start.accel_bias
     P = start.P.copy()
+    if (axes := model.slice_of(ACCEL_AXES)) is not None:  # gravity on them is a part of the bias
+        values[axes] = P[axes, BA] @ np.linalg.solve(P[BA, BA], start.accel_bias)
     if linear is not None and linear.begin is not None and (tau := model.slice_of(DELAY)) is not None:
         values[tau], P[tau, tau] = linear.begin[0], linear.begin[1] ** 2
     track = navigate_track(
@@ -216,6 +218,9 @@ def master_aiding(
         row, opens, error = _ROWS[kind]
         known = np.isfinite(measured[:, :3]).all(axis=1)
         roles: dict[Role, str] = {"lag": DELAY, "lever arm": ARM}
+        roles |= {"own": GYRO_AXES} if kind != "position" else {}
+        roles |= {"scale": ACCEL_AXES} if kind == "acceleration" else {}
+        at_rest = groups[ACCEL_AXES].figures if ACCEL_AXES in groups else (0.0, 0.0, 0.0)
         found.append(
             Aiding(
                 row.name,
@@ -226,7 +231,7 @@ def master_aiding(
                 assumed.lever_arm,
                 states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
-                figures=(OTHER_NOISE * of_sample, pushed),
+                figures=at_rest if kind == "acceleration" else (OTHER_NOISE * of_sample, pushed),
                 retimed=True,
                 patience=patience if opens is not None else 0,
                 opens=opens,

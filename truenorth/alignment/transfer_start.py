@@ -11,19 +11,21 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.transfer_delay import WINDOW, find_delay
 from truenorth.alignment.transfer_filter import Assumed
-from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
-from truenorth.errors.axes import axis_groups, standing
+from truenorth.errors.axes import turning_axes
+from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME
-from truenorth.errors.master import ATTITUDE_ERROR, PLACE_SIGMA, MasterErrors, TransferModel
+from truenorth.errors.master import ATTITUDE_ERROR, MOUNTING, PLACE_SIGMA, MasterErrors, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
-from truenorth.state.layout import BG, GYRO_AXES, PHI
+from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI
 from truenorth.state.state import Start
+from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -32,6 +34,7 @@ SURPRISE = 3.0  # sigmas by which a delay found by correlation must miss the giv
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
+BETTER = 4.0  # sigmas: a prior's mean moves what is known so much better by less than a sixteenth of it
 
 
 def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:
@@ -89,10 +92,14 @@ def model_from_spec(
     flexure: tuple[Array, float] | None,
     delay_walk: float,
     master: MasterErrors | None = None,
+    axes: tuple[Group, ...] | None = None,
 ) -> TransferModel:
-    """The error model of a specification; instabilities become random walks of the biases."""
-    axes = tuple(group for group in axis_groups(spec, standing()) if group.name == GYRO_AXES)
-    as_noise = 0.0 if axes else TURN_TIME
+    """The error model of a specification; instabilities become random walks of the biases.
+
+    `axes` are the groups of axes that a log asks for, those of :func:`turning_axes` when left out.
+    """
+    axes = turning_axes(spec) if axes is None else axes
+    as_noise = 0.0 if any(group.name == GYRO_AXES for group in axes) else TURN_TIME  # constants, or noise
     sigma, beta = ((0.0, 0.0, 0.0), 1.0) if flexure is None else (tuple(float(x) for x in flexure[0]), flexure[1])
     return TransferModel.of(
         spec,
@@ -123,6 +130,8 @@ def hand_over(
     assumed: Assumed,
     noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
     position: Position | None,  # where the master gives none
+    biases: Array
+    | None = None,  # (6,) rad/s and m/s^2, of gyros and accelerometers, to begin with; zeros when left out
 ) -> tuple[ImuRecord, Start]:
     """The slave's record from the master's first row on, and its first state as the master gives it.
 
@@ -173,6 +182,8 @@ def hand_over(
     if np.isfinite(noise[0]):
         dv = math.hypot(dv, noise[0])
     gyro, accel = bias_sigmas(spec)
+    if ACCEL_AXES in model.groups:
+        accel = np.sqrt(spec.bias_variance[3:])
     P = model.prior(
         dv,
         phi,
@@ -187,7 +198,33 @@ def hand_over(
         C_nb=None if C_nm is None else C,
         C_mb=assumed.C_mb,
     )
-    return part, Start(begin, C, v, lat, lon, alt, np.zeros(3), np.zeros(3), P)
+    gyro_bias, accel_bias = np.zeros(6).reshape(2, 3) if biases is None else biases.reshape(2, 3)
+    return part, Start(begin, C, v, lat, lon, alt, gyro_bias, accel_bias, P)
+
+
+def as_found(track: Track, start: Start, assumed: Assumed, biases: Array) -> tuple[Assumed, Array]:
+    """Mounting and biases (6,) to begin another pass with, where this one found them far better than was said.
+
+    A pass is linear about what it holds at the time. One that begins 3 deg off turns its columns while it learns, and takes that
+    for knowledge of what the motion does not separate: seat, gyros and accelerometers turned alike. What is begun with moves the
+    mean of the prior, which is no news of what is known `BETTER` times as well by the log.
+    """
+    P, first, biases = track.P[-1], start.P, biases.copy()
+    found = track.sensors[-1]
+    mount = track.layout.slice_of(MOUNTING)
+    if mount is not None and _better(P, first, mount):
+        C_mb = np.asarray(dcm_from_rotation_vector(found[mount]) @ assumed.C_mb)
+        assumed = replace(assumed, C_mb=C_mb)
+    for number, of in enumerate((BG, BA)):
+        if _better(P, first, of):
+            biases[3 * number : 3 * number + 3] = found[of]
+    return assumed, biases
+
+
+def _better(P: Array, before: Array, of: slice) -> bool:
+    """Whether each component is known `BETTER` times as well as before."""
+    now, then = np.linalg.eigvalsh(P[of, of])[-1], np.linalg.eigvalsh(before[of, of])[0]
+    return bool(now * BETTER**2 < then)
 
 
 def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:

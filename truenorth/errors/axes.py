@@ -94,16 +94,30 @@ def axis_groups(spec: ImuSpec, force: ArrayLike, *, always: bool = False) -> tup
     always : bool
         Those whose effect is small against the sensor's own noise, too.
     """
-    gyro, accel = axis_sigma(spec)
     found = []
-    for name, sigma, usual, noise, acts, figures in (
-        (GYRO_AXES, gyro, USUAL_TURN, spec.gyro_random_walk, _gyros, ()),
-        (ACCEL_AXES, accel, USUAL_PUSH, spec.accel_random_walk, _accels, tuple(map(float, np.asarray(force)))),
+    for group, usual, noise in (
+        (gyro_axes(spec), USUAL_TURN, spec.gyro_random_walk),
+        (accel_axes(spec, force), USUAL_PUSH, spec.accel_random_walk),
     ):
-        largest = float(sigma.max())
+        largest = float(group.sigma.max())
         if largest > 0.0 and (always or (largest * usual) ** 2 * TURN_TIME > SMALL * noise**2):
-            found.append(Group(name, sigma, acts=acts, figures=figures))
+            found.append(group)
     return tuple(found)
+
+
+def turning_axes(spec: ImuSpec) -> tuple[Group, ...]:
+    """The gyros' group, where it shows in turns against their noise; none else."""
+    return tuple(group for group in axis_groups(spec, standing()) if group.name == GYRO_AXES)
+
+
+def gyro_axes(spec: ImuSpec) -> Group:
+    """The elements of ``M_g`` by rows."""
+    return Group(GYRO_AXES, axis_sigma(spec)[0], acts=_gyros)
+
+
+def accel_axes(spec: ImuSpec, force: ArrayLike) -> Group:
+    """The elements of ``M_a`` by rows, which act on what differs from a force at rest, (3,) m/s^2."""
+    return Group(ACCEL_AXES, axis_sigma(spec)[1], acts=_accels, figures=tuple(map(float, np.asarray(force))))
 
 
 def known_as_bias(P: Array, values: Array, group: Group, first: int, constant: ArrayLike | None) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@
 | `ARM` | lever arm from the master to the slave, slave axes: true minus assumed | m |
 | `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
-| `GYRO_AXES` | scale factors and misalignments of the slave's gyros (:mod:`truenorth.errors.axes`) | 1 |
+| `GYRO_AXES`, `ACCEL_AXES` | scale factors and misalignments of the slave's sensors, by rows (:mod:`truenorth.errors.axes`) | 1 |
 | `VELOCITY_ERROR`, `ATTITUDE_ERROR` | the master's own slow errors, east, north, up: a constant and a drift each | m/s, rad |
 
 (The mounting stands in the *master's* axes, in which it does not turn with what is estimated: in the slave's axes the filter would
@@ -28,10 +28,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.errors import UsageError
 from truenorth.core.units import parse
+from truenorth.errors.axes import known_as_bias
 from truenorth.errors.group import Group
 from truenorth.errors.model import InsModel
 from truenorth.errors.walks import Walks
-from truenorth.state.layout import DV, GYRO_AXES, PHI, Layout
+from truenorth.state.layout import ACCEL_AXES, DV, GYRO_AXES, PHI, Layout
 from truenorth.state.prior import joined, prior_covariance
 
 Array = NDArray[np.float64]
@@ -47,7 +48,8 @@ _OF_GROUPS = {
     FLEXURE: (tuple(f"theta_{axis}" for axis in "xyz") + tuple(f"theta'_{axis}" for axis in "xyz"), "rad"),
     VELOCITY_ERROR: (tuple(f"master_dv_{axis}" for axis in "ENU"), "m/s"),
     ATTITUDE_ERROR: (tuple(f"master_phi_{axis}" for axis in "ENU"), "rad"),
-    GYRO_AXES: (tuple(f"axes_{i}{j}" for i in "xyz" for j in "xyz"), "1"),
+    GYRO_AXES: (tuple(f"M_g {row}{column}" for row in "xyz" for column in "xyz"), "1"),
+    ACCEL_AXES: (tuple(f"M_a {row}{column}" for row in "xyz" for column in "xyz"), "1"),
 }
 _OF_INS = (
     ("phi", "ENU", "rad"),
@@ -175,7 +177,7 @@ class TransferModel(Walks):
     # (2,) s; what scale factors and misalignments of the gyros do in turns, where they are no states; as of
     # :class:`truenorth.errors.model.InsModel`
     turn_noise: tuple[float, float] = (0.0, 0.0)
-    axes: tuple[Group, ...] = ()  # they, as states
+    axes: tuple[Group, ...] = ()  # they, and those of the accelerometers, as states
     delay: bool = True  # groups for them
     lever_arm: bool = True
     mounting: bool = False
@@ -283,6 +285,7 @@ class TransferModel(Walks):
         C_nb : (3, 3) array, optional
             The slave's attitude was handed over from the master through the assumed mounting: ``phi = C_nm mu + C theta`` and
             the master's own error, besides what `phi` says; its velocity with the master's. Without it they are independent.
+            Of accelerometers whose axes are states, `accel_bias` is of the bias proper.
         C_mb : (3, 3) array, optional
             The assumed mounting; the unit matrix when left out.
         """
@@ -301,6 +304,8 @@ class TransferModel(Walks):
                 P[part, at] = C @ own
                 P[at, part] = P[part, at].T
                 P[part, part] += C @ own @ C.T
+        if ACCEL_AXES in self.groups:
+            P, _ = known_as_bias(P, np.zeros(len(P)), self.groups[ACCEL_AXES], self.layout.first_of(ACCEL_AXES), None)
         return P
 
 
