@@ -62,7 +62,7 @@ def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stat
         Infinite where the model is degenerate.
     """
     found = np.empty(LANES)
-    restricted(*(in_lanes(x) for x in (Phi, Q, P0)), np.array(h), *(in_lanes(x) for x in (r, Y)), stationary, found)
+    restricted(*(in_lanes(x) for x in (Phi, Q, P0)), np.array(h), *(in_lanes(np.asarray(x)) for x in (r, Y)), stationary, found)
     return float(found[0])
 
 
