@@ -38,7 +38,7 @@ from truenorth.papers.transfer.truth import (
 )
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, PHI
-from truenorth.state.state import Start, State
+from truenorth.state.state import Start
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -213,10 +213,9 @@ def assumed_of(flights: Flights, run: Run, method: Method) -> Assumed:
 
 
 def _track(flights: Flights, run: Run, method: Method) -> Track:
-    spec, at = flights.scenario.imu_spec, flights.start
+    spec, C_nb = flights.scenario.imu_spec, flights.start.C_nb
     model = model_of(method, spec)
-    begin = State.at(run.C_nb, at.lat, at.lon, at.alt, run.v_n)
-    start = Start.of(begin, prior_of(method, model, spec, at.C_nb))
+    start = Start.of(run.start, prior_of(method, model, spec, C_nb))
     assumed = assumed_of(flights, run, method)
     kind = method.translation or "velocity"
     sigma = np.inf if method.translation is None else method.noise * NOISE[kind]

@@ -17,6 +17,7 @@ from truenorth.simulation import Flexed, FlexureSpec, IdealLog, MasterSpec, idea
 from truenorth.simulation.gnss import moved
 from truenorth.simulation.scenario import Scenario, read_scenario
 from truenorth.simulation.streams import stream
+from truenorth.state.state import State
 
 Array = NDArray[np.float64]
 
@@ -87,8 +88,7 @@ class Run:
     slave: ImuRecord
     master: MasterRecord
     motion: Moving  # of the slave
-    C_nb: Array  # the slave's first attitude, handed over, and velocity
-    v_n: Array
+    start: State  # of the slave, as it is handed over
     mounting: Array  # (3,) rad: ``C_mb = exp([mounting x])``
     tau: float  # s
     arm: Array  # (3,) m
@@ -113,7 +113,7 @@ class Flights:
 
     def __call__(self, run: int) -> Run:
         """Make one run."""
-        case = self.case
+        case, at = self.case, self.start
         rng = stream(self.seed, case.number, run, STREAM)
         mounting = np.array([LEVEL, LEVEL, HEADING]) * rng.standard_normal(3)
         dv = VELOCITY_NOISE * rng.standard_normal(3)
@@ -131,8 +131,7 @@ class Flights:
             log.record,
             master,
             ideal.motion if case.flexure else self.body,
-            C_nb,
-            self.start.v_n + dv,
+            State.at(C_nb, at.lat, at.lon, at.alt, at.v_n + dv),
             mounting,
             tau + case.extra_delay,
             arm,
