@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from truenorth.quality.signals import STILL_ANGLE, median_of_rows
 from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
@@ -23,8 +24,6 @@ SHORTEST = 12  # blocks that say what is usual
 ASIDE = 3  # blocks on either side whose means are compared, ...
 GAP = 2  # ... and between them, for what takes its time
 SETTLED = 5.0  # s after a touch from which the table is at rest again
-FACTOR = 10.0  # of the usual scatter of such differences: a false alarm in less than 1e-5 of logs with Gaussian noise
-CARRIED = 5.0  # of the sigma by which gyros carry the force askew meanwhile: chance passes it in 4e-5 of logs
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,8 @@ def find_touch(
     walk = angle_walk * math.sqrt(block * (GAP + 2.0 * ASIDE / 3.0))
     carried = gravity * math.hypot(walk, rate_sigma * block * (ASIDE + GAP))
     best = int(np.argmax(size))
-    if size[best] < max(math.hypot(FACTOR * scatter, CARRIED * carried), STILL_ANGLE * gravity):
+    by_chance = math.hypot(limit("touched") * scatter, limit("carried") * carried)
+    if size[best] < max(by_chance, STILL_ANGLE * gravity):
         return None
     middle = (best + ASIDE) * length + GAP * length // 2
     return Touch(float(time[middle]), steps[best], scatter)

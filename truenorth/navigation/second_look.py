@@ -16,16 +16,14 @@ from truenorth.core.errors import DataError
 from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.rivals import moved
 from truenorth.state.evidence import Effect, Evidence, Figure, note
+from truenorth.state.limits import limit
 from truenorth.state.mounting import FALSE_REJECTION, Mounting
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 SMALL = 10.0  # times its prior: beyond it a small-angle model does not hold
-CLEAR = 6.0  # sigmas from which a contradiction is worth a warning; from HINT on its effect is added to sigma, however large
-HINT = 3.5
 LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data do not show it
-MOST_CONTRADICTED = 0.2  # of a sensor's measurements
 KNOWN_ARM = 0.2  # of an arm, the sigma up to which the data show it
 SMALLER = {"centimetres": 1e-2, "millimetres": 1e-3}
 AXES = ("right", "forward", "up")
@@ -74,7 +72,7 @@ def second_look(
         track = run({name: _loosened(name, m) for name, m in mounting.items()})
     except DataError:  # the measurements fit no track at all, which the first pass has shown
         return []
-    if _contradicted(track) > MOST_CONTRADICTED:  # figures of a model that does not hold are worth nothing
+    if _contradicted(track) > limit("rejected"):  # figures of a model that does not hold are worth nothing
         return []
     against, found = [], []
     for key, (name, roles) in SENSORS.items():
@@ -88,9 +86,9 @@ def second_look(
                 continue
             value, sigma = track.sensors[-1, where], track.sigma[-1, where]
             size = np.where(np.abs(value) > OPEN[role].least, np.abs(value) / sigma, 0.0)
-            if np.any(size > HINT):
+            if np.any(size > limit("misfit")):
                 item = _contradiction(role, name, key, given, value, sigma)
-                against.append(replace(item, urgent=bool(np.any(size > CLEAR))))
+                against.append(replace(item, urgent=bool(np.any(size > limit("clear misfit")))))
             elif role == "lever arm" and np.linalg.norm(given.lever_arm) > LONG_ARM:
                 arm = given.lever_arm
                 length = float(np.linalg.norm(arm))

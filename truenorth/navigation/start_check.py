@@ -12,6 +12,7 @@ from truenorth.core.errors import DataError
 from truenorth.quality.regimes import MOVING_ACCELERATION, motion_summary
 from truenorth.records import ImuRecord
 from truenorth.state.layout import BA, BG, PHI, STATES
+from truenorth.state.limits import limit
 from truenorth.state.state import Start
 
 Array = NDArray[np.float64]
@@ -19,7 +20,6 @@ Array = NDArray[np.float64]
 ORTHONORMAL = 1e-6
 SYMMETRIC = 1e-6  # of the largest product of two sigmas
 FIRST, LEAST = 20.0, 5.0  # s of the log's begin that are held against the start, and the least of them at rest
-CLEAR = 8.0  # sigmas
 SHAKE = 0.02  # m/s^2 and, divided by a second, rad/s: of a mean over seconds at rest with the engine running
 
 
@@ -82,9 +82,9 @@ def check_start_at_rest(start: Start, record: ImuRecord) -> None:
     DataError
         With what is off.
     """
-    if record.duration < LEAST or float(np.linalg.norm(start.v_n)) > CLEAR * math.sqrt(
-        float(np.max(np.diag(start.P)[3:6]))
-    ):
+    clear = limit("start at rest")
+    v_sigma = math.sqrt(float(np.max(np.diag(start.P)[3:6])))
+    if record.duration < LEAST or float(np.linalg.norm(start.v_n)) > clear * v_sigma:
         return
     part = record.between(None, float(record.time[0]) + FIRST)
     motion = motion_summary(part)
@@ -105,12 +105,12 @@ def check_start_at_rest(start: Start, record: ImuRecord) -> None:
     w_sigma = math.sqrt(float(np.max(sigma[BG])) ** 2 + noise**2 + (SHAKE / g / rest.duration) ** 2)
     f_sigma = math.hypot(g * float(np.max(sigma[PHI][:2])), float(np.max(sigma[BA])), SHAKE)
     worst, hour = float(np.max(np.abs(w_off))), math.radians(1.0) / 3600.0
-    if worst > CLEAR * w_sigma + 0.1 * float(np.linalg.norm(earth_rate_n(start.lat))):
+    if worst > clear * w_sigma + 0.1 * float(np.linalg.norm(earth_rate_n(start.lat))):
         raise DataError(
             f"{record.source}: at rest the gyros miss the earth's rate, as the start has it, by {worst / hour:.3g} deg/h; expected "
             f"{w_sigma / hour:.2g} deg/h (one sigma): check the start's latitude and attitude, and the IMU's axes and units"
         )
-    if np.max(np.abs(f_off)) > CLEAR * f_sigma:
+    if np.max(np.abs(f_off)) > clear * f_sigma:
         raise DataError(
             f"{record.source}: at rest the accelerometers are tilted by {math.degrees(float(np.max(np.abs(f_off))) / g):.2g} deg "
             f"against the start; expected {math.degrees(f_sigma / g):.2g} deg (one sigma): the IMU has been moved, or the start is "

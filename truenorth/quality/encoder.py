@@ -14,6 +14,7 @@ from truenorth.core.attitude import dcm_from_quaternion, rotation_vector_from_dc
 from truenorth.quality.tilt import whole_cells
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, contradiction
+from truenorth.state.limits import limit
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
@@ -21,8 +22,6 @@ Array = NDArray[np.float64]
 CLEARER = 4.0  # times smaller squares of the base's turns that another reading must leave
 NET_TURN = math.radians(8.0)  # of the base's mean attitude from the first third of a log to the last: more is no sway
 FEWEST_TURNS = 4  # of the outer axis, that show a wobble
-SURE = 7.0  # sigmas of it at least: sway is alike from turn to turn
-CHANCE = 2e-4  # of a sound indexer, of whose few turns sigma is estimated
 LEAST_ZERO = math.radians(0.05)  # rad: indexers are mounted no better
 FASTEST = math.radians(60.0)  # rad/s RMS: no ship or vehicle that stays turns faster
 
@@ -87,7 +86,7 @@ def zero_evidence(record: ImuRecord, C_sb: Callable[[Array], Array], inner: Call
     if len(found) < FEWEST_TURNS:
         return []
     off, sigma = -float(np.mean(found)), float(np.std(found, ddof=1)) / math.sqrt(len(found))
-    if abs(off) < max(LEAST_ZERO, max(SURE, student_limit(CHANCE, len(found) - 1)) * sigma):
+    if abs(off) < max(LEAST_ZERO, max(limit("indexer"), student_limit(limit("few turns"), len(found) - 1)) * sigma):
         return []
     return [Evidence("encoder.zero", {"off": off, "sigma": sigma}, "bounded", Effect(abs(off), abs(off)), ("encoder",))]
 

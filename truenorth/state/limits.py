@@ -70,6 +70,26 @@ LIMITS: dict[str, Limit] = {
         "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 148, by Markov's inequality: up to the "
         "limit of a drift, which one of 268,000 exceeds, a hint whose effect is added to sigma, however large",
     ),
+    "touched": Limit(
+        10.0,
+        "usual scatter",
+        "of the steps of the level force between blocks of a position: a false alarm in less than 1e-5 of logs with Gaussian noise",
+    ),
+    "carried": Limit(
+        5.0, "sigma", "of how gyros carry the level force askew between these blocks: chance passes it in 4e-5 of logs"
+    ),
+    "indexer": Limit(
+        7.0,
+        "sigma",
+        "of a wobble of the zero of an indexer's angles: sway is alike from turn to turn, which sigma does not know",
+    ),
+    "few turns": Limit(2e-4, "1", "false alarms of a sound indexer, of whose few turns that sigma is estimated"),
+    "start at rest": Limit(
+        8.0,
+        "sigma",
+        "a start is refused outright, with no filter to weigh it: one whose sigmas are half of what they should be still "
+        "passes in all but one of 15,000 logs, an axis",
+    ),
     # ---- measurements of aiding sensors and masters
     "rejected": Limit(
         0.2, "1", "of a sensor's measurements; a sound one loses 1e-4 to the gate, a poor road some per cent"
@@ -77,6 +97,12 @@ LIMITS: dict[str, Limit] = {
     "nis": Limit(
         3.0, "1", "mean over its rows, beyond which sigma is 1.7 times too small: model and data do not agree"
     ),
+    "misfit": Limit(
+        3.5,
+        "sigma",
+        "of a clock, an arm or a mounting taken for known: chance gives it in 5e-4, and what it does is in sigma",
+    ),
+    "clear misfit": Limit(6.0, "sigma", "the same, which chance gives in 2e-9: worth a warning"),
     "mounting": Limit(5.0, "sigma", "by which a delay, an arm or a mounting may miss what was said of it"),
     "log": Limit(5.0, "sigma", "between INS and velocity log for half of the time: of sound ones one in a million"),
     # ---- innovations
