@@ -8,7 +8,8 @@ from truenorth.core.errors import UsageError
 from truenorth.core.linalg import load, padded
 from truenorth.errors.dynamics import dynamics_of, noise_of_pairs, second_order
 from truenorth.errors.group import Group
-from truenorth.estimate.correct import update_held
+from truenorth.estimate.correct import touched, update_held
+from truenorth.estimate.predict import propagate_errors
 from truenorth.filters.recursion import workspace
 from truenorth.state.layout import STATES
 
@@ -47,6 +48,45 @@ def test_a_considered_state_counts_and_stays():
         np.testing.assert_allclose(w.P[:n, :n], J @ P @ J.T + r * np.outer(k, k), rtol=1e-12)
         np.testing.assert_allclose(w.x[:n], k * nu)
         np.testing.assert_allclose(np.diag(w.P)[:n][mask], np.diag(P)[mask])
+
+
+@pytest.mark.parametrize("reach", [15, 18, 21])
+def test_a_covariance_carried_as_far_as_states_act_is_that_of_the_whole_transition(reach):
+    """Nine full rows up to `reach`, a diagonal, and two states of second order that act on the INS or do not."""
+    rng = np.random.default_rng(reach)
+    n = 21
+    pair = np.full(n, -1)
+    pair[16], pair[19] = 19, -2
+    Phi = np.diag(rng.uniform(0.5, 1.0, n))
+    Phi[:9, :reach] = rng.standard_normal((9, reach))
+    Phi[np.ix_([16, 19], [16, 19])] = rng.standard_normal((2, 2))
+    P, Q = (A @ A.T for A in rng.standard_normal((2, n, n)))
+    w, size = workspace(padded(n), 1), padded(n)
+    for source, place in ((Phi, w.Phi), (Phi.T.copy(), w.Phi_t), (P, w.P), (Q, w.Q)):
+        load(size, source, place)
+    propagate_errors(max(reach, 20) if reach > 15 else 15, pair, w.Phi, w.Phi_t, w.Q, w.P, w.temporary, w.t)
+    np.testing.assert_allclose(w.P[:n, :n], Phi @ P @ Phi.T + Q, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(w.P, w.P.T)
+    assert not w.P[n:].any()
+
+
+def test_rows_know_the_columns_they_touch():
+    """To the bit as with all of them."""
+    rng = np.random.default_rng(5)
+    n, size = 19, padded(19)
+    A = rng.standard_normal((n, n))
+    one, all_of_it = workspace(size, 3), workspace(size, 3)
+    for w in (one, all_of_it):
+        load(size, A @ A.T, w.P)
+        w.H[0, 4], w.H[1, [2, 17]], w.z[:] = 2.0, [-1.0, 0.3], [0.5, -0.2, np.nan]
+        w.R[:] = np.eye(3)
+    places = np.zeros(n, dtype=np.int64)
+    columns = places[: touched(one.H, places)]
+    assert columns.tolist() == [2, 4, 17]
+    held = np.zeros(n, dtype=bool)
+    assert update_held(size, one, held, columns) == update_held(size, all_of_it, held) == 0
+    np.testing.assert_array_equal(one.P, all_of_it.P)
+    np.testing.assert_array_equal(one.x, all_of_it.x)
 
 
 def test_contradictions_are_refused():
