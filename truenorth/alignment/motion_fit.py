@@ -203,7 +203,8 @@ def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
 
     def with_slope(u: Array) -> tuple[float, Array]:
         values = cost(u + around)  # in the lanes of one pass
-        return float(values[0]), (values[1:] - values[0]) / DIFFERENCE
+        there = np.isfinite(values).all()
+        return float(values[0]), (values[1:] - values[0]) / DIFFERENCE if there else np.full(size, np.nan)
 
     def inverse_curvatures(u: Array, value: float) -> Array:
         """Of the axes; no curvature so small that a step would leave all bounds."""

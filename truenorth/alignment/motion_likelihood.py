@@ -91,7 +91,7 @@ class Series:
     def expected(self, orders: Orders, logs: Array) -> Array:
         """Expected periodograms (m, K // 2 + 1) of the tapered series, of motions with logarithms (m, 1 + 3 q)."""
         acf = np.zeros((len(logs), len(self.lags)))
-        _autocovariances(orders, np.exp(logs), self.interval, acf)
+        _autocovariances(orders, *_values(logs), self.interval, acf)
         acf *= self.taper
         # Sum over lags -(K-1) .. K-1 of acf taper exp(-i w lag), at the frequencies of the series' own transform.
         acf[:, 1:] += acf[:, :0:-1].copy()
@@ -105,7 +105,7 @@ class Series:
     def exact(self, orders: Orders, logs: Array) -> Array:
         """Minus twice the restricted log-likelihoods (m,) of motions with logarithms (m, 1 + 3 q)."""
         found = np.empty(len(logs))
-        _deviances(orders, np.exp(logs), self.interval, *self.walks, self.lanes, found)
+        _deviances(orders, *_values(logs), self.interval, *self.walks, self.lanes, found)
         return found
 
     def lines(self, motion: AxisMotion, frequencies: Array) -> tuple[Array, Array]:
@@ -125,7 +125,7 @@ class Series:
             pairs = np.swapaxes(np.concatenate([np.cos(phase), np.sin(phase)], axis=2), 1, 2)
             columns = np.concatenate([self.lanes, pairs], axis=1)
             grams = np.zeros((p + 2 * m, p + 2 * m, LANES))
-            _products(orders, np.tile(np.exp(logs), (LANES, 1)), self.interval, *self.walks, columns, grams)
+            _products(orders, *_values(logs[None]), self.interval, *self.walks, columns, grams)
             for lane, which in enumerate(own):
                 gain[which], sigma[which] = _gained(grams[..., lane], p)
         return gain, sigma
@@ -148,56 +148,66 @@ def _gained(lower: Array, p: int) -> tuple[Array, Array]:
     return np.sum(size * match, axis=1), np.sqrt(0.5 * np.sum(size**2, axis=1))
 
 
-@compiled
-def _autocovariances(orders: Any, values: Any, interval: float, acf: Any) -> None:
-    for m in range(len(values)):
-        add_autocovariance(orders, values[m, 1:].reshape(-1, 3), interval, acf[m])
-        acf[m, 0] += values[m, 0] ** 2
+def _values(logs: Array) -> tuple[Array, Array]:
+    """Variances (m,) of what is white, and sigma, frequency and damping of each oscillator (m, q, 3), of logarithms (m, 1 + 3 q)."""
+    values = np.exp(logs)
+    return np.ascontiguousarray(values[:, 0] ** 2), np.ascontiguousarray(values[:, 1:]).reshape(len(logs), -1, 3)
 
 
 @compiled
-def _products(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any) -> None:
-    Phi, Q, P, h, r, first = _models(orders, values, 0, interval, walk_Phi, walk_Q)
-    products(Phi, Q, P, h, r, Y, first, gram, np.empty(LANES))
+def _autocovariances(orders: Any, white: Any, tables: Any, interval: float, acf: Any) -> None:
+    for m in range(len(white)):
+        add_autocovariance(orders, tables[m], interval, acf[m])
+        acf[m, 0] += white[m]
 
 
 @compiled
-def _deviances(orders: Any, values: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, found: Any) -> None:
+def _products(
+    orders: Any, white: Any, tables: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, gram: Any
+) -> None:
+    own, behind, driven, Q, P, h, r = _models(orders, white, tables, 0, interval, walk_Phi, walk_Q)
+    products(own, behind, driven, Q, P, h, r, Y, len(h) - 2, gram, np.empty(LANES))
+
+
+@compiled
+def _deviances(
+    orders: Any, white: Any, tables: Any, interval: float, walk_Phi: Any, walk_Q: Any, Y: Any, found: Any
+) -> None:
     in_lanes = np.empty(LANES)
-    for begin in range(0, len(values), LANES):
-        Phi, Q, P, h, r, first = _models(orders, values, begin, interval, walk_Phi, walk_Q)
-        restricted(Phi, Q, P, h, r, Y, first, in_lanes)
-        for lane in range(min(LANES, len(values) - begin)):
+    for begin in range(0, len(white), LANES):
+        own, behind, driven, Q, P, h, r = _models(orders, white, tables, begin, interval, walk_Phi, walk_Q)
+        restricted(own, behind, driven, Q, P, h, r, Y, len(h) - 2, in_lanes)
+        for lane in range(min(LANES, len(white) - begin)):
             found[begin + lane] = in_lanes[lane]
 
 
 @compiled
-def _models(orders: Any, values: Any, begin: int, interval: float, walk_Phi: Any, walk_Q: Any) -> Any:
-    """Motions from one on, a lane each, and the walks behind them; where there are none left, the last one again.
+def _models(orders: Any, white: Any, tables: Any, begin: int, interval: float, walk_Phi: Any, walk_Q: Any) -> Any:
+    """Motions from one on, a lane each, and the walks behind them, as :func:`products` takes them.
 
-    Transition, noise, first covariance, output row (of all), variance of what is white, and the states of a motion.
+    Where there are no motions left, the last one stands again.
     """
     n = 2
     for order in orders:  # np.sum would load a part of Numba that nothing else here needs, .2 s
         n += 2 * order
-    Phi, Q, P = np.zeros((n, n, LANES)), np.zeros((n, n, LANES)), np.zeros((n, n, LANES))
-    h, r, first = np.zeros(n), np.zeros(LANES), n - 2
-    one_Phi, one_Q, one_P = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    for lane in range(LANES):
-        m = min(begin + lane, len(values) - 1)
-        if lane == 0 or begin + lane < len(values):
-            for i in range(n):
-                for j in range(n):
-                    one_Phi[i, j] = one_Q[i, j] = one_P[i, j] = 0.0
-            fill_blocks(orders, values[m, 1:].reshape(-1, 3), interval, one_Phi, one_Q, one_P, h)
-            for i in range(
-                2
-            ):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
-                for j in range(2):
-                    one_Phi[first + i, first + j], one_Q[first + i, first + j] = walk_Phi[i, j], walk_Q[i, j]
+    own, behind, driven = np.zeros((n // 2, 4, LANES)), np.zeros((n // 2, 4, LANES)), np.zeros(n // 2, dtype=np.bool_)
+    Q, P, h, r = np.zeros((n, n, LANES)), np.zeros((n, n, LANES)), np.zeros(n), np.zeros(LANES)
+    for lane in range(len(r)):  # a length that the compiler knows is unrolled
+        m = min(begin + lane, len(white) - 1)
+        one_Phi, one_Q, one_P = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+        fill_blocks(orders, tables[m], interval, one_Phi, one_Q, one_P, h)
+        for i in range(2):  # one by one: for blocks Numba compiles the message of shapes that differ, 3 s of strings
+            for j in range(2):
+                one_Phi[n - 2 + i, n - 2 + j], one_Q[n - 2 + i, n - 2 + j] = walk_Phi[i, j], walk_Q[i, j]
         for i in range(n):
             for j in range(n):
-                Phi[i, j, lane], Q[i, j, lane], P[i, j, lane] = one_Phi[i, j], one_Q[i, j], one_P[i, j]
-        r[lane] = values[m, 0] ** 2
-    h[first] = 1.0
-    return Phi, Q, P, h, r, first
+                Q[i, j, lane], P[i, j, lane] = one_Q[i, j], one_P[i, j]
+            for j in range(2):
+                first = i - i % 2
+                own[i // 2, 2 * (i % 2) + j, lane] = one_Phi[i, first + j]
+                if first > 0:
+                    behind[i // 2, 2 * (i % 2) + j, lane] = one_Phi[i, first - 2 + j]
+                    driven[i // 2] |= one_Phi[i, first - 2 + j] != 0.0
+        r[lane] = white[m]
+    h[n - 2] = 1.0
+    return own, behind, driven, Q, P, h, r

@@ -61,17 +61,25 @@ def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stat
     float
         Infinite where the model is degenerate.
     """
-    found = np.empty(LANES)
-    restricted(*(in_lanes(x) for x in (Phi, Q, P0)), np.array(h), *(in_lanes(np.asarray(x)) for x in (r, Y)), stationary, found)
+    found, n = np.empty(LANES), len(h)
+    blocks = np.asarray(Phi).reshape(n // 2, 2, n // 2, 2).swapaxes(1, 2).reshape(n // 2, n // 2, 4)
+    own, behind = blocks[np.arange(n // 2), np.arange(n // 2)], np.zeros((n // 2, 4))
+    behind[1:] = blocks[np.arange(1, n // 2), np.arange(n // 2 - 1)]
+    lanes = [in_lanes(x) for x in (own, behind)]
+    restricted(
+        *lanes, behind.any(axis=1), in_lanes(Q), in_lanes(P0), np.array(h), in_lanes(r), in_lanes(Y), stationary, found
+    )
     return float(found[0])
 
 
 @compiled
-def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int, found: Any) -> None:
+def restricted(
+    own: Any, behind: Any, driven: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int, found: Any
+) -> None:
     """:func:`deviance` of eight models, for kernels; arguments as of :func:`products`, `found` (8,)."""
     p = Y.shape[1]
     gram, of_one = np.zeros((p, p, LANES)), np.empty((p, p))
-    products(Phi, Q, P, h, r, Y, stationary, gram, found)
+    products(own, behind, driven, Q, P, h, r, Y, stationary, gram, found)
     for lane in range(LANES):
         for i in range(p):
             for j in range(i + 1):
@@ -81,12 +89,18 @@ def restricted(Phi: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int
 
 
 @compiled
-def products(Phi: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int, gram: Any, log_F: Any) -> None:
+def products(
+    own: Any, behind: Any, driven: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int, gram: Any, log_F: Any
+) -> None:
     """Sums of ``log F`` (8,), not a number of a degenerate model; the products of the whitened columns are added to `gram`.
 
     Parameters
     ----------
-    Phi, Q : (n, n, 8) arrays
+    own, behind : (n / 2, 4, 8) arrays
+        Of each pair of states its own block of `Phi`, by rows, and that of the pair before it.
+    driven : (n / 2,) bool array
+        Whether the latter is there.
+    Q : (n, n, 8) array
     P : (n, n, 8) array
         At the first epoch on entry; work space.
     h : (n,) array
@@ -102,7 +116,6 @@ def products(Phi: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int, 
     n, columns = len(h), Y.shape[1]
     rank = n - stationary + 1
     width = columns + rank
-    own, behind, driven = _pairs(Phi)
     A, M, My = np.zeros((n, n, LANES)), np.zeros((rank, rank, LANES)), np.zeros((rank, LANES))  # My: M L' h
     X, after = np.zeros((n, width, LANES)), np.zeros((n, width, LANES))  # states of the columns, and L
     e, g = np.zeros((width, LANES)), np.zeros((n, LANES))  # innovations of the columns; Phi P h
@@ -142,21 +155,6 @@ def products(Phi: Any, Q: Any, P: Any, h: Any, r: Any, Y: Any, stationary: int, 
         _go_on(own, behind, driven, X, columns, e, My, weight, g, after)
         _innovations(after, Y, min(k + 1, len(Y) - 1), h, columns, e)
         X, after = after, X
-
-
-@compiled
-def _pairs(Phi: Any) -> Any:
-    """Of each pair of states its own block of `Phi` (n, n, 8), that of the pair before it, and whether that is there."""
-    pairs = len(Phi) // 2
-    own, behind, driven = np.zeros((pairs, 4, LANES)), np.zeros((pairs, 4, LANES)), np.zeros(pairs, dtype=np.bool_)
-    for p in range(pairs):
-        for i in range(4):
-            for lane in range(LANES):
-                own[p, i, lane] = Phi[2 * p + i // 2, 2 * p + i % 2, lane]
-                if p > 0:
-                    behind[p, i, lane] = Phi[2 * p + i // 2, 2 * p - 2 + i % 2, lane]
-                    driven[p] |= behind[p, i, lane] != 0.0
-    return own, behind, driven
 
 
 @borrowing(forceinline=True)
