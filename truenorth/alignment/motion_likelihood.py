@@ -149,7 +149,7 @@ def _gained(lower: Array, p: int) -> tuple[Array, Array]:
 
 
 def _values(logs: Array) -> tuple[Array, Array]:
-    """Variances (m,) of what is white, and sigma, frequency and damping of each oscillator (m, q, 3), of logarithms (m, 1 + 3 q)."""
+    """Variances (m,) of what is white; sigma, frequency and damping of each oscillator (m, q, 3); of logarithms (m, 1 + 3 q)."""
     values = np.exp(logs)
     return np.ascontiguousarray(values[:, 0] ** 2), np.ascontiguousarray(values[:, 1:]).reshape(len(logs), -1, 3)
 
