@@ -82,3 +82,16 @@ def test_vectors_do_not_stand_in_arrays_with_gaps():
     numba = pytest.importorskip("numba")
     with pytest.raises(numba.TypingError, match="contiguous"):
         _copied(np.zeros((16, 16))[:, ::2], np.zeros((16, 16)), 5, 8)
+
+
+def test_a_vector_from_the_disk_is_of_the_type_of_this_process():
+    """Of another type, an inner kernel that takes or gives vectors is refused by what is compiled anew and calls it."""
+    import pickle
+    import subprocess
+    import sys
+
+    from truenorth.core.vectors import _vector
+
+    program = "from numba.core.serialize import dumps\nfrom truenorth.core.vectors import _vector\nprint(dumps(_vector(8)).hex())"
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert pickle.loads(bytes.fromhex(said)) is _vector(8)

@@ -59,6 +59,10 @@ def _vector(width: int) -> Any:
     class Vector(types.Type):
         """So many doubles in one register."""
 
+        def __reduce__(self) -> Any:
+            """A kernel from the disk that is given vectors, or gives one, has the type of this process."""
+            return _vector, (width,)
+
     class VectorModel(models.PrimitiveModel):
         """As LLVM has it."""
 
