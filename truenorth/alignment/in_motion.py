@@ -21,6 +21,7 @@ from truenorth.alignment.in_motion_axes import half_turn_evidence
 from truenorth.alignment.in_motion_clocks import clock_evidence
 from truenorth.alignment.in_motion_latitude import NARROWED, PRIOR, find_latitude
 from truenorth.alignment.in_motion_learnt import learnt_evidence
+from truenorth.alignment.in_motion_level import UNTOLD, with_level_biases
 from truenorth.alignment.in_motion_passes import Pass, begun, once_more, turn_between
 from truenorth.alignment.in_motion_start import COARSE_HEADING, Guess, guesses_all_round
 from truenorth.alignment.in_motion_task import NO_LOG_ERRORS, MovingTask, has_fixes, in_body_axes, moving_task
@@ -198,6 +199,8 @@ def _aligned(
     if number > 1:
         spread = math.hypot(spread, found.used_twice, found.unsettled)
     guess, track = found.guess, found.track
+    if method == "motion" and math.hypot(found.sigma, spread) > UNTOLD:
+        task, guess, track = _by_gravity(task, guess, track, first)
     answer = moving_answer(task, task.with_lasting_fixes(track), method, why, spread)
     more = [item for log in (task.odometer, task.gnss) if log is not None for item in notes(log.notes)]
     more += [_of_latitude(answer, able)] if unknown else []
@@ -244,6 +247,17 @@ def _as_specified(task: MovingTask, found: Pass, first: Guess) -> tuple[MovingTa
         if _fits_worse(found.track, other.track):
             return task, found
     return constant, other
+
+
+def _by_gravity(task: MovingTask, guess: Guess, track: Track, first: Guess) -> tuple[MovingTask, Guess, Track]:
+    """Task, guess and track of a pass that takes no tilt for a bias; the same ones where the log speaks against it."""
+    held = task.with_level_biases_held()
+    try:
+        last = once_more(held, begun(held, first, held.run(first, gated=False)), first)
+        other = with_level_biases(task, last.track)
+    except DataError:  # the filter broke down
+        return task, guess, track
+    return (task, guess, track) if _fits_worse(track, other) else (held, last.guess, other)
 
 
 def _fits_worse(track: Track, other: Track) -> bool:

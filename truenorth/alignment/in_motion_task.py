@@ -45,6 +45,7 @@ from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRec
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
+from truenorth.state.layout import BA
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
@@ -91,6 +92,7 @@ class MovingTask:
     wanders: Sequence[Evidence] = ()  # and what is to be said of them
     # Scale factors and misalignments of the gyros are the constants that the specification says; else noise in turns besides
     steady: bool = False
+    held: bool = False  # biases of the accelerometers across the vertical are taken for zero
     sprung: bool = False  # the body goes up and down on its wheels: they do not say that it stays on the road
 
     def learnt(self, track: Track) -> tuple[MovingTask, bool]:
@@ -131,6 +133,11 @@ class MovingTask:
         other = replace(self, steady=True).with_spec(self.spec)
         return self if other.model.turn_noise == self.model.turn_noise else other
 
+    def with_level_biases_held(self) -> MovingTask:
+        """The task whose accelerometers have a bias along the vertical only: across it nothing tells a bias from a tilt."""
+        model = InsModel.from_spec(self.spec, groups=groups_of(self.errors, self.spec))
+        return replace(self, held=True, model=model)
+
     def without_slow_errors(self) -> list[MovingTask]:
         """The task without each of the slow errors that innovations have shown."""
         return [replace(self, lasting=less) for less in one_less(self.lasting)]
@@ -162,6 +169,11 @@ class MovingTask:
         start = start_at(
             self.record, guess, self.position, self.spec, self.odometer, self.gnss, self.wheel, self.antenna
         )
+        if self.held:
+            up = start.C_nb[2]
+            P = start.P.copy()
+            P[BA, BA] = up @ P[BA, BA] @ up * np.outer(up, up)
+            start = replace(start, P=P)
         return navigate_track(
             record,
             start,

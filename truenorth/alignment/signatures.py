@@ -40,4 +40,4 @@ def what_begins(
     steps += masked_evidence(fine, spec) if others is None else []
     if isinstance(fine, SwayAlignment):
         steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
-    return detect_drift(fine, drift), steps, hemisphere_evidence(gravity)
+    return detect_drift(fine, drift), steps, hemisphere_evidence(gravity, fine, position, given=given)
