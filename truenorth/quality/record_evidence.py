@@ -18,7 +18,7 @@ from truenorth.state.evidence import Effect, Evidence, contradiction, note
 Array = NDArray[np.float64]
 
 # Findings that make any answer wrong, whatever the base does; and those that do so where it turns.
-ALWAYS = ("saturated", "constant_channel", "gyro_unit", "accel_unit", "no_gravity")
+ALWAYS = ("saturated", "constant_channel", "rows_again", "gyro_unit", "accel_unit", "no_gravity")
 TURNING = ("repeated_rows", "frozen")
 QUIET = ("still", "disturbed")
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.core.remembered import remembered
+from truenorth.quality.again import Again, rows_again
 from truenorth.quality.packets import exchanged_packets
 from truenorth.records import COLUMNS, ImuRecord
 
@@ -100,6 +101,8 @@ def check_sampling(record: ImuRecord) -> tuple[Sampling, list[Finding]]:
         found = [
             Finding("note", "no_noise", "no channel has noise; expected a sensor's: the log is simulated without it")
         ]
+    elif (again := rows_again(record)) is not None and not _without_noise(data, same):
+        findings.append(_again(record, again))
     findings += found
     gaps = record.gaps
     sampling = Sampling(jitter_rms, jitter_max, record.time[gaps], record.steps[gaps], repeated, runs, at, saturated)
@@ -146,6 +149,18 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
             )
         )
     return rms, largest
+
+
+def _again(record: ImuRecord, again: Again) -> Finding:
+    first, second = (
+        f"{row + 1} to {row + again.length} (from {record.time[row]:.3f} s on)" for row in (again.first, again.again)
+    )
+    return Finding(
+        "error",
+        "rows_again",
+        f"rows {second} are rows {first} to the last digit; expected new noise in each row: a piece of the log was written "
+        "twice; take one of them",
+    )
 
 
 def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding]) -> int:

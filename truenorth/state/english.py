@@ -124,6 +124,7 @@ SENTENCES = {
     # ---- the record itself
     "record.saturated": "{text}",
     "record.constant_channel": "{text}",
+    "record.rows_again": "{text}",
     "record.gyro_unit": "{text}",
     "record.accel_unit": "{text}",
     "record.accel_level": "{text}",
