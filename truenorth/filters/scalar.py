@@ -67,7 +67,15 @@ def deviance(Phi: Array, Q: Array, P0: Array, h: Array, r: float, Y: Array, stat
     behind[1:] = blocks[np.arange(1, n // 2), np.arange(n // 2 - 1)]
     lanes = [in_lanes(x) for x in (own, behind)]
     restricted(
-        *lanes, behind.any(axis=1), in_lanes(Q), in_lanes(P0), np.array(h), in_lanes(r), in_lanes(Y), stationary, found
+        *lanes,
+        behind.any(axis=1),
+        in_lanes(Q),
+        in_lanes(P0),
+        np.array(h),
+        in_lanes(np.asarray(r)),
+        in_lanes(Y),
+        stationary,
+        found,
     )
     return float(found[0])
 
