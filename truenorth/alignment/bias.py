@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.earth import normal_gravity
+from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
 from truenorth.records.specs import ImuSpec
 
@@ -34,7 +34,7 @@ def bias_prior(spec: ImuSpec, C_n_b: Array, position: Position, lat_rate: Array,
     P = np.diag(spec.bias_variance)
     rate = C_n_b @ lat_rate * position.lat_sigma
     P[:3, :3] += np.outer(rate, rate)
-    slope = float(normal_gravity(position.lat, position.alt + 1.0)) - gravity
+    slope = gravity_of_place(position.lat, position.alt + 1.0) - gravity
     up = C_n_b @ np.array([0.0, 0.0, 1.0])
     P[3:, 3:] += np.outer(up, up) * (slope * position.vertical_sigma) ** 2
     P[3:, 3:] += np.diag(spec.acting_variance(gravity * up))

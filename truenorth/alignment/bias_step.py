@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -73,7 +74,12 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list
 
 def bias_signatures(fine: FineAlignment, courses: Sequence[tuple[str, float]] = SIGNATURES) -> Signatures:
     """Of each course, a step or a ramp from a part of the log on, in each of the six biases."""
-    count, n, rows = len(fine.estimates.innovation), fine.system.states, fine.system.rows
+    return _signatures_over(len(fine.estimates.innovation), fine.system.states, fine.system.rows, tuple(courses))
+
+
+@lru_cache(maxsize=8)
+def _signatures_over(count: int, n: int, rows: int, courses: tuple[tuple[str, float], ...]) -> Signatures:
+    """The same over so many epochs, of so many states and rows of a measurement. Nobody writes to them."""
     begin = np.repeat([round(onset * count) for _, onset in courses], 6)
     steps = np.repeat([course == "step" for course, _ in courses], 6)
     every = np.tile(np.eye(6), len(courses))
@@ -132,9 +138,11 @@ def turn_evidence(task: Task) -> list[Evidence]:
     motion = task.motion
     if motion.overall not in ("still", "disturbed"):
         return []
-    turns = np.convolve(motion.kind == KINDS.index("rotating"), np.ones(2 * AWAY + 1), "same") > 0.0
+    turns = motion.kind == KINDS.index("rotating")
+    if turns.any():
+        turns = np.convolve(turns, np.ones(2 * AWAY + 1), "same") > 0.0
     found = []
-    for part in np.split(np.arange(len(turns)), np.flatnonzero(np.diff(turns)) + 1):
+    for part in np.split(np.arange(len(turns)), np.flatnonzero(turns[1:] != turns[:-1]) + 1):
         if len(part) < FEWEST or turns[part[0]]:
             continue
         up = motion.specific_force[part].mean(axis=0)

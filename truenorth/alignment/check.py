@@ -20,7 +20,7 @@ from truenorth.alignment.task import Task
 from truenorth.alignment.usual import wandering_as_usual
 from truenorth.analysis.student import as_normal
 from truenorth.coarse.analytic import BLOCKS, Means
-from truenorth.core.earth import EARTH_RATE, normal_gravity
+from truenorth.core.earth import EARTH_RATE, gravity_of_place
 from truenorth.errors.staying import BA, BG, BIASES, StaticModel, mean_velocity
 from truenorth.errors.walks import Walks
 from truenorth.estimate.base_motion import white_variance
@@ -111,7 +111,7 @@ def check_filter(
     bias, P_last = log.bias + last.found.end[BIASES], last.found.P
     rate, rate_P = C @ bias[:3], C @ P_last[BG, BG] @ C.T
     force, force_P = C @ bias[3:], C @ P_last[BA, BA] @ C.T
-    slope = float(normal_gravity(lat, task.position.alt + 1.0)) - task.gravity
+    slope = gravity_of_place(lat, task.position.alt + 1.0) - task.gravity
     check = LogCheck(
         rate_residual=rate[1:],
         rate_noise=np.sqrt(np.diag(rate_P)[1:]),

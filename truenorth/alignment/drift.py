@@ -11,6 +11,7 @@ What a signature of the size found does to attitude follows from the same recurs
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -82,7 +83,13 @@ def detect_drift(fine: FineAlignment, match: Match) -> Drift:
 
 def drift_signatures(fine: FineAlignment) -> Signatures:
     """Of each onset, each kind, along each axis; the courses are those of the mean velocity, or of the velocity gained."""
-    t, n, by_velocity = fine.integrals.time, fine.system.states, fine.form == "velocity"
+    return _signatures_over(fine.integrals.time.tobytes(), fine.system.states, fine.form == "velocity")
+
+
+@lru_cache(maxsize=4)
+def _signatures_over(times: bytes, n: int, by_velocity: bool) -> Signatures:
+    """The same for so many states over intervals between times (of doubles): those of all logs as long. Nobody writes to them."""
+    t = np.frombuffer(times)
     at = (t[1:] + t[:-1]) / 2 if by_velocity else t[1:]
     onsets, kinds, axes = (np.array(x) for x in zip(*product(ONSETS, (0, 1), (0, 1)), strict=True))
     start = onsets * t[-1]

@@ -10,6 +10,8 @@ which the log is likeliest there, and what is usual of it counts as in the infer
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,13 +31,20 @@ WALKS = np.log(2.0) * np.arange(6)  # logarithms of gyros' random walks in the i
 
 def hemisphere_signature(fine: FineAlignment, position: Position) -> Signatures:
     """What gravity of the other hemisphere would do from the first epoch on."""
-    time, lat, alt = fine.integrals.time, position.lat, position.alt
-    if fine.form == "velocity":
+    by_velocity = fine.form == "velocity"
+    return _signature_over(fine.integrals.time.tobytes(), position.lat, position.alt, fine.system.states, by_velocity)
+
+
+@lru_cache(maxsize=4)
+def _signature_over(times: bytes, lat: float, alt: float, n: int, by_velocity: bool) -> Signatures:
+    """The same for so many states over intervals between times (of doubles). Nobody writes to it."""
+    time = np.frombuffer(times)
+    if by_velocity:
         off = np.diff(gravity_position(time, lat, alt) - gravity_position(time, -lat, alt), axis=0)
-        off /= fine.integrals.intervals[:, None]
+        off /= np.diff(time)[:, None]
     else:
         off = np.diff(gravity_velocity(time, lat, alt) - gravity_velocity(time, -lat, alt), axis=0)
-    none, one = np.zeros((fine.system.states, 1)), np.ones((1, 1))
+    none, one = np.zeros((n, 1)), np.ones((1, 1))
     return Signatures(np.zeros(1, dtype=np.int64), none, off[:1].T, one, none, off[..., None])
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +88,7 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     )
 
 
+@cache
 def usual_noise() -> StaticModel:
     """Where the fit of the random walks begins: the navigation preset's.
 

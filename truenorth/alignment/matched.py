@@ -15,7 +15,7 @@ linear systems", IEEE Trans. Autom. Control 21 (1976), eqs. 13-20.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -128,53 +128,123 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     tuple of Match
         One for each bank.
     """
-    state_course = np.concatenate([bank.state_course for bank in banks], axis=1)
-    measured_course = np.concatenate([bank.measured_course for bank in banks], axis=2)
-    (n, courses), right, gains = state_course.shape, seen.white.shape[2], seen.gains
-    behind = np.unique(np.concatenate([bank.epoch for bank in banks]))
+    all_of = _together(banks)
+    (n, courses), right, gains = all_of.state_course.shape, seen.white.shape[2], seen.gains
+    behind = all_of.behind
     forms = np.empty((len(behind), n + courses, n + courses + right))
     ends = np.empty((len(behind), 3, n + courses))
-    arrays = (gains.step, gains.H_Phi, gains.gain, seen.L, measured_course, state_course, seen.white)
-    whole = tuple(np.ascontiguousarray(a) for a in arrays)
+    of_gains = tuple(np.ascontiguousarray(a) for a in (gains.step, gains.H_Phi, gains.gain, seen.L))
+    white = np.ascontiguousarray(seen.white)
     sizes = padded(n), padded(n + seen.L.shape[1]), len(padded(n + courses + right))
-    _sum_back(*sizes, *whole, behind.astype(np.int64), forms, ends)
-    return _matches(seen, banks, behind, forms, ends)
-
-
-def _matches(
-    seen: Innovations, banks: Sequence[Signatures], behind: NDArray[np.int64], forms: Array, ends: Array
-) -> tuple[Match, ...]:
-    """Of the signatures of all banks; the forms of ``(e_k, w)``, w of all courses, are those behind the epochs `behind`."""
-    gains, k = seen.gains, np.concatenate([bank.epoch for bank in banks])
-    state = np.concatenate([bank.state for bank in banks], axis=1).T[..., None]  # (S, n, 1)
-    measured = np.concatenate([bank.measured for bank in banks], axis=1).T[..., None]
-    first = whitened(seen.L[k], gains.H_Phi[k] @ state + measured)  # their first epoch by itself
-    n = state.shape[1]
-    e = (gains.step[k] @ state - gains.gain[k] @ measured)[..., 0]
-    energy, match = np.sum(first[..., 0] ** 2, axis=1), (np.swapaxes(first, 1, 2) @ seen.white[k])[:, 0]
-    left, at = np.empty((3, len(k))), np.searchsorted(behind, k)
-    columns, row, course, parts = np.arange(ends.shape[2], forms.shape[2]), 0, n, []
-    for bank in banks:
-        courses, signatures = bank.after.shape
-        part, own = slice(row, row + signatures), np.r_[0:n, course : course + courses]  # e, and this bank's courses
-        begun = np.concatenate([e[part], bank.after.T], axis=1)
-        form = forms[:, own[:, None], np.concatenate([own, columns])][at[part]]
-        after = (begun[:, None] @ form)[:, 0]
-        energy[part] += np.sum(after[:, : len(own)] * begun, axis=1)
-        match[part] += after[:, len(own) :]
-        left[:, part] = (ends[:, :, own][at[part]] @ begun[..., None])[..., 0].T
-        row, course = row + signatures, course + courses
-        parts.append(part)
+    _sum_back(*sizes, *of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
+    count = len(all_of.epoch)
+    energy, match, left = np.empty(count), np.empty((count, right)), np.empty((3, count))
+    _match_each(all_of, *of_gains, white, forms, ends, np.empty((2, n + courses)), energy, match, left)
     of_innovations = match[:, 0]
-    if match.shape[1] > 1:
-        others = seen.white[:, :, 1:].reshape(seen.white[..., 0].size, -1)
-        known = np.column_stack([others.T @ seen.white[:, :, 0].ravel(), match[:, 1:].T])
+    if right > 1:
+        others = white[:, :, 1:].reshape(white[..., 0].size, -1)
+        known = np.column_stack([others.T @ white[:, :, 0].ravel(), match[:, 1:].T])
         explained = np.linalg.solve(np.eye(others.shape[1]) + others.T @ others, known)
         energy = energy - np.einsum("sr,rs->s", match[:, 1:], explained[:, 1:])
         of_innovations = of_innovations - match[:, 1:] @ explained[:, 0]
     energy = np.maximum(energy, 1e-300)
     size = of_innovations / energy
-    return tuple(Match((of_innovations * size)[part], size[part], left[:, part]) for part in parts)
+    ratio, edges = of_innovations * size, np.cumsum([0, *(len(bank.epoch) for bank in banks)]).tolist()
+    parts = (slice(*pair) for pair in pairwise(edges))
+    return tuple(Match(ratio[part], size[part], left[:, part]) for part in parts)
+
+
+class _Together(NamedTuple):
+    """All banks: courses one behind the other, and of each signature a column with its sizes of all of them."""
+
+    epoch: NDArray[np.int64]
+    at: NDArray[np.int64]  # place of the epoch in `behind`
+    behind: NDArray[np.int64]  # epochs, ascending, each once
+    state: Array
+    measured: Array
+    after: Array  # (w, S)
+    state_course: Array
+    measured_course: Array
+
+
+_JOINED: dict[tuple[int, ...], tuple[tuple[Signatures, ...], _Together]] = {}
+
+
+def _together(banks: tuple[Signatures, ...]) -> _Together:
+    """Remembered of the last banks, which are the same for all logs as long."""
+    key = tuple(map(id, banks))
+    if key not in _JOINED:
+        epoch = np.concatenate([bank.epoch for bank in banks]).astype(np.int64)
+        behind, at = np.unique(epoch, return_inverse=True)
+        after, course, signature = np.zeros((sum(len(bank.after) for bank in banks), len(epoch))), 0, 0
+        for bank in banks:
+            courses, signatures = bank.after.shape
+            after[course : course + courses, signature : signature + signatures] = bank.after
+            course, signature = course + courses, signature + signatures
+        state, measured, state_course = (
+            np.ascontiguousarray(np.concatenate([getattr(bank, name) for bank in banks], axis=1))
+            for name in ("state", "measured", "state_course")
+        )
+        measured_course = np.ascontiguousarray(np.concatenate([bank.measured_course for bank in banks], axis=2))
+        found = _Together(epoch, at.astype(np.int64), behind, state, measured, after, state_course, measured_course)
+        _JOINED.clear()
+        _JOINED[key] = banks, found  # that the banks are held keeps their numbers their own
+    return _JOINED[key][1]
+
+
+@compiled
+def _match_each(
+    of: _Together,
+    step: Any,
+    H_Phi: Any,
+    gain: Any,
+    L: Any,
+    white: Any,
+    forms: Any,
+    ends: Any,
+    work: Any,
+    energy: Any,
+    match: Any,
+    left: Any,
+) -> None:
+    """Energy (S,), match (S, 1 + M) and what is left at the end (3, S) of each signature."""
+    first, begun = work[0], work[1]
+    n, m, right, own = gain.shape[1], gain.shape[2], white.shape[2], ends.shape[2]
+    for s in range(len(energy)):
+        k, at = of.epoch[s], of.at[s]
+        energy[s] = 0.0
+        for r in range(right):
+            match[s, r] = 0.0
+        # Its first epoch by itself, made white.
+        for a in range(m):
+            first[a] = of.measured[a, s]
+            for i in range(n):
+                first[a] += H_Phi[k, a, i] * of.state[i, s]
+            for c in range(a):
+                first[a] -= L[k, a, c] * first[c]
+            first[a] /= L[k, a, a]
+            energy[s] += first[a] * first[a]
+            for r in range(right):
+                match[s, r] += first[a] * white[k, a, r]
+        # The error behind it, and the courses: (e, w).
+        for i in range(n):
+            begun[i] = 0.0
+            for j in range(n):
+                begun[i] += step[k, i, j] * of.state[j, s]
+            for a in range(m):
+                begun[i] -= gain[k, i, a] * of.measured[a, s]
+        for j in range(own - n):
+            begun[n + j] = of.after[j, s]
+        for i in range(own):
+            if begun[i] != 0.0:
+                for j in range(own):
+                    energy[s] += begun[i] * forms[at, i, j] * begun[j]
+                for r in range(right):
+                    match[s, r] += begun[i] * forms[at, i, own + r]
+        for a in range(3):
+            left[a, s] = 0.0
+            for j in range(own):
+                left[a, s] += ends[at, a, j] * begun[j]
 
 
 @compiled

@@ -26,7 +26,7 @@ from truenorth.alignment.swing import may_swing, swing_note, swings
 from truenorth.alignment.swing_fit import ARM, fit_swing
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
 from truenorth.coarse.uncertainty import base_velocity, detrended
-from truenorth.core.earth import normal_gravity
+from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
 from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
@@ -142,7 +142,7 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     log, residual = _settled(start, mount, turned)
     step = float(np.mean(log.integrals.intervals))
     model, position = start.model, start.position
-    walks = Walks(model.accel_random_walk, model.gyro_random_walk * float(normal_gravity(position.lat, position.alt)))
+    walks = Walks(model.accel_random_walk, model.gyro_random_walk * gravity_of_place(position.lat, position.alt))
     estimator = _MotionFilter(residual, step, walks)
     plain = _filtered(log, estimator)
     suspect = bool(plain.noisier) or any(item.kind != "hint" for item in plain.begun)
@@ -229,7 +229,7 @@ def _settled(start: CoarseStart, mount: Mount, turned: ImuSpec | None = None) ->
     """
     record, C_n0_i, position, model, _, interval, rows_at = start
     prior = _prior(start, mount, turned)
-    g = float(normal_gravity(position.lat, position.alt))
+    g = gravity_of_place(position.lat, position.alt)
     walked = math.sqrt(record.duration / 3.0) * math.hypot(
         model.accel_random_walk, g * model.gyro_random_walk * record.duration
     )

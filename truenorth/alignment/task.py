@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from truenorth.alignment.bias import bias_prior
 from truenorth.alignment.epoch import Epoch, find_epoch
 from truenorth.coarse.analytic import Means, means, static_jacobian
 from truenorth.core.attitude import dcm_from_euler
-from truenorth.core.earth import DEFLECTION, EARTH_RATE, normal_gravity
+from truenorth.core.earth import DEFLECTION, EARTH_RATE, gravity_of_place
 from truenorth.core.errors import DataError
 from truenorth.core.position import Position
 from truenorth.quality.regimes import MotionSummary, motion_summary
@@ -48,7 +49,7 @@ class Task:
     @property
     def gravity(self) -> float:
         """Normal gravity, m/s^2."""
-        return float(normal_gravity(self.position.lat, self.position.alt))
+        return gravity_of_place(self.position.lat, self.position.alt)
 
     def bias_prior(self, spec: ImuSpec, C_n_b: Array) -> Array:
         """(6, 6) prior covariance of what acts as gyro and accelerometer bias here."""
@@ -153,7 +154,10 @@ def lost_walk(record: ImuRecord, x: Array) -> float:
     return scale * math.sqrt(float(total.max()) / record.duration)
 
 
+@lru_cache(maxsize=16)
 def deflection_covariance(lat: float, g: float) -> Array:
-    """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would."""
+    """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would; nobody writes to it."""
     J = static_jacobian(lat, g)[:, :2] * (DEFLECTION * g)
-    return J @ J.T
+    found = J @ J.T
+    found.flags.writeable = False
+    return np.asarray(found)

@@ -14,7 +14,7 @@ from truenorth.alignment.drift import Drift
 from truenorth.alignment.result import Alignment, Status
 from truenorth.analysis.chi_square import tail
 from truenorth.core.attitude import UNIFORM_SIGMA
-from truenorth.core.earth import EARTH_RATE, normal_gravity, radii
+from truenorth.core.earth import EARTH_RATE, gravity_of_place, radii
 from truenorth.core.errors import AlignmentError
 from truenorth.quality.regimes import SEEN_LATE
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, Effect, Evidence, Figure, contradiction, note
@@ -167,7 +167,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
     place, (_, floor) = answer.position, azimuth_sigmas(answer)
     found = rate_evidence(check, float(np.max(answer.gyro_bias_prior)), place.lat, answer.imu_source, floor)
     # A scale factor error multiplies gravity: along the vertical it is a bias like any other.
-    g = float(normal_gravity(place.lat, place.alt))
+    g = gravity_of_place(place.lat, place.alt)
     accel = math.hypot(float(np.max(answer.accel_bias_prior)), answer.imu.accel_scale_factor * g)
     if check.force_misses(accel) > limit("specification"):
         found.append(
@@ -184,7 +184,7 @@ def base_evidence(answer: Alignment, check: LogCheck, drift: Drift | None, *, se
 
 def _height(lat: float, gravity: float) -> tuple[str, ...]:
     """The remedy of a wrong height, where one at which a base stays has this gravity."""
-    most, least = (float(normal_gravity(lat, alt)) for alt in HEIGHTS)
+    most, least = (gravity_of_place(lat, alt) for alt in HEIGHTS)
     return ("height",) if least < gravity < most else ()
 
 
@@ -215,7 +215,7 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
     """
     found = []
     place = answer.position
-    g = float(normal_gravity(place.lat, place.alt))
+    g = gravity_of_place(place.lat, place.alt)
     stays = answer.moving is None and answer.transfer is None
     gravity = np.zeros(3) if stays else answer.imu.acting_variance(answer.C_nb[2] * g)
     for kind, bias, sigma, prior in (

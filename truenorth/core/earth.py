@@ -8,6 +8,7 @@ Functions take scalars or arrays; the same source is compiled for kernels.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,12 @@ def radii_at(s2: Any) -> tuple[Any, Any]:
 def normal_gravity(lat: Any, alt: Any) -> Any:
     """Normal gravity, m/s^2, downward positive, at geodetic latitude (rad) and height (m)."""
     return normal_gravity_at(np.sin(lat) ** 2, alt)
+
+
+@lru_cache(maxsize=64)
+def gravity_of_place(lat: float, alt: float) -> float:
+    """:func:`normal_gravity` of one place, which is asked for again and again."""
+    return float(normal_gravity(lat, alt))
 
 
 def normal_gravity_at(s2: Any, alt: Any) -> Any:

@@ -88,8 +88,8 @@ class StaticModel(Walks):
         nominal = (np.ascontiguousarray(x) for x in (C_n0_i, integrals.C_mean, integrals.C_late))
         _transitions(integrals.intervals, *nominal, known.f, known.f_late, C_n_n0, Phi, H)
         z = (C_n_n0 @ mean_velocity(integrals, C_n0_i, lat, alt)[..., None])[..., 0]
-        with_log = known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + np.diag(R))
-        return with_log.with_arrays(z=z, x0=np.zeros(STATES) if x0 is None else x0, P0=P0)
+        with_log = known.noise.with_made(Phi=Phi, H=H, R=known.noise.R + np.diag(R), z=z)
+        return with_log.with_arrays(x0=np.zeros(STATES) if x0 is None else x0, P0=P0)
 
 
 @compiled

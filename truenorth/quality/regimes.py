@@ -124,15 +124,19 @@ class MotionSummary:
         """Share of the record's seconds that are of this kind, 0..1."""
         if kind not in KINDS or self.kind.size == 0:
             return float(kind == "unknown" and self.kind.size == 0)
-        return float(np.mean(self.kind == KINDS.index(kind)))
+        return float(self._shares[KINDS.index(kind)])
 
     @cached_property
     def overall(self) -> Kind:
         """The strongest kind of motion, in the order of `KINDS`, that over 5 % of the seconds show."""
         if self.kind.size == 0:
             return "unknown"
-        shares = np.bincount(self.kind, minlength=len(KINDS)) / self.kind.size
-        return KINDS[int(np.flatnonzero(shares > OVERALL_SHARE)[-1])]
+        return KINDS[int(np.flatnonzero(self._shares > OVERALL_SHARE)[-1])]
+
+    @cached_property
+    def _shares(self) -> Array:
+        """Of each kind."""
+        return np.bincount(self.kind, minlength=len(KINDS)) / self.kind.size
 
     @property
     def still_fraction(self) -> float:

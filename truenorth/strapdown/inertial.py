@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truenorth.core.attitude import skew
-from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, gravity_of_place
 from truenorth.core.errors import AlignmentError
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
@@ -38,12 +38,12 @@ def earth_rotation(t: ArrayLike, lat: float) -> Array:
 
 def gravity_velocity(t: ArrayLike, lat: float, alt: float) -> Array:
     """Integral of gravity in ``n0`` from 0 to t, (..., 3), m/s; the base stays where it is on the earth."""
-    return _earth_integral(t, lat, 1) @ np.array([0.0, 0.0, -float(normal_gravity(lat, alt))])
+    return _of_gravity(t, lat, alt, 1)
 
 
 def gravity_position(t: ArrayLike, lat: float, alt: float) -> Array:
     """Second integral of gravity in ``n0`` from 0 to t, (..., 3), m."""
-    return _earth_integral(t, lat, 2) @ np.array([0.0, 0.0, -float(normal_gravity(lat, alt))])
+    return _of_gravity(t, lat, alt, 2)
 
 
 def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
@@ -54,6 +54,21 @@ def _earth_integral(t: ArrayLike, lat: float, order: int) -> Array:
     if t.ndim == 1 and t.size <= MOST_REMEMBERED:
         return _of_epochs(t.tobytes(), float(lat), order)
     return _integrated_rotation(t, lat, order)
+
+
+def _of_gravity(t: ArrayLike, lat: float, alt: float, order: int) -> Array:
+    """Gravity in ``n0``, integrated `order` times; nobody writes to it."""
+    t = np.asarray(t, dtype=np.float64)
+    if t.ndim == 1 and t.size <= MOST_REMEMBERED:
+        return _gravity_of_epochs(t.tobytes(), float(lat), float(alt), order)
+    return _earth_integral(t, lat, order) @ np.array([0.0, 0.0, -gravity_of_place(lat, alt)])
+
+
+@lru_cache(maxsize=32)
+def _gravity_of_epochs(times: bytes, lat: float, alt: float, order: int) -> Array:
+    found = _of_epochs(times, lat, order) @ np.array([0.0, 0.0, -gravity_of_place(lat, alt)])
+    found.flags.writeable = False
+    return np.asarray(found)
 
 
 @lru_cache(maxsize=32)
