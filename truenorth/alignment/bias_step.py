@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -142,8 +142,10 @@ def turn_evidence(task: Task) -> list[Evidence]:
     if turns.any():
         turns = np.convolve(turns, np.ones(2 * AWAY + 1), "same") > 0.0
     found = []
-    for part in np.split(np.arange(len(turns)), np.flatnonzero(turns[1:] != turns[:-1]) + 1):
-        if len(part) < FEWEST or turns[part[0]]:
+    edges = [0, *(np.flatnonzero(turns[1:] != turns[:-1]) + 1).tolist(), len(turns)]
+    for begin, end in pairwise(edges):
+        part = slice(begin, end)
+        if end - begin < FEWEST or turns[begin]:
             continue
         up = motion.specific_force[part].mean(axis=0)
         rate = motion.rate[part] @ (up / np.linalg.norm(up))

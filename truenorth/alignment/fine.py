@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_rotation_vector, rotate
+from truenorth.core.compiled import compiled
 from truenorth.core.position import Position
 from truenorth.errors.staying import (
     BA,
@@ -126,21 +128,29 @@ class FineAlignment(Filtered):
 
     def _carried_to(self, time: float) -> Array:
         """(9, n) misalignment and biases at a time from the last state: the whole log's knowledge carried back to it."""
+        if self._carried[0] == time:
+            return self._carried[1]
         J = np.zeros((9, len(self.end)))
         J[PHI, PHI] = np.eye(3)
         J[PHI, BG] = self._turned_between(time)  # phi(t) = phi_end + int_t^end C_n0_b eps
         behind, share = self._behind(time)
         J[PHI, STATES:] = -np.einsum("k,kij->ij", share, self.system.Phi[behind, PHI, STATES:])
         J[3:6, BG] = J[6:9, BA] = np.eye(3)
+        self._carried[:] = time, J
         return J
+
+    @cached_property
+    def _carried(self) -> list[Any]:
+        """The last time and what :meth:`_carried_to` gave; an answer asks twice for its epoch."""
+        return [None, None]
 
     def departures(self) -> Array:
         """(K, 3) how far the attitude known at each epoch is off the final one at the same time: phi in ``n0``, rad."""
-        T = self.integrals.intervals[:, None, None]
-        turns = T * (self.C_n0_i @ self.integrals.C_mean)
+        turned = self.integrals.intervals[:, None] * (self.integrals.C_mean @ self.end[BG])
         # int from each epoch to the end of C_n0_b dt, with the final residual bias: the final answer carried back.
-        after = np.concatenate([np.cumsum(turns[:0:-1], axis=0)[::-1], np.zeros((1, 3, 3))])
-        return self.end[PHI] + after @ self.end[BG] - self.estimates.x[:, PHI]
+        after = np.zeros_like(turned)
+        np.cumsum(turned[:0:-1], axis=0, out=after[-2::-1])
+        return np.asarray(self.end[PHI] + after @ self.C_n0_i.T - self.estimates.x[:, PHI])
 
     def _turned_between(self, time: float) -> Array:
         """``int C_n0_b dt`` from `time` to the last epoch; negative beyond it."""
@@ -232,9 +242,34 @@ def left_over(elapsed: float) -> Callable[[Filtered], float]:
 
 def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:
     """Attitude in n, covariance of the misalignment in n and the biases' part of it, at each epoch, (K, 3, 3) each."""
-    t = fine.integrals.time[1:]
-    C_n_n0 = np.swapaxes(earth_rotation(t, lat), 1, 2)
-    turn = dcm_from_rotation_vector(fine.estimates.x[:, PHI])
-    C_nb = C_n_n0 @ turn @ fine.C_n0_i @ fine.integrals.C_ib[1:]
-    C_n0_n = np.swapaxes(C_n_n0, 1, 2)
-    return C_nb, C_n_n0 @ fine.estimates.P[:, PHI, PHI] @ C_n0_n, C_n_n0 @ fine.floors @ C_n0_n
+    found = tuple(np.empty((len(fine.floors), 3, 3)) for _ in range(3))
+    C_n0_b = fine.C_n0_i @ fine.integrals.C_ib[1:]
+    _turn_each(
+        earth_rotation(fine.integrals.time[1:], lat), C_n0_b, fine.estimates.x, fine.estimates.P, fine.floors, *found
+    )
+    return found
+
+
+@compiled
+def _turn_each(C_n0_n: Any, C_n0_b: Any, x: Any, P: Any, floors: Any, C_nb: Any, covariance: Any, floor: Any) -> None:
+    """From ``n0`` to n: attitude without the misalignment that begins the states x, its covariance, and the floor of that."""
+    work = np.empty((3, 3))
+    for k in range(len(C_nb)):
+        q, C = quaternion_from_rotation_vector((x[k, 0], x[k, 1], x[k, 2])), C_n0_n[k]
+        for j in range(3):
+            axis = rotate(q, (C_n0_b[k, 0, j], C_n0_b[k, 1, j], C_n0_b[k, 2, j]))
+            for i in range(3):
+                C_nb[k, i, j] = C[0, i] * axis[0] + C[1, i] * axis[1] + C[2, i] * axis[2]
+        _turn(C, P[k], work, covariance[k])
+        _turn(C, floors[k], work, floor[k])
+
+
+@compiled
+def _turn(C: Any, P: Any, work: Any, turned: Any) -> None:
+    """``C' P C`` of the first three rows and columns."""
+    for i in range(3):
+        for j in range(3):
+            work[i, j] = P[i, 0] * C[0, j] + P[i, 1] * C[1, j] + P[i, 2] * C[2, j]
+    for i in range(3):
+        for j in range(3):
+            turned[i, j] = C[0, i] * work[0, j] + C[1, i] * work[1, j] + C[2, i] * work[2, j]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.compiled import compiled
 from truenorth.errors.staying import QUIETEST_BASE
 from truenorth.estimate.batch import Filtered
 from truenorth.filters import Estimates, LinearSystem, kalman
@@ -41,24 +43,38 @@ def base_variance(estimates: Estimates, R: Array, colour: bool) -> tuple[Array, 
 def _variance_of(innovation: Array, covariance: Array, R: Array, colour: bool) -> tuple[Array, Array]:
     """:func:`base_variance` of innovations (K, 3) and their covariances (K, 3, 3)."""
     skip = min(5, len(innovation) // 5)
-    # A row for each axis, whose sums run along memory.
-    nu = np.ascontiguousarray(innovation[skip:].T)
-    expected = np.ascontiguousarray(covariance.reshape(len(covariance), 9)[skip:, ::4].T)
-    count = nu.shape[1]
-    ratio = np.sum(nu * nu / expected, axis=1) / count
+    count = len(innovation) - skip
+    ratio, mean, low = np.zeros((3, 3))
+    _sums_of(innovation, covariance, skip, COLOUR_BLOCK, ratio, mean, low)
+    ratio, mean = ratio / count, mean / count
     # White innovations add up as their variances. A base that wanders slowly adds up to more, and that is what tilts
     # the answer: then R is what a white noise of that low-frequency density would have. Less is never taken off.
     blocks = count // COLOUR_BLOCK
     if colour and blocks >= COLOUR_RUNS:
-        e = (nu / np.sqrt(expected))[:, : blocks * COLOUR_BLOCK].reshape(3, blocks, COLOUR_BLOCK)
-        low = np.sum((e @ np.ones(COLOUR_BLOCK)) ** 2, axis=1) / blocks / COLOUR_BLOCK
+        low = low / blocks / COLOUR_BLOCK
         # What white noise itself may give: Wilson and Hilferty's limit of chi-square over its freedom, 1 % at 5 blocks.
         chance = (1.0 - 2.0 / (9.0 * blocks) + COLOUR_ALARM * np.sqrt(2.0 / (9.0 * blocks))) ** 3
         # Innovations within it are left alone although they are coloured: a larger R would only colour them more.
         coloured = low > chance * ratio
         ratio = np.where(coloured, np.where(low > chance, np.maximum(low, ratio), np.maximum(ratio, 1.0)), ratio)
-    mean = np.sum(expected, axis=1) / count
     return np.maximum(R + (ratio - 1.0) * mean, QUIETEST_BASE**2), mean
+
+
+@compiled
+def _sums_of(innovation: Any, covariance: Any, skip: int, length: int, squares: Any, expected: Any, low: Any) -> None:
+    """Of each axis, from row `skip` on: squares of the innovations in their variances, the variances, squares of sums of blocks."""
+    count = len(innovation) - skip
+    for i in range(len(squares)):
+        whole, total = 0, 0.0
+        for k in range(count):
+            nu, variance = innovation[skip + k, i], covariance[skip + k, i, i]
+            squares[i] += nu * nu / variance
+            expected[i] += variance
+            total += nu / np.sqrt(variance)
+            whole += 1
+            if whole == length:
+                low[i] += total * total
+                whole, total = 0, 0.0
 
 
 class VelocityNoise:

@@ -180,10 +180,11 @@ def block_limits(estimates: Estimates) -> Array:
 
 def _sizes(estimates: Estimates, length: int) -> Array:
     """(B, 2) of each block of so many epochs: sum of the squared innovations, and squares of their sums, in sigmas."""
-    sigma = np.sqrt(np.einsum("kii->ki", estimates.innovation_covariance))
-    e = estimates.innovation / sigma
-    e = e[: len(e) // length * length].reshape(-1, length, e.shape[1])
-    return np.stack([np.sum(e**2, axis=(1, 2)), np.sum(e.sum(axis=1) ** 2, axis=1) / length], axis=1)
+    e = estimates.innovation / np.sqrt(np.einsum("kii->ki", estimates.innovation_covariance))
+    blocks = len(e) // length
+    e = e[: blocks * length]
+    flat, sums = e.reshape(blocks, -1), np.ones(length) @ e.reshape(blocks, length, -1)
+    return np.stack([np.einsum("bi,bi->b", flat, flat), np.einsum("bi,bi->b", sums, sums) / length], axis=1)
 
 
 def _disturbance(estimates: Estimates) -> Array:

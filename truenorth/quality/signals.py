@@ -159,21 +159,45 @@ def _allan_variances(total: Any, step: int, m: int, group: int, variance: Any) -
 
 def angle_wander(rates: Array, interval: float, per_second: int) -> Array:
     """(3, windows) RMS of the angle about its straight line, in windows of 10 s that start at each second."""
-    angle = np.cumsum(rates * interval, axis=1)
-    count = min(WINDOW, angle.shape[1] // per_second)
-    # Sums over each second; of the angle also with the place in the second, and with the second in the log.
-    seconds = angle.reshape(3, -1, per_second)
-    each, place = seconds @ np.ones(per_second), seconds @ np.arange(per_second, dtype=np.float64)
-    number = np.arange(each.shape[1], dtype=np.float64)
-    square = np.einsum("csk,csk->cs", seconds, seconds)
-    sums = np.concatenate([each, square, place + per_second * (number * each)])
-    total, energy, moment = _neighbours(sums, count).reshape(3, 3, -1)
+    seconds = rates.shape[1] // per_second
+    count = min(WINDOW, seconds)
+    sums, found = np.empty((3, 4, seconds)), np.empty((3, seconds - count + 1))
+    _wander(np.ascontiguousarray(rates), interval, per_second, count, sums, found)
+    return found
+
+
+@compiled
+def _wander(rates: Any, interval: float, per_second: int, count: int, sums: Any, found: Any) -> None:
+    """:func:`angle_wander` (3, windows) of `count` seconds; of each second sums (3, 4, seconds) stand about the angle before it."""
     length = count * per_second
-    middle = per_second * number[: total.shape[1]] + (length - 1) / 2.0
-    line = np.arange(length) - (length - 1) / 2.0
-    slope = moment - middle * total
-    mean = total / length
-    return np.sqrt(np.maximum(energy / length - mean**2 - slope**2 / (length * (line @ line)), 0.0))
+    square_of_line = length * (length * length - 1.0) / 12.0
+    for i in range(len(rates)):
+        angle = 0.0
+        for s in range(sums.shape[2]):
+            each = square = place = since = 0.0
+            for k in range(per_second):
+                since += rates[i, s * per_second + k] * interval
+                each += since
+                square += since * since
+                place += k * since
+            sums[i, 0, s], sums[i, 1, s], sums[i, 2, s], sums[i, 3, s] = each, square, place, angle
+            angle += since
+        for first in range(found.shape[1]):
+            total = energy = moment = 0.0
+            for s in range(first, first + count):
+                before = (
+                    sums[i, 3, s] - sums[i, 3, first]
+                )  # about the angle at the window's beginning: no digits are lost
+                each = sums[i, 0, s] + per_second * before
+                total += each
+                energy += sums[i, 1, s] + before * (2.0 * sums[i, 0, s] + per_second * before)
+                moment += (
+                    sums[i, 2, s] + before * (0.5 * per_second * (per_second - 1)) + (s - first) * per_second * each
+                )
+            mean, slope = total / length, moment - 0.5 * (length - 1) * total
+            found[i, first] = np.sqrt(
+                max(energy / length - mean * mean - slope * slope / (length * square_of_line), 0.0)
+            )
 
 
 def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) -> Array:

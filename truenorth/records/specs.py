@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -143,10 +143,13 @@ class ImuSpec:
                 )
             object.__setattr__(self, "accel_positions", tuple(places))
 
-    @property
+    @cached_property
     def bias_variance(self) -> NDArray[np.float64]:
-        """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2."""
-        return self.constant_variance + np.repeat([self.gyro_bias_instability**2, self.accel_bias_instability**2], 3)
+        """(6,) variance of the biases proper, gyro and accelerometer, (rad/s)^2 and (m/s^2)^2; nobody writes to it."""
+        wanders = np.repeat([self.gyro_bias_instability**2, self.accel_bias_instability**2], 3)
+        found = self.constant_variance + wanders
+        found.flags.writeable = False
+        return np.asarray(found)
 
     @property
     def constant_variance(self) -> NDArray[np.float64]:
