@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
+from truenorth.formats.arrow import numbers, words
+
 _WORD = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
     [
@@ -61,7 +63,9 @@ def table_of(rows: Sequence[Row]) -> Any:
     arrays = []
     for field, column in zip(SCHEMA, columns, strict=True):
         if pa.types.is_dictionary(field.type):
-            arrays.append(pa.array(column, pa.string()).dictionary_encode().cast(field.type))
+            arrays.append(words(column).dictionary_encode().cast(field.type))
+        elif field.type == pa.string():
+            arrays.append(words(column))
         else:
-            arrays.append(pa.array(column, field.type))
+            arrays.append(numbers(column, field.type))
     return pa.Table.from_arrays(arrays, schema=SCHEMA)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from truenorth.records import Record
 
@@ -32,6 +32,23 @@ def to_numpy(columns: list[pa.ChunkedArray]) -> Array:
     return values
 
 
+def numbers(column: ArrayLike, kind: pa.DataType) -> pa.Array:
+    """A column of numbers, none of them absent."""
+    import pyarrow as pa
+
+    values = np.ascontiguousarray(column, dtype=kind.to_pandas_dtype())
+    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
+
+
+def words(column: Sequence[str]) -> pa.StringArray:
+    """A column of words, none of them absent."""
+    import pyarrow as pa
+
+    coded = [word.encode() for word in column]
+    ends = np.cumsum([0, *map(len, coded)], dtype=np.int32)
+    return pa.StringArray.from_buffers(len(coded), pa.py_buffer(ends), pa.py_buffer(b"".join(coded)))
+
+
 def table_of(record: Record) -> pa.Table:
     """A record with the documented columns."""
     return table_from({"time": record.time, **record.columns()})
@@ -41,10 +58,7 @@ def table_from(columns: Mapping[str, Array], index: str | None = None) -> pa.Tab
     """Columns (N,) as a table; the column named `index` is the index where pandas reads it."""
     import pyarrow as pa
 
-    arrays = [
-        pa.Array.from_buffers(pa.float64(), len(column), [None, pa.py_buffer(np.ascontiguousarray(column))])
-        for column in columns.values()
-    ]
+    arrays = [numbers(column, pa.float64()) for column in columns.values()]
     table = pa.Table.from_arrays(arrays, names=list(columns))
     if index is None:
         return table
