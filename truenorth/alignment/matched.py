@@ -100,10 +100,23 @@ def innovations_of(fine: FineAlignment, others: Array | None = None) -> Innovati
         explain what they can.
     """
     seen = fine.estimates.innovation[..., None]
-    L = np.asarray(np.linalg.cholesky(fine.estimates.innovation_covariance), dtype=np.float64)
     if others is not None:
         seen = np.concatenate([seen, through(fine.gains, others)[0]], axis=2)
+    L = np.zeros(fine.estimates.innovation_covariance.shape)
+    _factor(np.ascontiguousarray(fine.estimates.innovation_covariance), L)
     return Innovations(L, fine.gains, whitened(L, seen))
+
+
+@compiled
+def _factor(covariance: Any, L: Any) -> None:
+    """Lower triangles of ``L L'`` of (K, m, m), zero so far: of small matrices a library takes longer to begin than to do it."""
+    for k in range(len(L)):
+        for i in range(L.shape[1]):
+            for j in range(i + 1):
+                total = covariance[k, i, j]
+                for r in range(j):
+                    total -= L[k, i, r] * L[k, j, r]
+                L[k, i, j] = np.sqrt(total) if i == j else total / L[k, j, j]
 
 
 def whitened(L: Array, x: Array) -> Array:

@@ -156,7 +156,7 @@ def lost_walk(record: ImuRecord, x: Array) -> float:
 
 @lru_cache(maxsize=16)
 def deflection_covariance(lat: float, g: float) -> Array:
-    """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias would; nobody writes to it."""
+    """(3, 3) covariance of phi from the deflection of the vertical: it tilts as an accelerometer bias. Nobody writes to it."""
     J = static_jacobian(lat, g)[:, :2] * (DEFLECTION * g)
     found = J @ J.T
     found.flags.writeable = False

@@ -210,18 +210,22 @@ def rate_bias(rates: Array, wander: Array, per_second: int, angle_noise: Array) 
     seconds = np.ascontiguousarray(rates).reshape(3, -1, per_second) @ np.ones(per_second)
     mean = _neighbours(seconds, length // per_second) / length
     limit = np.clip(50.0 * float(np.linalg.norm(angle_noise)), np.radians(0.1), LARGEST_BIAS)
-    everywhere = np.ones(mean.shape[1], dtype=bool)
+    bias = _constant_part(mean, wander)
+    if np.linalg.norm(bias) < limit:
+        return bias
     believable = np.linalg.norm(mean, axis=0) < limit
-    for windows in (everywhere, believable):
-        if not windows.any():
-            continue
-        chosen, still = mean[:, windows], wander[:, windows].max(axis=0)
-        drift = np.sqrt(np.sum((chosen - median_of_rows(chosen)) ** 2, axis=0)) * WINDOW / np.sqrt(12.0)
-        weight = 1.0 / (still**2 + drift**2 + STILL_ANGLE**2)
-        bias: Array = chosen @ weight / weight.sum()
-        if np.linalg.norm(bias) < limit:
-            return bias
-    return np.zeros(3)
+    if not believable.any():
+        return np.zeros(3)
+    bias = _constant_part(mean[:, believable], wander[:, believable])
+    return bias if np.linalg.norm(bias) < limit else np.zeros(3)
+
+
+def _constant_part(mean: Array, wander: Array) -> Array:
+    """(3,) mean of windows (3, windows), those of little motion counting most."""
+    off = mean - median_of_rows(mean)
+    drift = np.einsum("cw,cw->w", off, off) * (WINDOW**2 / 12.0)
+    weight = 1.0 / (wander.max(axis=0) ** 2 + drift + STILL_ANGLE**2)
+    return np.asarray(mean @ weight / weight.sum())
 
 
 def median_of_rows(values: Array) -> Array:
