@@ -105,11 +105,20 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     import multiprocessing
 
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent)
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=begin)
     try:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def begin() -> None:
+    """What a worker does first."""
+    import atexit
+    import gc
+
+    atexit.register(gc.freeze)  # what is there at the end goes with the process, without being looked through
+    end_with_parent()
 
 
 def end_with_parent() -> None:

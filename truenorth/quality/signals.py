@@ -327,15 +327,14 @@ def _sliding_medians(signal: Any, ordered: Any, found: Any) -> None:
     width = len(ordered)
     for i in range(signal.shape[0]):
         for k in range(signal.shape[1]):
-            if k < width:
-                place = k
-            else:
+            place = k
+            if k >= width:
                 place = 0
-                while ordered[place] != signal[i, k - width] and place < width - 1:
+                for m in range(width - 1):
+                    place += ordered[m] < signal[i, k - width]
+                while place < width - 1 and ordered[place + 1] < signal[i, k]:
+                    ordered[place] = ordered[place + 1]
                     place += 1
-                for m in range(place, width - 1):
-                    ordered[m] = ordered[m + 1]
-                place = width - 1
             while place > 0 and ordered[place - 1] > signal[i, k]:
                 ordered[place] = ordered[place - 1]
                 place -= 1
