@@ -51,12 +51,10 @@ def _portmanteau(x: Array) -> float:
     """Ljung and Box's statistic of both columns (K, 2), a parabola taken out."""
     count = len(x)
     trend = _trend(count)
-    e = x - trend @ (trend.T @ x)
-    power = np.einsum("ki,ki->i", e, e)
     total = 0.0
-    for lag in range(1, LAGS + 1):
-        rho = np.einsum("ki,ki->i", e[lag:], e[:-lag]) / power
-        total += float(rho @ rho) / (count - lag)
+    for e in np.ascontiguousarray((x - trend @ (trend.T @ x)).T):
+        power = float(e @ e)
+        total += sum((float(e[lag:] @ e[:-lag]) / power) ** 2 / (count - lag) for lag in range(1, LAGS + 1))
     return count * (count + 2) * total
 
 

@@ -71,6 +71,7 @@ def _truth_of(motion: Moving) -> Callable[[float], MotionStates]:
     return lru_cache(maxsize=MOST_EPOCHS)(lambda time: motion.states(np.array(time)))
 
 
+@remembered
 def _is_sound(scenario: Scenario) -> bool:
     """Whether every log of a scenario is known to be without the faults that :func:`align` looks for.
 
