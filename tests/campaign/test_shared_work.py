@@ -1,11 +1,16 @@
 """What the runs of a campaign and the steps of an alignment share is worked out once, and workers keep their memory."""
 
 import os
+import subprocess
+import sys
 
 import numpy as np
+import pyarrow as pa
+import pytest
 
 from truenorth.campaign.aligning import _truth_of
 from truenorth.campaign.execution import one_thread_each
+from truenorth.campaign.rows import SCHEMA, Row, table_of
 from truenorth.core.position import Position
 from truenorth.errors.staying import QUIETEST_BASE, StaticModel
 from truenorth.estimate.base_motion import VelocityNoise
@@ -83,3 +88,28 @@ def test_a_linearised_log_stands_the_check_that_it_is_spared():
         np.testing.assert_allclose(loud.R - system.R, np.tile(np.diag(added), (system.epochs, 1, 1)), atol=1e-18)
         for name in ("Phi", "Q", "H", "R", "S", "P0"):
             assert getattr(system, name).flags.c_contiguous
+
+
+def test_rows_become_the_table_that_arrow_makes_of_them():
+    rows = [
+        Row(0, "kalman", k, 600.0, what, 0.1 * k, unit="µg", reason="é" * k)
+        for k in range(3)
+        for what in ("nis", "phi_u")
+    ]
+    columns = zip(*rows, strict=True)
+    theirs = [pa.array(list(column), field.type) for column, field in zip(columns, SCHEMA, strict=True)]
+    ours, theirs = table_of(rows).to_pydict(), pa.Table.from_arrays(theirs, schema=SCHEMA).to_pydict()
+    assert np.isnan(ours.pop("sigma")).all()
+    assert np.isnan(theirs.pop("sigma")).all()
+    assert ours == theirs
+    assert table_of([]).schema == SCHEMA
+
+
+@pytest.mark.slow
+def test_a_worker_loads_no_pandas():
+    code = (
+        "import sys\nfrom truenorth.campaign.execution import work\nfrom truenorth.campaign.store import Block\n"
+        "from tests.campaign.test_plan import PLAN\nfrom truenorth.campaign.plan import read_plan\n"
+        "work(read_plan(PLAN).to_mapping(), Block(0, 0, 0))\nassert 'pandas' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

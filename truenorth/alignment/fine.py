@@ -242,12 +242,10 @@ def left_over(elapsed: float) -> Callable[[Filtered], float]:
 
 def attitude_history(fine: FineAlignment, lat: float) -> tuple[Array, Array, Array]:
     """Attitude in n, covariance of the misalignment in n and the biases' part of it, at each epoch, (K, 3, 3) each."""
-    found = tuple(np.empty((len(fine.floors), 3, 3)) for _ in range(3))
-    C_n0_b = fine.C_n0_i @ fine.integrals.C_ib[1:]
-    _turn_each(
-        earth_rotation(fine.integrals.time[1:], lat), C_n0_b, fine.estimates.x, fine.estimates.P, fine.floors, *found
-    )
-    return found
+    C_nb, covariance, floor = np.empty((3, len(fine.floors), 3, 3))
+    C_n0_n, C_n0_b = earth_rotation(fine.integrals.time[1:], lat), fine.C_n0_i @ fine.integrals.C_ib[1:]
+    _turn_each(C_n0_n, C_n0_b, fine.estimates.x, fine.estimates.P, fine.floors, C_nb, covariance, floor)
+    return C_nb, covariance, floor
 
 
 @compiled
