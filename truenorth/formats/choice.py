@@ -16,7 +16,7 @@ from truenorth.formats.behaviour import accel_readings, gravity_level
 from truenorth.formats.columns import Columns, listed, missing_column
 from truenorth.formats.guesses import UnsureError
 from truenorth.formats.layout import BLOCKS, Layout
-from truenorth.formats.names import Heading, clock_of, families, heading_of
+from truenorth.formats.names import Heading, clock_of, families, heading_of, says_rates
 from truenorth.records import COLUMNS, Guess
 from truenorth.records.imu import Kind
 
@@ -199,7 +199,8 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
         gyros, accels = sets[kind]
         if not gyros or not accels:
             continue
-        accels = _with_gravity(columns, accels) if len(accels) > 1 else accels
+        gyros = _calibrated(gyros)
+        accels = _calibrated(_with_gravity(columns, accels) if len(accels) > 1 else accels)
         if len(gyros) > 1 or len(accels) > 1:
             several = gyros if len(gyros) > 1 else accels
             sensor = BLOCKS[kind][0 if several is gyros else 1]
@@ -216,11 +217,16 @@ def _by_name(columns: Columns, layout: Layout) -> Choice | None:
             kind = "increments"
         ours = COLUMNS[kind]
         guess = Guess("columns", ", ".join(names), "their names", 1.0, {"columns": dict(zip(ours, names))})
-        shown = kind if kind == "increments" or said is not None else None
+        shown = kind if kind == "increments" or said is not None or says_rates(names[3:]) else None
         return Choice(
             shown, (), [(name, 1.0) for name in names], _units(headings, layout.kind or kind), guesses=[guess]
         )
     return None
+
+
+def _calibrated(sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
+    """Of several sets of one sensor those that the log does not call uncalibrated."""
+    return [axes for axes in sets if "uncal" not in axes["x"].family] or sets
 
 
 def _with_gravity(columns: Columns, sets: list[dict[str, Heading]]) -> list[dict[str, Heading]]:
@@ -362,9 +368,12 @@ def _by_behaviour(columns: Columns, layout: Layout) -> Choice:
         )
     ]  # fmt: skip
     if longest < 3 or not forces or len(blocks) < 2:
+        from truenorth.formats.sensor_folder import hint
+
         raise DataError(
             f"{source}: no columns of an IMU among {listed(columns.names)}; expected time, gyro_x .. accel_z (rates "
             "in SI units) or dtheta_x .. dvel_z (increments), or other usual names: name the columns"
+            + hint(columns.path)
         )
     others = [block for block in blocks if block not in forces] if len(forces) == 1 else []
     if len(forces) > 1 or len(others) > 1:

@@ -26,7 +26,7 @@ SUFFIXES = {
     ".bin": "kf-gins-binary",
     **devices.SUFFIXES,
 }
-FORMATS = tuple(dict.fromkeys((*SUFFIXES.values(), "kf-gins", *devices.DEVICES)))
+FORMATS = tuple(dict.fromkeys((*SUFFIXES.values(), "kf-gins", "sensor-folder", *devices.DEVICES)))
 AIDING_SUFFIXES = {
     ".csv": "csv",
     ".tsv": "csv",
@@ -89,9 +89,12 @@ def format_of(
     if path.is_dir():
         if given in (None, "parquet") and suffixes is SUFFIXES and parts_of(path):
             return "parquet"
+        if given in (None, "sensor-folder") and suffixes is SUFFIXES and _has_sensors(path):
+            return "sensor-folder"
         if given not in (None, "ros") or not (path / "metadata.yaml").is_file():
             raise UsageError(
-                f"{path}: a folder; only a ROS 2 bag is one (with metadata.yaml in it), and the rows of a live run; name a file"
+                f"{path}: a folder; expected a ROS 2 bag (with metadata.yaml in it), one file for each sensor (such as "
+                "Gyroscope.csv and Accelerometer.csv), or the rows of a live run; else name a file"
             )
         return "ros"
     head = first_bytes(path)
@@ -131,6 +134,12 @@ def _check_content(source: str, head: bytes, chosen: str, found: str | None) -> 
         raise DataError(f"{source}: read as {chosen}, which is text, but it holds binary data; name its format")
     if chosen == "kf-gins-binary" and all(byte in b"\t\n\r" or 32 <= byte < 127 for byte in head):
         raise DataError(f"{source}: read as binary, but it holds text; name the format kf-gins or csv")
+
+
+def _has_sensors(folder: Path) -> bool:
+    from truenorth.formats.sensor_folder import is_one  # which reads tables: not for every start of the command line
+
+    return is_one(folder)
 
 
 def _is_npz(path: Path) -> bool:

@@ -25,7 +25,13 @@ STEMS = {
 BEFORE = re.compile(
     r"(?:(?:imu|ins|field|sensors?|raw|calib(?:rated)?|cal|uncal(?:ibrated)?|body|data|device|meas(?:ured)?|output|inertial|combined|b|mems|fog|rlg|left|right|main|primary)_?\d*_?)+"
 )
-AFTER = r"raw|cal|calibrated|body|b|meas|out|sensor|imu\d*"
+CHIPS = (  # as Android names its sensors: ``accelerometer_lsm6ds3_c``
+    r"(?:lsm|lis|ism|bm[aigx]|ic[mg]|iim|mpu|adxl|adis|mma|kx|l3g|itg|fx[ao]s|stk|ak[mg]?)_?\d\w*"
+)
+AFTER = rf"raw|cal|calibrated|body|b|meas|out|sensor|imu\d*|{CHIPS}"
+RATES = re.compile(
+    r"acceleration|angular_?(?:vel(?:ocity)?|rate)|rotation_rate|turn_rate"
+)  # names of nothing but rates
 NOT_FORCE = ("free", "user", "gravity", "mag")  # accelerations without gravity, gravity alone, magnetometers
 AXES = {"x": "x", "y": "y", "z": "z"}
 ROLL_RATES = {"p": "x", "q": "y", "r": "z"}  # of aircraft
@@ -121,6 +127,11 @@ def clock_of(name: str) -> tuple[bool, str | None]:
     if said is not None and parse_unit(said)[1] != DIMENSIONS["time"][0]:
         said = None
     return True, said
+
+
+def says_rates(names: Sequence[str]) -> bool:
+    """Whether names of both sensors are those of rates: ``linear_acceleration``, ``angular_velocity``."""
+    return all(RATES.search(plain(split(name)[0])) is not None for name in names)
 
 
 def families(names: Sequence[str]) -> dict[str, list[dict[str, Heading]]]:

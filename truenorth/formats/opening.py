@@ -28,6 +28,10 @@ def columns_of(path: Path, format: str, named: bool = True) -> Columns:
         table = open_table(path)
         notes = (*table.notes, table.dialect.words())
         return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, table.above)
+    if format == "sensor-folder":
+        from truenorth.formats import sensor_folder
+
+        return sensor_folder.columns(path)
     if format in ("parquet", "feather"):
         from truenorth.formats import parquet
 
