@@ -278,6 +278,20 @@ def test_novatel(tmp_path):
     assert_is_at_home(solution, 10)
 
 
+def test_novatel_text_without_carriage_returns(tmp_path):
+    """An editor or a version control ends lines by a line feed alone: none of them was decoded."""
+    pytest.importorskip("novatel_edie")
+    lines = [novatel_line("RAWIMUSA", f"2300,{TOW + 0.01 * k:.6f},00000077,641{k % 9},-3,{k},20{k % 7},-28,9", TOW + 0.01 * k)
+             for k in range(200)]  # fmt: skip
+    (tmp_path / "as_sent.ASC").write_bytes("".join(lines).encode())
+    (tmp_path / "edited.ASC").write_bytes("".join(lines).replace("\r\n", "\n").encode())
+    units = {"gyro": "1e-7 deg", "accel": "1.5e-5 m/s"}
+    sent, edited = (read_imu(tmp_path / name, units=units, kind="increments") for name in ("as_sent.ASC", "edited.ASC"))
+    assert len(edited.gyro) == 200
+    np.testing.assert_array_equal(edited.gyro, sent.gyro)
+    np.testing.assert_array_equal(edited.accel, sent.accel)
+
+
 def test_rtklib(tmp_path):
     path = tmp_path / "rover.pos"
     head = ("% program   : RTKPOST ver.2.4.2\n% ( lat/lon/height=WGS84/ellipsoidal,Q=1:fix )\n"

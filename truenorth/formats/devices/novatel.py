@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 
 EXTRA = "novatel"
 AXES = "RFU"
+LONGEST_LINE = 4096  # bytes, of a log of text
 
 
 def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[str, Array]]:
@@ -27,7 +29,7 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
     atexit.unregister(gc.freeze)  # of the command line: the library's own count of what is left would call that leaked
 
     rows: dict[str, list[list[float]]] = {"imu": [], "place": [], "velocity": [], "poses": []}
-    for message in oem.FileParser(str(path)):
+    for message in _text_messages(path) if _has_bare_lines(path) else oem.FileParser(str(path)):
         name = getattr(message, "name", "")
         values = message.to_dict() if name.startswith(("RAWIMU", "BESTPOS", "BESTVEL", "INSPVA")) else None
         if values is None:
@@ -45,6 +47,24 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
         elif name.startswith("INSPVA"):
             rows["poses"].append(_pose(values, tow))
     return {"imu": _imu(rows["imu"]), "gnss": _gnss(rows["place"], rows["velocity"]), "poses": _poses(rows["poses"])}
+
+
+def _has_bare_lines(path: Path) -> bool:
+    """Whether the log is text whose carriage returns an editor or a version control took away: the decoder wants them."""
+    with path.open("rb") as file:
+        first = file.readline(LONGEST_LINE)
+    return first[:1] in (b"#", b"%") and first.endswith(b"\n") and not first.endswith(b"\r\n")
+
+
+def _text_messages(path: Path) -> Iterator[Any]:
+    """The messages of a log of text, each line ended as the receiver ends it."""
+    from novatel_edie import oem
+
+    parser = oem.Parser()
+    with path.open("rb") as file:
+        for line in file:
+            parser.write(line.rstrip(b"\r\n") + b"\r\n")
+            yield from parser
 
 
 def _solved(values: dict[str, Any]) -> bool:
