@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from truenorth.formats.magnetometer import read_magnetometer
     from truenorth.navigation import Mounting, Navigation, navigate
     from truenorth.navigation.known import known_start, start_from_master, with_heading
+    from truenorth.papers import reproduce
     from truenorth.quality import inspect
     from truenorth.records import (
         GnssRecord,
@@ -157,6 +158,7 @@ _HOMES = {
     "read_velocity": "formats",
     "register_recipe": "alignment",
     "register_result": "results",
+    "reproduce": "papers",
     "run_campaign": "campaign",
     "save": "results",
     "simulate": "simulation",
@@ -224,6 +226,7 @@ __all__ = [
     "read_velocity",
     "register_recipe",
     "register_result",
+    "reproduce",
     "run_campaign",
     "save",
     "simulate",
