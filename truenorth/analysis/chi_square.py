@@ -43,11 +43,16 @@ def chi_square_limit(chance: float, dof: int) -> float:
         from scipy.special import chdtri
 
         return float(chdtri(dof, chance))
-    # The logarithm of the tail is concave: Newton's method comes to the root from one side. From below the first step is too long.
+    # The logarithm of the tail is concave: Newton's method comes to the root from one side. From below the first step is too long,
+    # and half of it is taken back as long as it leads to where the tail is no number.
     wanted, norm = math.log(chance), -0.5 * dof * math.log(2.0) - math.lgamma(0.5 * dof)
-    x = float(dof)
+    x = last = float(dof)
     for _ in range(STEPS):
         p = tail(x, dof)
+        if p == 0.0:
+            x = 0.5 * (x + last)
+            continue
+        last = x
         density = math.exp(norm + (0.5 * dof - 1.0) * math.log(x) - 0.5 * x)
         step = (math.log(p) - wanted) * p / density
         x = max(x + step, 0.1 * x)
