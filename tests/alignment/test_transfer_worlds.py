@@ -9,9 +9,11 @@ import pytest
 
 from benchmarks.honesty.transfer import ERRORS, aircraft
 from tests.alignment.test_transfer import ARCMIN, DEG, MASTER, TACTICAL
+from truenorth.aiding.aids import Master
+from truenorth.alignment import align
 from truenorth.alignment.transfer import _colour, align_transfer
 from truenorth.alignment.transfer_answer import _bent
-from truenorth.alignment.transfer_delay import find_delay
+from truenorth.alignment.transfer_delay import find_delay, runs_backwards
 from truenorth.alignment.transfer_verdict import _lasting
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.attitude import dcm_from_euler
@@ -25,6 +27,7 @@ from truenorth.records.specs import imu_spec
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import straight
+from truenorth.simulation.scenario import read_scenario
 from truenorth.simulation.sway import Disturbed
 from truenorth.simulation.tones import Tone
 from truenorth.state.track import Residuals
@@ -181,3 +184,61 @@ def test_accelerometers_that_lag_by_less_than_a_rung_of_the_ladder_are_found():
     answer = bench.align(inputs | {"record": replace(record, accel=accel)})
     assert any(item.key == "delay.gyros_early" for item in answer.evidence)
     assert max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 3.0
+
+
+@pytest.mark.parametrize("attitude", [True, False])
+def test_rows_that_run_backwards_are_no_clock_that_is_off(attitude):
+    """A flight with two turns, reversed, agrees with its master at a shift that brings one turn upon itself."""
+    inputs, _ = BENCHES["attitude"].draw(9131, 0)
+    slave, master = inputs["record"], inputs["master"]
+    master = master if attitude else replace(master, C_nb=None)
+    backwards = replace(slave, gyro=slave.gyro[::-1], accel=slave.accel[::-1])
+    assert find_delay(backwards, master, np.eye(3)).sure
+    assert find_delay(backwards, master, np.eye(3)).delay > 60.0
+    with pytest.raises(DataError, match="run backwards"):
+        align(backwards, imu=inputs["imu"], aid=[Master(master, inputs["mounting"])])
+    reversed_master = replace(master, **{k: x[::-1] for k in ("C_nb", "v_n") if (x := getattr(master, k)) is not None})
+    # Its attitudes, reversed, turn the other way round; the size of its force is the same.
+    assert runs_backwards(slave, reversed_master[200:], np.eye(3), 0.0, 0.3) is not attitude
+
+
+@pytest.mark.parametrize("late", [-60.0, -5.0, 5.0, 30.0, 71.0])
+def test_clocks_that_are_off_by_minutes_are_brought_together(late):
+    inputs, truth = BENCHES["attitude"].draw(9131, 0)
+    slave, master = inputs["record"], inputs["master"].shifted(late)
+    for one in (master, replace(master, C_nb=None)):
+        assert not runs_backwards(slave, one, np.eye(3), 0.0, 0.3)
+    found = align(slave, imu=inputs["imu"], aid=[Master(master, inputs["mounting"], matching="both")])
+    assert found.status == "aligned"
+    assert found.transfer.delay == pytest.approx(late + 0.03, abs=0.01)
+    assert max(np.abs(off).max() for off in misses(found, truth).values()) < 4.0
+
+
+def test_one_turn_looks_the_same_from_both_ends():
+    """Turns at 25 s and, by the other's clock, at 75 s of 100 s: mirrored they agree without a shift, in no more of the motion."""
+    scenario = {
+        "name": "turn",
+        "duration": "200 s",
+        "rate": "50 Hz",
+        "position": {"lat": "40 deg", "lon": "0 deg", "alt": "3000 m"},
+        "imu": "tactical",
+        "motion": {
+            "kind": "legs",
+            "heading": "20 deg",
+            "speed": "120 m/s",
+            "legs": [
+                {"kind": "straight", "duration": "80 s"},
+                {"kind": "turn", "angle": "60 deg", "rate": "3 deg/s", "onset": "0.5 s"},
+                {"kind": "straight", "duration": "100 s"},
+            ],
+        },
+        "master": {"rate": "10 Hz", "velocity_noise": "0.2 m/s"},
+    }
+    built = read_scenario(scenario)
+    slave, master = built.simulate(seed=5).record, built.simulate_aiding(seed=5)["master"].record
+    slave, master = slave.between(65.0, 165.0), master.between(15.0, 115.0).shifted(50.0)
+    straight, mirrored = (find_delay(slave, master, np.eye(3), mirrored=m) for m in (False, True))
+    assert straight.delay == pytest.approx(50.0, abs=0.1)
+    assert abs(mirrored.delay) < 2.0
+    assert mirrored.sure
+    assert not runs_backwards(slave, master, np.eye(3), 0.0, 2.0)

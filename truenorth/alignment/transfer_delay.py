@@ -25,6 +25,9 @@ SHORTEST = 10.0  # s that both must have in common
 SURE = 0.5  # correlation below this is no agreement
 # Log-likelihood by which the peak must exceed another elsewhere; signals taken as white beyond their window
 UNIQUE = 20.0
+MORE = (
+    1.2  # times the changes of motion that a shift brings together: what a mirrored log must show to be taken for one
+)
 CHANCE = 5.0  # sigmas by which a correlation must exceed that of unrelated signals
 
 FEWEST = 3.0  # windows that must move: the first row of a turn at the end of a log agrees with any row of it
@@ -37,15 +40,19 @@ class Found(NamedTuple):
     correlation: float  # of the signals at that shift
     rival: float  # the highest correlation elsewhere
     sure: bool  # the correlation is high, no chance, and the only one
+    gain: float = 0.0  # log-likelihood of the agreement at that shift
+    shared: float = 0.0  # changes of motion that both logs show there: sum of their products
 
 
-def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Found:
+def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored: bool = False) -> Found:
     """Find the delay of a master by correlation, of all at which both logs have 10 s in common.
 
     Parameters
     ----------
     C_mb : (3, 3) array
         Slave to master axes, within some ten degrees.
+    mirrored : bool
+        Whether the slave's rows are taken in reversed order, under the stamps that they have.
 
     Returns
     -------
@@ -55,6 +62,7 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Found:
     kind = "rate" if master.C_nb is not None else "force"
     step = max(GRID, master.interval) if master.interval < WINDOW[kind] else 0.5 * WINDOW[kind]
     a = _slave_signal(slave, kind, step)
+    a = a[::-1] if mirrored else a
     b = _master_signal(master, C_mb, kind, step)
     least = round(SHORTEST / step)
     if len(a) < least or len(b) < least:
@@ -79,7 +87,37 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Found:
     better = 0.5 * independent * math.log(max(1.0 - rival**2, 1e-12) / max(1.0 - peak**2, 1e-12))
     lasting = min(_lasting(a), _lasting(b)) * step > FEWEST * WINDOW[kind]
     sure = lasting and peak > max(SURE, CHANCE / math.sqrt(independent)) and better > UNIQUE
-    return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure)
+    shared = _changes(a, b, round(shifts[k]), max(1, round(WINDOW[kind] / step)))
+    gain = -0.5 * independent * math.log(max(1.0 - peak**2, 1e-12))
+    return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure, gain, shared)
+
+
+def runs_backwards(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float, slack: float) -> bool:
+    """Whether one log in reversed order fits the other under the stamps as they are better than any shift does.
+
+    A turn looks the same from both ends. The logs of a flight with two turns, one log reversed, agree at a shift that brings one
+    turn upon itself, and leaves the other out. Reversed back they agree as well, in more of the motion, and no clock is off. So the
+    mirrored agreement must be the likelier one by as much as a peak must be, show `MORE` changes of motion, and lie at the delay
+    that was said (`delay` within `slack`, s): a single turn changes no more mirrored, and a clock that is off is at no such delay.
+    """
+    straight, mirrored = find_delay(slave, master, C_mb), find_delay(slave, master, C_mb, mirrored=True)
+    # Of a master that is reversed, the mirrored slave is as late as the middles of the logs are apart, twice.
+    middles = float(master.time[0] + master.time[-1] - slave.time[0] - slave.time[-1])
+    slack += WINDOW["rate" if master.C_nb is not None else "force"]
+    return (
+        mirrored.sure
+        and mirrored.gain - straight.gain > UNIQUE
+        and mirrored.shared > MORE * straight.shared
+        and min(abs(mirrored.delay - delay), abs(mirrored.delay - (middles - delay))) < slack
+    )
+
+
+def _changes(a: Array, b: Array, shift: int, apart: int) -> float:
+    """What both change within so many rows, at a shift. A steady rate, however long, counts nothing, nor does noise in the mean."""
+    first, second = max(shift, 0), max(-shift, 0)
+    many = min(len(a) - first, len(b) - second)
+    x, y = a[first : first + many], b[second : second + many]
+    return float(np.sum((x[apart:] - x[:-apart]) * (y[apart:] - y[:-apart])))
 
 
 def _lasting(signal: Array) -> float:

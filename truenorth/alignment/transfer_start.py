@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.transfer_delay import WINDOW, find_delay
+from truenorth.alignment.transfer_delay import WINDOW, find_delay, runs_backwards
 from truenorth.alignment.transfer_filter import Assumed
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR
@@ -43,13 +43,20 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     Raises
     ------
     DataError
-        The logs have no time in common and their motion does not say how they belong together.
+        The logs have no time in common and their motion does not say how they belong together; or one of them is reversed.
     """
     found = find_delay(slave, master, assumed.C_mb)
     start, stop = master.time[0] - assumed.delay, master.time[-1] - assumed.delay
     apart = start >= slave.time[-1] or stop <= slave.time[0]
     miss = abs(found.delay - assumed.delay)
-    if found.sure and (apart or miss > SURPRISE * max(assumed.delay_sigma, 0.5 * master.interval)):
+    slack = SURPRISE * max(assumed.delay_sigma, 0.5 * master.interval)
+    if found.sure and (apart or miss > slack):
+        if not apart and runs_backwards(slave, master, assumed.C_mb, assumed.delay, slack):
+            raise DataError(
+                f"{slave.source}: its motion agrees with the master's in reversed order, without a shift and in more of it than at "
+                f"a shift of {found.delay:.3f} s: the rows of one of the logs run backwards: write them in the order in which they "
+                "were measured"
+            )
         return replace(assumed, delay=found.delay), (
             f"the master's stamps are {found.delay:.3f} s behind the slave's clock by their motion (correlation "
             f"{found.correlation:.3f}), where {assumed.delay:.3f} s were given: the found delay is taken",

@@ -108,6 +108,10 @@ def _held(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     return replace(record, gyro=record.gyro[rows], accel=record.accel[rows]), f"{count} rows"
 
 
+def _reversed(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    return replace(record, gyro=record.gyro[::-1], accel=record.accel[::-1]), "all"
+
+
 def _dropped(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     share = rng.uniform(0.002, 0.03)
     keep = rng.random(len(record)) > share
@@ -270,6 +274,7 @@ IMU_FAULTS: tuple[Fault, ...] = (
     of_imu("dropped rows", _dropped),
     of_imu("doubled rows", _doubled),
     of_imu("reordered rows", _reordered),
+    of_imu("reversed rows", _reversed),
     _clipped("gyro"),
     _clipped("accel"),
     of_imu("coarse quantum", _quantised),
