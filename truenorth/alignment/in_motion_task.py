@@ -224,7 +224,7 @@ def moving_task(
         position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
-    spec = imu_spec(imu).seen_in(record)
+    spec = imu_spec(imu).seen_in(record).with_coning_of(record)
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)

@@ -148,7 +148,7 @@ def align_transfer(
     _check_sigmas(lever_arm_sigma, delay, delay_sigma, mounting_sigma, heading_limit)
     if flexure is not None and not what.attitude:
         raise UsageError("flexure is seen by attitude matching alone; leave it out, or match attitude too")
-    spec = noise_in(slave, imu_spec("industrial" if imu is None else imu))
+    spec = noise_in(slave, imu_spec("industrial" if imu is None else imu)).with_coning_of(slave)
     where = "preset industrial, since none was given" if imu is None else f"specification {spec.name}"
     if calibration is not None:
         slave = calibration.apply(slave)

@@ -12,6 +12,7 @@ from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
 from truenorth.quality.tilt import check_tilt
+from truenorth.quality.vibration import vibration_evidence
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, contradiction, note
 
@@ -48,15 +49,16 @@ def record_evidence(
     found += [_error(doubt) for doubt in doubts if doubt.code in codes and doubt.severity == "error"]
     # What is no unit may be a push, but not of a base that stays; and no accelerometer has a bias of that size.
     found += [_error(doubt) for doubt in doubts if doubt.code == "accel_level"]
-    if quiet:
+    if quiet:  # its attitude is a mean, not integrated to the last row
         return found
+    found += vibration_evidence(record)
     tilt = check_tilt(record, C_sb)
     return found if tilt is None else found + tilt.evidence()
 
 
 def moving_evidence(record: ImuRecord) -> list[Evidence]:
     """Evidence of a record on the move; of noise for a while see :func:`truenorth.estimate.rivals.noise_evidence`."""
-    return sampling_evidence(record, turns=True)
+    return vibration_evidence(record) + sampling_evidence(record, turns=True)
 
 
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:

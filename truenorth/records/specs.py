@@ -30,9 +30,13 @@ from truenorth.core.units import format as format_quantity
 from truenorth.core.yaml_file import quantity, read_mapping, unknown_key
 from truenorth.records.presets import PRESETS
 from truenorth.records.spec_keys import CORRELATION_TIME, ENTRIES, KEYS, PLAIN, WANTED, Entry, field_of
+from truenorth.records.vibration import coning_left
 
 if TYPE_CHECKING:
     from truenorth.records.imu import ImuRecord
+
+CONING = 0.1  # of the bias of the gyros, that the drift of coning is negligible below: half a percent of its sigma
+LEAST_DRIFT = math.radians(1e-4) / 3600.0  # rad/s; less than that of the best gyros
 
 Places = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
@@ -192,6 +196,13 @@ class ImuSpec:
     def seen_in(self, record: ImuRecord) -> ImuSpec:
         """What a filter sees in a record: the noise of samples, and what its scattered time stamps make of its motion."""
         return self.with_random_walks(record.interval).with_more_noise(*record.stamp_walks)
+
+    def with_coning_of(self, record: ImuRecord) -> ImuSpec:
+        """With the drift that the coning of a base leaves between rows, as a bias: what integrates these rows has it."""
+        drift = coning_left(record)
+        if drift <= max(CONING * math.sqrt(self.bias_variance[0]), LEAST_DRIFT):
+            return self
+        return replace(self, gyro_turn_on_bias=math.hypot(self.gyro_turn_on_bias, drift))
 
     def to_mapping(self) -> dict[str, Any]:
         """The specification as it stands in a file; only what differs from a perfect IMU."""

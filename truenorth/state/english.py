@@ -134,6 +134,10 @@ SENTENCES = {
     "record.frozen": "{text}",
     "record.gaps": "{text}",
     "record.jitter": "{text}",
+    "record.vibration": (
+        "vibration that rows at {rate:.4g} Hz hardly sample turns the attitude at the last one by {size:angle} (one sigma), and "
+        "its coning is a gyro bias of {drift:deg/h|.2g} deg/h: log increments, or more rows a second"
+    ),
     "record.time_unit": "{text}",
     "record.reordered_rows": "{text}",
     "record.clock_jumps": (
