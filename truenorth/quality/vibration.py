@@ -1,7 +1,7 @@
 """Vibration that a log hardly samples, as evidence: the attitude at the last sample, and the drift that counts as a bias.
 
-The first is of the epoch of the answer, and is added to its sigma here. The second is a bias of the gyros to a filter that aligns on
-the move (:meth:`truenorth.records.specs.ImuSpec.with_coning_of`), and is only said.
+The first is of the epoch of the answer, and is added to its sigma here. The second is a bias of the gyros to a filter on the
+move (:meth:`truenorth.records.specs.ImuSpec.with_coning_of`), and is only said.
 """
 
 from __future__ import annotations
