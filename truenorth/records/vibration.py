@@ -59,15 +59,14 @@ def coning_left(record: ImuRecord) -> float:
     blocks = len(record) // length
     if record.kind == "increments" or blocks == 0:
         return 0.0
-    window = np.hanning(length) * math.sqrt(8.0 / 3.0)  # of unit power
-    rows = record.gyro[len(record) - blocks * length :].reshape(blocks, length, 3)
-    W = np.fft.rfft(rows.transpose(0, 2, 1) * window)[..., 1:] * (2.0 / length)  # amplitudes of tones
+    rows = record.gyro[len(record) - blocks * length :].reshape(blocks, length, 3).transpose(0, 2, 1)
+    W = np.fft.rfft(rows * np.hanning(length))[..., 1:]
     x = 2.0 * math.pi * np.arange(1, W.shape[-1] + 1) / length
-    weight = _share_left(x) * record.interval / (2.0 * x)
-    # <theta x w>/2 of a tone: Im(W x conj(W))/(4 w), of whose two products each is the other's conjugate
-    products = np.imag((W * weight) @ np.conj(W).transpose(0, 2, 1))
-    drift = products[:, [1, 2, 0], [2, 0, 1]]
-    return math.sqrt(float(np.max(np.mean(drift**2, axis=0))))
+    # <theta x w>/2 of a tone of amplitude A: Im(A x conj(A))/(4 w), of whose two products each is the other's conjugate. A window
+    # of power 3/8 makes A of W.
+    weight = (8.0 / 3.0) * (2.0 / length) ** 2 * _share_left(x) * record.interval / (2.0 * x)
+    drift = [(W[:, j].imag * W[:, k].real - W[:, j].real * W[:, k].imag) @ weight for j, k in ((1, 2), (2, 0), (0, 1))]
+    return math.sqrt(float(np.max(np.mean(np.square(drift), axis=1))))
 
 
 def _share_left(x: Array) -> Array:
