@@ -275,7 +275,7 @@ def _seen(
     found = [] if task.gnss is None else gnss_evidence(task.gnss)
     found += moving_evidence(task.record)
     if gyrocompassed:
-        found += [*rest_evidence(task), *half_turn_evidence(task, track, gated=gated)]
+        found += [*rest_evidence(task, track), *half_turn_evidence(task, track, gated=gated)]
 
     def other(record: ImuRecord) -> Track:
         return replace(task, record=record).run(guess, gated=gated)

@@ -7,20 +7,20 @@ engine shake.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.check import check_filter, check_means, sharper
 from truenorth.alignment.in_motion_task import MovingTask
+from truenorth.alignment.moving import fifteen
 from truenorth.alignment.task import make_task
 from truenorth.alignment.verdict import rate_evidence
 from truenorth.coarse.inertial import oba
-from truenorth.core.earth import EARTH_RATE
 from truenorth.errors.staying import StaticModel
 from truenorth.navigation.stops import seconds_at_rest
 from truenorth.state.evidence import Evidence
+from truenorth.state.layout import BG, PHI
+from truenorth.state.track import Track
 from truenorth.strapdown.inertial import integrate
 
 Array = NDArray[np.float64]
@@ -29,8 +29,15 @@ LONG_ENOUGH = 30.0  # s: of fewer epochs a filter does not separate a base's mot
 APART = 1.5  # s: seconds further apart are two rests
 
 
-def rest_evidence(task: MovingTask) -> list[Evidence]:
-    """Rates that contradict the earth's in the longest rest of a log on the move, by the specification of the gyros."""
+def rest_evidence(task: MovingTask, track: Track) -> list[Evidence]:
+    """Rates that contradict the earth's in the longest rest of a log on the move, by the specification of the gyros.
+
+    Parameters
+    ----------
+    task : MovingTask
+    track : Track
+        Of the log: it says how far biases of the gyros turn the heading at its end.
+    """
     seconds = np.sort(np.concatenate(seconds_at_rest(task.record, task.odometer, task.gnss)))
     rests = np.split(seconds, np.flatnonzero(np.diff(seconds) > APART) + 1)
     longest = max(rests, key=len)
@@ -43,5 +50,15 @@ def rest_evidence(task: MovingTask) -> list[Evidence]:
     filtered, _ = check_filter(rest, integrals, coarse.C_n0_i, noise, noise)
     check = sharper(filtered, check_means(rest.means, lat, rest.gravity), rest.motion)
     bias = float(np.sqrt(task.spec.bias_variance[0]))
-    floor = bias / (EARTH_RATE * math.cos(lat))
-    return rate_evidence(check, bias, lat, f"specification {task.spec.name!r}", floor)
+    return rate_evidence(check, bias, lat, f"specification {task.spec.name!r}", heading_by_biases(task, track))
+
+
+def heading_by_biases(task: MovingTask, track: Track) -> float:
+    """The part of heading's sigma at the end that the biases of the gyros make, rad.
+
+    An estimate x answers what was believed of a constant b with ``dx / db = cov(x, b) / P0``, its covariance a posteriori by b's
+    variance a priori: of the earth's rate alone ``1 / (w_ie cos L)`` towards east, of a vehicle that GNSS has seen turn next to
+    nothing.
+    """
+    covariance = fifteen(track)[-1, PHI, BG][2]
+    return float(np.linalg.norm(covariance / np.sqrt(task.spec.bias_variance[:3])))
