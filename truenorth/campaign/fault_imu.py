@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.campaign.fault import Fault, Inputs, Rng, clock_rate, either, of_log, over_decades
+from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import METRES_PER_RADIAN
 from truenorth.records import ImuRecord
@@ -110,6 +111,16 @@ def _held(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
 
 def _reversed(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     return replace(record, gyro=record.gyro[::-1], accel=record.accel[::-1]), "all"
+
+
+def _interleaved(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
+    """Every second row of another IMU, which is turned against the first."""
+    axis = rng.standard_normal(3)
+    angle = over_decades(rng, math.radians(0.02), math.radians(2.0))
+    C = dcm_from_rotation_vector(angle * axis / np.linalg.norm(axis))
+    gyro, accel = record.gyro.copy(), record.accel.copy()
+    gyro[1::2], accel[1::2] = gyro[1::2] @ C.T, accel[1::2] @ C.T
+    return replace(record, gyro=gyro, accel=accel), f"{math.degrees(angle):.3f} deg"
 
 
 def _dropped(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
@@ -275,6 +286,7 @@ IMU_FAULTS: tuple[Fault, ...] = (
     of_imu("doubled rows", _doubled),
     of_imu("reordered rows", _reordered),
     of_imu("reversed rows", _reversed),
+    of_imu("rows of two IMUs", _interleaved),
     _clipped("gyro"),
     _clipped("accel"),
     of_imu("coarse quantum", _quantised),

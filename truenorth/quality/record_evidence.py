@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.quality.alternation import alternation_evidence
 from truenorth.quality.plausibility import unit_findings
 from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding, check_sampling
@@ -64,7 +65,7 @@ def moving_evidence(record: ImuRecord) -> list[Evidence]:
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     """Evidence of faults of clock, logging and range; `turns`: whether the base turns."""
     _, findings = check_sampling(record)
-    found = []
+    found = alternation_evidence(record)
     for finding in findings:
         serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
         # What an increment counts is lost where another is written in its place; a rate at rest is held without harm.

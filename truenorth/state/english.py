@@ -229,6 +229,10 @@ SENTENCES = {
         "{name} is written in steps of {step:.3g}, which hide its noise: its mean may be off by a part of a step; heading by "
         "{heading:angle}, level by {level:angle}"
     ),
+    "record.alternates": (
+        "every second row of {name} differs by {size:.3g} all through the log, as those of two sensors in turn: their mean is "
+        "turned against either by {level:angle}"
+    ),
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
         "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "

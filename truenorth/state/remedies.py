@@ -34,6 +34,7 @@ REMEDIES = {
     "height_sensor": "give a sensor of height, or let the height be free, where the vehicle climbs",
     "use_barometer": "for its heights keep the height by the barometer",
     "part_of_logs": "align a part of the logs",
+    "rows_of_one": "align the rows of one sensor",
     "put_times_right": "correct the times",
     "transfer_geometry": "check the axes, the lever arm, the mounting and the delay",
     "flexure": "check whether both sit on one rigid body",

@@ -1,0 +1,78 @@
+"""Rows of two sensors in turn are found, with what their mean is turned by; vibration and coarse counters do not alternate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests import recordings
+from truenorth.alignment import align
+from truenorth.campaign.fault_benches import BENCHES
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.core.earth import GRAVITY_EQUATOR
+from truenorth.quality.alternation import alternation, alternation_evidence
+from truenorth.records import ImuRecord
+
+RATE, SPAN = 100.0, 240.0
+
+
+def two_in_turn(record, rotation):
+    C = dcm_from_rotation_vector(np.array(rotation))
+    gyro, accel = record.gyro.copy(), record.accel.copy()
+    gyro[1::2], accel[1::2] = gyro[1::2] @ C.T, accel[1::2] @ C.T
+    return replace(record, gyro=gyro, accel=accel)
+
+
+def still(seed, kind="rates", vibration=0.0, frequency=0.0, step=0.0):
+    rng = np.random.default_rng(seed)
+    n = round(SPAN * RATE)
+    time = np.arange(1, n + 1) / RATE
+    gyro, accel = 1e-4 * rng.standard_normal((n, 3)), 0.01 * rng.standard_normal((n, 3))
+    accel += [0.3, -0.2, GRAVITY_EQUATOR]
+    accel += vibration * np.sin(2.0 * np.pi * frequency * time + rng.uniform(0.0, 6.0))[:, None]
+    unit = 1.0 / RATE if kind == "increments" else 1.0
+    gyro, accel = gyro * unit, accel * unit
+    if step:  # a counter that carries its remainder on
+        accel = np.diff(np.floor(np.cumsum(accel, axis=0, dtype=np.float64) / step), axis=0, prepend=0.0) * step
+    return ImuRecord(time, gyro, accel, kind, "still")
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("degrees", [0.05, 1.0])
+def test_half_the_turn_of_one_against_the_other_is_found(kind, degrees):
+    found = alternation_evidence(two_in_turn(still(1, kind), [np.radians(degrees), 0.0, 0.0]))
+    assert found[0].effect.level == pytest.approx(np.radians(degrees) / 2.0, rel=0.06)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_sound_logs_do_not_alternate(seed):
+    """Noise, an engine that idles near half the rate, and counters whose steps hide the noise."""
+    rng = np.random.default_rng([seed, 7])
+    frequency = RATE / 2.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-2.0, 1.0)
+    kind = ("rates", "increments")[seed % 2]
+    assert not alternation(still(seed, kind)).any()
+    assert not alternation(still(seed, kind, vibration=rng.uniform(0.05, 2.0), frequency=frequency)).any()
+    assert not alternation(still(seed, "increments", step=10 ** rng.uniform(-3.0, -1.0))).any()
+
+
+def test_a_counter_alternates_by_a_part_of_its_step():
+    """At half a step more than whole ones it counts one more in every second row, however long: nothing is lost."""
+    n = 24_000
+    counts = np.full((n, 3), 1e-3) * (10 + np.arange(n) % 2)[:, None]
+    gyro = 1e-5 * np.random.default_rng(1).standard_normal((n, 3))
+    assert not alternation(ImuRecord(np.arange(1, n + 1) / RATE, gyro, counts, "increments", "counter")).any()
+
+
+def test_the_judge_weighs_what_it_does_to_level():
+    inputs, _ = BENCHES["still"].draw(3, 0)
+    answers = [
+        align(two_in_turn(inputs["record"], [size, 0.0, 0.0]), inputs["place"], inputs["imu"]) for size in (0.0, 0.02)
+    ]
+    assert [answer.status for answer in answers] == ["aligned", "inconsistent"]
+    assert "every second row of" in answers[1].reasons[0]
+
+
+def test_recordings_do_not_alternate():
+    logs = (recordings.rlg_vehicle_xian, recordings.fog_gps_xian, recordings.mems_rotation_table)
+    for record, _ in (read() for read in logs):
+        assert not alternation(record).any()
