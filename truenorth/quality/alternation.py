@@ -4,6 +4,9 @@ What keeps its phase at half the rate of rows over a whole log is no motion: a v
 hertz, and turns over in the log. The alternating part of each channel is looked at in stretches, with motion taken off by fourth
 differences (gain one at half the rate, ``sin^4`` below). Of forces of which one in two is turned, it is half of what the turn makes
 of gravity, and so much is the mean of both turned against either sensor.
+
+Where gravity moves in the axes of the IMU, as on an indexer, the difference moves with it: a turn theta of one against the mean
+alternates as ``theta x f``. It is found by least squares over the log, and each stretch must show it.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
-from truenorth.records import COLUMNS, ImuRecord
+from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure
 
 Array = NDArray[np.float64]
@@ -26,41 +29,81 @@ SURE = (
     8.0  # sigmas of the mean of all stretches: Student's t of 31 degrees of freedom is as large once in 10^8 channels
 )
 PARTS, STEADY = 8, 0.5  # parts of the log that must all agree, and how far they may scatter, of their mean
+SEEN = 0.05  # of the strongest direction's weight: turns about a gravity that hardly moves are not seen
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
 @remembered
 def alternation(record: ImuRecord) -> Array:
-    """(6,) half of what every second row of each channel has more than the others; zero where chance, a counter or motion says it."""
-    length = (len(record) - 4) // STRETCHES // 2 * 2
+    """(6,) half of what every second row of each channel has more than the others; zero where chance, a counter or motion does."""
+    length = _length(record)
     found = np.zeros(6)
     if length < SHORTEST:
         return found
     for channel in range(6):
         x = (record.gyro if channel < 3 else record.accel)[:, channel % 3]
-        quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / 16.0
-        pairs = quick[: STRETCHES * length].reshape(STRETCHES, length // 2, 2)
-        means = 0.5 * (pairs[:, :, 0] - pairs[:, :, 1]).mean(axis=1)
-        size, spread = float(means.mean()), float(means.std(ddof=1))
-        parts = means.reshape(PARTS, -1).mean(axis=1)
-        steady = float(parts.std()) < STEADY * abs(size) and bool(np.all(parts * size > 0.0))
-        if steady and abs(size) > SURE * spread / math.sqrt(STRETCHES) and abs(size) > COUNTS * _step(x):
+        means = _alternating(x, length).mean(axis=1)
+        size = float(means.mean())
+        if _keeps(means) and abs(size) > COUNTS * _step(x):
             found[channel] = size
     return found
 
 
+@remembered
+def turn_in_turn(record: ImuRecord) -> float:
+    """By how much (rad) every second row of forces is turned against the mean of all; zero where not all of the log shows it."""
+    length = _length(record)
+    if length < SHORTEST:
+        return 0.0
+    columns = record.accel.T
+    q = np.stack([_alternating(x, length) for x in columns], axis=2)
+    f = np.stack([_smooth(x, length) for x in columns], axis=2)
+    z = np.cross(f, q).sum(axis=1)  # of each stretch, as A: normal equations of q = theta x f
+    A = np.sum(f * f, axis=(1, 2))[:, None, None] * np.eye(3) - np.einsum("kni,knj->kij", f, f)
+    theta = np.linalg.pinv(A.sum(axis=0), rcond=SEEN, hermitian=True) @ z.sum(axis=0)
+    force = math.sqrt(float(np.mean(f**2)) * 3.0)
+    counter = max(_step(x) for x in columns)
+    shows, expected = z @ theta, np.einsum("i,kij,j->k", theta, A, theta)
+    size = float(np.linalg.norm(theta))
+    if size * force <= COUNTS * counter or not _keeps(shows / max(float(expected.mean()), 1e-300)):
+        return 0.0
+    return size
+
+
+def _length(record: ImuRecord) -> int:
+    """Rows of a stretch, an even number."""
+    return (len(record) - 4) // STRETCHES // 2 * 2
+
+
+def _alternating(x: Array, length: int) -> Array:
+    """(STRETCHES, length / 2) alternating part of a channel, of two rows each."""
+    quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / 16.0
+    pairs = quick[: STRETCHES * length].reshape(STRETCHES, length // 2, 2)
+    return np.asarray(0.5 * (pairs[:, :, 0] - pairs[:, :, 1]))
+
+
+def _smooth(x: Array, length: int) -> Array:
+    """The rest of it, at the same rows."""
+    slow = (x[:-4] + 4.0 * x[1:-3] + 6.0 * x[2:-2] + 4.0 * x[3:-1] + x[4:]) / 16.0
+    return np.asarray(slow[: STRETCHES * length].reshape(STRETCHES, length // 2, 2).mean(axis=2))
+
+
+def _keeps(means: Array) -> bool:
+    """Whether means of stretches have a mean beyond chance, and all parts of the log have it."""
+    size, spread = float(means.mean()), float(means.std(ddof=1))
+    parts = means.reshape(PARTS, -1).mean(axis=1)
+    steady = float(parts.std()) < STEADY * abs(size) and bool(np.all(parts * size > 0.0))
+    return steady and abs(size) > SURE * spread / math.sqrt(len(means))
+
+
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:
     """That the rows of the accelerometers alternate, and by how much the mean of two sensors is turned against either."""
-    size = np.abs(alternation(record)[3:])
-    turned = float(np.linalg.norm(size)) / GRAVITY_EQUATOR / (record.interval if record.kind == "increments" else 1.0)
+    offset = float(np.linalg.norm(alternation(record)[3:]))
+    unit = record.interval if record.kind == "increments" else 1.0
+    turned = max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record))
     if turned == 0.0:
         return []
-    axis = int(np.argmax(size))
-    figures: dict[str, Figure] = {
-        "name": COLUMNS[record.kind][3 + axis],
-        "size": 2.0 * float(size[axis]),
-        "level": turned,
-    }
+    figures: dict[str, Figure] = {"size": 2.0 * turned * GRAVITY_EQUATOR, "level": turned}
     return [Evidence("record.alternates", figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",))]
 
 

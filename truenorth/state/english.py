@@ -230,8 +230,8 @@ SENTENCES = {
         "{heading:angle}, level by {level:angle}"
     ),
     "record.alternates": (
-        "every second row of {name} differs by {size:.3g} all through the log, as those of two sensors in turn: their mean is "
-        "turned against either by {level:angle}"
+        "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
+        "their mean is turned against either by {level:angle}"
     ),
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
