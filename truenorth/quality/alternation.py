@@ -1,7 +1,7 @@
 """Rows that alternate: two sensors, or two converters of one, in turn.
 
 What keeps its phase at half the rate of rows over a whole log is no motion: a vibration there is off by some hundredths of a
-hertz, and turns over in the log. The alternating part of each channel is looked at in stretches, with motion taken off by fourth
+hertz, and turns over in the log. The alternating part of each accelerometer is looked at in stretches, with motion taken off by fourth
 differences (gain one at half the rate, ``sin^4`` below). Of forces of which one in two is turned, it is half of what the turn makes
 of gravity, and so much is the mean of both turned against either sensor.
 
@@ -35,13 +35,12 @@ COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itsel
 
 @remembered
 def alternation(record: ImuRecord) -> Array:
-    """(6,) half of what every second row of each channel has more than the others; zero where chance, a counter or motion does."""
+    """(3,) half of what every second row of each accelerometer has more than the others; zero where chance, a counter or motion does."""
     length = _length(record)
-    found = np.zeros(6)
+    found = np.zeros(3)
     if length < SHORTEST:
         return found
-    for channel in range(6):
-        x = (record.gyro if channel < 3 else record.accel)[:, channel % 3]
+    for channel, x in enumerate(record.accel.T):
         means = _alternating(x, length).mean(axis=1)
         size = float(means.mean())
         if _keeps(means) and abs(size) > COUNTS * _step(x):
@@ -98,7 +97,7 @@ def _keeps(means: Array) -> bool:
 
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:
     """That the rows of the accelerometers alternate, and by how much the mean of two sensors is turned against either."""
-    offset = float(np.linalg.norm(alternation(record)[3:]))
+    offset = float(np.linalg.norm(alternation(record)))
     unit = record.interval if record.kind == "increments" else 1.0
     turned = max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record))
     if turned == 0.0:
