@@ -1,9 +1,9 @@
 """Rows that alternate: two sensors, or two converters of one, in turn.
 
 What keeps its phase at half the rate of rows over a whole log is no motion: a vibration there is off by some hundredths of a
-hertz, and turns over in the log. The alternating part of each accelerometer is looked at in stretches, with motion taken off by fourth
-differences (gain one at half the rate, ``sin^4`` below). Of forces of which one in two is turned, it is half of what the turn makes
-of gravity, and so much is the mean of both turned against either sensor.
+hertz, and turns over in the log. The alternating part of each accelerometer is looked at in stretches, with motion taken off by
+fourth differences (gain one at half the rate, ``sin^4`` below). Of forces of which one in two is turned, it is half of what the
+turn makes of gravity, and so much is the mean of both turned against either sensor.
 
 Where gravity moves in the axes of the IMU, as on an indexer, the difference moves with it: a turn theta of one against the mean
 alternates as ``theta x f``. It is found by least squares over the log, and each stretch must show it.
@@ -25,9 +25,7 @@ Array = NDArray[np.float64]
 
 STRETCHES = 32  # of the log
 SHORTEST = 32  # rows of one
-SURE = (
-    8.0  # sigmas of the mean of all stretches: Student's t of 31 degrees of freedom is as large once in 10^8 channels
-)
+SURE = 8.0  # sigmas of the mean of all stretches: chance gives as many once in 10^8 channels (Student's t)
 PARTS, STEADY = 8, 0.5  # parts of the log that must all agree, and how far they may scatter, of their mean
 SEEN = 0.05  # of the strongest direction's weight: turns about a gravity that hardly moves are not seen
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
@@ -35,7 +33,7 @@ COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itsel
 
 @remembered
 def alternation(record: ImuRecord) -> Array:
-    """(3,) half of what every second row of each accelerometer has more than the others; zero where chance, a counter or motion does."""
+    """(3,) half of what every second row of each accelerometer has more than the others; zero where chance may give it."""
     length = _length(record)
     found = np.zeros(3)
     if length < SHORTEST:
