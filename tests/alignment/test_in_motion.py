@@ -14,10 +14,12 @@ from truenorth import OdometerRecord, UsageError, VelocityRecord, align, imu_spe
 from truenorth.aiding.aids import Odometer, VelocityLog
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import backtracked, departures, path_to_the_end
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, POSITION_FLOOR, VELOCITY_FLOOR
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.navigation import Mounting
+from truenorth.quality.slow_aids import USUAL_TIME
 from truenorth.simulation import OdometerSpec, simulate, simulate_sensor
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.layout import BG, DP
@@ -227,17 +229,31 @@ def test_driving_backwards():
 
 
 @pytest.mark.parametrize(("imu", "heading"), some([("industrial", 0.3)], [("tactical", 0.1)]))
-@few_and_all(5, few=3)
+@few_and_all(30, few=3)
 def test_gnss_from_an_unknown_heading(imu, heading, runs):
-    """A van in town, 150 s."""
+    """A van in town, 150 s, with the receiver that the filter supposes where nobody says more.
+
+    Its fixes are off together for a minute, and late; floors are real errors. Without these a tactical IMU's heading is better than
+    its sigma: RMS of error over sigma .8 in 180 runs, with them .91 in 164.
+    """
     content = read_scenario("van").to_mapping()
     content |= {"duration": "150 s", "imu": imu, "odometer": None}
-    content["gnss"] = {"rate": "5 Hz", "position_noise": "0.5 m", "velocity_noise": "0.05 m/s"}
+    far, fast, ratio = 0.5, 0.05, np.array([1.0, 1.0, 1.5])
+    content["gnss"] = {
+        "rate": "5 Hz",
+        "position_noise": f"{math.hypot(far, POSITION_FLOOR)} m",
+        "position_drift": f"{math.hypot(far, POSITION_FLOOR)} m",
+        "correlation_time": f"{USUAL_TIME} s",
+        "velocity_noise": f"{math.hypot(fast, VELOCITY_FLOOR)} m/s",
+    }
     van = read_scenario(content)
     off = []
     for run in range(runs):
         sim, gnss = van.simulate(seed=2, run=run), van.simulate_aiding(seed=2, run=run)["gnss"].record
-        answer = align_in_motion(sim.record, imu, gnss=gnss)
+        said = {"position_sigma": far * ratio, "velocity_sigma": fast * ratio}
+        gnss = replace(gnss, **{name: np.tile(sigma, (len(gnss.time), 1)) for name, sigma in said.items()})
+        late = np.random.default_rng([2, run]).normal(0.0, LATENCY_SIGMA)
+        answer = align_in_motion(sim.record, imu, gnss=gnss.shifted(late))
         assert answer.status == "aligned"
         sigma = np.sqrt(answer.phi_covariance[2, 2])
         assert sigma < math.radians(heading)

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.honesty.frame import run_case
 from benchmarks.honesty.harness import framed
 from benchmarks.honesty.moving import CASES
-from truenorth.alignment.suspect import FACTORS, poorer_evidence
+from truenorth.alignment.suspect import FACTORS, name_specification, poorer_evidence
 from truenorth.alignment.verdict import bias_evidence, claimed
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.records.specs import imu_spec
@@ -73,6 +73,26 @@ def test_biases_that_are_together_too_large_are_in_sigma():
     grows = np.sqrt(item.figures["factor"] ** 2 - 1.0)
     assert item.effect.level == pytest.approx(grows * claim.level)
     assert item.effect.heading == pytest.approx(grows * claim.heading)
+
+
+@pytest.mark.parametrize(("size", "first"), [(0.05, "specification"), (0.25, "imu_axes")])
+def test_a_bias_of_a_quarter_of_g_says_that_axes_are_wrong(size, first):
+    """Of g: no specification makes it up, and no poorer one is tried."""
+    bench = BENCHES["gnss"]
+    sound = bench.align(bench.draw(9305, 0)[0])
+    wrong = replace(sound, accel_bias=np.array([9.8 * size, 0.0, 0.0]), accel_bias_sigma=np.full(3, 0.01))
+    (item,) = [item for item in bias_evidence(wrong) if item.key == "bias.accel"]
+    assert item.remedies[0] == first
+    assert item.remedies[-1] == "specification"
+    rejected = replace(item, key="innovations.outliers")
+    asked = []
+
+    def again(spec):
+        asked.append(spec)
+        return sound
+
+    answer = name_specification(replace(wrong, status="inconsistent", evidence=(item, rejected)), again)
+    assert (answer.evidence[0].key == "bias.accel") == (first == "imu_axes") == (not asked)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 A class of IMU that is too good makes the filter follow its gyros where it should follow the measurements: these are rejected by the
 thousand, and seem to be at fault. Where an IMU some times poorer is contradicted no more, the specification is; but it is no
-suspect where a clock is found to be, that of the receiver or of the gyros: a poorer IMU would cover it as well.
+suspect where a clock is found to be, that of the receiver or of the gyros, or axes are: a poorer IMU would cover it as well.
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ def name_specification(answer: Alignment, again: Callable[[ImuSpec], Alignment])
     clocks = [item for name in CLOCKS for item in answer.evidence if item.key.startswith(name)]
     if clocks:
         return replace(answer, evidence=(*clocks, *(item for item in answer.evidence if item not in clocks)))
-    if not any(item.key.startswith("innovations.") for item in answer.evidence):
+    axes = any("imu_axes" in item.remedies for item in answer.evidence if item.key == "bias.accel")
+    if axes or not any(item.key.startswith("innovations.") for item in answer.evidence):
         return answer
     for factor in FACTORS:
         try:

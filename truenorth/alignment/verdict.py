@@ -235,7 +235,9 @@ def bias_evidence(answer: Alignment) -> list[Evidence]:
                 "allowed": allowed,
                 "imu": answer.imu_source,
             }
-            found.append(Evidence(f"bias.{kind}", figures, "bounded", effect, ("specification",)))
+            other_axes = kind == "accel" and size - allowed > limit("other axes") * g
+            suspects = ("imu_axes", "specification") if other_axes else ("specification",)
+            found.append(Evidence(f"bias.{kind}", figures, "bounded", effect, suspects))
     return found + _biases_together(answer, gravity) if answer.moving is not None else found
 
 

@@ -33,6 +33,11 @@ LIMITS: dict[str, Limit] = {
     ),
     # ---- checks of the sensors against earth and gravity
     "specification": Limit(5.0, "sigma", "a sound IMU misses its specification by that much once in a million"),
+    "other axes": Limit(
+        0.1,
+        "g",
+        "beyond its specification no accelerometer is that far off, and axes that are not those of the body show it easily",
+    ),
     "two answers": Limit(
         3.0,
         "sigma of both",
