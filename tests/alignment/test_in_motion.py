@@ -228,13 +228,15 @@ def test_driving_backwards():
     assert align_in_motion(sim.record, RING.imu_spec, odometer=unsigned, position=PLACE).status == "inconsistent"
 
 
-@pytest.mark.parametrize(("imu", "heading"), some([("industrial", 0.3)], [("tactical", 0.1)]))
-@few_and_all(30, few=3)
+@pytest.mark.parametrize(
+    ("imu", "heading", "runs"), some([("industrial", 0.3, 3)], [("industrial", 0.3, 12), ("tactical", 0.1, 60)])
+)
 def test_gnss_from_an_unknown_heading(imu, heading, runs):
     """A van in town, 150 s, with the receiver that the filter supposes where nobody says more.
 
     Its fixes are off together for a minute, and late; floors are real errors. Without these a tactical IMU's heading is better than
-    its sigma: RMS of error over sigma .8 in 180 runs, with them .91 in 164.
+    its sigma: RMS of error over sigma .8 in 180 runs, with them .94 in 224 of four seeds. Few runs do not tell one from the other:
+    the first 30 of this seed have .68, the next 30 1.26.
     """
     content = read_scenario("van").to_mapping()
     content |= {"duration": "150 s", "imu": imu, "odometer": None}
