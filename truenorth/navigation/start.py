@@ -125,8 +125,7 @@ def _by_static_limits(
     # What acts as an accelerometer bias as long as the vehicle stays level: also scale factor, misalignment, deflection.
     acting = spec.acting_variance(g * C_nb[2])
     nabla = np.diag(accel_bias_sigma**2 + acting)
-    prior = spec.bias_variance
-    prior[3:] += acting
+    prior = spec.bias_variance + np.concatenate([np.zeros(3), acting])
     nabla += C_nb.T @ np.diag([1.0, 1.0, 0.0]) @ C_nb * (DEFLECTION * g) ** 2
     J = static_jacobian(position.lat, g)
     X = np.hstack([J[:, 3:] @ C_nb @ eps, J[:, :3] @ C_nb @ nabla])
