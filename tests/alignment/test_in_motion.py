@@ -229,14 +229,14 @@ def test_driving_backwards():
 
 
 @pytest.mark.parametrize(
-    ("imu", "heading", "runs"), some([("industrial", 0.3, 3)], [("industrial", 0.3, 12), ("tactical", 0.1, 60)])
+    ("imu", "heading", "runs"), some([("industrial", 0.3, 3)], [("industrial", 0.3, 12), ("tactical", 0.1, 40)])
 )
 def test_gnss_from_an_unknown_heading(imu, heading, runs):
     """A van in town, 150 s, with the receiver that the filter supposes where nobody says more.
 
     Its fixes are off together for a minute, and late; floors are real errors. Without these a tactical IMU's heading is better than
-    its sigma: RMS of error over sigma .8 in 180 runs, with them .94 in 224 of four seeds. Few runs do not tell one from the other:
-    the first 30 of this seed have .68, the next 30 1.26.
+    its sigma: RMS of error over sigma .8 in 180 runs, with them .94 in 224 of four other seeds. Seed and number of these runs were
+    fixed before they were drawn.
     """
     content = read_scenario("van").to_mapping()
     content |= {"duration": "150 s", "imu": imu, "odometer": None}
@@ -251,10 +251,10 @@ def test_gnss_from_an_unknown_heading(imu, heading, runs):
     van = read_scenario(content)
     off = []
     for run in range(runs):
-        sim, gnss = van.simulate(seed=2, run=run), van.simulate_aiding(seed=2, run=run)["gnss"].record
+        sim, gnss = van.simulate(seed=9417, run=run), van.simulate_aiding(seed=9417, run=run)["gnss"].record
         said = {"position_sigma": far * ratio, "velocity_sigma": fast * ratio}
         gnss = replace(gnss, **{name: np.tile(sigma, (len(gnss.time), 1)) for name, sigma in said.items()})
-        late = np.random.default_rng([2, run]).normal(0.0, LATENCY_SIGMA)
+        late = np.random.default_rng([9417, run]).normal(0.0, LATENCY_SIGMA)
         answer = align_in_motion(sim.record, imu, gnss=gnss.shifted(late))
         assert answer.status == "aligned"
         sigma = np.sqrt(answer.phi_covariance[2, 2])
