@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from truenorth.state.english import SENTENCES, TITLES
 from truenorth.state.evidence import ANY_EFFECT, NO_EFFECT, OUTPUTS, Effect, Evidence, contradiction, note
 from truenorth.state.judge import Claim, judge, weight
-from truenorth.state.limits import LIMITS, limit
+from truenorth.state.limits import limit
 from truenorth.state.remedies import REMEDIES
 from truenorth.state.wording import headline, sentence
 
@@ -127,10 +127,6 @@ def test_the_weight_is_the_largest_share_of_sigma(effect):
 
 
 # ------------------------------------------------------------------------------------------------------------ words
-
-
-def test_every_limit_has_its_reason():
-    assert all(entry.value > 0.0 and len(entry.reason) > 20 for entry in LIMITS.values())
 
 
 def test_english_names_no_option():

@@ -19,7 +19,7 @@ from truenorth.aiding.velocity import VELOCITY
 from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError, UsageError
 from truenorth.errors.group import Group
-from truenorth.state.mounting import FALSE_REJECTION
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 Role = Literal["lever arm", "scale", "mounting", "bias", "lag", "flexure", "own"]
@@ -80,7 +80,7 @@ class Aiding:
     lever_arm: Array = field(default_factory=lambda: np.zeros(3))
     C_mb: Array = field(default_factory=lambda: np.eye(3))
     states: Mapping[Role, Group] = field(default_factory=dict)
-    gate: float = FALSE_REJECTION
+    gate: float = limit("gate")
     loop: float = 0.0
     figures: Sequence[float] = ()
     retimed: bool = False

@@ -34,7 +34,6 @@ from truenorth.state.limits import limit, may_be_chance
 Array = NDArray[np.float64]
 
 AWAY = 5  # seconds from a turn: it begins and ends slowly
-WANDERS = 3.0  # times its instability, that an accelerometer's bias is off by at some time
 DRIFT_BLOCK, FEWEST_BLOCKS = 10, 6  # seconds of still base, whose means show a drift, and how many of them
 FEWEST = 30  # seconds of a quiet base, in which a step of the vertical rate is looked for
 ONSETS = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
@@ -52,7 +51,7 @@ def bias_step_evidence(fine: FineAlignment, spec: ImuSpec, match: Match) -> list
     ratio, size, ends = match
     instability = max(spec.accel_bias_instability, usual("accel", "bias_instability", spec.accel_random_walk))
     accel = np.arange(len(ratio)) % 6 >= 3
-    ratio = np.where(accel & (np.abs(size) < WANDERS * instability), 0.0, ratio)
+    ratio = np.where(accel & (np.abs(size) < limit("wanders") * instability), 0.0, ratio)
     best = int(np.argmax(ratio))
     if ratio[best] <= limit("hint"):
         return []

@@ -30,7 +30,6 @@ from truenorth.state.limits import limit
 from truenorth.strapdown.inertial import integrate
 
 STEP = 1e-3  # s, with which is asked
-SHOWN = 0.6  # of a delay, that the fit of the base's motion leaves at least
 
 
 def late_gyros_evidence(fine: FineAlignment, record: ImuRecord, interval: float, position: Position) -> list[Evidence]:
@@ -61,7 +60,7 @@ def late_gyros_evidence(fine: FineAlignment, record: ImuRecord, interval: float,
     rate = record.gyro / (record.interval if record.kind == "increments" else 1.0)
     up = record.accel / np.linalg.norm(record.accel, axis=1, keepdims=True)
     about = np.sum(rate * up, axis=1)
-    turned = abs(delay) / SHOWN
+    turned = abs(delay) / limit("shown delay")
     tilt = turned * math.sqrt(max(float(np.mean(np.sum(rate**2, axis=1) - about**2)), 0.0))
     turn = turned * math.sqrt(float(np.mean(about**2)))
     figures: dict[str, Figure] = {

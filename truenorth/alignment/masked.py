@@ -35,7 +35,6 @@ from truenorth.state.limits import limit, may_be_chance
 
 Array = NDArray[np.float64]
 
-FOLLOWS = 0.5  # correlation of innovations with the next, from which the base's motion is no white noise
 FEWEST = 20  # intervals
 # Walks of the biases, gyros and accelerometers, in those of the specification, or of usual sensors where they are larger.
 WALKS = tuple(product((0.0, 4.0, 16.0), (0.0, 2.0, 4.0, 8.0, 16.0, 64.0)))
@@ -79,7 +78,7 @@ def _follow_each_other(fine: FineAlignment) -> bool:
     """Whether innovations of the level axes are correlated with the next."""
     e = fine.estimates.innovation[:, :2]
     power = np.sum(e**2, axis=0)
-    return bool(np.any(np.sum(e[1:] * e[:-1], axis=0) > FOLLOWS * power))
+    return bool(np.any(np.sum(e[1:] * e[:-1], axis=0) > limit("motion follows") * power))
 
 
 def _likeliest(fine: FineAlignment, spec: ImuSpec, system: LinearSystem) -> tuple[Array, Array]:

@@ -26,7 +26,6 @@ from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Innovations, innovations_of, matched, whitened
 from truenorth.errors.staying import PHI
 from truenorth.errors.sway import AxisMotion, Oscillator, motion_first
-from truenorth.estimate.rivals import RULED_OUT
 from truenorth.filters import LinearSystem, kalman
 from truenorth.filters.gains import filter_gains, through
 from truenorth.state.evidence import Effect, Evidence, Figure
@@ -88,7 +87,7 @@ def slow_sway_evidence(
         other = fine if share == 1.0 else _with_less(fine, _smaller(system, motion, duration, share))
         lowest = min(lowest, -2.0 * float(other.estimates.log_likelihood))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
-        found += [(limit("drift") if share == 1.0 else RULED_OUT, cause) for cause in causes(other)]
+        found += [(limit("drift") if share == 1.0 else limit("ruled out"), cause) for cause in causes(other)]
     # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
     lowest = min(lowest, without(np.zeros_like(system.z))[0])
     for kind in {_kind(cause) for _, cause in found}:

@@ -12,9 +12,10 @@ from dataclasses import replace
 
 from truenorth.alignment.result import Alignment
 from truenorth.core.errors import AlignmentError, DataError
-from truenorth.estimate.rivals import RULED_OUT, likelihood_ratio, moved, rival
+from truenorth.estimate.rivals import likelihood_ratio, moved, rival
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 FACTORS = (3.0, 10.0, 30.0, 100.0)  # classes of IMUs lie up to a hundred times apart
@@ -49,7 +50,7 @@ def poorer_evidence(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec
         except DataError:  # the filter broke down: no explanation
             break
         ratio = likelihood_ratio(first.residuals, other.residuals)
-        if ratio < RULED_OUT:
+        if ratio < limit("ruled out"):
             break
         found.append(rival("rival.poorer", {"factor": factor}, ratio, moved(first, other), "specification"))
     return sorted(found, key=lambda item: item.effect.level)[-1:]

@@ -24,12 +24,13 @@ from truenorth.errors.staying import QUIETEST_BASE, StaticModel
 from truenorth.errors.sway import AxisMotion, with_motion
 from truenorth.estimate.staying import StayingLog
 from truenorth.filters import kalman
-from truenorth.quality.density import ALIKE, LOUD, noise_densities, noise_evidence
+from truenorth.quality.density import noise_densities, noise_evidence
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.limits import limit
 
-FACTORS = (0.5 * LOUD, LOUD, 2.0 * LOUD, 4.0 * LOUD, 8.0 * LOUD)  # of the specification's random walks
+# Of the random walks as specified: below, at and above those of another sensor
+FACTORS = tuple(k * limit("another sensor") for k in (0.5, 1.0, 2.0, 4.0, 8.0))
 SENSORS = ("accel", "gyro")
 
 
@@ -42,13 +43,13 @@ def louder_walks(noise: StaticModel, factors: Mapping[str, float]) -> StaticMode
 def is_louder(noise: StaticModel, usual: StaticModel) -> bool:
     """Whether a sensor's random walk is another sensor's than the usual one."""
     walks = ("gyro_random_walk", "accel_random_walk")
-    return any(getattr(noise, walk) > LOUD * getattr(usual, walk) for walk in walks)
+    return any(getattr(noise, walk) > limit("another sensor") * getattr(usual, walk) for walk in walks)
 
 
 def noisier_sensors(
     log: StayingLog, motion: Sequence[AxisMotion], interval: float, begun: Callable[[], float]
 ) -> dict[str, float]:
-    """How many times noisier than specified a sensor is, where the log rules out less than `LOUD` times.
+    """How many times noisier than specified a sensor is, where the log rules out less than ``limit("another sensor")`` times.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def noisier_sensors(
         both = (motion,) if factor == 1.0 else (motion, steady)
         return max(2.0 * float(kalman(with_motion(system, interval, m)).log_likelihood) for m in both)
 
-    suspects = [sensor for sensor in SENSORS if seen[sensor] * ALIKE >= LOUD]
+    suspects = [sensor for sensor in SENSORS if seen[sensor] * limit("one noise") >= limit("another sensor")]
     if not suspects:
         return {}
     as_said = likelihood(SENSORS[0], 1.0)

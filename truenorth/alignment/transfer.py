@@ -49,6 +49,7 @@ from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import ACCEL_AXES
+from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -56,7 +57,6 @@ Array = NDArray[np.float64]
 
 LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, s, rad
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
-GATE = 1e-6  # probability of rejecting a sound row
 PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
 PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
 LEAST = 0.1  # of the noise to begin with: less is not believed
@@ -174,7 +174,7 @@ def align_transfer(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
-    rows = Matching(*noise, what.kind, GATE)
+    rows = Matching(*noise, what.kind, limit("master's gate"))
     run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
@@ -293,7 +293,7 @@ def _passes(
         rows = (
             Matching(FIRST_NOISE["velocity"], noise[1])
             if velocity
-            else Matching(*noise, kind, GATE if number > 0 else 0.0)
+            else Matching(*noise, kind, limit("master's gate") if number > 0 else 0.0)
         )
         track = transfer_filter(part, master, model, start, rows, assumed, linear=linear)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)

@@ -34,6 +34,7 @@ from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import BA, BG, DP, DV, GYRO_AXES, PHI, STATES
+from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments, interval_lengths
@@ -46,7 +47,6 @@ MOST_ROWS = 5000  # of the history
 LONG_SILENCE = 3.0  # nominal intervals, and a second: shorter drop-outs are not worth a word
 LEAST_GYRO, LEAST_ACCEL = 1e-9, 1e-6  # rad/s, m/s^2: smaller priors of biases leave nothing open
 UNITS = {None: "rad", "velocity": "m/s", "position": "m", "acceleration": "m/s^2"}
-TIED = 0.95  # correlation of two states beyond which one is not known without the other
 
 WORDS = {
     "dv_E": "velocity error east",
@@ -283,7 +283,7 @@ def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
     """States whose errors go together in the end: each is worse known than the group would be with one of them given."""
     sigma = np.sqrt(np.diag(P))
     size = np.where(sigma > 0.0, sigma, 1.0)
-    tied = (np.abs(P / np.outer(size, size)) > TIED) | np.eye(len(names), dtype=bool)
+    tied = (np.abs(P / np.outer(size, size)) > limit("tied")) | np.eye(len(names), dtype=bool)
     left, found = set(range(len(names))), []
     while left:
         group, grown = {min(left)}, set[int]()
@@ -293,7 +293,7 @@ def _tied(names: list[str], P: Array, quiet: set[str]) -> tuple[str, ...]:
         said = [names[i] for i in sorted(group) if names[i] not in quiet]
         if len(said) > 1:
             listed = f"{', '.join(said[:-1])} and {said[-1]}"
-            found.append(f"{listed} are known together far better than each alone (correlation above {TIED})")
+            found.append(f"{listed} are known together far better than each alone (correlation above {limit('tied')})")
     return tuple(found)
 
 

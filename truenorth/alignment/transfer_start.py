@@ -24,13 +24,13 @@ from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI
+from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
-SURPRISE = 3.0  # sigmas by which a delay found by correlation must miss the given one to be taken in its place
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
@@ -49,7 +49,7 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     start, stop = master.time[0] - assumed.delay, master.time[-1] - assumed.delay
     apart = start >= slave.time[-1] or stop <= slave.time[0]
     miss = abs(found.delay - assumed.delay)
-    slack = SURPRISE * max(assumed.delay_sigma, 0.5 * master.interval)
+    slack = limit("other delay") * max(assumed.delay_sigma, 0.5 * master.interval)
     if found.sure and (apart or miss > slack):
         if not apart and runs_backwards(slave, master, assumed.C_mb, assumed.delay, slack):
             raise DataError(

@@ -25,9 +25,7 @@ from truenorth.state.limits import is_estimated, limit
 Array = NDArray[np.float64]
 
 
-FASTEST_BASE = 10.0  # m/s RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster
 HEIGHTS = (-500.0, 9000.0)  # m, at which bases stay
-UPSIDE_DOWN = -0.5  # cosine between z and up, below which z points down
 
 
 def no_attitude(source: str) -> AlignmentError:
@@ -197,7 +195,7 @@ def _taken_to_stay(answer: Alignment) -> list[Evidence]:
 def base_speed(answer: Alignment) -> list[Evidence]:
     """That a base which stays would have to move as none does."""
     speed = float(np.max(answer.disturbance[:2]))
-    return [contradiction("base.fast", speed=speed)] if speed > FASTEST_BASE else []
+    return [contradiction("base.fast", speed=speed)] if speed > limit("fastest base") else []
 
 
 def model_evidence(drift: Drift | None, *, settled: bool) -> list[Evidence]:
@@ -322,6 +320,6 @@ def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[E
         found.append(note(key, pays_until=answer.pays_until, duration=answer.duration))
     if answer.near_vertical:
         found.append(note("heading.vertical"))
-    if answer.C_nb[2, 2] < UPSIDE_DOWN:
+    if answer.C_nb[2, 2] < limit("upside down"):
         found.append(note("level.upside_down"))
     return found

@@ -53,7 +53,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-GATE = 1.0 - 1e-6  # with which a good row passes: one in six days at 1 Hz is lost
 WINDOW = 5.0  # s, of filter 2
 LEAST_WALK = 1e-5  # m/s/sqrt(s), of an IMU without noise
 
@@ -280,7 +279,7 @@ def _damped(
         return _by_network(course, reference, damper, start, whole)
     assert reference is not None  # checked before
     if damper.method == "augmented":
-        kinds = {"augmented": replace(whole, gate=GATE)}
+        kinds = {"augmented": replace(whole, gate=1.0 - limit("log's gate"))}
         first = run_filters(course, reference.velocity, start=start, kinds=kinds)["augmented"]
         again = run_filters(course, reference.velocity, start=start, kinds=kinds, about=first.x[:, MOTION])
         estimate = again["augmented"]

@@ -23,6 +23,7 @@ from truenorth.damping.course import motion_at
 from truenorth.errors.log import LogErrors, log_rows
 from truenorth.records import VelocityRecord
 from truenorth.state.evidence import Evidence, note
+from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
@@ -30,12 +31,8 @@ Array = NDArray[np.float64]
 MINUTE = 60.0  # s, of a running median and of the lines on both sides of a jump
 FEWEST = 5  # measurements of them, where the epochs are far apart
 SPLIT = 10.0  # s, of a gap over which nothing is compared
-OUTLIER = 6.0  # sigmas of one measurement
-JUMP = 8.0  # sigmas of the lines' difference
-CURVATURE = 0.03  # m/s by which healthy lines may miss each other, or a healthy value its median: waves, curvature
 LEAST_NOISE = 1e-4  # m/s
 GAP = 60.0  # s, from which a gap is named
-ALLOWED = 4.0  # sigmas of what slow errors change, that are no jump
 
 
 @dataclass(frozen=True)
@@ -167,7 +164,7 @@ def cleaned(
     change : (K+1,) array or float, m/s
         One-sigma of what slow errors change from a minute before to a minute after.
     """
-    allowed = ALLOWED * np.broadcast_to(np.asarray(change, dtype=np.float64), course.time.shape)
+    allowed = limit("slow change of a log") * np.broadcast_to(np.asarray(change, dtype=np.float64), course.time.shape)
     rows = np.flatnonzero(np.isfinite(velocity).all(axis=1))
     n = max(FEWEST, round(MINUTE / course.interval)) | 1
     apart = max(SPLIT, 2.0 * course.interval) / course.interval
@@ -180,7 +177,9 @@ def cleaned(
         good = np.ones(len(part), dtype=bool)
         for column in d[part].T:
             off = np.abs(column - _running_median(column, n))
-            good &= off <= OUTLIER * max(sigma, _usual(off)) + CURVATURE + allowed[part]
+            good &= (
+                off <= limit("outlier of a log") * max(sigma, _usual(off)) + limit("curvature of a log") + allowed[part]
+            )
         outliers += int(np.sum(~good))
         part = part[good]
         held = np.tile(level, (len(part), 1))
@@ -235,10 +234,10 @@ def _jumps(d: Array, sigma: float, n: int, allowed: Array) -> list[int]:
         return []
     size = np.abs(_differences(d, n))
     own = max(_usual(size[n : len(d) - n + 1].ravel()), sigma * float(np.sqrt(2.0 * np.sum(_end_weights(n) ** 2))))
-    size, limit = size.max(axis=1), JUMP * own + CURVATURE
+    size, most = size.max(axis=1), limit("jump of a log") * own + limit("curvature of a log")
     size[: len(d)] -= allowed
     found: list[int] = []
-    while size.max() > limit:
+    while size.max() > most:
         k = int(np.argmax(size))
         found.append(k)
         size[max(k - n, 0) : k + n] = 0.0

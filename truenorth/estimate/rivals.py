@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 # By how many of its sigmas a bias walks over the log. Up the ladder as long as the log does not rule a walk out: larger ones
 # are ruled out more.
 LADDERS = {"gyro": (1.0, 5.0, 30.0, 200.0), "accel": (0.3, 1.5, 8.0)}
-RULED_OUT = -3.0  # twice the logarithm of a likelihood ratio
 FEWEST = 20  # measurements of each sort that a comparison needs
 
 
@@ -172,7 +171,7 @@ def _climb(
         gained = ratio - max(least, 0.0)
         if gained > limit("rival"):
             found.append(Rival(gained, f"rival.{sensor}_wanders", {"size": size * sigma}, _effect(first, other)))
-        elif ratio < before + RULED_OUT:
+        elif ratio < before + limit("ruled out"):
             break
         before = max(ratio, before)
     return found

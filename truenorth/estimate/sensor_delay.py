@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from truenorth.aiding.body_velocity import COUNTED_FORWARD
 from truenorth.aiding.source import Aiding
 from truenorth.core.errors import DataError
-from truenorth.estimate.rivals import RULED_OUT, likelihood_ratio, moved, rival
+from truenorth.estimate.rivals import likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Evidence
@@ -93,7 +93,7 @@ def _likelier(
     for sign in (1, -1):
         for size in LADDER:
             rows = at + sign * max(1, round(size / record.interval))
-            if 2 * abs(rows) >= len(record) or tried(rows) < RULED_OUT:
+            if 2 * abs(rows) >= len(record) or tried(rows) < limit("ruled out"):
                 break
     tried(_peak(ratios, max(ratios, key=ratios.__getitem__)))  # which may stand out where no rung of the ladder does
     best = max(ratios, key=ratios.__getitem__)

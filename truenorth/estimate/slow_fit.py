@@ -26,9 +26,8 @@ from truenorth.analysis.chi_square import chi_square_limit
 from truenorth.core.errors import DataError
 from truenorth.errors.group import Group
 from truenorth.quality.slow_aids import FIXES, KINDS, LEAST, SPEEDS, Lasting, Slow, wanders
-from truenorth.quality.whiteness import LEAST_CORRELATION
 from truenorth.state.evidence import Evidence
-from truenorth.state.mounting import FALSE_REJECTION
+from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
@@ -79,7 +78,7 @@ def fitted(
     found = as_said(lowest(misfit, middle))
     new = [(name, *_correlation(found[name], sources[name])) for name in names if name not in slow]
     unit = {name: sources[name].row.unit for name in names}
-    return found, [wanders(name, r, size, unit[name]) for name, r, size in new if r > LEAST_CORRELATION]
+    return found, [wanders(name, r, size, unit[name]) for name, r, size in new if r > limit("colour")]
 
 
 def lowest(misfit: Callable[[Array], float], start: Array) -> Array:
@@ -107,7 +106,7 @@ def lowest(misfit: Callable[[Array], float], start: Array) -> Array:
 
 def bounded_misfit(residuals: Iterable[Residuals]) -> float:
     """Minus twice the log-likelihood of measurements, but for a constant; none counts for more than the gate allows."""
-    most = np.array([0.0, *(chi_square_limit(FALSE_REJECTION, rows) for rows in (1, 2, 3))])
+    most = np.array([0.0, *(chi_square_limit(limit("gate"), rows) for rows in (1, 2, 3))])
     total = 0.0
     for r in residuals:
         rows = r.rows

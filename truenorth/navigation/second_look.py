@@ -17,12 +17,11 @@ from truenorth.estimate.latency import as_late_as_found
 from truenorth.estimate.rivals import moved
 from truenorth.state.evidence import Effect, Evidence, Figure, note
 from truenorth.state.limits import limit
-from truenorth.state.mounting import FALSE_REJECTION, Mounting
+from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
-SMALL = 10.0  # times its prior: beyond it a small-angle model does not hold
 LONG_ARM = 10.0  # m: longer than on most vehicles, worth a word where the data do not show it
 KNOWN_ARM = 0.2  # of an arm, the sigma up to which the data show it
 SMALLER = {"centimetres": 1e-2, "millimetres": 1e-3}
@@ -107,14 +106,16 @@ def _contradicted(track: Track) -> float:
     for r in track.residuals:
         there = r.rows > 0
         if there.any():
-            limits = np.array([chi_square_limit(FALSE_REJECTION, dof) for dof in range(int(r.rows.max()) + 1)])
+            limits = np.array([chi_square_limit(limit("gate"), dof) for dof in range(int(r.rows.max()) + 1)])
             shares.append(float(np.mean(r.nis[there] > limits[r.rows[there]])))
     return max(shares)
 
 
 def _beyond(track: Track, name: str, role: Role) -> bool:
     where = track.layout.slice_of(f"{name} {role}")
-    return where is not None and bool(np.any(np.abs(track.sensors[-1, where]) > SMALL * OPEN[role].prior))
+    return where is not None and bool(
+        np.any(np.abs(track.sensors[-1, where]) > limit("small angles") * OPEN[role].prior)
+    )
 
 
 def on_any_clock(mounting: Mounting) -> Mounting:

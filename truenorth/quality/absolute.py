@@ -17,15 +17,13 @@ from truenorth.aiding.sensors import place_axes, place_sigma
 from truenorth.quality.slow_aids import Lasting, says_size, usual_bias
 from truenorth.records import GnssRecord
 from truenorth.state.layout import DP
+from truenorth.state.limits import limit
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 # m, along the level, of a receiver that says nothing but the kind of its fixes (NMEA 0183): differential, fixed and floating phase
 BY_QUALITY = {2: 1.0, 4: 0.05, 5: 0.5}
-
-# Times what a receiver says of a fix: what innovations show beyond that is neither chance nor what datasheets differ by
-UNTRUE = 1.5
 
 
 def accuracy_of(record: GnssRecord) -> Array:
@@ -53,7 +51,7 @@ def known_as_fixes(track: Track, record: GnssRecord | None, bias: float | None, 
     P, at = track.P.copy(), np.arange(DP.start, DP.stop)
     known = P[:, at, at] > 0.0  # a height that is held has no sigma
     seen = math.inf if shown is None else math.hypot(shown.white, shown.group.sigma[0] / place_sigma(record))
-    if says_size(record) and seen < UNTRUE:
+    if says_size(record) and seen < limit("fix untrue"):
         wide = P[:, at, at] + max(1.0 - seen**2, 0.0) * sigma**2
     else:
         least = sigma if shown is None else np.maximum(sigma, shown.group.sigma)

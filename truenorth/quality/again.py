@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.records import ImuRecord
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 Hashes = NDArray[np.uint64]
 
 SHORTEST, SAFE = 50, 3.0  # rows of a stretch at least, and what its length is multiplied by
-CHANCE = 1e-9
 ASKED = 200_000  # rows by which the probability is found, and stretches that are looked at
 CHUNK = 1 << 20  # rows that are hashed at a time
 MIXED = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93, 0xA0761D6478BD642F,
@@ -72,7 +72,7 @@ def _long_enough(record: ImuRecord) -> int:
         return SHORTEST
     if len(kinds) < SHORTEST or q > 0.99:  # hardly anything happens in it
         return len(record)
-    pairs = 2.0 * math.log(len(record)) - math.log(2.0 * CHANCE)
+    pairs = 2.0 * math.log(len(record)) - math.log(2.0 * limit("written twice"))
     return max(SHORTEST, math.ceil(SAFE * pairs / -math.log(q)))
 
 

@@ -20,14 +20,13 @@ from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
 STRETCHES = 32  # of the log
 SHORTEST = 32  # rows of one
-SURE = 8.0  # sigmas of the mean of all stretches: chance gives as many once in 10^8 channels (Student's t)
 PARTS, STEADY = 8, 0.5  # parts of the log that must all agree, and how far they may scatter, of their mean
-SEEN = 0.05  # of the strongest direction's weight: turns about a gravity that hardly moves are not seen
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
@@ -57,7 +56,7 @@ def turn_in_turn(record: ImuRecord) -> float:
     f = np.stack([_smooth(x, length) for x in columns], axis=2)
     z = np.cross(f, q).sum(axis=1)  # of each stretch, as A: normal equations of q = theta x f
     A = np.sum(f * f, axis=(1, 2))[:, None, None] * np.eye(3) - np.einsum("kni,knj->kij", f, f)
-    theta = np.linalg.pinv(A.sum(axis=0), rcond=SEEN, hermitian=True) @ z.sum(axis=0)
+    theta = np.linalg.pinv(A.sum(axis=0), rcond=limit("alternating turn"), hermitian=True) @ z.sum(axis=0)
     force = math.sqrt(float(np.mean(f**2)) * 3.0)
     counter = max(_step(x) for x in columns)
     shows, expected = z @ theta, np.einsum("i,kij,j->k", theta, A, theta)
@@ -90,7 +89,7 @@ def _keeps(means: Array) -> bool:
     size, spread = float(means.mean()), float(means.std(ddof=1))
     parts = means.reshape(PARTS, -1).mean(axis=1)
     steady = float(parts.std()) < STEADY * abs(size) and bool(np.all(parts * size > 0.0))
-    return steady and abs(size) > SURE * spread / math.sqrt(len(means))
+    return steady and abs(size) > limit("alternates") * spread / math.sqrt(len(means))
 
 
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:

@@ -19,6 +19,7 @@ from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
@@ -27,9 +28,6 @@ ROWS = (1, 2, 4)  # over which means are taken
 ORDER, GAIN = 6, 924.0  # of the differences, and their squares' sum
 FEWEST = 30  # differences in a stretch
 TAUS = (0.02, 0.1, 0.5, 1.0, 2.0, 5.0)  # s: of the Allan deviation of a sensor at rest
-ALIKE = 1.5  # largest over smallest of the densities that pass for one
-BURST = 3.0  # times the usual density: a stretch of its own
-LOUD = 4.0  # times the specification, beyond which it is another sensor's
 
 
 def noise_densities(record: ImuRecord) -> tuple[Array, Array]:
@@ -61,7 +59,7 @@ def _densities(record: ImuRecord) -> tuple[Array, Array, Array]:
     start = float(record.time[0]) - dt
     edges = np.append(start, record.time[rows - 1 : count * rows : rows])
     level = np.exp(np.log(np.maximum(density, 1e-300)).mean(axis=0))
-    return edges, np.where((low > 0.0) & (high < ALIKE * low), level, np.nan), level
+    return edges, np.where((low > 0.0) & (high < limit("one noise") * low), level, np.nan), level
 
 
 def walk_density(record: ImuRecord) -> Array:
@@ -76,7 +74,7 @@ def walk_density(record: ImuRecord) -> Array:
         turns = np.diff(total[::m], n=2, axis=0)
         found.append(np.sqrt(0.5 * np.mean(turns**2, axis=0) / (m * record.interval)))
     low, high = np.min(found, axis=0), np.max(found, axis=0)
-    return np.where(high < ALIKE * low, np.exp(np.log(np.maximum(found, 1e-300)).mean(axis=0)), np.nan)
+    return np.where(high < limit("one noise") * low, np.exp(np.log(np.maximum(found, 1e-300)).mean(axis=0)), np.nan)
 
 
 def bursts(record: ImuRecord) -> tuple[Array, Array]:
@@ -92,7 +90,7 @@ def bursts(record: ImuRecord) -> tuple[Array, Array]:
         axis=0
     )  # the median, what is not white on its upper side
     moving = np.where(np.isfinite(density), 0.0, level).max(axis=0)
-    louder = np.isfinite(known) & (known > BURST * usual) & (known > moving)
+    louder = np.isfinite(known) & (known > limit("noisy stretch") * usual) & (known > moving)
     return edges, np.where(
         louder,
         np.sqrt(np.maximum(np.where(louder, known, 0.0) ** 2 - np.where(np.isfinite(usual), usual, 0.0) ** 2, 0.0)),
@@ -138,7 +136,7 @@ def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSp
         return []
     noise = white_noise(record)
     said_noise = np.repeat([spec.gyro_random_walk, spec.accel_random_walk], 3)
-    if np.any(noise > LOUD * said_noise):
+    if np.any(noise > limit("another sensor") * said_noise):
         noise = np.nan_to_num(walk_density(record))
     found = []
     for name, channels, said in (
@@ -146,7 +144,7 @@ def specification_evidence(record: ImuRecord, motion: MotionSummary, spec: ImuSp
         ("accel", slice(3, 6), spec.accel_random_walk),
     ):
         loud = float(noise[channels].max())
-        if said > 0.0 and loud > LOUD * said:
+        if said > 0.0 and loud > limit("another sensor") * said:
             found.append(noise_evidence(name, loud, spec, lat))
     return found
 

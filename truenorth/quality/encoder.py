@@ -19,7 +19,6 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 
-CLEARER = 4.0  # times smaller squares of the base's turns that another reading must leave
 NET_TURN = math.radians(8.0)  # of the base's mean attitude from the first third of a log to the last: more is no sway
 FEWEST_TURNS = 4  # of the outer axis, that show a wobble
 LEAST_ZERO = math.radians(0.05)  # rad: indexers are mounted no better
@@ -51,7 +50,7 @@ def encoder_evidence(
 
     given, net = turns(C_sb)
     best, name = min((turns(reading)[0], name) for name, reading in others.items())
-    if given**2 > CLEARER * best**2:
+    if given**2 > limit("clearer encoder") * best**2:
         return [contradiction("encoder.turns", "encoder", given=given, best=best, reading=name)]
     if net > NET_TURN or given > FASTEST:
         return [contradiction("encoder.drifts", "encoder", net=net, rate=given)]

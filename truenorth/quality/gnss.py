@@ -26,13 +26,13 @@ from truenorth.analysis.student import below
 from truenorth.core.earth import radii
 from truenorth.records import GnssRecord, MasterRecord
 from truenorth.state.evidence import Effect, Evidence, Figure, contradiction
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
 PIECE = 20.0  # s, of a displacement
 LEAST_WAY = 20.0  # m of a piece: shorter ones do not show a direction
 FEWEST = 4  # pieces of such a way, that show wrong axes
-UNEXPLAINED = 0.3  # of the squares of displacements, that velocities turned as one may leave at most
 CELLS = 60  # of a log, at most: means over them are compared
 FEWEST_CELLS = 4  # without a gap between them
 RATIOS = (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0)  # of the walk's variance in a cell to that of the white noise
@@ -44,7 +44,6 @@ LASTING = (
 PARTS, DIFFERENT = 4, 4.0  # of a log, and sigmas by which one of them may differ from the mean of all
 SINGULAR = 1e-12  # of the largest power of a column
 ROUNDING = 1e-14  # of the squares of the places about their mean: of two numbers that are taken from each other
-CHANCE = 1e-4  # that a sound log shows a turn, of either sign
 LATE = 0.1  # s, one sigma: of velocities against the positions of the same receiver
 LEAST = math.radians(0.15)  # rad: a smaller turn is the drift of a receiver's positions
 
@@ -103,7 +102,7 @@ def turn_evidence(
     if not len(p):
         return []
     k = np.sum(p * np.conj(s)) / np.sum(np.abs(s) ** 2)
-    if len(p) >= FEWEST and np.sum(np.abs(p - k * s) ** 2) > UNEXPLAINED * np.sum(np.abs(p) ** 2):
+    if len(p) >= FEWEST and np.sum(np.abs(p - k * s) ** 2) > limit("turned as one") * np.sum(np.abs(p) ** 2):
         return [contradiction(f"{source}.velocity", "sensor_axes")]
     cells = _cells(stretch, time, at, k * whole, velocity)
 
@@ -113,7 +112,7 @@ def turn_evidence(
 
     count = len(cells[0])
     found = turn(slice(None))
-    if found is None or abs(found.angle) < LEAST or found.otherwise > 0.5 * CHANCE:
+    if found is None or abs(found.angle) < LEAST or found.otherwise > 0.5 * limit("turned velocities"):
         return []
     edges = np.linspace(0, count, PARTS + 1).astype(int)
     parts = [part for a, b in pairwise(edges) if (part := turn(slice(a, b))) is not None]

@@ -17,7 +17,6 @@ from truenorth.state.track import Residuals
 
 Array = NDArray[np.float64]
 
-ONE_PLACE = 4.0  # mean over scatter of places that are all off alike
 SCHULER = 5064.0  # s
 NO_ROTATION = "zero rotation"  # that the gyros show themselves
 REST = ("zero velocity", NO_ROTATION)
@@ -127,7 +126,7 @@ def _elsewhere(source: Residuals) -> tuple[str, str, float] | None:
         off = first[:, axes]
         if off.size and np.isfinite(off).all():
             away = float(np.linalg.norm(off.mean(axis=0)))
-            if away > ONE_PLACE * float(np.linalg.norm(off.std(axis=0))):
+            if away > limit("one place") * float(np.linalg.norm(off.std(axis=0))):
                 return f"innovations.{key}", remedy, away
     return None
 

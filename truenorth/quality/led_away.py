@@ -32,9 +32,7 @@ Array = NDArray[np.float64]
 LED = ("GNSS velocity",)
 MEMORIES = (3.0, 10.0, 30.0)  # rows, within which filters follow a step
 
-OUTLIER = 6.0  # sigmas: counts no more than this, which is less than a step has to
 BEGINS = 10  # rows, of which a step is the filter's own start
-DOUBTFUL = 0.2  # of sound logs have a ratio that is worth another look
 MOST_LOOKS = 4
 # Parts of the rows: what ratios and squares there are larger than of white innovations, any step's is.
 USUAL, LARGE = 0.9, 0.975
@@ -77,7 +75,7 @@ def doubtful_onsets(source: Residuals) -> list[float]:
     ratio = np.max([_ratios(z, math.exp(-1.0 / memory))[0] for memory in MEMORIES], axis=0)
     ratio[:BEGINS] = 0.0
     onsets: list[float] = []
-    while len(onsets) < MOST_LOOKS and ratio.max() > 2.0 * math.log(len(MEMORIES) * len(z) / DOUBTFUL):
+    while len(onsets) < MOST_LOOKS and ratio.max() > 2.0 * math.log(len(MEMORIES) * len(z) / limit("another look")):
         row = int(np.argmax(ratio))
         onsets.append(float(time[row]))
         ratio[max(row - 1, 0) : row + 2] = 0.0
@@ -99,7 +97,7 @@ def no_outlier(z: Array) -> Array:
 
     The gate may have taken the first rows of a step for outliers, and one outlier is no step.
     """
-    return z / np.maximum(1.0, np.linalg.norm(z, axis=1, keepdims=True) / OUTLIER)
+    return z / np.maximum(1.0, np.linalg.norm(z, axis=1, keepdims=True) / limit("counts at most"))
 
 
 def _largest_step(z: Array, memory: float) -> tuple[float, int, Array]:

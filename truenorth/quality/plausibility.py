@@ -20,18 +20,13 @@ from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.sampling import Finding
 from truenorth.quality.signals import even_rates
 from truenorth.records import ImuRecord
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
 DEG = np.pi / 180.0
-LEVEL_TOLERANCE = 0.12  # of g: local gravity, biases of cheap sensors, motion
 UP_LIMIT = np.radians(60.0)  # tilt of z from up beyond which the axes are doubtful
 ONE_DIRECTION = 0.8  # of the median specific force: the median vector's length where the base keeps its tilt
-CONTRADICTS = 4.0  # times as much left unexplained as by another reading: the axes as given are wrong
-# A lever arm r accelerates in step with the sway and tilts apparent gravity by w^2 r/g: .3 for 3 m at 1 rad/s.
-SCALE_TOLERANCE = 0.35
-RATE_RESOLVED = 0.05  # relative sigma of the mean rate, to compare it with the earth's
-RATE_SHARP = 0.01  # the same, to tell a unit by it
 # A cheap gyro's bias imitates any rate: a unit is named only where, converted, the noise is a gyrocompass's.
 GYROCOMPASS_NOISE = 0.03 * np.pi / 180.0 / 60.0  # rad/sqrt(s), norm of three axes: 0.03 deg/sqrt(h)
 AXES = "xyz"
@@ -84,10 +79,10 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
     dt = record.interval
     unit = dt if record.kind == "increments" else 1.0
     # Where all of them are near gravity the median is.
-    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < LEVEL_TOLERANCE for extreme in _extremes(record.accel)):
+    if all(abs(np.sqrt(extreme) / unit / G - 1.0) < limit("gravity") for extreme in _extremes(record.accel)):
         return True
     level = float(np.median(np.linalg.norm(record.accel, axis=1))) / unit
-    if abs(level / G - 1.0) < LEVEL_TOLERANCE:
+    if abs(level / G - 1.0) < limit("gravity"):
         return True
     readings = [
         (1.0 / G, "in g", "`units` with accel in g, or multiply by 9.80665"),
@@ -105,7 +100,7 @@ def _force_level(record: ImuRecord, findings: list[Finding]) -> bool:
         readings.append((dt, "multiplied by the interval twice", "remove one conversion"))
     found = f"the accelerometers show {level:.4g} m/s^2 (median of the norm); expected about 9.8"
     distance = np.abs([level / (G * factor) - 1.0 for factor, _, _ in readings])
-    likely = [readings[i] for i in np.argsort(distance) if distance[i] < LEVEL_TOLERANCE / 2.0]
+    likely = [readings[i] for i in np.argsort(distance) if distance[i] < limit("gravity") / 2.0]
     if likely:
         looks = "; or ".join(f"the values look {what}: {remedy}" for _, what, remedy in likely)
         findings.append(Finding("error", "accel_unit", f"{found}; {looks}"))
@@ -177,7 +172,7 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
     """Judge unit and axes of the gyros by the turning; True where that was possible."""
     if not np.isfinite(turning.best_agreement) or turning.best_agreement < AGREES:
         return False
-    unexplained = max(0.05, CONTRADICTS * (1.0 - turning.best_agreement))
+    unexplained = max(0.05, limit("other reading") * (1.0 - turning.best_agreement))
     if 1.0 - turning.agreement > unexplained:
         findings.append(
             Finding(
@@ -188,7 +183,7 @@ def _gyro_against_gravity(turning: Turning, findings: list[Finding]) -> bool:
             )
         )
         return True
-    if turning.agreement < AGREES or abs(turning.scale - 1.0) < SCALE_TOLERANCE:
+    if turning.agreement < AGREES or abs(turning.scale - 1.0) < limit("scale by tilt"):
         return turning.agreement >= AGREES
     found = f"the gyros turn {turning.scale:.3g} times as far as gravity in the accelerometers; expected 1"
     readings = [(1.0 / DEG, "in deg/s"), (3600.0 / DEG, "in deg/h"), (1000.0, "in mrad/s")]
@@ -233,7 +228,7 @@ def _gyro_against_earth(record: ImuRecord, motion: MotionSummary, lat: float | N
     size = float(np.linalg.norm(mean))
     noise = float(np.linalg.norm(motion.angle_noise)) / np.sqrt(seconds)
     sigma = np.hypot(noise, float(np.sqrt(np.mean(motion.wander[inside] ** 2))) * 4.0 / seconds)
-    if size == 0.0 or sigma > RATE_RESOLVED * size:
+    if size == 0.0 or sigma > limit("rate seen") * size:
         return
     found = f"at rest the gyros show {size:.4g} rad/s, that is {size / EARTH_RATE:.4g} times the earth's rate"
     dt = record.interval
@@ -247,7 +242,7 @@ def _gyro_against_earth(record: ImuRecord, motion: MotionSummary, lat: float | N
     if abs(size / EARTH_RATE - 1.0) < 0.2:
         _vertical_earth_rate(record, motion, mean, sigma, inside, lat, findings)
         return
-    sharp = sigma < RATE_SHARP * size
+    sharp = sigma < limit("unit by the rate") * size
     for factor, what in readings:
         quiet = np.linalg.norm(motion.angle_noise) < GYROCOMPASS_NOISE * factor
         if sharp and quiet and abs(size / (EARTH_RATE * factor) - 1.0) < 0.03:

@@ -14,30 +14,23 @@ from truenorth.core.remembered import remembered
 from truenorth.quality.again import Again, rows_again
 from truenorth.quality.packets import exchanged_packets
 from truenorth.records import COLUMNS, ImuRecord
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 Severity = Literal["error", "warning", "note"]
 
-JITTER = 0.1  # of the interval, RMS: above, the time stamps are worth a warning
-SLIGHT = 0.05  # the same, from which what a stamp may be off by is looked at
-EXCHANGED_SHARE = 0.01  # of the rows that have changed places, from which they are an error
-REPEATED_SHARE = 0.002  # of the rows, beyond chance
-HELD_SHARE = 0.1  # of the rows that repeat, from which they may be samples that are held
 FEWEST_RUNS, EVENLY = 200, 0.5  # runs of such rows, and of the variance that chance gives their lengths
 ROUNDING = 1e-10  # of a sensor's largest value: what varies by less has no noise
 NOISELESS = 1e-7  # of the same: noise and quantum of every sensor are larger
 FEWEST = 20  # rows that say whether there is noise
 FROZEN_TIME = 1.0  # s, and 10 rows: a shorter run of one value is not called frozen
-FROZEN_FACTOR = 3.0  # times the longest run that chance gives
 BLOCK = 1000  # rows over which the chance of a repeat is counted
 SATURATED_RUN = 3  # rows at the extreme, one after the other ...
-PILED = 10  # ... or so many times as many as at the next value: of a vibration's peaks each is a row
 RANGE_SLACK = 1.05  # by which the other side may exceed the end of a range, for a bias taken off, ...
 TAIL, TAIL_LEVELS = 0.25, 20  # ... and more where a tail of so many levels, in this part of the spread, is cut off
 # Counts of a period of a pulse train, where both edges of two signals are counted: the four are not alike, so that of a sensor
 # at rest every fourth value may be full and those between empty. Values are compared over whole periods.
 PERIOD = 4
-COARSE = 0.3  # of the rows that repeat: a coarse quantum
 AROUND, WITHIN = 4, 3.0  # stretches to either side that a run is compared with, and their standard deviations
 OFF = 0.01  # of a step, by which an extreme misses what all other values are multiples of
 LATTICE = 1e-4  # of a step, by which those may
@@ -125,7 +118,7 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
                 f"{record.interval:.4g} s: use a stretch without gaps (`record.between`), or repair the log",
             )
         )
-    if rms > JITTER * record.interval:
+    if rms > limit("jitter") * record.interval:
         findings.append(
             Finding(
                 "warning",
@@ -135,7 +128,7 @@ def _clock(record: ImuRecord, findings: list[Finding]) -> tuple[float, float]:
                 "computer stamped the rows, give the sensor's rate instead (`rate`)",
             )
         )
-    elif rms > SLIGHT * record.interval:
+    elif rms > limit("slight jitter") * record.interval:
         text = f"the time steps scatter by {rms * 1e3:.3g} ms RMS about {record.interval * 1e3:.4g} ms"
         findings.append(Finding("note", "jitter", text))
     if record.interval >= 1.0 or record.interval < 2e-5:
@@ -168,8 +161,8 @@ def _repeated(record: ImuRecord, same: NDArray[np.bool_], findings: list[Finding
     chance = float(np.prod(_chance_of_repeat(same))) * same.shape[1]
     # Samples that are held repeat in all channels at once; quiet ones of a coarse quantum repeat each by itself.
     share, least = repeated / same.shape[1], float(same.mean(axis=1).min())
-    held = share > HELD_SHARE and (share > 0.98 * least or _evenly(same)) and chance < 0.9 * repeated
-    if held or repeated > 3 + 5.0 * chance + REPEATED_SHARE * same.shape[1]:
+    held = share > limit("held rows") and (share > 0.98 * least or _evenly(same)) and chance < 0.9 * repeated
+    if held or repeated > 3 + 5.0 * chance + limit("repeated rows") * same.shape[1]:
         share = 100.0 * repeated / len(record)
         findings.append(
             Finding(
@@ -198,7 +191,7 @@ def _exchanged(record: ImuRecord, data: Sequence[Array]) -> list[Finding]:
     share = 2.0 * length * len(packets.rows) / len(record)
     return [
         Finding(
-            "error" if share > EXCHANGED_SHARE else "warning",
+            "error" if share > limit("exchanged rows") else "warning",
             "reordered_rows",
             f"packets of {length} row(s) have changed places with the next at {len(packets.rows)} places at least, first "
             f"before row {first + 1} (t = {record.time[first]:.3f} s): exchanged back the log is smooth there; expected rows in "
@@ -217,7 +210,7 @@ def _frozen(
     for channel, name in enumerate(COLUMNS[record.kind]):
         runs[channel], first = _longest_run(same[channel])
         at[channel] = first
-        limit = max(10.0, FROZEN_TIME / record.interval, FROZEN_FACTOR * by_chance[channel])
+        most = max(10.0, FROZEN_TIME / record.interval, limit("frozen") * by_chance[channel])
         if runs[channel] == len(record):
             dead = _is_dead(data, channel)
             # Where the other sensor has noise, no simulation without noise made the log.
@@ -230,13 +223,15 @@ def _frozen(
                     + ("channel is dead or not connected" if dead else "log is simulated without noise, or coarse"),
                 )
             )
-        elif runs[channel] > limit and (chance[channel] < COARSE or _loses(data[channel], first, int(runs[channel]))):
+        elif runs[channel] > most and (
+            chance[channel] < limit("coarse") or _loses(data[channel], first, int(runs[channel]))
+        ):
             findings.append(
                 Finding(
                     "warning",
                     "frozen",
                     f"{name} stays at {data[channel][first]:g} for {runs[channel]} rows from row {first + 1} "
-                    f"(t = {record.time[first]:.3f} s); expected at most about {limit:.0f} equal values: the sensor "
+                    f"(t = {record.time[first]:.3f} s); expected at most about {most:.0f} equal values: the sensor "
                     "or the log was stuck; leave this stretch out",
                 )
             )
@@ -319,7 +314,7 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             levels, counts = np.unique(signed[~at_top], return_counts=True)
             spread = top - float(np.median(signed))
             tail = counts[levels > top - TAIL * spread]
-            cut = len(tail) > TAIL_LEVELS and count > PILED * max(
+            cut = len(tail) > TAIL_LEVELS and count > limit("piled") * max(
                 int(tail.max()), 2
             )  # of many levels, each with few rows
             if not cut and -float(levels[0]) > RANGE_SLACK * abs(top):  # a range has two sides alike: not its end
@@ -331,10 +326,12 @@ def _saturated(record: ImuRecord, data: Sequence[Array], findings: list[Finding]
             # Noise of less than a quantum takes a row one further down; half a quantum is for rounding.
             lowest = second - (1.5 if noise <= top - second else 0.5) * (top - second)
             consecutive = consecutive and not _crests(signed, rows_at, lowest, inside)
-            often = count > PILED * max(inside, 2)
+            often = count > limit("piled") * max(inside, 2)
             piled = count > 2 * inside and (consecutive or often)
             # Values that have many digits are never alike by chance, wherever the next ones stand.
-            piled = piled and (spread > 5.0 * (top - second) or (often and top - second > PILED * _finest(levels)))
+            piled = piled and (
+                spread > 5.0 * (top - second) or (often and top - second > limit("piled") * _finest(levels))
+            )
             if piled or _off(top, levels[1:]):  # what clips has two sides
                 rows[channel] += count
                 findings.append(

@@ -27,6 +27,7 @@ from truenorth.core.attitude import dcm_from_quaternion, skew
 from truenorth.core.earth import GRAVITY_EQUATOR
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
+from truenorth.state.limits import limit
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.inertial_integration import integrate_attitude
 
@@ -37,17 +38,6 @@ PIECE = 20.0  # s, of a constant and a slope: biases and the earth turn gravity 
 MOST_TIME = 160.0  # s of a log that are looked at: its middle
 LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
 SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
-# Of the squares that gyros at rest would leave: what is left where the gyros are right, but for rough bases
-PLAIN = 0.05
-CLEARER = 3.0  # times smaller squares that another reading must leave
-EXPLAINED = 0.25  # of the squares that gyros at rest would leave, that it may leave at most
-# Of a small delay and of a scale factor of sound gyros: sigma is estimated from few pieces, and the base's own motion is alike in
-# them. Of eight pieces 10 and 7 sigmas.
-SURE, CLEAR = 2e-5, 2e-4
-HINT = 1e-3  # of a delay: its tilt is added to sigma, no more
-LEAST_SCALE = 0.005  # no gyro of a specification has a larger error of scale, or misalignment in rad
-LEAST_DELAY = 0.02  # s: a shorter one is that of sensors' own filters
-ALIKE = 0.3  # of a delay, that it may differ by between axes: a base's own motion hides or adds a part about each
 IDENTITY = "+x +y +z"
 AXES = np.eye(3)
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
@@ -108,16 +98,19 @@ class Tilt:
             "axes": self.axes,
             "delay": abs(self.delay),
         }
-        explains = self.best**2 < min(self.given**2 / CLEARER, EXPLAINED * self.unturned**2)
+        explains = self.best**2 < min(self.given**2 / limit("clearer tilt"), limit("explained tilt") * self.unturned**2)
         if explains and self.axes != IDENTITY:
             return [Evidence("tilt.axes", figures, "unknown", ANY_EFFECT, ("imu_axes",))]
         late = "tilt.gyros_late" if self.delay > 0.0 else "tilt.gyros_early"
         if explains:
             return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
         found = []
-        sure, clear, hint = (student_limit(chance, self.pieces - 1) for chance in (SURE, CLEAR, HINT))
+        sure, clear, hint = (
+            student_limit(chance, self.pieces - 1)
+            for chance in (limit("sure delay"), limit("clear delay"), limit("hint of a delay"))
+        )
         agree = self._axes_agree(0.0 if self.rough else clear)  # on a rough base it has to be seen
-        if abs(self.delay) >= max(LEAST_DELAY, hint * self.delay_sigma) and (agree or not self.rough):
+        if abs(self.delay) >= max(limit("late sensor"), hint * self.delay_sigma) and (agree or not self.rough):
             certain = agree and abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
             # What the gyros do not explain may be the base's own, and have hidden as much of a delay as it may have made.
             level = self.tilt if certain else math.hypot(self.tilt, self.given / GRAVITY_EQUATOR)
@@ -133,13 +126,13 @@ class Tilt:
     @property
     def rough(self) -> bool:
         """Whether the base's own accelerations are much of what the gyros should explain."""
-        return self.given**2 > PLAIN * self.unturned**2
+        return self.given**2 > limit("gyros right") * self.unturned**2
 
     def _axes_agree(self, clear: float) -> bool:
         """Whether the two axes that show a delay best show the same one: one clock has one delay, a base's own motion any."""
         best = np.argsort(self.by_axis_sigma)[:2]
         (one, other), sigma = self.by_axis[best], float(np.linalg.norm(self.by_axis_sigma[best]))
-        return bool(abs(one - other) <= max(ALIKE * abs(self.delay), clear * sigma))
+        return bool(abs(one - other) <= max(limit("one delay") * abs(self.delay), clear * sigma))
 
     def _on_two_axes(self, sure: float) -> bool:
         """Whether turns about two axes show it: a base that goes to and fro in the time of a sway looks like it about one."""
@@ -173,7 +166,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     best, axes, delay = given, IDENTITY, 0.0
     few = [(o, s) for o, s in READINGS if _is_near(o, s)]
     likely = min(bench.left(theta[..., order] * signs) for order, signs in few)
-    rough = given**2 > PLAIN * unturned**2
+    rough = given**2 > limit("gyros right") * unturned**2
     for order, signs in READINGS if rough or 1.5 * likely**2 < given**2 else []:
         left = bench.left(theta[..., order] * signs)
         if left < 0.99 * best:
@@ -191,7 +184,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     tilt = abs(late) * bench.rate(theta)
     # Scale factors are fitted on a straight line, and the base's motion along the sway may pass for them. With half of what was
     # found taken off, and with all, the gyros must turn better and better.
-    clear = student_limit(CLEAR, len(theta) - 1)
+    clear = student_limit(limit("clear delay"), len(theta) - 1)
     scale, sigma_scale = little[1:4], sigma[1:4]
     wrong = np.where(np.abs(scale) >= np.maximum(least_scale(turns), clear * sigma_scale), scale, 0.0)
     if wrong.any():
@@ -208,7 +201,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
 
 def least_scale(turned: Array) -> Array:
     """(3,) the smallest scale error that is more than a sound gyro's: turns about the other axes leak in by its misalignment."""
-    return np.asarray(LEAST_SCALE * np.linalg.norm(turned) / np.maximum(turned, 1e-12))
+    return np.asarray(limit("scale factor") * np.linalg.norm(turned) / np.maximum(turned, 1e-12))
 
 
 READINGS = list(product(permutations(range(3)), product((1.0, -1.0), repeat=3)))

@@ -28,7 +28,6 @@ LAGS, MOST_LAGS = 5, 60
 FEWEST_BLOCKS = 12  # whose means are compared
 MANOEUVRE = 20.0  # s, the period of turns and changes of speed
 CHANCE = math.erfc(limit("chance") / math.sqrt(2.0))
-LEAST_CORRELATION = 0.05  # mean over the first lags
 
 
 class Whiteness(NamedTuple):
@@ -69,7 +68,7 @@ def whiteness(normalised: Array, interval: float = 1.0) -> Whiteness:
     size = math.sqrt(total / count)
     spread = math.sqrt(2.0 * (1.0 + 2.0 * float(np.sum(r[:last] ** 2))) / count)
     mean = float(r[:LAGS].mean())
-    coloured = mean > max(LEAST_CORRELATION, limit("chance") / math.sqrt(LAGS * count)) or scatter > 1.0
+    coloured = mean > max(limit("colour"), limit("chance") / math.sqrt(LAGS * count)) or scatter > 1.0
     return Whiteness(size, colour, turning, coloured or size**2 - 1.0 > limit("chance") * spread)
 
 

@@ -117,6 +117,165 @@ LIMITS: dict[str, Limit] = {
         "probability that a step of a sound receiver is seen at any row: false alarms of the whole are below 1 %",
     ),
     "chance": Limit(5.0, "sigma", "a statistic of innovations this far out is chance once in two million tests"),
+    # ---- rows and stamps of a log
+    "jitter": Limit(
+        0.1, "of the interval", "RMS scatter of time stamps, above which a warning says that they are poor"
+    ),
+    "slight jitter": Limit(
+        0.05, "of the interval", "the same, from which what a stamp may be off by is looked at, and is in sigma"
+    ),
+    "exchanged rows": Limit(
+        0.01,
+        "of the rows",
+        "that have changed places, above which it is an error: fewer move the means of a log by less than noise does",
+    ),
+    "repeated rows": Limit(0.002, "of the rows", "that repeat the one before, beyond those that chance gives"),
+    "held rows": Limit(
+        0.1,
+        "of the rows",
+        "that repeat the one before, above which they may be samples that are held for several rows",
+    ),
+    "frozen": Limit(
+        3.0,
+        "longest run by chance",
+        "a run of one value three times as long as the longest that chance gives: the cube of its probability",
+    ),
+    "coarse": Limit(0.3, "of the rows", "that repeat, above which a quantum is as large as the noise"),
+    "piled": Limit(
+        10, "rows at the next value", "of a vibration's peaks each is a row, and the rows at the end of a range pile up"
+    ),
+    # ---- units and axes against earth and gravity
+    "gravity": Limit(
+        0.12, "g", "local gravity, biases of cheap sensors and motion change the mean specific force by less"
+    ),
+    "other reading": Limit(
+        4.0, "1", "times as much left unexplained as by another reading of the axes: those as given are wrong"
+    ),
+    "scale by tilt": Limit(
+        0.35,
+        "1",
+        "a lever arm moves with the sway and tilts gravity by w^2 r/g, .3 for 3 m at 1 rad/s: less is no wrong unit",
+    ),
+    "rate seen": Limit(
+        0.05, "of the rate", "one sigma of the mean rate, with which it can be compared with the earth's"
+    ),
+    "unit by the rate": Limit(
+        0.01,
+        "of the rate",
+        "the same, with which a unit can be named: a third of the 3 per cent by which the rate may miss the earth's then",
+    ),
+    "written twice": Limit(1e-9, "1", "probability that a stretch as long comes again by chance: one in 10^9 logs"),
+    "fix untrue": Limit(
+        1.5, "sigma as said", "beyond it what innovations show of a fix is neither chance nor what datasheets differ by"
+    ),
+    "one place": Limit(
+        4.0,
+        "scatter of the places",
+        "of places that are all off to one side: their mean is four times what they scatter by",
+    ),
+    # ---- noise
+    "one noise": Limit(
+        1.5,
+        "1",
+        "largest over smallest density that pass for one noise: over means of 1, 2 and 4 rows, which white noise has alike",
+    ),
+    "noisy stretch": Limit(3.0, "usual density", "above which a stretch counts as noisy for itself"),
+    "another sensor": Limit(
+        4.0, "specification", "noise of another class of IMU: sensors of one datasheet scatter by less"
+    ),
+    "another look": Limit(
+        0.2,
+        "1",
+        "of sound logs have a ratio that is looked at again by the filter's own response: it costs time, no answer",
+    ),
+    "counts at most": Limit(
+        6.0, "sigma", "of one innovation, less than a step has to show: an outlier alone is no step"
+    ),
+    # ---- velocities against positions
+    "turned as one": Limit(
+        0.3, "of the squares", "of displacements, that velocities which are turned as one may leave at the most"
+    ),
+    "turned velocities": Limit(
+        1e-4, "1", "probability that a sound log shows a turn of its velocities, of either sign"
+    ),
+    # ---- gyros against accelerometers and encoders
+    "gyros right": Limit(
+        0.05,
+        "of the squares",
+        "that gyros at rest would leave: what is left where the gyros are right, but for rough bases",
+    ),
+    "clearer tilt": Limit(3.0, "1", "times smaller squares that another reading of the axes must leave to be named"),
+    "explained tilt": Limit(
+        0.25, "of the squares", "that gyros at rest would leave, that this other reading may leave at the most"
+    ),
+    "sure delay": Limit(
+        2e-5,
+        "1",
+        "false alarms of a small delay and of a scale factor: sigma is estimated from few pieces, of eight it is 10 sigmas",
+    ),
+    "clear delay": Limit(2e-4, "1", "the same of one whose effect is added to sigma: of eight pieces 7 sigmas"),
+    "hint of a delay": Limit(1e-3, "1", "the same of a delay whose tilt is added to sigma, no more"),
+    "scale factor": Limit(0.005, "1", "no gyro of a specification has a larger error of scale, or misalignment in rad"),
+    "late sensor": Limit(0.02, "s", "a shorter delay is that of sensors' own filters"),
+    "one delay": Limit(
+        0.3, "of the delay", "that it may differ by between axes: a base's own motion hides or adds a part about each"
+    ),
+    "clearer encoder": Limit(
+        4.0, "1", "times smaller squares of the base's turns that another reading of the angles must leave to be named"
+    ),
+    "alternates": Limit(
+        8.0, "sigma", "of the mean of all stretches: chance gives as many once in 10^8 channels (Student's t)"
+    ),
+    "alternating turn": Limit(
+        0.05, "of the strongest direction", "turns about a gravity that hardly moves are not seen"
+    ),
+    "colour": Limit(
+        0.05,
+        "1",
+        "mean correlation of innovations over the first lags: less changes sigma by less than its figures are worth",
+    ),
+    # ---- a base that stays
+    "wanders": Limit(
+        3.0, "bias instability", "that an accelerometer's bias is off by at some time: what is larger is a change of it"
+    ),
+    "shown delay": Limit(
+        0.6,
+        "of the delay",
+        "that the fit of the base's motion leaves at least: of what it takes up itself nothing is said",
+    ),
+    "motion follows": Limit(
+        0.5, "1", "correlation of innovations with the next, from which the base's motion is no white noise"
+    ),
+    # ---- masters
+    "other delay": Limit(
+        3.0, "sigma", "by which a delay found by correlation must miss the given one to be taken in its place"
+    ),
+    "fastest base": Limit(
+        10.0, "m/s", "RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster"
+    ),
+    "upside down": Limit(-0.5, "1", "cosine between z and up, below which z points down"),
+    "master's gate": Limit(1e-6, "1", "probability of rejecting a sound row of a master: of 10,000 rows none"),
+    "tied": Limit(0.95, "1", "correlation of two states beyond which one is not known without the other"),
+    # ---- velocity logs of damping
+    "outlier of a log": Limit(6.0, "sigma", "of one measurement: chance gives one in 5e8"),
+    "jump of a log": Limit(
+        8.0, "sigma", "of the difference of the lines on both sides, whose sigma is estimated from few rows"
+    ),
+    "curvature of a log": Limit(
+        0.03, "m/s", "by which healthy lines may miss each other, or a healthy value its median: waves and turns"
+    ),
+    "slow change of a log": Limit(4.0, "sigma", "of what its slow errors change by: that is no jump"),
+    "log's gate": Limit(1e-6, "1", "probability of rejecting a sound row: one in six days at 1 Hz"),
+    # ---- filters
+    "gate": Limit(
+        1e-4, "1", "probability of rejecting a sound measurement: few enough to cost nothing, and outliers are far out"
+    ),
+    "ruled out": Limit(
+        -3.0,
+        "1",
+        "twice the log of a likelihood ratio, below which a walk of a bias is ruled out; larger walks are ruled out more",
+    ),
+    "small angles": Limit(10.0, "sigma a priori", "beyond it a small-angle model does not hold"),
 }
 
 

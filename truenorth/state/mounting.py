@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import UsageError
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
 SLIP_SIGMA = 0.1  # m/s, of a wheel sideways and of a body on its springs up and down
 LONGEST_ARM = 100.0  # m; ships have no longer ones
-FALSE_REJECTION = 1e-4  # of a sound measurement by the gate
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Mounting:
     bias_time: float = math.inf
     latency: float = 0.0
     latency_sigma: float = 0.0
-    gate: float = FALSE_REJECTION
+    gate: float = limit("gate")
     noise: float | None = None
     slip: float = SLIP_SIGMA
 
