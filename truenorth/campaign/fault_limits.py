@@ -63,6 +63,8 @@ LIKE_MOTION = (
 )
 
 
+# A turn that lags is another heading while it lasts; straight and level flight shows a master by velocity no heading.
+LATE = ("late gyros", "gyros late by a filter")
 LIKE_HEADING = ("gyro scale",)  # that act on a base at rest as another heading does, to first order
 
 
@@ -100,6 +102,8 @@ def unseen(procedure: str, fault: str, size: str, ratio: float | None = None) ->
         return f"what gyros at rest see prefers the sound log by {ratio:.1f} only"
     if measured and procedure not in REST and fault in LIKE_MOTION:
         return f"the measurements prefer the true sensors by {ratio:.1f} only"
+    if measured and procedure == "transfer" and fault in LATE:
+        return f"the master's velocities prefer gyros of one moment by {ratio:.1f} only"
     known = next((u for u in UNSEEN if procedure in u.procedures and fault == u.fault and re.match(u.size, size)), None)
     return None if known is None else known.why
 
