@@ -53,6 +53,11 @@ BY_MEANS = (
     "an axis that points about east, a scale error k turns heading by k times its angle from east, and changes the length by k "
     "times the square of that angle"
 )
+BY_LATENCY = (
+    "measured, trial by trial: the master's velocities prefer gyros of one moment by less than 25 (the same ratio). Gyros that are "
+    "late by d turn heading by d times the rate while a turn lasts; straight flight shows a master by velocity no heading, so that "
+    "only one turn against another, of a delay of the slave that is not known either, tells it from one"
+)
 LEAST_RATIO = 25.0
 # Faults that act as motion does: on the move only the aiding measurements speak of them.
 LIKE_MOTION = (
