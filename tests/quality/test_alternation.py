@@ -78,6 +78,14 @@ def test_recordings_do_not_alternate():
         assert not alternation_evidence(record)
 
 
+def test_a_turn_about_the_vertical_is_found_where_the_vehicle_turns():
+    """Of 120 s of flight the two turns alone push sideways: before, 6.6 and 4.4 sigmas of heading in silence."""
+    record = BENCHES["attitude"].draw(90415, 0)[0]["record"]
+    turned = two_in_turn(record, [0.0, 0.0, np.radians(0.07)])
+    assert turn_in_turn(turned) == pytest.approx(np.radians(0.035), rel=0.05)
+    assert not turn_in_turn(record)
+
+
 def test_on_an_indexer_the_difference_moves_with_gravity():
     inputs, _ = BENCHES["rotary"].draw(9131, 2)
     turn = np.array([0.004, -0.003, 0.006])

@@ -29,7 +29,7 @@ from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
-from truenorth.alignment.swaying import farthest, sway_align
+from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
 from truenorth.alignment.turning import (
     infer_turning,
@@ -322,7 +322,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     others = matrix_signatures(fine, used) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
-    steps += late_gyros_evidence(fine, task.record, task.interval, task.position) if sways else []
+    steps += late_gyros_evidence(fine, fine.late, task.record) if isinstance(fine, SwayAlignment) else []
     way = farthest(fine, task.position) if sways else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)
 

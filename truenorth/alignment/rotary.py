@@ -27,7 +27,7 @@ from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
 from truenorth.alignment.published import FADING, factor_share, faded_align, turned_arm_velocity
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
-from truenorth.alignment.swaying import ARM_PRIOR, Mount, sway_align
+from truenorth.alignment.swaying import ARM_PRIOR, Mount, SwayAlignment, sway_align
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
@@ -164,7 +164,7 @@ def align_rotary(
     drift, steps, hemisphere = what_begins(fine, spec, task.position)
     evidence = model_evidence(drift, settled=fine.settled)
     evidence += base_speed(answer) + steps + bad_stretches(fine, record) + hemisphere
-    evidence += [] if own in FADING else late_gyros_evidence(fine, record, task.interval, task.position)
+    evidence += late_gyros_evidence(fine, fine.late, record) if isinstance(fine, SwayAlignment) else []
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     return judged(answer, _of_encoder(record, encoder, axes, task) + evidence + notes(encoder.notes), heading_limit)

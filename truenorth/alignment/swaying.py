@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import bias_signatures
 from truenorth.alignment.fine import CoarseStart, FineAlignment
+from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.motion_fit import fit_motion
 from truenorth.alignment.motion_likelihood import Walks
@@ -69,6 +70,7 @@ class SwayAlignment(FineAlignment):
     motion: tuple[AxisMotion, ...]  # along E, N, U
     arm: Array  # (3,) m
     arm_sigma: Array  # (3,) m
+    late: Array  # (K, 3) what gyros that are late add to the measurements, by the second of their delay
     begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
     noisier: Mapping[str, float] = field(default_factory=dict)  # times its specification, by sensor
     slow_arm: slice | None = None  # states of the arm of a base that swings on lines; None of another
@@ -183,6 +185,7 @@ def _filtered(log: StayingLog, estimator: _MotionFilter) -> SwayAlignment:
         motion=estimator.motion,
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
+        late=response_to_late_gyros(log, last.found.system.z),
         slow_arm=log.prior.groups.get("slow arm"),
     )
     return replace(

@@ -15,6 +15,7 @@ from truenorth.campaign.fault import Fault, Inputs, Rng, clock_rate, either, of_
 from truenorth.core.attitude import dcm_from_rotation_vector
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import METRES_PER_RADIAN
+from truenorth.estimate.sensor_delay import gyros_behind
 from truenorth.records import ImuRecord
 
 Array = NDArray[np.float64]
@@ -87,13 +88,6 @@ def _late_gyros(record: ImuRecord, rng: Rng) -> tuple[ImuRecord, str]:
     return (
         ImuRecord(record.time[rows:], record.gyro[:-rows], record.accel[rows:], record.kind, record.source),
         f"{rows * record.interval:.3f} s",
-    )
-
-
-def gyros_behind(record: ImuRecord, late: float) -> ImuRecord:
-    """The record with its gyros late by so many seconds, parts of a row too."""
-    return replace(
-        record, gyro=np.stack([np.interp(record.time - late, record.time, x) for x in record.gyro.T], axis=1)
     )
 
 

@@ -53,6 +53,11 @@ BY_MEANS = (
     "an axis that points about east, a scale error k turns heading by k times its angle from east, and changes the length by k "
     "times the square of that angle"
 )
+BY_LATENCY = (
+    "measured, trial by trial: the master's velocities prefer gyros of one moment by less than 25 (the same ratio). Gyros that are "
+    "late by d turn heading by d times the rate while a turn lasts; straight flight shows a master by velocity no heading, so that "
+    "only one turn against another, of a delay of the slave that is not known either, tells it from one"
+)
 LEAST_RATIO = 25.0
 # Faults that act as motion does: on the move only the aiding measurements speak of them.
 LIKE_MOTION = (
@@ -63,6 +68,8 @@ LIKE_MOTION = (
 )
 
 
+# A turn that lags is another heading while it lasts; straight and level flight shows a master by velocity no heading.
+LATE = ("late gyros", "gyros late by a filter")
 LIKE_HEADING = ("gyro scale",)  # that act on a base at rest as another heading does, to first order
 
 
@@ -100,6 +107,8 @@ def unseen(procedure: str, fault: str, size: str, ratio: float | None = None) ->
         return f"what gyros at rest see prefers the sound log by {ratio:.1f} only"
     if measured and procedure not in REST and fault in LIKE_MOTION:
         return f"the measurements prefer the true sensors by {ratio:.1f} only"
+    if measured and procedure == "transfer" and fault in LATE:
+        return f"the master's velocities prefer gyros of one moment by {ratio:.1f} only"
     known = next((u for u in UNSEEN if procedure in u.procedures and fault == u.fault and re.match(u.size, size)), None)
     return None if known is None else known.why
 

@@ -9,7 +9,17 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from truenorth.campaign.fault_limits import BY_LIKELIHOOD, BY_MEANS, BY_STAYING, LIKE_HEADING, LIKE_MOTION, REST, UNSEEN
+from truenorth.campaign.fault_limits import (
+    BY_LATENCY,
+    BY_LIKELIHOOD,
+    BY_MEANS,
+    BY_STAYING,
+    LATE,
+    LIKE_HEADING,
+    LIKE_MOTION,
+    REST,
+    UNSEEN,
+)
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
 from truenorth.core.atomic import atomic_path
 from truenorth.core.errors import DataError, UsageError
@@ -127,6 +137,7 @@ def _unseen() -> list[str]:
     lines.append(f"| {', '.join(LIKE_HEADING)} | {', '.join(REST)} | {BY_MEANS} |")
     biases = [name for name in LIKE_MOTION if name.startswith(("gyro", "accel"))]
     lines.append(f"| {', '.join(biases)} | swaying | {BY_STAYING} |")
+    lines.append(f"| {', '.join(LATE)} | transfer | {BY_LATENCY} |")
     return [*lines, f"| {', '.join(LIKE_MOTION)} | odometer, gnss, transfer, attitude, navigate | {BY_LIKELIHOOD} |"]
 
 

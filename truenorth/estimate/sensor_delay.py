@@ -111,6 +111,12 @@ def gyros_later(record: ImuRecord, rows: int) -> ImuRecord:
     return replace(record, gyro=record.gyro[at])
 
 
+def gyros_behind(record: ImuRecord, late: float) -> ImuRecord:
+    """The record with its gyros late by so many seconds, parts of a row too."""
+    behind = [np.interp(record.time - late, record.time, x) for x in record.gyro.T]
+    return replace(record, gyro=np.stack(behind, axis=1))
+
+
 def _peak(ratios: dict[int, float], best: int) -> int:
     """Where the parabola through the likeliest delay and its neighbours is highest, in rows; at an end of them the end itself."""
     tried = sorted(rows for rows, ratio in ratios.items() if math.isfinite(ratio))

@@ -168,10 +168,26 @@ class StayingLog:
     ) -> None:
         self.record, self.C_n0_i, self.position, self.noise = record, C_n0_i, position, noise
         self.prior, self.interval, self.form, self.sways, self.C_sb = prior, interval, form, sways, C_sb
-        self.rows = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
+        self.rows: Array = np.zeros(0, dtype=np.int64) if rows_at is None else rows_at
         self.taken = (prior.mean if taken is None else taken).copy()
         self._turns = np.zeros((0, 3, MATRICES))
         self.integrals = self._integrated() if integrals is None else integrals
+
+    def with_record(self, record: ImuRecord) -> StayingLog:
+        """Another record about the same attitude, with the same errors taken off."""
+        return StayingLog(
+            record,
+            self.C_n0_i,
+            self.position,
+            self.noise,
+            self.prior,
+            self.interval,
+            self.rows,
+            sways=self.sways,
+            C_sb=self.C_sb,
+            form=self.form,
+            taken=self.taken,
+        )
 
     @property
     def bias(self) -> Array:

@@ -6,7 +6,7 @@ fourth differences (gain one at half the rate, ``sin^4`` below). Of forces of wh
 turn makes of gravity, and so much is the mean of both turned against either sensor.
 
 Where gravity moves in the axes of the IMU, as on an indexer, the difference moves with it: a turn theta of one against the mean
-alternates as ``theta x f``. It is found by least squares over the log, and each stretch must show it.
+alternates as ``theta x f``. It is found by least squares over the log, and each part of it that can must show it.
 """
 
 from __future__ import annotations
@@ -61,9 +61,11 @@ def turn_in_turn(record: ImuRecord) -> float:
     counter = max(_step(x) for x in columns)
     shows, expected = z @ theta, np.einsum("i,kij,j->k", theta, A, theta)
     size = float(np.linalg.norm(theta))
-    if size * force <= COUNTS * counter or not _keeps(shows / max(float(expected.mean()), 1e-300)):
-        return 0.0
-    return size
+    left = np.mean(
+        q - np.cross(theta, f), axis=1
+    )  # of each stretch: a vibration alternates where no force is turned, too
+    explains = float(np.sum(left**2)) < float(expected.sum()) / q.shape[1]
+    return size if size * force > COUNTS * counter and explains and _shown(shows, expected) else 0.0
 
 
 def _length(record: ImuRecord) -> int:
@@ -90,6 +92,22 @@ def _keeps(means: Array) -> bool:
     parts = means.reshape(PARTS, -1).mean(axis=1)
     steady = float(parts.std()) < STEADY * abs(size) and bool(np.all(parts * size > 0.0))
     return steady and abs(size) > limit("alternates") * spread / math.sqrt(len(means))
+
+
+def _shown(shows: Array, expected: Array) -> bool:
+    """Whether stretches show what a turn makes them show, and all parts of the log that can show as much as each other.
+
+    A turn about the vertical moves the force only where the vehicle turns or gathers way: no stretch counts for more than it
+    should show. Where fewer than `PARTS` of them show it all, a vibration may keep its phase for as long.
+    """
+    total = float(expected.sum())
+    if total <= 0.0 or total**2 < PARTS * float(np.sum(expected**2)):
+        return False
+    part = (PARTS * (np.cumsum(expected) - 0.5 * expected) / total).astype(np.int64)
+    sums = np.bincount(part, shows, PARTS) / np.maximum(np.bincount(part, expected, PARTS), 1e-300)
+    steady = float(sums.std()) < STEADY and bool(np.all(sums > 0.0))
+    n = len(shows)
+    return steady and float(shows.sum()) > SURE * math.sqrt(n / (n - 1) * float(np.sum((shows - expected) ** 2)))
 
 
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:

@@ -238,11 +238,6 @@ LIMITS: dict[str, Limit] = {
     "wanders": Limit(
         3.0, "bias instability", "that an accelerometer's bias is off by at some time: what is larger is a change of it"
     ),
-    "shown delay": Limit(
-        0.6,
-        "of the delay",
-        "that the fit of the base's motion leaves at least: of what it takes up itself nothing is said",
-    ),
     "motion follows": Limit(
         0.5, "1", "correlation of innovations with the next, from which the base's motion is no white noise"
     ),
