@@ -28,6 +28,7 @@ from truenorth.alignment.transfer_filter import (
     delay_found,
     transfer_filter,
 )
+from truenorth.alignment.transfer_shaken import shaken_evidence
 from truenorth.alignment.transfer_start import as_found, common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
@@ -165,19 +166,21 @@ def align_transfer(
     model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
-    found = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
+    noise, linear, assumed, biases = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
     tell("aligning")
-    noise, linear, assumed, biases = found
     part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
     if part.duration < SHORTEST:
         raise DataError(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
-    rows = Matching(*noise, what.kind, GATE)
-    run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
+    run = partial(
+        transfer_filter, master=master, matching=Matching(*noise, what.kind, GATE), assumed=assumed, linear=linear
+    )
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
+    if what.translation == "velocity":
+        seen += shaken_evidence(run, track, part, master, model, start, assumed, linear)
     track = as_said_together(track, model, assumed, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
