@@ -161,12 +161,12 @@ def align_transfer(
         lever_arm_sigma = 0.0  # attitude does not see it
     said = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     said, notes = common_clock(slave, master, said)
-    notes = (*notes, *master.notes)
     errors = _errors(master, master_errors)
     model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
-    noise, linear, assumed, biases = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
+    found = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
+    noise, linear, assumed, biases = found
     tell("aligning")
     part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
     if part.duration < SHORTEST:
@@ -174,18 +174,16 @@ def align_transfer(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
-    run = partial(
-        transfer_filter, master=master, matching=Matching(*noise, what.kind, GATE), assumed=assumed, linear=linear
-    )
+    rows = Matching(*noise, what.kind, GATE)
+    run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
-    if what.translation == "velocity":
-        seen += shaken_evidence(run, track, part, master, model, start, assumed, linear)
+    seen += shaken_evidence(run, track, part, master, model, start, assumed, linear, what)
     track = as_said_together(track, model, assumed, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least, said)
-    answer = assemble_transfer(last, spec, where, notes, heading_limit, seen)
+    answer = assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 
 

@@ -21,6 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from truenorth.aiding.matching import Matched
 from truenorth.alignment.transfer_filter import Assumed, Linear, arm_of
 from truenorth.alignment.transfer_turns import shaken
 from truenorth.core.attitude import rotation_vector_from_dcm
@@ -40,6 +41,7 @@ def shaken_evidence(
     start: Start,
     assumed: Assumed,
     linear: Linear | None,
+    what: Matched,
 ) -> list[Evidence]:
     """What the fast part of the rates does to the answer, where there is one.
 
@@ -50,7 +52,7 @@ def shaken_evidence(
     track : Track
         What it made of these.
     """
-    if linear is None or master.v_n is None:
+    if what.translation != "velocity" or linear is None or master.v_n is None:
         return []
     held = master.time - assumed.delay - linear.delay
     rates = shaken(slave, held, model.gyro_random_walk, assumed.delay_sigma)
