@@ -94,9 +94,10 @@ def _beyond_noise(rate: Any, variance: float) -> float:
 
 @row
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
-    """Measured: velocity; the master's acceleration, or the slave's spin; the slave's attitude to linearise with; or NaN.
+    """Measured: velocity; the master's acceleration, or the slave's spin; its attitude to linearise with; its rate; or NaN.
 
-    Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant.
+    Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant. The rate is what its gyros
+    say, in body axes, without what vibrates (:mod:`truenorth.alignment.transfer_shaken`); else that of the instant.
 
     Columns of the arm are of a rate with another noise than that of `z`: one that is in both (4 cm/s of an industrial gyro at
     37 m) is taken for an arm that is too long, .6 m of it. Its own figures: the variance of a component of that rate; and 1 where
@@ -107,7 +108,10 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     r = with_state(figures, ARM, assumed, at[AT_ARM])
     C, w, spin, f = matrix_of(now, NOW_C), vector_of(now, NOW_RATE), vector_of(now, NOW_SPIN), vector_of(now, NOW_FORCE)
     earth = vector_of(now, NOW_EARTH)
-    still = times_back(C, earth)
+    still, other = times_back(C, earth), vector_of(now, NOW_OTHER_RATE)
+    if not np.isnan(measured[10]):
+        w = (measured[10] - assumed[_BG], measured[11] - assumed[_BG + 1], measured[12] - assumed[_BG + 2])
+        other = w
     off = by_axes(assumed, at[AT_OWN], w)
     w = (w[0] - off[0], w[1] - off[1], w[2] - off[2])
     w_eb = (w[0] - still[0], w[1] - still[1], w[2] - still[2])
@@ -127,17 +131,15 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     away = (-r[0], -r[1], -r[2])
     velocity_row(now, C, w_eb, push, away, lag_now(now, assumed, at[AT_LAG]), -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
-        other = vector_of(now, NOW_OTHER_RATE)
-        other = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
-        seen = _beyond_noise(other, figures[OWN])
+        turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
+        seen = _beyond_noise(turn, figures[OWN])
         for j in range(3):
-            m = times(C, cross(other, (seen * (j == 0), seen * (j == 1), seen * (j == 2))))
+            m = times(C, cross(turn, (seen * (j == 0), seen * (j == 1), seen * (j == 2))))
             a = at[AT_ARM] + j
             x, y = m[0], m[1]
             s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
             H[0, a], H[1, a], H[2, a] = c * x - s * y, s * x + c * y, m[2]
     if at[AT_OWN] >= 0:  # as biases of the gyros; by a rate of another noise, as the arm
-        other = vector_of(now, NOW_OTHER_RATE)
         seen = _beyond_noise(other, figures[OWN])
         for i in range(3):
             for j in range(3):
@@ -226,7 +228,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 
 MASTER_VELOCITY = Row(
-    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9}, width=10, instant=True
+    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9}, width=13, instant=True
 )
 MASTER_ATTITUDE = Row(
     "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"

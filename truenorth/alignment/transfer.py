@@ -28,6 +28,7 @@ from truenorth.alignment.transfer_filter import (
     delay_found,
     transfer_filter,
 )
+from truenorth.alignment.transfer_shaken import shaken_evidence
 from truenorth.alignment.transfer_start import as_found, common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
@@ -160,14 +161,13 @@ def align_transfer(
         lever_arm_sigma = 0.0  # attitude does not see it
     said = Assumed(arm, lever_arm_sigma, delay, delay_sigma, C_mb, mounting_sigma, heading)
     said, notes = common_clock(slave, master, said)
-    notes = (*notes, *master.notes)
     errors = _errors(master, master_errors)
     model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
     found = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
-    tell("aligning")
     noise, linear, assumed, biases = found
+    tell("aligning")
     part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
     if part.duration < SHORTEST:
         raise DataError(
@@ -178,11 +178,12 @@ def align_transfer(
     run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
+    seen += shaken_evidence(run, track, part, master, model, start, assumed, linear, what)
     track = as_said_together(track, model, assumed, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least, said)
-    answer = assemble_transfer(last, spec, where, notes, heading_limit, seen)
+    answer = assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 
 

@@ -15,7 +15,7 @@ from truenorth.aiding.master_position import MASTER_POSITION
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
-from truenorth.alignment.transfer_turns import KNOWN, push_of, spins_at, turns_at
+from truenorth.alignment.transfer_turns import KNOWN, MEAN, push_of, shaken, spins_at, turns_at
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
 from truenorth.core.errors import DataError
@@ -207,11 +207,8 @@ def master_aiding(
     measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
     if measured is not None and kind == "acceleration" and slave is not None:
         measured[:, 3:] = _slopes(slave, held)
-    elif measured is not None and kind == "velocity" and slave is not None and np.isnan(measured[:, 3:6]).all():
-        assert master.v_n is not None
-        arm = math.hypot(*assumed.lever_arm, math.sqrt(3.0) * assumed.lever_arm_sigma)
-        spins, pushed = spins_at(slave, held, model.gyro_random_walk, arm, push_of(stamps, master.v_n))
-        measured[:, 3:6] = np.nan if spins is None else spins
+    elif measured is not None and kind == "velocity" and slave is not None:
+        pushed = _add_turns(measured, slave, master, model, assumed, held)
     has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
     known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
     if measured is not None:
@@ -269,6 +266,31 @@ def master_aiding(
     return found
 
 
+def arm_of(track: Track, assumed: Assumed) -> Array:
+    """(3,) m: size of each component of the lever arm in the end, its sigma included."""
+    at = track.layout.slice_of(ARM)
+    found, sigma = (0.0, 0.0) if at is None else (track.sensors[-1, at], track.sigma[-1, at])
+    return np.asarray(np.hypot(assumed.lever_arm + found, sigma))
+
+
+def _add_turns(
+    measured: Array, slave: ImuRecord, master: MasterRecord, model: TransferModel, assumed: Assumed, held: Array
+) -> float:
+    """How the slave turns, into velocity rows; how they know the acceleration."""
+    walk, pushed = model.gyro_random_walk, KNOWN
+    assert master.v_n is not None
+    own = bool(np.isfinite(measured[:, 3:6]).any())  # the master says its acceleration
+    if not own:
+        arm = math.hypot(*assumed.lever_arm, math.sqrt(3.0) * assumed.lever_arm_sigma)
+        spins, pushed = spins_at(slave, held, walk, arm, push_of(master.time, master.v_n))
+        measured[:, 3:6] = np.nan if spins is None else spins
+    if (rates := shaken(slave, held, walk, assumed.delay_sigma)) is not None:
+        measured[:, 10:] = rates.slow
+        if not own and pushed == KNOWN:
+            measured[:, 3:6], pushed = rates.spin, MEAN
+    return pushed
+
+
 # Row, the first state that takes up a jump, the group of the master's own error.
 _ROWS: dict[Translation, tuple[Row, int | None, str | None]] = {
     "velocity": (MASTER_VELOCITY, DV.start, VELOCITY_ERROR),
@@ -291,11 +313,11 @@ def _translation(master: MasterRecord, kind: Translation, place: Array | None, l
         return np.column_stack([force, np.full((len(master), 6), np.nan)])
     if master.v_n is None:
         return None
-    measured = np.full((len(master), 10), np.nan)
+    measured = np.full((len(master), 13), np.nan)
     measured[:, :3] = master.v_n
     measured[:, 3:6] = _acceleration(master, place)
     if linear is not None and np.isnan(measured[:, 3]).any():
-        measured[:, 6:] = _quaternions(linear.C_nb)
+        measured[:, 6:10] = _quaternions(linear.C_nb)
     return measured
 
 

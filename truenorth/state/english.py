@@ -343,6 +343,10 @@ SENTENCES = {
         "sigma is absolute, the master's own errors are in it; against the master heading is known to {heading:angle}, level "
         "to {level:angle}"
     ),
+    "transfer.shaken": (
+        "vibration moves the slave against its master by {size:.2g} m/s, at a phase that the delay does not tell: level may be off "
+        "by {level:angle} (one sigma), which its sigma has; give lever arm and delay with smaller sigmas"
+    ),
     "transfer.relative": "sigma is against the master, whose own errors come on top: they were not given",
     "transfer.open": "left open by this motion: {states}",
     # ---- clocks, arms, scales and mountings left open
