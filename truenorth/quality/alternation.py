@@ -107,7 +107,9 @@ def _shown(shows: Array, expected: Array) -> bool:
     sums = np.bincount(part, shows, PARTS) / np.maximum(np.bincount(part, expected, PARTS), 1e-300)
     steady = float(sums.std()) < STEADY and bool(np.all(sums > 0.0))
     n = len(shows)
-    return steady and float(shows.sum()) > SURE * math.sqrt(n / (n - 1) * float(np.sum((shows - expected) ** 2)))
+    return steady and float(shows.sum()) > limit("alternates") * math.sqrt(
+        n / (n - 1) * float(np.sum((shows - expected) ** 2))
+    )
 
 
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:
