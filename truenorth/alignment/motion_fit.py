@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.motion_likelihood import LOWEST_BIN, Series, Walks, motion_of, parameters
+from truenorth.alignment.motion_likelihood import FINER, LOWEST_BIN, Series, Walks, finer_grids, motion_of, parameters
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, Oscillator
 
 Array = NDArray[np.float64]
@@ -125,9 +125,9 @@ def _oscillator_at(series: Series, peak: int, order: int, damping: float | None 
 def _line_frequency(series: Series, guess: float) -> float:
     """Where the tapered series' transform is largest: three grids, each finer than the last."""
     tapered, spacing = series.taper_weights * series.detrended, series.frequencies[1]
-    for _ in range(3):
-        grid = guess + spacing * np.linspace(-1.0, 1.0, 21)
-        power = np.abs(np.sum(np.exp(-1j * np.outer(grid, series.lags)) * tapered, axis=1))
+    for turned in finer_grids(len(series.lags), series.interval):
+        grid = guess + spacing * FINER
+        power = np.abs(np.sum(turned * (np.exp(-1j * guess * series.lags) * tapered), axis=1))
         guess, spacing = float(grid[np.argmax(power)]), spacing / 10.0
     return guess
 
@@ -162,24 +162,24 @@ def _score(series: Series, guess: AxisMotion) -> AxisMotion:
     scale = _Scale(guess, float(series.lags[-1]))
     size = len(scale.centre)
     u, damping = np.zeros(size), 1e-2
-    around = np.vstack([np.zeros(size), DIFFERENCE * np.eye(size)])
+    around = DIFFERENCE * np.eye(size)
 
-    def expected(u: Array) -> Array:
-        return series.expected(scale.orders, scale.logs(u + around))
+    def expected(points: Array) -> Array:
+        return series.expected(scale.orders, scale.logs(points))
 
-    f = expected(u)
-    cost = series.whittle(f[0])
+    f = expected(u[None])[0]
+    cost = series.whittle(f)
     for _ in range(SCORINGS):
-        J = ((f[1:] - f[0]) / (DIFFERENCE * f[0])).T[LOWEST_BIN:]
-        slope = J.T @ (1.0 - series.periodogram[LOWEST_BIN:] / f[0, LOWEST_BIN:])
+        J = ((expected(u + around) - f) / (DIFFERENCE * f)).T[LOWEST_BIN:]
+        slope = J.T @ (1.0 - series.periodogram[LOWEST_BIN:] / f[LOWEST_BIN:])
         fisher = J.T @ J
         diagonal = np.diag(np.diag(fisher)) + 1e-6 * np.eye(size)
         before = cost
         while True:
             step = np.linalg.solve(fisher + damping * diagonal, slope)
             trial = scale.clipped(u - np.clip(step, -LONGEST, LONGEST))
-            f = expected(trial)
-            cost = series.whittle(f[0])
+            f = expected(trial[None])[0]  # nearby ones where the search goes on from there
+            cost = series.whittle(f)
             if cost < before:
                 u, damping = trial, max(0.2 * damping, LEAST_LEVENBERG)
                 break

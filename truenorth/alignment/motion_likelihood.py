@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,9 @@ Orders = NDArray[np.int64]
 
 TREND = 4  # degree of the polynomial that takes what the first fit missed
 LOWEST_BIN = 3  # slower than this is the trend's
+FINER = np.linspace(
+    -1.0, 1.0, 21
+)  # of a grid's spacing: where a line is looked for, three times, each a tenth of the last
 LINES = 16  # that go through a lane of a filter at once: each is multiplied by all others
 
 
@@ -91,10 +95,7 @@ class Series:
     def expected(self, orders: Orders, logs: Array) -> Array:
         """Expected periodograms (m, K // 2 + 1) of the tapered series, of motions with logarithms (m, 1 + 3 q)."""
         acf = np.zeros((len(logs), len(self.lags)))
-        _autocovariances(orders, *_values(logs), self.interval, acf)
-        acf *= self.taper
-        # Sum over lags -(K-1) .. K-1 of acf taper exp(-i w lag), at the frequencies of the series' own transform.
-        acf[:, 1:] += acf[:, :0:-1].copy()
+        _folded_autocovariances(orders, *_values(logs), self.interval, self.taper, acf)
         return np.maximum(np.fft.rfft(acf).real, 1e-30)
 
     def whittle(self, expected: Array) -> float:
@@ -136,6 +137,13 @@ class Series:
         return float(self.exact(orders, logs[None])[0]) + math.log(len(self.lags)) * len(logs)
 
 
+@lru_cache(maxsize=1)
+def finer_grids(count: int, interval: float) -> tuple[NDArray[np.complex128], ...]:
+    """What a line of `count` samples is turned by, to the points of three grids about any frequency: (21, count) each."""
+    spacing, lags = 2 * np.pi / (count * interval), interval * np.arange(count, dtype=np.float64)
+    return tuple(np.exp(-1j * np.outer(spacing / finer * FINER, lags)) for finer in (1.0, 10.0, 100.0))
+
+
 def _gained(lower: Array, p: int) -> tuple[Array, Array]:
     """What m pairs of columns gain, and their sigmas, of the products of p others and of theirs; the lower half."""
     gram = lower + np.tril(lower, -1).T
@@ -155,10 +163,17 @@ def _values(logs: Array) -> tuple[Array, Array]:
 
 
 @compiled
-def _autocovariances(orders: Any, white: Any, tables: Any, interval: float, acf: Any) -> None:
+def _folded_autocovariances(orders: Any, white: Any, tables: Any, interval: float, taper: Any, acf: Any) -> None:
+    """Sums over lags -(K-1) .. K-1 of acf taper exp(-i w lag) are transforms of this at the frequencies of the series' own."""
+    K = len(taper)
     for m in range(len(white)):
         add_autocovariance(orders, tables[m], interval, acf[m])
         acf[m, 0] += white[m]
+        for k in range(K):
+            acf[m, k] *= taper[k]
+        for k in range(1, K // 2 + 1):  # a lag and the one that the transform takes for its negative
+            both = acf[m, k] + acf[m, K - k]
+            acf[m, k], acf[m, K - k] = both, both
 
 
 @compiled

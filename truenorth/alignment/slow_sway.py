@@ -191,8 +191,11 @@ def _departure(fine: FineAlignment, seen: Innovations, onsets: Sequence[float]) 
     through_filter, left = through(fine.gains, signature)
     white = whitened(seen.L, through_filter).reshape(-1, len(when), 2)
     nu = seen.white[:, :, 0].ravel()
-    energy = np.einsum("ika,ikb->kab", white, white) + 1e-300 * np.eye(2)
-    match = np.einsum("ika,i->ka", white, nu)
+    east, north = white[..., 0], white[..., 1]
+    both = np.sum(east * north, axis=0)
+    energy = np.array([[np.sum(east**2, axis=0), both], [both, np.sum(north**2, axis=0)]]).transpose(2, 0, 1)
+    energy = energy + 1e-300 * np.eye(2)
+    match = np.sum(white * nu[:, None, None], axis=0)
     size = np.linalg.solve(energy, match[..., None])[..., 0]
     ratio = np.sum(size * match, axis=1)
     best = int(np.argmax(ratio))
