@@ -7,7 +7,7 @@ import inspect
 import pytest
 import typer
 
-from truenorth.cli import app
+from truenorth.cli import app, main
 from truenorth.damping.options import Damper
 from truenorth.live.session import Session
 
@@ -61,3 +61,18 @@ def test_lines_to_copy_fit_a_terminal_of_eighty_columns(name):
     kept = [part for part in text.split("\n\n") if "\b" in part]
     assert kept
     assert [line for part in kept for line in part.splitlines() if len(line) > 78] == []
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("48,1", "expected 48.1, with a decimal point"), ("north", "expected a number"), ("1,2,3", "such as 48.1")],
+)
+def test_a_number_that_is_none_says_what_was_meant(given, meant, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr("sys.argv", ["truenorth", "align", "log.csv", "--lat", given])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2
+    said = capsys.readouterr().err
+    assert f"found '{given}'" in said
+    assert meant in said

@@ -37,6 +37,19 @@ def test_nothing_to_part_without_vibration_or_with_a_known_delay():
     assert shaken(turning([SLOW, FAST]), at, WALK, 0.001) is None
 
 
+def test_rows_that_are_lost_shift_nothing():
+    """A tenth of the rows: what is slow stays where it was, to what a straight line over a lost row is worth."""
+    record = turning([SLOW, FAST])
+    keep = np.arange(len(record)) % 10 != 7
+    rows = np.flatnonzero(keep)
+    turned = np.diff(np.append(0.0, np.cumsum(record.gyro[:, 0])[rows]), prepend=0.0)[1:]
+    lost = ImuRecord(record.time[keep], np.outer(turned, [1.0, -0.5, 0.2]), record.accel[keep], "increments")
+    at = np.linspace(10.0, 50.0, 301)
+    found = shaken(lost, at, WALK, 0.05)
+    slow = 0.1 * np.sinc(SLOW / 50.0)
+    np.testing.assert_allclose(found.slow[:, 0], slow * np.cos(2.0 * np.pi * SLOW * at), atol=0.03 * slow)
+
+
 @pytest.mark.slow
 def test_levels_of_shaken_flights():
     """Before, of five such flights one was 2.6 sigmas off and one refused: the vibration told a false arm and delay."""

@@ -131,7 +131,7 @@ def shaken(slave: ImuRecord, times: Array, walk: float, delay_sigma: float) -> S
     edge = 1.0 / (2.0 * math.pi * delay_sigma) if delay_sigma > 0.0 else math.inf  # Hz: a radian of phase
     if 2.0 * edge >= 0.5 / T:
         return None
-    rates = increments(slave)[0] / interval_lengths(slave)[:, None]
+    rates, begins = _even_rates(slave)
     whole = np.fft.rfft(np.concatenate([rates, rates[::-1]]), axis=0)  # there and back: no jump at the ends
     f = np.arange(len(whole)) / (2.0 * len(rates) * T)
     passed = 0.5 * (1.0 + np.cos(math.pi * np.clip(f / edge - 1.0, 0.0, 1.0)))[:, None]
@@ -142,14 +142,26 @@ def shaken(slave: ImuRecord, times: Array, walk: float, delay_sigma: float) -> S
     def at(spectrum: NDArray[np.complex128]) -> Array:
         count = 2 * len(rates) * FINER
         series = np.fft.irfft(spectrum, count, axis=0) * FINER
-        # The mean over an interval is the rate at its middle.
-        begins = slave.time[0] - 0.5 * T
         return np.stack(
             [np.interp(times, begins + np.arange(count // 2) * T / FINER, x[: count // 2]) for x in series.T], 1
         )
 
     slow = whole * passed
     return Shaken(at(slow), at(slow * (2j * math.pi * f)[:, None]), at(beyond), at(-1j * beyond))
+
+
+def _even_rates(slave: ImuRecord) -> tuple[Array, float]:
+    """(N, 3) mean rates over intervals that are all alike, rad/s, and the middle of the first one, s.
+
+    Where rows are lost, what turned in their time is spread over it: rows that are counted without it would put the rest of a log
+    too early.
+    """
+    T = slave.interval
+    knots = np.append(slave.time[0] - interval_lengths(slave)[0], slave.time)
+    turned = np.vstack([np.zeros(3), np.cumsum(increments(slave)[0], axis=0)])
+    even = knots[0] + T * np.arange(round((knots[-1] - knots[0]) / T) + 1)
+    angles = np.stack([np.interp(even, knots, axis) for axis in turned.T], axis=1)
+    return np.diff(angles, axis=0) / T, float(knots[0] + 0.5 * T)
 
 
 def _mean_rate(slave: ImuRecord, times: Array, half: float) -> Array:

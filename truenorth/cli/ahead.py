@@ -93,57 +93,49 @@ def filter_sway() -> None:
     _filtered(SWAY_STATES)
 
 
-def _fine() -> Any:
-    """What an alignment of a swaying base has of nothing, where its evidence is looked for."""
-    from types import SimpleNamespace
-
+def sway() -> None:
+    """What a motion of the base looks like, but for its likelihood: the first process is at that meanwhile."""
     import numpy as np
 
-    from truenorth.filters import filter_gains
+    from truenorth.alignment.motion_likelihood import Series, Walks, parameters
+    from truenorth.errors.sway import AxisMotion, Oscillator
 
-    system, estimates = _filtered(SWAY_STATES)
-    turns = np.tile(np.eye(3), (EPOCHS + 1, 1, 1))
-    integrals = SimpleNamespace(time=np.arange(EPOCHS + 1.0), C_ib=turns)
-    gains, floors = filter_gains(system, estimates), np.zeros((EPOCHS, 3, 3))
-    return SimpleNamespace(
-        system=system, estimates=estimates, gains=gains, floors=floors, integrals=integrals, C_n0_i=np.eye(3)
-    )
+    motion = AxisMotion(1.0, (Oscillator(1, 1.0, 1.0, 0.1),))
+    orders, logs = parameters(motion)
+    Series(np.zeros(16), 1.0, Walks(1.0, 1.0)).expected(orders, logs[None])
+    motion.blocks(1.0)
 
 
 def match() -> None:
     """Gains, and what begins in the log."""
-    import numpy as np
+    from types import SimpleNamespace
 
-    from truenorth.alignment.matched import Signatures, innovations_of, matched
-    from truenorth.filters.gains import initial_part, through
-
-    fine = _fine()
-    K, n, m = EPOCHS, SWAY_STATES, ROWS
-    state, measured, course = np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((K, m, 1))
-    one = Signatures(np.zeros(1, dtype=np.int64), state, measured, np.zeros((1, 1)), state, course)
-    initial_part(fine.gains.step, fine.system.P0)
-    matched(innovations_of(fine), one)
-    through(fine.gains, course)
-
-
-def turn() -> None:
-    """The history in n, and attitude by the gyros alone, held against gravity."""
-    import numpy as np
-
-    from truenorth.alignment.fine import attitude_history
-    from truenorth.strapdown.inertial_integration import integrate_attitude
-
-    attitude_history(_fine(), 0.0)
-    integrate_attitude(np.zeros((EPOCHS, 3)))
-
-
-def see() -> None:
-    """What errors of the sensors make of the measurements: the first process is at that, where it has had to wait."""
     import numpy as np
 
     from truenorth.alignment.bias_step import seen_of
+    from truenorth.alignment.matched import Signatures, innovations_of, matched
+    from truenorth.filters import filter_gains
+    from truenorth.filters.gains import initial_part, through
 
-    seen_of(_fine(), np.zeros((EPOCHS, 6, 1)))
+    system, estimates = _filtered(SWAY_STATES)
+    K, n, m = EPOCHS, SWAY_STATES, ROWS
+    gains = filter_gains(system, estimates)
+    fine: Any = SimpleNamespace(system=system, estimates=estimates, gains=gains)
+    state, measured, course = np.zeros((n, 1)), np.zeros((m, 1)), np.zeros((K, m, 1))
+    one = Signatures(np.zeros(1, dtype=np.int64), state, measured, np.zeros((1, 1)), state, course)
+    initial_part(gains.step, system.P0)
+    matched(innovations_of(fine), one)
+    through(gains, course)
+    seen_of(fine, np.zeros((K, 6, 1)))
+
+
+def turn() -> None:
+    """Attitude by the gyros alone, held against gravity."""
+    import numpy as np
+
+    from truenorth.strapdown.inertial_integration import integrate_attitude
+
+    integrate_attitude(np.zeros((EPOCHS, 3)))
 
 
 def filter_own() -> None:
@@ -154,4 +146,4 @@ def filter_own() -> None:
     _filtered(STATES)
 
 
-JOBS: tuple[Callable[[], None], ...] = (filter_sway, match, turn, see, filter_own)
+JOBS: tuple[Callable[[], None], ...] = (filter_sway, sway, match, turn, filter_own)

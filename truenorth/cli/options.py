@@ -16,6 +16,19 @@ import typer
 from typer.models import ArgumentInfo, OptionInfo
 
 
+def _number(text: str | float) -> float:
+    """A number; what is none is shown, with a point in place of a comma where that makes it one."""
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        meant = f"{float(str(text).replace(',', '.')):g}, with a decimal point"
+    except ValueError:
+        meant = "a number, such as 48.1"
+    raise typer.BadParameter(f"found {str(text)!r}; expected {meant}")
+
+
 def option(help: str, *names: str, panel: str | None = None, **more: Any) -> Any:
     """An option; its names are made from the parameter's where none is given."""
     return typer.Option(*names, help=help, rich_help_panel=panel, **more)
@@ -85,6 +98,9 @@ def _in_panel(hint: Any, panel: str | None, default: Any) -> Any:
     kind, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     infos = [copy(mark) for mark in marks if isinstance(mark, OptionInfo | ArgumentInfo)]
     for info in infos:
+        if kind in (float, float | None):
+            info.parser = _number
+            info.metavar = info.metavar or "<float>"
         info.rich_help_panel = info.rich_help_panel or panel
         info.show_default = info.show_default and default is not None
     return Annotated[kind, *infos] if infos else hint
