@@ -159,7 +159,7 @@ def test_a_master_that_is_late_or_on_another_clock_is_recognised(real, found, of
     slave, master = real
     late = align_transfer(slave, master.shifted(offset))
     assert late.transfer.delay == pytest.approx(offset + found.transfer.delay, abs=1e-3)
-    assert any("the found delay is taken" in reason for reason in late.reasons)
+    assert "the found delay is taken" in late.reasons[1]
     np.testing.assert_allclose(late.C_nb, found.C_nb, atol=2e-4)
 
 

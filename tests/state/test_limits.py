@@ -48,7 +48,7 @@ def test_no_limit_is_missing():
 def test_a_limit_says_why(name):
     value, unit, reason = LIMITS[name]
     assert math.isfinite(value)
-    assert value != 0.0
+    assert value > 0.0
     assert unit
     assert len(reason) > 20
     assert limit(name) == value

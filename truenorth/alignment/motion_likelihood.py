@@ -27,9 +27,8 @@ Orders = NDArray[np.int64]
 
 TREND = 4  # degree of the polynomial that takes what the first fit missed
 LOWEST_BIN = 3  # slower than this is the trend's
-FINER = np.linspace(
-    -1.0, 1.0, 21
-)  # of a grid's spacing: where a line is looked for, three times, each a tenth of the last
+# Of a grid's spacing: where a line is looked for, three times, each a tenth of the last.
+FINER = np.linspace(-1.0, 1.0, 21)
 LINES = 16  # that go through a lane of a filter at once: each is multiplied by all others
 
 

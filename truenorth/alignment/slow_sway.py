@@ -87,7 +87,7 @@ def slow_sway_evidence(
         other = fine if share == 1.0 else _with_less(fine, _smaller(system, motion, duration, share))
         lowest = min(lowest, -2.0 * float(other.estimates.log_likelihood))
         # With the motion as fitted chance finds something in every log: there the usual limit decides.
-        found += [(limit("drift") if share == 1.0 else limit("ruled out"), cause) for cause in causes(other)]
+        found += [(limit("drift") if share == 1.0 else -limit("ruled out"), cause) for cause in causes(other)]
     # Oscillators that were fitted along with what began are not what is left without it. With nothing off they may fit better, too.
     lowest = min(lowest, without(np.zeros_like(system.z))[0])
     for kind in {_kind(cause) for _, cause in found}:

@@ -50,7 +50,7 @@ def poorer_evidence(run: Callable[[ImuSpec], Track], first: Track, spec: ImuSpec
         except DataError:  # the filter broke down: no explanation
             break
         ratio = likelihood_ratio(first.residuals, other.residuals)
-        if ratio < limit("ruled out"):
+        if ratio < -limit("ruled out"):
             break
         found.append(rival("rival.poorer", {"factor": factor}, ratio, moved(first, other), "specification"))
     return sorted(found, key=lambda item: item.effect.level)[-1:]

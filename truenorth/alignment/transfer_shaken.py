@@ -28,6 +28,9 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.errors.master import TransferModel
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.evidence import Effect, Evidence
+from truenorth.state.judge import weight
+from truenorth.state.layout import DV, PHI
+from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
@@ -67,5 +70,9 @@ def shaken_evidence(
             off.append(np.concatenate([phi, other.v_n[-1] - track.v_n[-1]]))
     sizes = np.sqrt(0.5 * np.sum(np.square(off), axis=0))
     effect = Effect(heading=float(sizes[2]), level=float(np.max(sizes[:2])), velocity=float(np.max(sizes[3:])))
+    own = np.sqrt(np.diagonal(track.P[-1]))
+    least = Effect(float(own[PHI][2]), float(np.min(own[PHI][:2])), float(np.min(own[DV])))
+    if weight(effect, least) <= limit("negligible"):  # nothing is added for it: not worth a word
+        return []
     size = float(np.sqrt(np.mean(np.sum(rates.fast**2, axis=1)) * (arm @ arm)))
     return [Evidence("transfer.shaken", {"size": size, "level": effect.level}, "hint", effect)]

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.records import ImuRecord
+from truenorth.state.limits import limit
 from truenorth.strapdown.increments import increments, interval_lengths
 
 Array = NDArray[np.float64]
@@ -30,16 +31,10 @@ INSTANT = 0.85  # variance of the rate at an epoch, of that of a sample (`descri
 HALVES = (0.05, 0.1, 0.2, 0.4, 0.8)  # s, before and after
 SHARE = 0.01  # of what tells the delay, that may be noise
 ASKEW = 5e-4  # s: of a false delay, by what the noise of a spin and of a velocity's arm have in common
-KNOWN, MEAN, UNKNOWN = (
-    0.0,
-    1.0,
-    2.0,
-)  # the acceleration of a velocity row: by the master or the instant, by a mean spin, or not
-
-STANDS_OUT = 2.0  # of the variance of the gyros' own noise: white noise of 1000 rows is within 1.2
-FINER = (
-    4  # points of the fast part a row: a straight line from one to the next is a tone of five rows a period within 1 %
-)
+# The acceleration of a velocity row: by the master or the instant, by a mean spin, or not.
+KNOWN, MEAN, UNKNOWN = 0.0, 1.0, 2.0
+# Points of the fast part a row: a straight line from one to the next is a tone of five rows a period within 1 %.
+FINER = 4
 
 
 class Shaken(NamedTuple):
@@ -136,7 +131,7 @@ def shaken(slave: ImuRecord, times: Array, walk: float, delay_sigma: float) -> S
     f = np.arange(len(whole)) / (2.0 * len(rates) * T)
     passed = 0.5 * (1.0 + np.cos(math.pi * np.clip(f / edge - 1.0, 0.0, 1.0)))[:, None]
     beyond = whole * (1.0 - passed)
-    if float(np.mean(np.abs(beyond[1:]) ** 2)) < STANDS_OUT * 2.0 * len(rates) * walk**2 / T:
+    if float(np.mean(np.abs(beyond[1:]) ** 2)) < limit("vibrates") * 2.0 * len(rates) * walk**2 / T:
         return None
 
     def at(spectrum: NDArray[np.complex128]) -> Array:

@@ -320,6 +320,6 @@ def _good(answer: Alignment, sigma: float, floor: float, level: float) -> list[E
         found.append(note(key, pays_until=answer.pays_until, duration=answer.duration))
     if answer.near_vertical:
         found.append(note("heading.vertical"))
-    if answer.C_nb[2, 2] < limit("upside down"):
+    if -answer.C_nb[2, 2] > limit("upside down"):
         found.append(note("level.upside_down"))
     return found

@@ -171,7 +171,7 @@ def _climb(
         gained = ratio - max(least, 0.0)
         if gained > limit("rival"):
             found.append(Rival(gained, f"rival.{sensor}_wanders", {"size": size * sigma}, _effect(first, other)))
-        elif ratio < before + limit("ruled out"):
+        elif ratio < before - limit("ruled out"):
             break
         before = max(ratio, before)
     return found

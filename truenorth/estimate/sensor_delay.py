@@ -93,7 +93,7 @@ def _likelier(
     for sign in (1, -1):
         for size in LADDER:
             rows = at + sign * max(1, round(size / record.interval))
-            if 2 * abs(rows) >= len(record) or tried(rows) < limit("ruled out"):
+            if 2 * abs(rows) >= len(record) or tried(rows) < -limit("ruled out"):
                 break
     tried(_peak(ratios, max(ratios, key=ratios.__getitem__)))  # which may stand out where no rung of the ladder does
     best = max(ratios, key=ratios.__getitem__)

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 STRETCHES = 32  # of the log
 SHORTEST = 32  # rows of one
-PARTS, STEADY = 8, 0.5  # parts of the log that must all agree, and how far they may scatter, of their mean
+PARTS = 8  # of the log, that must all agree
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
@@ -61,9 +61,7 @@ def turn_in_turn(record: ImuRecord) -> float:
     counter = max(_step(x) for x in columns)
     shows, expected = z @ theta, np.einsum("i,kij,j->k", theta, A, theta)
     size = float(np.linalg.norm(theta))
-    left = np.mean(
-        q - np.cross(theta, f), axis=1
-    )  # of each stretch: a vibration alternates where no force is turned, too
+    left = np.mean(q - np.cross(theta, f), axis=1)  # a vibration alternates where no force is turned, too
     explains = float(np.sum(left**2)) < float(expected.sum()) / q.shape[1]
     return size if size * force > COUNTS * counter and explains and _shown(shows, expected) else 0.0
 
@@ -90,7 +88,7 @@ def _keeps(means: Array) -> bool:
     """Whether means of stretches have a mean beyond chance, and all parts of the log have it."""
     size, spread = float(means.mean()), float(means.std(ddof=1))
     parts = means.reshape(PARTS, -1).mean(axis=1)
-    steady = float(parts.std()) < STEADY * abs(size) and bool(np.all(parts * size > 0.0))
+    steady = float(parts.std()) < limit("alternates alike") * abs(size) and bool(np.all(parts * size > 0.0))
     return steady and abs(size) > limit("alternates") * spread / math.sqrt(len(means))
 
 
@@ -105,7 +103,7 @@ def _shown(shows: Array, expected: Array) -> bool:
         return False
     part = (PARTS * (np.cumsum(expected) - 0.5 * expected) / total).astype(np.int64)
     sums = np.bincount(part, shows, PARTS) / np.maximum(np.bincount(part, expected, PARTS), 1e-300)
-    steady = float(sums.std()) < STEADY and bool(np.all(sums > 0.0))
+    steady = float(sums.std()) < limit("alternates alike") and bool(np.all(sums > 0.0))
     n = len(shows)
     return steady and float(shows.sum()) > limit("alternates") * math.sqrt(
         n / (n - 1) * float(np.sum((shows - expected) ** 2))

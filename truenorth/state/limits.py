@@ -220,11 +220,19 @@ LIMITS: dict[str, Limit] = {
     "one delay": Limit(
         0.3, "of the delay", "that it may differ by between axes: a base's own motion hides or adds a part about each"
     ),
+    "vibrates": Limit(
+        2.0,
+        "variance of the gyros' noise",
+        "of rates beyond what a delay tells: white noise of 1000 rows is within 1.2",
+    ),
     "clearer encoder": Limit(
         4.0, "1", "times smaller squares of the base's turns that another reading of the angles must leave to be named"
     ),
     "alternates": Limit(
         8.0, "sigma", "of the mean of all stretches: chance gives as many once in 10^8 channels (Student's t)"
+    ),
+    "alternates alike": Limit(
+        0.5, "of the mean", "scatter of the parts of a log, which must all agree: a vibration fades"
     ),
     "alternating turn": Limit(
         0.05, "of the strongest direction", "turns about a gravity that hardly moves are not seen"
@@ -248,7 +256,7 @@ LIMITS: dict[str, Limit] = {
     "fastest base": Limit(
         10.0, "m/s", "RMS of sway and arm together: no ship or vehicle that stays moves its IMU faster"
     ),
-    "upside down": Limit(-0.5, "1", "cosine between z and up, below which z points down"),
+    "upside down": Limit(0.5, "1", "cosine between z and down, above which z points down"),
     "master's gate": Limit(1e-6, "1", "probability of rejecting a sound row of a master: of 10,000 rows none"),
     "tied": Limit(0.95, "1", "correlation of two states beyond which one is not known without the other"),
     # ---- velocity logs of damping
@@ -266,9 +274,9 @@ LIMITS: dict[str, Limit] = {
         1e-4, "1", "probability of rejecting a sound measurement: few enough to cost nothing, and outliers are far out"
     ),
     "ruled out": Limit(
-        -3.0,
+        3.0,
         "1",
-        "twice the log of a likelihood ratio, below which a walk of a bias is ruled out; larger walks are ruled out more",
+        "twice the log of a likelihood ratio, by which a log must be against a walk of a bias to rule it out, and larger ones",
     ),
     "small angles": Limit(10.0, "sigma a priori", "beyond it a small-angle model does not hold"),
 }
