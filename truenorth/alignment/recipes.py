@@ -19,7 +19,6 @@ from truenorth.core.position import Position
 from truenorth.records import ImuRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.specs import ImuSpec
-from truenorth.state.mounting import Mounting
 
 
 @dataclass(frozen=True)
@@ -177,11 +176,10 @@ def in_motion(r: Request) -> Alignment:
 
 def by_master(r: Request) -> Alignment:
     """Against a master INS on the same vehicle."""
-    from truenorth.alignment.transfer import DELAY_SIGMA, LEVER_ARM_SIGMA, MOUNTING_SIGMA, align_transfer
+    from truenorth.alignment.transfer import ON_MASTER, align_transfer
 
     master = r.aids[Master]
-    usual = Mounting(lever_arm_sigma=LEVER_ARM_SIGMA, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
-    m = master.mounting or usual
+    m = master.mounting or ON_MASTER
     return align_transfer(
         r.record,
         master.record,

@@ -51,12 +51,15 @@ from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
 from truenorth.state.layout import ACCEL_AXES
 from truenorth.state.limits import limit
+from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
 
 LEVER_ARM_SIGMA, DELAY_SIGMA, MOUNTING_SIGMA = 1.0, 0.05, math.radians(3.0)  # m, s, rad
+# Of an IMU of whose place on the master's vehicle nothing is said.
+ON_MASTER = Mounting(lever_arm_sigma=LEVER_ARM_SIGMA, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
 DELAY_WALK = 1e-4  # s/sqrt(s): clocks of two boxes part by a millisecond in 100 s
 PASSES = 3  # that fit the noise of the master's rows, and the attitude to linearise with
 PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers

@@ -15,7 +15,7 @@ from truenorth.alignment import align
 from truenorth.alignment.in_motion_task import WHEEL as ON_WHEEL
 from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.result import Alignment
-from truenorth.alignment.transfer import DELAY_SIGMA, LEVER_ARM_SIGMA, MOUNTING_SIGMA
+from truenorth.alignment.transfer import ON_MASTER
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
 from truenorth.navigation import navigate
@@ -216,7 +216,6 @@ def _attitude(i: Inputs) -> Alignment:
     return align(i["record"], imu=i["imu"], aid=[Master(i["master"], i["mounting"], matching="both")])
 
 
-ON_MASTER = Mounting(lever_arm_sigma=LEVER_ARM_SIGMA, angle_sigma=MOUNTING_SIGMA, latency_sigma=DELAY_SIGMA)
 BENCHES: dict[str, Bench] = {
     bench.name: bench
     for bench in (

@@ -2,35 +2,55 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from truenorth.cli.fields import (
+    angles,
+    arm,
+    arm_to_imu,
+    axes,
+    bending,
+    degrees,
+    given,
+    known_latency,
+    plain,
+    quantity,
+    quantity_and_time,
+    second_antenna,
+    sets,
+)
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from truenorth.records.flexure import FlexureSpec
-    from truenorth.state.mounting import Mounting
-
 GYROS = "gyros"
 
-
-IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first.")]
+IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first."), sets("indexer", axes)]
 IndexerSigma = Annotated[
     str,
     option("One-sigma error of the indexer's own angles and axes: '10 arcsec'; the body's attitude has it in full."),
+    sets("indexer", quantity("angle_sigma", "angle")),
 ]
 Baseline = Annotated[
     str | None,
     option(
         "Direction of the second GNSS antenna from the first on the vehicle, and its one sigma, deg; '0,1' without it."
     ),
+    sets("antenna", second_antenna),
 ]
-
+KnownLatency = Annotated[
+    float | None,
+    option("GNSS measurements are older than their stamps by this, s; estimated without it."),
+    sets("antenna", known_latency),
+]
+OdometerNoise = Annotated[
+    float | None, option("One-sigma noise of the odometer's speed, m/s."), sets("odometer", plain("noise"))
+]
+Errors = Annotated[list[str] | None, option("Error states of a plug-in, by name; more than one by repeating it.")]
 
 Offset = Annotated[
     str | None,
@@ -63,22 +83,6 @@ def shifted(aids: Sequence[Any], offset: str | None) -> list[Any]:
     return [replace(aid, record=aid.record.shifted(late[aid.key])) if aid.key in late else aid for aid in aids]
 
 
-def arm_of(text: str, option: str) -> Any:
-    """A lever arm: right, forward, up, m."""
-    import numpy as np
-
-    return np.array(numbers_of(text, option, 3, "right,forward,up in metres"))
-
-
-def angles_of(text: str) -> Any:
-    """``C_mb`` of --mounting."""
-    from truenorth.state.mounting import mounting_angles
-
-    return mounting_angles(
-        *(math.radians(x) for x in numbers_of(text, "--mounting", 3, "heading,pitch,roll in degrees"))
-    )
-
-
 @dataclass(frozen=True)
 class Turntable:
     """Options of an alignment on a turntable."""
@@ -87,7 +91,9 @@ class Turntable:
     positions: Annotated[
         str | None, option("auto: a turntable takes the IMU from position to position; turns are found in the gyros.")
     ] = None
-    arm_sigma: Annotated[float, option("How far the IMU may sit from the table's axes, m.")] = 0.05
+    arm_sigma: Annotated[
+        float, option("How far the IMU may sit from the table's axes, m."), sets("positions", plain("arm_sigma"))
+    ] = 0.05
     advise: Annotated[
         float | None,
         option(
@@ -104,7 +110,7 @@ class Turntable:
             return []
         if self.positions != "auto":
             raise UsageError(f"--positions {self.positions!r}; expected auto: turns and positions are found in the log")
-        return [Positions(self.arm_sigma)]
+        return [Positions(**given(self, "positions"))]
 
 
 @dataclass(frozen=True)
@@ -123,24 +129,18 @@ class OnIndexer:
         option(
             "Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it."
         ),
+        sets("indexer", arm_to_imu),
+        sets("on master", arm_to_imu),
     ] = None
-
-    @property
-    def arm(self) -> Any:
-        """From the IMU to the centre or the master, which is the library's sense; None: not given."""
-        return None if self.lever_arm is None else -arm_of(self.lever_arm, "--lever-arm")
 
     def aids(self) -> list[Any]:
         """The indexer, where one is named."""
         from truenorth.aiding.aids import Indexer
-        from truenorth.core.units import parse
         from truenorth.formats import read_encoder
 
         if self.indexer is None:
             return []
-        encoder = None if self.indexer == GYROS else read_encoder(self.indexer)
-        axes = tuple(self.indexer_axes.replace(" ", "").lower().replace(",", ""))
-        return [Indexer(encoder, axes, self.arm, parse(self.indexer_sigma, "angle"))]
+        return [Indexer(None if self.indexer == GYROS else read_encoder(self.indexer), **given(self, "indexer"))]
 
 
 @dataclass(frozen=True)
@@ -157,14 +157,20 @@ class ByMaster:
     matching: Annotated[
         str,
         option("What is matched: auto, velocity, attitude or both; position, acceleration, or either with +attitude."),
+        sets("master", plain("matching")),
     ] = "auto"
     delay: Annotated[
         str | None,
         option(
             "By which the master's stamps are late: '30 ms', or with its uncertainty '30 ms,5 ms'; 0 and 50 ms without it."
         ),
+        sets("on master", quantity_and_time("latency", "time", "latency_sigma")),
     ] = None
-    lever_arm_sigma: Annotated[float, option("What --lever-arm (master to IMU) is uncertain by, m; 0: known.")] = 1.0
+    lever_arm_sigma: Annotated[
+        float,
+        option("What --lever-arm (master to IMU) is uncertain by, m; 0: known."),
+        sets("on master", plain("lever_arm_sigma")),
+    ] = 1.0
     master_sigma: Annotated[
         str | None,
         option(
@@ -172,34 +178,29 @@ class ByMaster:
             "velocity=0.05 m/s'; without it what its log says (sigma_heading .. sigma_VU). With neither, or none, the master is "
             "taken for the truth, and sigma is against it."
         ),
+        sets("master", plain("errors")),
     ] = None
     flexure: Annotated[
-        str | None, option("The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time.")
+        str | None,
+        option("The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time."),
+        sets("master", bending),
     ] = None
 
-    def aids(self, arm: Any, mounting: str | None, mounting_sigma: float) -> list[Any]:
-        """The master, where one is named; `arm` from the IMU to it."""
+    def aids(self, *others: Any) -> list[Any]:
+        """The master, where one is named; `others` are groups that say of its mounting, too."""
         if self.master is None:
             return []
-        import numpy as np
+        from dataclasses import replace
 
         from truenorth.aiding.aids import Master
-        from truenorth.alignment.transfer import DELAY_SIGMA
+        from truenorth.alignment.transfer import ON_MASTER
         from truenorth.formats import read_master
-        from truenorth.state.mounting import Mounting
 
-        late, late_sigma = _delay(self.delay, DELAY_SIGMA)
-        mounted = Mounting(
-            lever_arm=np.zeros(3) if arm is None else arm,
-            lever_arm_sigma=self.lever_arm_sigma,
-            C_mb=np.eye(3) if mounting is None else angles_of(mounting),
-            angle_sigma=math.radians(mounting_sigma),
-            latency=late,
-            latency_sigma=late_sigma,
-        )
+        mounted = ON_MASTER
+        for group in (self, *others):
+            mounted = replace(mounted, **given(group, "on master"))
         record = read_master(self.master, columns=self.master_columns, units=self.master_units)
-        flexure = None if self.flexure is None else _flexure(self.flexure)
-        return [Master(record, mounted, self.matching, flexure, self.master_sigma)]  # type: ignore[arg-type]  # checked there, with the choices
+        return [Master(record, mounted, **given(self, "master"))]
 
 
 @dataclass(frozen=True)
@@ -222,29 +223,36 @@ class OnTheMove:
     wheel_arm: Annotated[
         str | None,
         option("IMU to the odometer's wheel or the velocity log, m: right,forward,up; estimated without it."),
+        sets("wheel", arm),
     ] = None
-    antenna_arm: Annotated[str | None, option("IMU to the GNSS antenna, m: right,forward,up.")] = None
-    latency: Annotated[
-        float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
+    antenna_arm: Annotated[
+        str | None, option("IMU to the GNSS antenna, m: right,forward,up."), sets("antenna", arm)
     ] = None
+    latency: KnownLatency = None
     baseline: Baseline = None
     mounting: Annotated[
-        str | None, option("Heading,pitch,roll of the IMU against the vehicle (or the master), deg.")
+        str | None,
+        option("Heading,pitch,roll of the IMU against the vehicle (or the master), deg."),
+        sets("wheel", angles),
+        sets("on master", angles),
     ] = None
-    mounting_sigma: Annotated[float, option("How far off those may be, one sigma, deg; estimated.")] = 3.0
-    odometer_noise: Annotated[float | None, option("One-sigma noise of the odometer's speed, m/s.")] = None
-    error: Annotated[list[str] | None, option("Error states of a plug-in, by name; more than one by repeating it.")] = (
-        None
-    )
+    mounting_sigma: Annotated[
+        float,
+        option("How far off those may be, one sigma, deg; estimated."),
+        sets("wheel", degrees("angle_sigma")),
+        sets("on master", degrees("angle_sigma")),
+    ] = 3.0
+    odometer_noise: OdometerNoise = None
+    error: Errors = None
 
     @property
-    def given(self) -> bool:
+    def named(self) -> bool:
         """Whether a sensor of motion is named."""
         return any(log is not None for log in (self.odometer, self.gnss, self.velocity))
 
     def aids(self) -> list[Any]:
         """Odometer, velocity log and GNSS, where they are named."""
-        if not self.given:
+        if not self.named:
             return []
         from dataclasses import replace
 
@@ -256,55 +264,12 @@ class OnTheMove:
         if not self.mounting_sigma > 0.0:
             raise UsageError(f"--mounting-sigma {self.mounting_sigma:g}: expected degrees above zero")
         found: list[Any] = []
-        wheel = replace(WHEEL, angle_sigma=math.radians(self.mounting_sigma))
-        if self.mounting is not None:
-            wheel = replace(wheel, C_mb=angles_of(self.mounting))
-        if self.wheel_arm is not None:
-            wheel = replace(wheel, lever_arm=arm_of(self.wheel_arm, "--wheel-arm"), lever_arm_sigma=0.0)
+        wheel = replace(WHEEL, **given(self, "wheel"))
         if self.odometer is not None:
-            counted = replace(wheel, noise=self.odometer_noise)
-            found.append(Odometer(read_odometer(self.odometer), counted))
+            found.append(Odometer(read_odometer(self.odometer), replace(wheel, **given(self, "odometer"))))
         if self.velocity is not None:
             found.append(VelocityLog(read_velocity(self.velocity), wheel))
         if self.gnss is not None:
             receiver = read_gnss(self.gnss)
-            antenna = usual_antenna(receiver)
-            if self.antenna_arm is not None:
-                antenna = replace(antenna, lever_arm=arm_of(self.antenna_arm, "--antenna-arm"))
-            if self.latency is not None:
-                antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
-            found.append(Gnss(receiver, on_baseline(antenna, self.baseline)))
+            found.append(Gnss(receiver, replace(usual_antenna(receiver), **given(self, "antenna"))))
         return found
-
-
-def on_baseline(antenna: Mounting, baseline: str | None) -> Mounting:
-    """The antenna with the direction of a second one."""
-    from dataclasses import replace
-
-    from truenorth.aiding.aids import BASELINE
-    from truenorth.state.mounting import mounting_angles
-
-    if baseline is None:
-        return replace(antenna, angle_sigma=BASELINE)
-    angle, sigma = (math.radians(x) for x in numbers_of(baseline, "--baseline", 2, "heading and one sigma in degrees"))
-    return replace(antenna, C_mb=mounting_angles(-angle), angle_sigma=sigma)
-
-
-def _delay(text: str | None, usual: float) -> tuple[float, float]:
-    from truenorth.core.units import parse
-
-    if text is None:
-        return 0.0, usual
-    first, _, second = text.partition(",")
-    return parse(first, "time"), parse(second, "time") if second.strip() else usual
-
-
-def _flexure(text: str) -> FlexureSpec:
-    from truenorth.core.errors import UsageError
-    from truenorth.core.units import parse
-    from truenorth.records.flexure import FlexureSpec
-
-    first, comma, second = text.partition(",")
-    if not comma:
-        raise UsageError(f"--flexure {text!r}: expected an angle and a time, such as '3 arcmin,5 s'")
-    return FlexureSpec(sigma=(parse(first, "angle"),) * 3, correlation_time=parse(second, "time"))

@@ -85,7 +85,7 @@ def align(
 ) -> None:
     """Find pitch, roll and true heading of an IMU: still, swaying, turned on purpose, on the move, or against a master."""
     check_options(context)
-    aided = (moving.given, pointing.given, master.master, table.positions, indexer.indexer)
+    aided = (moving.named, pointing.named, master.master, table.positions, indexer.indexer)
     if not any(aided):
         compile_ahead()  # before what takes time to import
 
@@ -98,7 +98,7 @@ def align(
     from truenorth.records.calibration import Calibration
 
     place = where.position()
-    if place is None and not moving.given and master.master is None:
+    if place is None and not moving.named and master.master is None:
         raise UsageError(
             "the latitude is missing; expected --lat DEGREES, or --gnss FILE or --master FILE with positions"
         )
@@ -108,7 +108,7 @@ def align(
     with stages(quiet=as_json) as tell:
         tell(f"reading {log.name}")
         record = reading.read(log)
-        if imu is None and moving.given and master.master is None:
+        if imu is None and moving.named and master.master is None:
             raise UsageError(
                 "on the move the errors of the IMU cannot be found from the log; expected --imu navigation, tactical, industrial, "
                 "consumer or a YAML file"
@@ -116,8 +116,8 @@ def align(
         found = moving.aids() if master.master is None else []
         start = _first_place(record, found)
         aids: list[Any] = [
-            *master.aids(indexer.arm, moving.mounting, moving.mounting_sigma),
-            *shifted([*found, *(pointing.aids(record, place or start) if pointing.given else [])], moving.offset),
+            *master.aids(indexer, moving),
+            *shifted([*found, *(pointing.aids(record, place or start) if pointing.named else [])], moving.offset),
             *table.aids(),
             *indexer.aids(),
         ]

@@ -3,30 +3,48 @@
 from __future__ import annotations
 
 import datetime as dt
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from truenorth.cli.fields import Fields, angles_with_sigma, given, sets
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
 if TYPE_CHECKING:
     from truenorth.core.position import Position
     from truenorth.records import ImuRecord
-    from truenorth.state.mounting import Mounting
+
+
+def attitude_sigmas(text: str, option: str) -> Fields:
+    """Noise, slow error and its time of an attitude."""
+    import numpy as np
+
+    said = numbers_of(text, option, 3 if text.count(",") == 2 else 1, "deg, or deg,deg,s")
+    return dict(zip(("noise", "slow", "slow_time"), [*np.radians(said[:2]).tolist(), *said[2:]]))
+
+
+def iron(text: str, option: str) -> Fields:
+    """Hard and soft iron."""
+    parts = numbers_of(text, option, 2, "hard,soft in % of the earth's field")
+    return dict(zip(("hard_iron", "soft_iron"), (0.01 * x for x in parts)))
+
 
 AttitudeSigma = Annotated[
     str | None,
     option("Its one-sigma noise; and its slow error, and the time of that: '0.1' or '0.1,0.3,300', deg and s."),
+    sets("attitude", attitude_sigmas),
 ]
 AttitudeMounting = Annotated[
-    str | None, option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg.")
+    str | None,
+    option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg."),
+    sets("attitude", angles_with_sigma),
 ]
 MagnetometerAxes = Annotated[str | None, option("Where its x, y and z point, such as FRD; RFU without it.")]
 MagnetometerIron = Annotated[
     str | None,
     option("One sigma of hard and soft iron, % of the earth's field; '10,3' (not calibrated) without it."),
+    sets("magnetometer", iron),
 ]
 
 FIRST_DATE = 1e9  # s since 1970: a clock beyond it holds dates
@@ -50,7 +68,7 @@ class OfAttitude:
     date: Annotated[str | None, option("Of the log, YYYY-MM-DD; its clock's own where that counts from 1970.")] = None
 
     @property
-    def given(self) -> bool:
+    def named(self) -> bool:
         """Whether a sensor is named."""
         return self.attitude is not None or self.magnetometer is not None
 
@@ -64,8 +82,7 @@ class OfAttitude:
 
         if self.attitude is None:
             return []
-        sigmas, mounting = attitude_sigmas(self.attitude_sigma), attitude_mounting(self.attitude_mounting)
-        return [Attitude(read_master(self.attitude), mounting=mounting, **sigmas)]
+        return [Attitude(read_master(self.attitude), **of_attitude(self))]
 
     def _magnetometer(self, record: ImuRecord, place: Position | None) -> list[Any]:
         from truenorth.aiding.magnetometer import Magnetometer, earth_field
@@ -82,40 +99,24 @@ class OfAttitude:
             date = dt.datetime.fromtimestamp(float(record.time[0]), dt.UTC).date()
         else:
             raise UsageError("--magnetometer without a date; expected --date YYYY-MM-DD: north of the needle moves")
-        iron = iron_of(self.magnetometer_iron)
         log = read_magnetometer(self.magnetometer, axes=self.magnetometer_axes)
-        return [Magnetometer(log, earth_field(place, date), **iron)]
+        return [Magnetometer(log, earth_field(place, date), **given(self, "magnetometer"))]
 
 
-def attitude_sigmas(text: str | None) -> dict[str, float]:
-    """Noise, slow error and its time of an attitude, as `--attitude-sigma` says them."""
-    import numpy as np
+def of_attitude(group: Any) -> Fields:
+    """What a group of options says of another system's attitude.
 
+    Raises
+    ------
+    UsageError
+        It does not say how good that is.
+    """
     from truenorth.core.errors import UsageError
 
-    if text is None:
+    said = given(group, "attitude")
+    if "noise" not in said:
         raise UsageError("--attitude without --attitude-sigma; expected how good it is, such as 0.1, or 0.1,0.3,300")
-    given = numbers_of(text, "--attitude-sigma", 3 if text.count(",") == 2 else 1, "deg, or deg,deg,s")
-    return dict(zip(("noise", "slow", "slow_time"), [*np.radians(given[:2]).tolist(), *given[2:]]))
-
-
-def attitude_mounting(text: str | None) -> Mounting:
-    """How that system sits, as `--attitude-mounting` says it."""
-    from truenorth.state.mounting import Mounting, mounting_angles
-
-    if text is None:
-        return Mounting()
-    angles = numbers_of(text, "--attitude-mounting", 4, "heading,pitch,roll,sigma in degrees")
-    *sits, sigma = (math.radians(x) for x in angles)
-    return Mounting(C_mb=mounting_angles(*sits), angle_sigma=sigma)
-
-
-def iron_of(text: str | None) -> dict[str, Any]:
-    """Hard and soft iron, as `--magnetometer-iron` says them; nothing where it says nothing."""
-    if text is None:
-        return {}
-    parts = numbers_of(text, "--magnetometer-iron", 2, "hard,soft in % of the earth's field")
-    return dict(zip(("hard_iron", "soft_iron"), (0.01 * x for x in parts)))
+    return said
 
 
 def date_of(text: str) -> dt.date:

@@ -6,17 +6,16 @@ import datetime as dt
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.aiding_options import GYROS, Baseline, IndexerAxes, IndexerSigma
+from truenorth.cli.aiding_options import GYROS, Baseline, IndexerAxes, IndexerSigma, KnownLatency
 from truenorth.cli.attitude_options import (
     AttitudeMounting,
     AttitudeSigma,
     MagnetometerAxes,
     MagnetometerIron,
-    attitude_mounting,
-    attitude_sigmas,
     date_of,
-    iron_of,
+    of_attitude,
 )
+from truenorth.cli.fields import arm, given, plain, sets
 from truenorth.cli.options import option
 
 if TYPE_CHECKING:
@@ -44,23 +43,20 @@ class Turned:
 
     def feeds(self) -> list[Feed]:
         """The encoder."""
-        from truenorth.core.units import parse
         from truenorth.live.indexer_feed import IndexerFeed
 
-        sigma = parse(self.indexer_sigma, "angle")
-        return [IndexerFeed(axes_of(self.indexer_axes), angle_sigma=sigma)] if self.sources() else []
+        return [IndexerFeed(**given(self, "indexer"))] if self.sources() else []
 
     def turner(self) -> Turner | None:
         """A turntable, or an indexer without an encoder."""
         from truenorth.aiding.aids import Indexer
         from truenorth.cli.aiding_options import Turntable
         from truenorth.core.errors import UsageError
-        from truenorth.core.units import parse
 
         if self.positions is not None and self.indexer is not None:
             raise UsageError("--positions and --indexer: expected one thing that turns the IMU")
         if self.indexer == GYROS:
-            return Indexer(None, axes_of(self.indexer_axes), angle_sigma=parse(self.indexer_sigma, "angle"))
+            return Indexer(None, **given(self, "indexer"))
         return next(iter(Turntable(self.positions).aids()), None)
 
 
@@ -75,7 +71,9 @@ class Aids:
     baro: Annotated[str | None, option("Source of heights: CSV; in navigation.")] = None
     master: Annotated[str | None, option("Source of another INS's solution on the same vehicle: CSV.")] = None
     master_sigma: Annotated[
-        str | None, option("Slow errors of that solution: navigation or tactical; without it what its rows say.")
+        str | None,
+        option("Slow errors of that solution: navigation or tactical; without it what its rows say."),
+        sets("master", plain("errors")),
     ] = None
     magnetometer: Annotated[
         str | None, option("Source of a magnetometer's rows: CSV or a device; on the move and in navigation.")
@@ -88,10 +86,8 @@ class Aids:
     ] = None
     attitude_sigma: AttitudeSigma = None
     attitude_mounting: AttitudeMounting = None
-    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up.")] = None
-    latency: Annotated[
-        float | None, option("GNSS measurements are older than their stamps by this, s; estimated without it.")
-    ] = None
+    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up."), sets("antenna", arm)] = None
+    latency: KnownLatency = None
     baseline: Baseline = None
 
     def sources(self) -> dict[str, str]:
@@ -111,7 +107,7 @@ class Aids:
             elif key == "attitude":
                 found.append(self._attitude())
             elif key == "master":
-                found.append(MasterFeed(errors=self.master_sigma))
+                found.append(MasterFeed(**given(self, "master")))
             else:
                 found.append(FEEDS[key]())
             if key == "gnss":
@@ -122,16 +118,9 @@ class Aids:
         from dataclasses import replace
 
         from truenorth.alignment.in_motion_task import usual_antenna
-        from truenorth.cli.aiding_options import arm_of, on_baseline
 
-        if self.lever_arm is None and self.latency is None and self.baseline is None:
-            return None
-        antenna = usual_antenna(None)
-        if self.lever_arm is not None:
-            antenna = replace(antenna, lever_arm=arm_of(self.lever_arm, "--lever-arm"))
-        if self.latency is not None:
-            antenna = replace(antenna, latency=self.latency, latency_sigma=0.0)
-        return on_baseline(antenna, self.baseline)
+        said = given(self, "antenna")
+        return replace(usual_antenna(None), **said) if said else None
 
     def _magnetometer(self, place: Position | None, imu_source: str) -> Feed:
         from truenorth.aiding.magnetometer import earth_field
@@ -143,17 +132,10 @@ class Aids:
         if self.date is None and imu_source.startswith("replay:"):
             raise UsageError("--magnetometer without a date; expected --date YYYY-MM-DD of the log that is replayed")
         date = dt.datetime.now(dt.UTC).date() if self.date is None else date_of(self.date)
-        return MagnetometerFeed(
-            earth_field(place, date), axes=self.magnetometer_axes, **iron_of(self.magnetometer_iron)
-        )
+        field = earth_field(place, date)
+        return MagnetometerFeed(field, axes=self.magnetometer_axes, **given(self, "magnetometer"))
 
     def _attitude(self) -> Feed:
         from truenorth.live.attitude_feeds import AttitudeFeed
 
-        sigmas = attitude_sigmas(self.attitude_sigma)
-        return AttitudeFeed(**sigmas, mounting=attitude_mounting(self.attitude_mounting))
-
-
-def axes_of(text: str) -> tuple[str, ...]:
-    """Axes of an indexer, such as ``z,x``."""
-    return tuple(text.replace(" ", "").lower().replace(",", ""))
+        return AttitudeFeed(**of_attitude(self))

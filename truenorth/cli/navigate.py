@@ -14,6 +14,7 @@ import typer
 from truenorth.cli.aiding_options import shifted
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import in_reader_s_words, make_console, print_written, stages
+from truenorth.cli.fields import given, plain, sets
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Calibrated, Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
@@ -51,7 +52,7 @@ Exit codes: 0 navigated; 2 wrong usage; 3 bad data; 4 no usable heading, or a tr
 
 @dataclass(frozen=True)
 class Damping:
-    """Options of damping; their names are those of :class:`truenorth.damping.Damper`, with a prefix."""
+    """Options of damping."""
 
     PANEL: ClassVar = "Damping"
     damping: Annotated[
@@ -59,29 +60,30 @@ class Damping:
         option(
             "Damp a free INS at sea: none, internal, external, kalman, double or augmented; --velocity is the reference."
         ),
+        sets("damping", plain("method")),
     ] = None
-    damping_ratio: Annotated[float, option("Of the networks (internal, external).")] = 0.5
-    damping_order: Annotated[int, option("Of the networks: 1 or 2.")] = 2
-    azimuth_damping: Annotated[float, option("Ratio for the 24 h oscillation (external); 0: none.")] = 0.0
-    damping_start: Annotated[float, option("Seconds after the start, when it is switched on.")] = 0.0
-    damping_ramp: Annotated[float, option("Seconds in which a network is switched on.")] = 0.0
-    damping_switching: Annotated[bool, option("Internal damping is switched off in manoeuvres.")] = True
+    damping_ratio: Annotated[
+        float, option("Of the networks (internal, external)."), sets("damping", plain("ratio"))
+    ] = 0.5
+    damping_order: Annotated[int, option("Of the networks: 1 or 2."), sets("damping", plain("order"))] = 2
+    azimuth_damping: Annotated[
+        float, option("Ratio for the 24 h oscillation (external); 0: none."), sets("damping", plain("azimuth"))
+    ] = 0.0
+    damping_start: Annotated[
+        float, option("Seconds after the start, when it is switched on."), sets("damping", plain("start"))
+    ] = 0.0
+    damping_ramp: Annotated[
+        float, option("Seconds in which a network is switched on."), sets("damping", plain("ramp"))
+    ] = 0.0
+    damping_switching: Annotated[
+        bool, option("Internal damping is switched off in manoeuvres."), sets("damping", plain("switching"))
+    ] = True
 
     def damper(self) -> Damper | None:
         """The method; None: no damping."""
         from truenorth.damping.options import Damper
 
-        if self.damping is None:
-            return None
-        return Damper(
-            self.damping,  # type: ignore[arg-type]  # checked there, with the choices in the message
-            ratio=self.damping_ratio,
-            order=self.damping_order,  # type: ignore[arg-type]
-            azimuth=self.azimuth_damping,
-            start=self.damping_start,
-            ramp=self.damping_ramp,
-            switching=self.damping_switching,
-        )
+        return None if self.damping is None else Damper(**given(self, "damping"))
 
 
 @dataclass(frozen=True)

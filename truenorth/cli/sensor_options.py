@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.aiding_options import Baseline, Offset, angles_of, arm_of, on_baseline
+from truenorth.cli.aiding_options import Baseline, Errors, OdometerNoise, Offset
+from truenorth.cli.fields import Fields, Read, angles, arm, given, plain, quantity, quantity_and_time, sets
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
@@ -20,6 +21,38 @@ if TYPE_CHECKING:
 
 PARTS = ("scale", "mounting", "lever_arm", "latency", "scale_factors")
 SIGMAS = {"scale": 0.05, "mounting": math.radians(5.0), "lever_arm": 2.0, "latency": 0.3}
+
+
+def parts_of(text: str | None, option: str) -> set[str]:
+    """Names of what is estimated.
+
+    Raises
+    ------
+    UsageError
+        One that is not of `PARTS`.
+    """
+    from truenorth.core.errors import UsageError
+
+    parts = {part.strip().replace("-", "_") for part in text.split(",")} if text else set()
+    if unknown := parts - set(PARTS):
+        raise UsageError(f"{option} {min(unknown)!r} is not known; choose of {', '.join(PARTS)}")
+    return parts
+
+
+def estimated(*names: str) -> Read:
+    """Sigmas of those of `names` that are to be estimated."""
+    fields = {name: "angle_sigma" if name == "mounting" else f"{name}_sigma" for name in names}
+    return lambda text, option: {fields[part]: SIGMAS[part] for part in names if part in parts_of(text, option)}
+
+
+def drift_of_places(text: str, option: str) -> Fields:
+    """Slow error of a receiver's positions."""
+    from truenorth.core.errors import UsageError
+
+    sigma, time = numbers_of(text, option, 2, "one sigma in metres, time in seconds")
+    if not (sigma >= 0.0 and time > 0.0):
+        raise UsageError(f"{option} {text}: expected metres (0: there is none) and seconds above zero, such as 2,60")
+    return {"bias_sigma": sigma, "bias_time": time}
 
 
 @dataclass(frozen=True)
@@ -35,11 +68,21 @@ class Sensors:
         option("Kind of the velocity log: reference, em, doppler-water or doppler-bottom; sets its slow errors."),
     ] = None
     log_drift: Annotated[
-        str | None, option("Its drift east and north, such as a current, and how long it lasts: '0.5 m/s, 3 h'.")
+        str | None,
+        option("Its drift east and north, such as a current, and how long it lasts: '0.5 m/s, 3 h'."),
+        sets("log", quantity_and_time("drift", "speed", "drift_time", drift_time=None)),
     ] = None
-    log_scale: Annotated[str | None, option("Its scale error, one sigma: '0.5 %'.")] = None
-    log_mounting: Annotated[str | None, option("Its error of mounting about the vertical: '0.3 deg'.")] = None
-    log_bias: Annotated[str | None, option("Its bias along the hull's axes: '0.1 m/s'.")] = None
+    log_scale: Annotated[
+        str | None, option("Its scale error, one sigma: '0.5 %'."), sets("log", quantity("scale", "ratio"))
+    ] = None
+    log_mounting: Annotated[
+        str | None,
+        option("Its error of mounting about the vertical: '0.3 deg'."),
+        sets("log", quantity("mounting", "angle")),
+    ] = None
+    log_bias: Annotated[
+        str | None, option("Its bias along the hull's axes: '0.1 m/s'."), sets("log", quantity("bias", "speed"))
+    ] = None
     fix: Annotated[
         list[str] | None,
         option("Position fix: time, lat, lon, one sigma: '21600,20.1,115.3,100' (s, deg, m); repeat for more."),
@@ -52,105 +95,88 @@ class Sensors:
     aid: Annotated[
         list[str] | None, option("Log of a plug-in's sensor, as NAME=FILE; more than one by repeating it.")
     ] = None
-    error: Annotated[list[str] | None, option("Error states of a plug-in, by name; more than one by repeating it.")] = (
-        None
-    )
+    error: Errors = None
     baro_loop: Annotated[
-        float, option("Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain.")
+        float,
+        option("Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain."),
+        sets("baro", plain("loop")),
     ] = 0.0
-    lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up.")] = None
+    lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up."), sets("antenna", arm)] = None
     baseline: Baseline = None
-    wheel_arm: Annotated[str | None, option("IMU to the odometer's wheel, m: right,forward,up.")] = None
-    mounting: Annotated[
-        str | None, option("Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log).")
+    wheel_arm: Annotated[
+        str | None, option("IMU to the odometer's wheel, m: right,forward,up."), sets("wheel", arm)
     ] = None
-    estimate: Annotated[str | None, option(f"What is not known and estimated, of: {', '.join(PARTS)}.")] = None
-    odometer_noise: Annotated[float | None, option("One-sigma noise of the odometer's speed, m/s.")] = None
+    mounting: Annotated[
+        str | None,
+        option("Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log)."),
+        sets("wheel", angles),
+    ] = None
+    estimate: Annotated[
+        str | None,
+        option(f"What is not known and estimated, of: {', '.join(PARTS)}."),
+        sets("antenna", estimated("lever_arm", "latency")),
+        sets("wheel", estimated("scale", "mounting", "lever_arm")),
+    ] = None
+    odometer_noise: OdometerNoise = None
     offset: Offset = None
-    latency: Annotated[float, option("GNSS measurements are older than their stamps by this, s.")] = 0.0
+    latency: Annotated[
+        float,
+        option("GNSS measurements are older than their stamps by this, s."),
+        sets("antenna", plain("latency")),
+    ] = 0.0
     gnss_drift: Annotated[
         str | None,
         option("Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."),
+        sets("antenna", drift_of_places),
     ] = None
 
     @property
     def parts(self) -> set[str]:
         """What --estimate names."""
-        from truenorth.core.errors import UsageError
-
-        parts = {part.strip().replace("-", "_") for part in self.estimate.split(",")} if self.estimate else set()
-        if unknown := parts - set(PARTS):
-            raise UsageError(f"--estimate {min(unknown)!r} is not known; choose of {', '.join(PARTS)}")
-        return parts
+        return parts_of(self.estimate, "--estimate")
 
     def antenna(self) -> Mounting:
         """Of the GNSS receiver."""
-        from dataclasses import replace
+        from truenorth.aiding.aids import ANTENNA
 
-        from truenorth.core.errors import UsageError
+        return replace(ANTENNA, **given(self, "antenna"))
 
-        antenna = self._mounted(self.lever_arm, "--lever-arm", None, self.parts & {"lever_arm", "latency"})
-        if self.gnss_drift is not None:
-            sigma, time = numbers_of(self.gnss_drift, "--gnss-drift", 2, "one sigma in metres, time in seconds")
-            if not (sigma >= 0.0 and time > 0.0):
-                raise UsageError(
-                    f"--gnss-drift {self.gnss_drift}: expected metres (0: there is none) and seconds above zero, such as 2,60"
-                )
-            antenna = replace(antenna, bias_sigma=sigma, bias_time=time)
-        return on_baseline(replace(antenna, latency=self.latency), self.baseline)
+    def wheel(self, found: Mounting | None = None) -> Mounting:
+        """Of the odometer, and of a velocity log; `found` is how an alignment found it, where nothing is said."""
+        from truenorth.state.mounting import Mounting
+
+        said = given(self, "wheel")
+        return replace(Mounting() if said or found is None else found, **said)
 
     def log_errors(self, frame: str) -> LogErrors | None:
         """Of the velocity log: those of its kind, and what is given of them; None: nothing is said."""
-        from dataclasses import replace
-
-        from truenorth.core.units import parse
         from truenorth.errors.log import LogErrors, log_errors
 
-        given: dict[str, float | None] = {}
-        for name, text, dimension in (
-            ("scale", self.log_scale, "ratio"),
-            ("mounting", self.log_mounting, "angle"),
-            ("bias", self.log_bias, "speed"),
-        ):
-            if text is not None:
-                given[name] = parse(text, dimension)
-        if self.log_drift is not None:
-            size, _, time = self.log_drift.partition(",")
-            given["drift"] = parse(size, "speed")
-            given["drift_time"] = None if not time.strip() else parse(time, "time")
-        if self.log_kind is None and not given:
+        said = given(self, "log")
+        if self.log_kind is None and not said:
             return None
-        return replace(LogErrors() if self.log_kind is None else log_errors(self.log_kind, frame), **given)  # type: ignore[arg-type]
-
-    def wheel(self) -> Mounting:
-        """Of the odometer, and of a velocity log."""
-        return self._mounted(self.wheel_arm, "--wheel-arm", self.mounting, self.parts - {"latency"})
+        return replace(LogErrors() if self.log_kind is None else log_errors(self.log_kind, frame), **said)
 
     def aids(self, found: Mounting | None) -> list[Any]:
         """The sensors that are named; `found` is how an alignment on the move found the odometer."""
-        from dataclasses import replace
-
         from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
         from truenorth.core.errors import UsageError
         from truenorth.core.plugins import plugin
         from truenorth.formats import read_gnss, read_height, read_odometer, read_velocity
 
-        antenna, wheel = self.antenna(), self.wheel()
-        said = self.wheel_arm is not None or self.mounting is not None
-        said = said or bool(self.parts & {"scale", "mounting", "lever_arm"})
-        known = said or found is None or self.odometer_noise is not None
-        sits = replace(wheel if said or found is None else found, noise=self.odometer_noise) if known else None
+        said = given(self, "wheel") or given(self, "odometer")
         aids: list[Any] = []
         if self.gnss is not None:
-            aids.append(Gnss(read_gnss(self.gnss), antenna))
+            aids.append(Gnss(read_gnss(self.gnss), self.antenna()))
         if self.odometer is not None:
+            sits = replace(self.wheel(found), **given(self, "odometer")) if said or found is None else None
             aids.append(Odometer(read_odometer(self.odometer), sits))
         if self.velocity is not None:
-            log = replace(wheel, lever_arm_sigma=0.0)
+            log = replace(self.wheel(), lever_arm_sigma=0.0)
             record = read_velocity(self.velocity)
             aids.append(VelocityLog(record, log, self.log_errors(record.frame)))
         if self.baro is not None:
-            aids.append(Barometer(read_height(self.baro), loop=self.baro_loop))
+            aids.append(Barometer(read_height(self.baro), **given(self, "baro")))
         if self.fix or self.azimuth:
             aids.append(_fixes(self.fix or (), self.azimuth or ()))
         for text in self.aid or ():
@@ -159,22 +185,6 @@ class Sensors:
                 raise UsageError(f"--aid {text!r}: expected NAME=FILE")
             aids.append(plugin("truenorth.aiding", name)(Path(file)))
         return aids
-
-    @staticmethod
-    def _mounted(arm: str | None, option: str, angles: str | None, parts: set[str]) -> Mounting:
-        import numpy as np
-
-        from truenorth.state.mounting import Mounting
-
-        sigma = {part: SIGMAS[part] for part in parts if part in SIGMAS}
-        return Mounting(
-            lever_arm=np.zeros(3) if arm is None else arm_of(arm, option),
-            lever_arm_sigma=sigma.get("lever_arm", 0.0),
-            C_mb=np.eye(3) if angles is None else angles_of(angles),
-            angle_sigma=sigma.get("mounting", 0.0),
-            scale_sigma=sigma.get("scale", 0.0),
-            latency_sigma=sigma.get("latency", 0.0),
-        )
 
 
 def _fixes(places: Sequence[str], headings: Sequence[str]) -> Fixes:
