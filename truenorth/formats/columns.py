@@ -43,6 +43,8 @@ class Columns:
         Whether the names are the log's own; else ``1, 2, ...``.
     notes : tuple of str
         What was left out or mended, and how the log is written.
+    why : str
+        By what that was found.
     whole : mapping
         Arrays of doubles that are there as they stand, in memory or on the disk, by the names of their columns.
     """
@@ -54,6 +56,7 @@ class Columns:
     place: Callable[[int], str] = lambda row: f"row {row + 1}"
     named: bool = True
     notes: tuple[str, ...] = ()
+    why: str = "the format's own order"
     above: tuple[str, ...] = ()
     whole: Mapping[tuple[str, ...], Array] = field(default_factory=dict)
 

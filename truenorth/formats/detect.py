@@ -55,6 +55,7 @@ FOREIGN = {
     b"%PDF": "a PDF document",
 }
 TEXT = ("csv", "psins", "kf-gins")
+ANYWHERE = ("novatel", "ubx", "sbf", "vectornav", "gnsslogger")  # whose messages may follow something else
 
 
 def format_of(
@@ -91,17 +92,20 @@ def format_of(
             return "parquet"
         if given in (None, "sensor-folder") and suffixes is SUFFIXES and _has_sensors(path):
             return "sensor-folder"
-        if given not in (None, "ros") or not (path / "metadata.yaml").is_file():
+        found = devices.of_folder(path)
+        if found is None or given not in (None, found):
             raise UsageError(
-                f"{path}: a folder; expected a ROS 2 bag (with metadata.yaml in it), one file for each sensor (such as "
-                "Gyroscope.csv and Accelerometer.csv), or the rows of a live run; else name a file"
+                f"{path}: a folder; expected a ROS 2 bag (with metadata.yaml in it), KITTI's oxts (with timestamps.txt and "
+                "data), one file for each sensor (such as Gyroscope.csv and Accelerometer.csv), or the rows of a live run; else "
+                "name a file"
             )
-        return "ros"
+        return found
     head = first_bytes(path)
     if not head:
         raise DataError(f"{path.name}: the file is empty; expected {what}")
     found = next((name for beginning, name in BEGINNINGS.items() if head.startswith(beginning)), None)
-    by_content = found if suffix_of(path) in ANYTHING and found in devices.DEVICES else None
+    says_little = suffix_of(path) in ANYTHING or suffixes.get(suffix_of(path)) == "csv"
+    by_content = found if says_little and found in devices.DEVICES else None
     chosen = given or by_content or suffixes.get(suffix_of(path)) or found
     foreign = next((what for beginning, what in FOREIGN.items() if head.startswith(beginning)), None)
     if found == "npz" and not _is_npz(path):
@@ -125,7 +129,7 @@ def _check_content(source: str, head: bytes, chosen: str, found: str | None) -> 
         raise DataError(
             f"{source}: read as {chosen}, but it holds {found} data; rename the file, or read it as {found}"
         )
-    if chosen in BEGINNINGS.values() and found is None and chosen not in ("novatel", "ubx", "sbf", "mavlink"):
+    if chosen in BEGINNINGS.values() and found is None and chosen not in ANYWHERE:
         raise DataError(
             f"{source}: read as {chosen}, but it does not begin as such a file does; it is damaged, or of another format: "
             "name that"

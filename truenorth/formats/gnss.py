@@ -65,7 +65,7 @@ def read_gnss(
     """Read the log of a GNSS receiver.
 
     A table of named columns, NMEA 0183 (GGA, RMC, VTG, HDT, THS), RTKLIB's ``.pos``, the GNSS text of KF-GINS, or a device's log
-    (u-blox, Septentrio, NovAtel, PX4, ArduPilot, ROS).
+    (u-blox, Septentrio, NovAtel, VectorNav, PX4, ArduPilot, an Android phone, ROS, KITTI).
 
     Columns ``time``; position as ``lat, lon`` (degrees) and ``alt``, as ``ecef_x, ecef_y, ecef_z``, or as metres ``east, north,
     up`` (or ``down``) from an `origin`; velocity as ``VE, VN, VU`` (or ``VD``), ``ecef_vx, ecef_vy, ecef_vz``, or ``speed`` and

@@ -27,7 +27,8 @@ def columns_of(path: Path, format: str, named: bool = True) -> Columns:
 
         table = open_table(path)
         notes = (*table.notes, table.dialect.words())
-        return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, table.above)
+        why = "the dialect in which most lines are rows of numbers"
+        return Columns(path, table.names, table.read, table.column, table.place, table.named, notes, why, table.above)
     if format == "sensor-folder":
         from truenorth.formats import sensor_folder
 

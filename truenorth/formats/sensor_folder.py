@@ -101,12 +101,14 @@ def columns(folder: Path) -> Columns:
         )
     if not rows.any():
         raise DataError(f"{folder.name}: {gyro.name} and {accel.name} have no time in common by their column {clock}")
-    force = accel.values if clock not in accel.clocks else _at(times[rows], accel.clocks[clock], accel.values)
+    force = accel.values if clock not in accel.clocks else at_times(times[rows], accel.clocks[clock], accel.values)
     table = {clock: times[rows]} if clock else {}
     table |= dict(zip(gyro.headings, gyro.values[rows].T)) | dict(zip(accel.headings, force.T))
     left = f", {len(times) - rows.sum()} rows of one of them alone left out" if not rows.all() else ""
     merged = columns_of_arrays(folder, table)
-    note = f"{gyro.name} and {accel.name}, rows of the gyros{left}"
+    moved = clock in accel.clocks and not _same(times[rows], accel.clocks[clock])
+    moved_words = "; accelerometers interpolated to them, which takes some of their white noise away" if moved else ""
+    note = f"{gyro.name} and {accel.name}, rows of the gyros{left}{moved_words}"
     return Columns(folder, merged.names, merged.read, merged.column, named=True, notes=(note,), whole=merged.whole)
 
 
@@ -169,7 +171,7 @@ def _accel(folder: Path, files: dict[str, list[Path]], clock: str) -> _Sensor:
     for path in files.get("gravity", ()):
         gravity, (sensor, _) = _sensor(path, "accel"), seen[0]
         if clock in gravity.clocks and clock in sensor.clocks:
-            both = sensor.values + _at(sensor.clocks[clock], gravity.clocks[clock], gravity.values)
+            both = sensor.values + at_times(sensor.clocks[clock], gravity.clocks[clock], gravity.values)
             if accel_readings(gravity_level(both), np.nan, ("rates",)):
                 return _Sensor(f"{sensor.name} + {gravity.name}", both, sensor.headings, sensor.clocks)
     sensor, level = seen[0]
@@ -179,8 +181,12 @@ def _accel(folder: Path, files: dict[str, list[Path]], clock: str) -> _Sensor:
     )
 
 
-def _at(times: Array, clock: Array, values: Array) -> Array:
+def at_times(times: Array, clock: Array, values: Array) -> Array:
     """Values at other times; as they are where the times are the same."""
-    if len(times) == len(clock) and np.array_equal(times, clock):
+    if _same(times, clock):
         return values
     return np.column_stack([np.interp(times, clock, values[:, i]) for i in range(3)])
+
+
+def _same(times: Array, clock: Array) -> bool:
+    return len(times) == len(clock) and bool(np.array_equal(times, clock))

@@ -51,9 +51,7 @@ def record_of(columns: Columns, layout: Layout) -> ImuRecord:
     choice = choose(columns, layout)
     guesses = choice.guesses
     if columns.notes:
-        guesses.insert(
-            0, Guess("text", "; ".join(columns.notes), "the dialect in which most lines are rows of numbers")
-        )
+        guesses.insert(0, Guess("text", "; ".join(columns.notes), columns.why))
     gyro, accel = _sensors(columns, layout, choice)
     time, layout = clock_of_log(columns, layout, choice, len(gyro), guesses)
     kind, units = _units(time, gyro, accel, layout, choice, source, guesses)

@@ -7,6 +7,7 @@ A module of this folder has
 - `AXES`: where x, y and z of its IMU point;
 - ``tables(path, topic)``: tables by what they hold, ``imu``, ``gnss``, ``velocity``, ``poses``, ``mag``; each maps headings with
   their units, such as ``gyro_x [rad/s]``, to arrays. The clock is one and the same in all of them;
+- where something is to be said of what it makes, `NOTES`: by what a table holds;
 - where messages need what came before them, `Memory`: a stream hands one over, ``tables(path, topic, memory=...)``.
 
 A new format is a new file here, and a line in `DEVICES`.
@@ -14,6 +15,7 @@ A new format is a new file here, and a line in `DEVICES`.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -21,7 +23,7 @@ from types import ModuleType
 from truenorth.core.errors import DataError, TruenorthError, UsageError
 from truenorth.formats.columns import Columns, columns_of_arrays
 
-DEVICES = ("ubx", "sbf", "novatel", "xsens", "ulog", "dataflash", "mavlink", "ros")
+DEVICES = ("ubx", "sbf", "novatel", "xsens", "ulog", "dataflash", "mavlink", "ros", "vectornav", "gnsslogger", "kitti")
 SUFFIXES = {
     ".ubx": "ubx",
     ".sbf": "sbf",
@@ -51,7 +53,14 @@ BEGINNINGS = {
     b"#ROSBAG": "ros",
     b"\x89MCAP": "ros",
     b"SQLite format 3": "ros",
+    b"$VN": "vectornav",
+    b"# \n# Header Description": "gnsslogger",
+    b"# \r\n# Header Description": "gnsslogger",
+    b"#\n# Header Description": "gnsslogger",
+    b"# Header Description": "gnsslogger",
+    b"MessageType,utcTimeMillis": "gnsslogger",
 }
+FOLDERS = {"ros": ("metadata.yaml",), "kitti": ("timestamps.txt", "data")}  # what a folder of a format holds
 WANTED = {
     "imu": "rates and specific forces",
     "gnss": "positions",
@@ -91,4 +100,10 @@ def columns(path: Path, format: str, part: str, topic: str | None = None) -> Col
     if not table or not len(next(iter(table.values()))):
         have = ", ".join(WANTED[name] for name, found in tables.items() if found) or "nothing that is read"
         raise DataError(f"{path.name}: no {WANTED[part]} in this {format} log; found {have}")
-    return columns_of_arrays(path, table)
+    said = getattr(module, "NOTES", {}).get(part)
+    return replace(columns_of_arrays(path, table), notes=() if said is None else (said,))
+
+
+def of_folder(path: Path) -> str | None:
+    """The format of a folder; None where it holds none of these."""
+    return next((name for name, inside in FOLDERS.items() if all((path / each).exists() for each in inside)), None)
