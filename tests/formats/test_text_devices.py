@@ -34,7 +34,7 @@ def phone_log(elapsed=True, fixes_elapsed=True):
         lines += [phone_row("UncalAccel", TIME[k] - SHIFT, forces[k], elapsed) for k in part]
         lines += [phone_row("UncalGyro", TIME[k], SWAY.gyro[k], elapsed) for k in (*part, part[0])]
         lines += [phone_row("Gyro", TIME[part[0]], [1.0, 2.0, 3.0], elapsed), f"Raw,{first},1,2,3"]
-        lines += [phone_row("UncalMag", TIME[part[0]], SWAY.accel[part[0]], elapsed)]
+        lines += [phone_row("UncalMag", TIME[part[0]], 4.0 * SWAY.accel[part[0]] + 0.5, elapsed)]  # hard iron, and said
         own = f"{(BOOT + first / 100) * 1e9:.0f}" if fixes_elapsed else ""
         utc = f"{(UTC + first / 100) * 1e3:.0f}"
         lines += [f"Fix,GPS,{LAT},{LON},{ALT},2.0,3.03,90.0,{utc},0.5,5,{own},4.5,0"]
@@ -60,7 +60,7 @@ def test_a_phone(tmp_path, name):
     np.testing.assert_allclose(fixes.v_n[:, 0], 2.0)
     np.testing.assert_allclose(fixes.position_sigma[0], [2.0, 2.0, 4.5], rtol=1e-2)
     field = read_magnetometer(path)
-    np.testing.assert_allclose(field.field, SWAY.accel[::50] * 1e-6, rtol=1e-7)
+    np.testing.assert_allclose(field.field, SWAY.accel[::50] * 4e-6, rtol=1e-7)
 
 
 def test_fixes_in_utc_alone_come_to_the_phone_s_clock(tmp_path):
@@ -205,3 +205,23 @@ def test_what_is_wrong_in_kitti_is_named(tmp_path):
         read_imu(folder)
     with pytest.raises(UsageError, match="a folder; expected"):
         read_imu(tmp_path)
+
+
+def test_a_line_as_a_phone_wrote_it(tmp_path):
+    """From GnssLogger's own description of its log: hard iron of five times the earth's field, which the phone knows."""
+    path = tmp_path / "gnss_log.txt"
+    path.write_text(
+        "# \n# Header Description:\n"
+        "UncalMag,1663164669191,65972055195160,221.51251,89.793755,-21.16875,213.84875,180.1958,5.4516187\n"
+        "UncalGyro,1663164669189,65972053803181,0.0006108648,-0.020769402,0.023518294,-0.009432952,0.000007726701,-0.008078051\n"
+        "UncalAccel,1663164669190,65972054923181,0.4642076,7.7742805,5.8707905,0.0,0.0,0.0\n"
+        "UncalMag,1663164669201,65972065195160,221.51251,89.793755,-21.16875,213.84875,180.1958,5.4516187\n"
+        "Fix,GPS,28.1435263000,-82.2971356000,-14.2,0.09635656,5.857,108.336426,1663712656000,,,445420306913617,11.185,0\n"
+        "Fix,GPS,28.1435263000,-82.2971356000,-14.2,0.09635656,5.857,,1663712657000,,,445421306913617,11.185,0\n"
+    )
+    field = read_magnetometer(path).field[0]
+    np.testing.assert_allclose(field, [7.66376e-6, -90.402045e-6, -26.6203687e-6], rtol=1e-6)
+    fix = read_gnss(path)
+    np.testing.assert_allclose(np.degrees(fix.lat), 28.1435263)
+    np.testing.assert_allclose(np.diff(fix.time), 1.0)
+    np.testing.assert_allclose(fix.v_n[0, :2], 0.09635656 * np.array([0.9492, -0.3146]), rtol=1e-3)

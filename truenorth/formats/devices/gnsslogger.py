@@ -2,7 +2,8 @@
 
 A line begins with what it is: ``UncalGyro,utcTimeMillis,elapsedRealtimeNanos,x,y,z,...``. Lines ``# UncalGyro,...`` above them name
 the fields; logs of older versions have fewer. Uncalibrated gyros and accelerometers are taken where there are some: the phone
-changes the bias that it takes off the calibrated ones in steps, where a constant one is found by an alignment.
+changes the bias that it takes off the calibrated ones in steps, where a constant one is found by an alignment. A magnetometer
+has a hard iron of several times the earth's field: the phone's estimate of it is taken off.
 
 The rows are the gyros'. Accelerometers, which the phone samples at other times, are interpolated to them. Time is
 ``elapsedRealtimeNanos``, the phone's clock since it started, which rows and fixes share; a fix of an older log has UTC alone and
@@ -31,7 +32,7 @@ EXTRA = ""  # no decoder is needed
 AXES = "RFU"
 NOTES = {"imu": "rows of the gyros; accelerometers interpolated to them, which takes some of their white noise away"}
 GYROS, FORCES = ("UncalGyro", "Gyro"), ("UncalAccel", "Accel")
-FIELDS = ("Mag", "UncalMag")  # the phone's own calibration takes its hard iron off
+FIELDS = ("UncalMag", "Mag")
 UTC, ELAPSED, FIRST = 0, 1, 2  # fields of a sensor's row: ms, ns, the first value
 FIX = ("Provider", "LatitudeDegrees", "LongitudeDegrees", "AltitudeMeters", "SpeedMps", "AccuracyMeters",
        "BearingDegrees", "UnixTimeMillis", "SpeedAccuracyMps", "BearingAccuracyDegrees", "elapsedRealtimeNanos",
@@ -62,7 +63,8 @@ def tables(path: Path, part: str, topic: str | None = None) -> dict[str, dict[st
     if field is not None:
         clock = UTC if late is None else ELAPSED
         found["mag"] = {"time [s]": _seconds(field, clock)}
-        found["mag"] |= {f"mag_{x} [uT]": field[:, FIRST + i] for i, x in enumerate("xyz")}
+        iron = np.nan_to_num(field[:, FIRST + 3 :])
+        found["mag"] |= {f"mag_{x} [uT]": field[:, FIRST + i] - iron[:, i] for i, x in enumerate("xyz")}
     if "Fix" in lines:
         found["gnss"] = _fixes(path, lines["Fix"], named.get("Fix", FIX), late)
     return found
@@ -86,9 +88,10 @@ def _lines(path: Path) -> tuple[Lines, dict[str, tuple[str, ...]]]:
 
 
 def _sensor(path: Path, lines: Lines, kinds: Sequence[str]) -> Array | None:
-    """Time in UTC and of the phone, and three values, of the first kind that is there; (N, 5), NaN where a time is not."""
+    """Times, three values and what the phone says of their biases, of the first kind that is there; (N, 8), NaN where absent."""
     kind = next((name for name in kinds if lines.get(name)), None)
-    return None if kind is None else _numbers(path, kind, lines[kind], range(FIRST + 3), empty=(UTC, ELAPSED))
+    may_be_empty = (UTC, ELAPSED, *range(FIRST + 3, FIRST + 6))
+    return None if kind is None else _numbers(path, kind, lines[kind], range(FIRST + 6), may_be_empty)
 
 
 def _numbers(path: Path, kind: str, rows: Rows, columns: Sequence[int], empty: Sequence[int] = ()) -> Array:
@@ -131,7 +134,7 @@ def _imu(gyros: Array, forces: Array, clock: int) -> dict[str, Array]:
     both = (time >= clocks[0]) & (time <= clocks[-1])
     table = {"time [s]": time[both]}
     table |= {f"gyro_{x} [rad/s]": gyros[both, FIRST + i] for i, x in enumerate("xyz")}
-    force = at_times(time[both], clocks, forces[:, FIRST:])
+    force = at_times(time[both], clocks, forces[:, FIRST : FIRST + 3])
     return table | {f"accel_{x} [m/s^2]": force[:, i] for i, x in enumerate("xyz")}
 
 
