@@ -1,5 +1,7 @@
 """Gyros of another moment, and a receiver whose clock is left open, in navigation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -88,3 +90,22 @@ def test_a_late_antenna_that_the_road_swings():
     assert not [item for item in result.evidence if item.key.startswith("delay.")]
     lag = result.estimated()["GNSS lag"]
     assert lag["value"][0] == pytest.approx(late, abs=0.01)
+
+
+def test_a_delay_that_an_alignment_has_found_is_taken_over(drive):
+    motion, record, start = drive
+    times = np.arange(1.0, 179.0)
+    sound = fixes(motion, times, sigma=0.3)
+    gnss = replace(sound, time=sound.time + 0.1)
+    found = replace(start, gnss_delay=(0.09, 0.01))
+    result = navigate(record, found, aid=Gnss(gnss), imu=SPEC)
+    assert "gnss.delay_taken_over" in {item.key for item in result.evidence}
+    assert not any(item.key.startswith("second_look") for item in result.evidence)
+    plain = navigate(record, start, aid=Gnss(gnss), imu=SPEC)
+    assert "second_look.late" in {item.key for item in plain.evidence}
+    lag = result.track.layout.slice_of("GNSS lag").start
+    left, sigma = result.track.sensors[-1, lag], result.track.sigma[-1, lag]
+    assert abs(0.09 + left - 0.1) < 4.0 * sigma
+    assert sigma < 0.01
+    said = navigate(record, found, aid=Gnss(gnss, Mounting(latency=0.1)), imu=SPEC)
+    assert "gnss.delay_taken_over" not in {item.key for item in said.evidence}

@@ -241,7 +241,7 @@ def navigate(
         result = navigate_record(
             record,
             begin if known.heading is not None or start is None else start,
-            aid=shifted([*sensors.aids(begin.wheel), *pointing.aids(record, place)], sensors.offset),
+            aid=shifted([*sensors.aids(begin), *pointing.aids(record, place)], sensors.offset),
             altitude=altitude,  # type: ignore[arg-type]  # checked there, with the choices in the message
             zupt=stops,
             smooth=smooth,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from truenorth.aiding.fixes import Fixes
     from truenorth.errors.log import LogErrors
     from truenorth.state.mounting import Mounting
+    from truenorth.state.state import Start
 
 PARTS = ("scale", "mounting", "lever_arm", "latency", "scale_factors")
 SIGMAS = {"scale": 0.05, "mounting": math.radians(5.0), "lever_arm": 2.0, "latency": 0.3}
@@ -120,10 +121,12 @@ class Sensors:
     odometer_noise: OdometerNoise = None
     offset: Offset = None
     latency: Annotated[
-        float,
-        option("GNSS measurements are older than their stamps by this, s."),
+        float | None,
+        option(
+            "GNSS measurements are older than their stamps by this, s; without it by what the alignment found, else 0."
+        ),
         sets("antenna", plain("latency")),
-    ] = 0.0
+    ] = None
     gnss_drift: Annotated[
         str | None,
         option("Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."),
@@ -135,11 +138,13 @@ class Sensors:
         """What --estimate names."""
         return parts_of(self.estimate, "--estimate")
 
-    def antenna(self) -> Mounting:
-        """Of the GNSS receiver."""
+    def antenna(self, begin: Start | None = None) -> Mounting:
+        """Of the GNSS receiver, late as an alignment found it where nothing is said of that."""
         from truenorth.aiding.aids import ANTENNA
+        from truenorth.navigation.given import late_as_found
 
-        return replace(ANTENNA, **given(self, "antenna"))
+        unsaid = ANTENNA if begin is None or self.latency is not None else late_as_found(ANTENNA, begin)
+        return replace(unsaid, **given(self, "antenna"))
 
     def wheel(self, found: Mounting | None = None) -> Mounting:
         """Of the odometer, and of a velocity log; `found` is how an alignment found it, where nothing is said."""
@@ -157,8 +162,8 @@ class Sensors:
             return None
         return replace(LogErrors() if self.log_kind is None else log_errors(self.log_kind, frame), **said)
 
-    def aids(self, found: Mounting | None) -> list[Any]:
-        """The sensors that are named; `found` is how an alignment on the move found the odometer."""
+    def aids(self, begin: Start) -> list[Any]:
+        """The sensors that are named; how an alignment on the move found them stands in the start."""
         from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
         from truenorth.core.errors import UsageError
         from truenorth.core.plugins import plugin
@@ -167,9 +172,9 @@ class Sensors:
         said = given(self, "wheel") or given(self, "odometer")
         aids: list[Any] = []
         if self.gnss is not None:
-            aids.append(Gnss(read_gnss(self.gnss), self.antenna()))
+            aids.append(Gnss(read_gnss(self.gnss), self.antenna(begin)))
         if self.odometer is not None:
-            sits = replace(self.wheel(found), **given(self, "odometer")) if said or found is None else None
+            sits = replace(self.wheel(begin.wheel), **given(self, "odometer")) if said or begin.wheel is None else None
             aids.append(Odometer(read_odometer(self.odometer), sits))
         if self.velocity is not None:
             log = replace(self.wheel(), lever_arm_sigma=0.0)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 
-from truenorth.aiding.aids import WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import ANTENNA, WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.core.errors import UsageError
 from truenorth.navigation.result import Altitude
@@ -44,6 +45,25 @@ def sits_as_found(given: dict[str, Any], begin: Start) -> bool:
         given["odometer"] = odometer.mounted(found)
         return True
     return bool(np.all(odometer.mounting.C_mb == found.C_mb)) and odometer.mounting.scale_sigma == found.scale_sigma
+
+
+def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
+    """An antenna whose receiver is as late as an alignment on the move has found it, which is estimated on."""
+    if begin.gnss_delay is None:
+        return antenna
+    late, sigma = begin.gnss_delay
+    return replace(antenna, latency=late, latency_sigma=sigma)
+
+
+def takes_delay_over(given: dict[str, Any], begin: Start) -> bool:
+    """Whether the receiver is late as an alignment on the move has found; mounts it so where nothing else is said."""
+    gnss = given.get("gnss")
+    if begin.gnss_delay is None or not isinstance(gnss, Gnss):
+        return False
+    if gnss.mounting is None:
+        given["gnss"] = gnss.mounted(late_as_found(ANTENNA, begin))
+        return True
+    return (gnss.mounting.latency, gnss.mounting.latency_sigma) == begin.gnss_delay
 
 
 def record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:

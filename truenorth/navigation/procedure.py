@@ -31,6 +31,7 @@ from truenorth.navigation.given import (
     mounted_as,
     record_of,
     sits_as_found,
+    takes_delay_over,
 )
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
@@ -146,7 +147,8 @@ def navigate(
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
-    found = sits_as_found(given, begin)
+    taken = [note("odometer.taken_over")] if sits_as_found(given, begin) else []
+    taken += [note("gnss.delay_taken_over")] if takes_delay_over(given, begin) else []
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
     model = _model(begin, noise, groups, scale_factors, height)
@@ -161,7 +163,7 @@ def navigate(
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
     plan, given, track, wanders = filtered(plan, given, smooth)
-    evidence = [*_seen(plan, track, given, found), *wanders, *why, *said]
+    evidence = [*_seen(plan, track, given), *taken, *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
         evidence += _rivals(plan, track, given, noise, smooth)
@@ -194,13 +196,11 @@ def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: 
     return InsModel.from_spec(noise, standing=force, every_axis=every_axis, groups=groups, fixed_altitude=fixed)
 
 
-def _seen(plan: Plan, track: Track, given: Mapping[str, Any], found: bool) -> list[Evidence]:
-    """What the measurements and the log show; `found`: the odometer sits as an alignment on the move has found."""
+def _seen(plan: Plan, track: Track, given: Mapping[str, Any]) -> list[Evidence]:
+    """What the measurements and the log show."""
     evidence = innovation_evidence(track.residuals, last_sigma(track)) + moving_evidence(plan.record)
     receiver = record_of(given, Gnss)
     evidence += [] if receiver is None else gnss_evidence(receiver)
-    if found:
-        evidence.append(note("odometer.taken_over"))
     if "baro" in given and plan.altitude != "baro":
         evidence.append(note("height.barometer_unused", "use_barometer", altitude=plan.altitude))
     return evidence

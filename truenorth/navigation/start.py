@@ -59,7 +59,7 @@ def start_from_alignment(alignment: Alignment) -> Start:
             alignment.position,
             alignment.imu,
         )
-        return start if alignment.moving is None else replace(start, wheel=_found_wheel(alignment.moving.summary()))
+        return start if alignment.moving is None else _with_sensors(start, alignment.moving.summary())
     joint = alignment.handover
     if joint is None:
         joint = _by_static_limits(
@@ -155,6 +155,13 @@ def moving_start(
     return Start(time, C_nb, v_n, lat, lon, alt, gyro_bias, accel_bias, positive(np.asarray(P)), whole)
 
 
+def _with_sensors(start: Start, summary: Mapping[str, Any]) -> Start:
+    """The start with what an alignment on the move has found of its sensors: how the odometer sits, how late GNSS is."""
+    delay = summary.get("delays_s", {}).get("GNSS")
+    found = None if delay is None else (float(delay[0]), float(delay[1]))
+    return replace(start, wheel=_found_wheel(summary), gnss_delay=found)
+
+
 def _found_wheel(summary: Mapping[str, Any]) -> Mounting | None:
     """How an alignment on the move says the odometer sits and counts; None: it had none.
 
@@ -209,7 +216,7 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
             v_n, P = np.array(n["v_n"], dtype=np.float64), np.array(n["P"], dtype=np.float64)
             biases = numbers["gyro_bias"], numbers["accel_bias"]
             start = moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
-            start = replace(start, wheel=_found_wheel(s))
+            start = _with_sensors(start, s)
             return start, spec, str(s.get("source", ""))
         gyro_bias = numbers.pop("gyro_bias")
         if "handover" in n:

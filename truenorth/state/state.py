@@ -55,6 +55,8 @@ class Start(State):
         The biases hold the slow ones as well, and how to take them apart; None: the slow ones come on top of them, unknown.
     wheel : Mounting or None
         How an alignment on the move found the odometer to sit and to count.
+    gnss_delay : (delay, sigma) or None, s
+        By which that alignment found the receiver's stamps to be late.
     plumb : float, rad
         One-sigma deflection of the vertical that P holds as tilt and accelerometer bias that cancel each other; 0: none.
     """
@@ -62,6 +64,7 @@ class Start(State):
     P: Array
     whole: WholeBiases | None = None
     wheel: Mounting | None = None
+    gnss_delay: tuple[float, float] | None = None
     plumb: float = 0.0
 
     @classmethod
