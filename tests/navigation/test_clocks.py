@@ -105,7 +105,16 @@ def test_a_delay_that_an_alignment_has_found_is_taken_over(drive):
     assert "second_look.late" in {item.key for item in plain.evidence}
     lag = result.track.layout.slice_of("GNSS lag").start
     left, sigma = result.track.sensors[-1, lag], result.track.sigma[-1, lag]
-    assert abs(0.09 + left - 0.1) < 4.0 * sigma
+    assert abs(left - 0.1) < 4.0 * sigma  # the whole delay, not what is left of it
     assert sigma < 0.01
     said = navigate(record, found, aid=Gnss(gnss, Mounting(latency=0.1)), imu=SPEC)
     assert "gnss.delay_taken_over" not in {item.key for item in said.evidence}
+
+
+def test_an_arm_that_is_estimated_is_shown_whole(drive):
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 179.0), sigma=0.05, arm=(0.5, 2.0, 1.0))
+    given = Mounting(lever_arm=(0.5, 1.0, 1.0), lever_arm_sigma=1.0)
+    arm = navigate(record, start, aid=Gnss(gnss, given), imu=SPEC).estimated()["GNSS lever arm"]
+    assert abs(arm["value"][1] - 2.0) < 4.0 * arm["sigma"][1]
+    assert arm["sigma"][1] < 0.2

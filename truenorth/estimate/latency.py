@@ -9,8 +9,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truenorth.state.mounting import Mounting
 from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
 
 LEAST_DELAY = 0.01  # s: a shorter one acts as its derivative, even of an antenna that the road swings at some hertz
 SHOWN_DELAY = 3.0  # sigmas from which a delay is worth a word, or a pass
@@ -35,9 +40,19 @@ def as_late_as_found(mounting: Mounting, track: Track, name: str) -> Mounting:
 
 def counted_from(track: Track, name: str, before: float) -> Track:
     """The track with a sensor's delay counted from another latency, `before` (s) less than the one it was run with."""
-    where = track.layout.slice_of(f"{name} lag")
-    if where is None or before == 0.0:
+    return _added(track, f"{name} lag", np.array([before]))
+
+
+def counted_whole(track: Track, name: str, mounting: Mounting) -> Track:
+    """The track with a sensor's delay and lever arm as they are, not as what they are beyond those that were said."""
+    track = counted_from(track, name, mounting.latency)
+    return _added(track, f"{name} lever arm", mounting.lever_arm)
+
+
+def _added(track: Track, group: str, known: Array) -> Track:
+    where = track.layout.slice_of(group)
+    if where is None or not known.any():
         return track
     sensors = track.sensors.copy()
-    sensors[:, where] += before
+    sensors[:, where] += known
     return replace(track, sensors=sensors)

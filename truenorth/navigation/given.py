@@ -36,7 +36,13 @@ def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
     return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
 
 
-def sits_as_found(given: dict[str, Any], begin: Start) -> bool:
+def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
+    """What of an alignment on the move holds for the aids, which are mounted so where nothing else is said."""
+    said = [note("odometer.taken_over")] if _sits_as_found(given, begin) else []
+    return said + ([note("gnss.delay_taken_over")] if _is_late_as_found(given, begin) else [])
+
+
+def _sits_as_found(given: dict[str, Any], begin: Start) -> bool:
     """Whether the odometer sits and counts as an alignment on the move has found; mounts it so where nothing else is said."""
     odometer, found = given.get("odometer"), begin.wheel
     if found is None or not isinstance(odometer, Odometer):
@@ -55,7 +61,7 @@ def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
     return replace(antenna, latency=late, latency_sigma=sigma)
 
 
-def takes_delay_over(given: dict[str, Any], begin: Start) -> bool:
+def _is_late_as_found(given: dict[str, Any], begin: Start) -> bool:
     """Whether the receiver is late as an alignment on the move has found; mounts it so where nothing else is said."""
     gnss = given.get("gnss")
     if begin.gnss_delay is None or not isinstance(gnss, Gnss):

@@ -20,6 +20,7 @@ from truenorth.errors.deflection import Deflection
 from truenorth.errors.group import Group, groups_of
 from truenorth.errors.model import InsModel
 from truenorth.estimate.gaps import bridge_gaps
+from truenorth.estimate.latency import counted_whole
 from truenorth.estimate.led_by import led_by_evidence
 from truenorth.estimate.rivals import counted_once, jump_evidence, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence, on_springs
@@ -30,12 +31,11 @@ from truenorth.navigation.given import (
     looked_at,
     mounted_as,
     record_of,
-    sits_as_found,
-    takes_delay_over,
+    taken_over,
 )
 from truenorth.navigation.passes import COARSE, Plan, delayed, filtered
 from truenorth.navigation.result import Altitude, Navigation, judged_navigation, last_sigma
-from truenorth.navigation.second_look import on_any_clock, second_look
+from truenorth.navigation.second_look import SENSORS, on_any_clock, second_look
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.navigation.start_check import check_start, check_start_at_rest
 from truenorth.navigation.stops import zero_updates
@@ -147,8 +147,7 @@ def navigate(
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
-    taken = [note("odometer.taken_over")] if sits_as_found(given, begin) else []
-    taken += [note("gnss.delay_taken_over")] if takes_delay_over(given, begin) else []
+    taken = taken_over(given, begin)
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
     model = _model(begin, noise, groups, scale_factors, height)
@@ -162,6 +161,7 @@ def navigate(
         plan = replace(plan, always=[*zero_updates(record, zupt, *seen), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
+    asked = given
     plan, given, track, wanders = filtered(plan, given, smooth)
     evidence = [*_seen(plan, track, given), *taken, *wanders, *why, *said]
     if check_clocks and aiding:
@@ -172,7 +172,7 @@ def navigate(
     result = Navigation(
         status="navigated",
         evidence=(),
-        track=track,
+        track=_counted_whole(track, asked),
         altitude=height,
         smoothed=smooth,
         gaps=gaps,
@@ -188,6 +188,14 @@ def navigate(
     tell(f"damping: {damping.method}")
     fine = plan.finest() if reference is not None and plan.every > 1 else None
     return damp_navigation(replace(result, evidence=tuple(evidence)), reference, noise, damping, groups, fixes, fine)
+
+
+def _counted_whole(track: Track, asked: Mapping[str, Any]) -> Track:
+    """The track with latencies and arms as they are; `asked` are the aids as they were given."""
+    for key, (name, _) in SENSORS.items():
+        if (mounting := getattr(asked.get(key), "mounting", None)) is not None:
+            track = counted_whole(track, name, mounting)
+    return track
 
 
 def _model(begin: Start, noise: ImuSpec, groups: tuple[Group, ...], every_axis: bool, height: Altitude) -> InsModel:
