@@ -161,18 +161,17 @@ def navigate(
         plan = replace(plan, always=[*zero_updates(record, zupt, *seen), *disturbances])
     check_velocities(plan.record, plan.start, plan.model, given.values(), FINE)
     tell("navigating")
-    asked = given
-    plan, given, track, wanders = filtered(plan, given, smooth)
-    evidence = [*_seen(plan, track, given), *taken, *wanders, *why, *said]
+    plan, used, track, wanders = filtered(plan, given, smooth)
+    evidence = [*_seen(plan, track, used), *taken, *wanders, *why, *said]
     if check_clocks and aiding:
         tell("checking biases, clocks and mountings")
-        evidence += _rivals(plan, track, given, noise, smooth)
+        evidence += _rivals(plan, track, used, noise, smooth)
     else:
         evidence += burst_evidence(record)
     result = Navigation(
         status="navigated",
         evidence=(),
-        track=_counted_whole(track, asked),
+        track=_counted_whole(track, given),
         altitude=height,
         smoothed=smooth,
         gaps=gaps,
