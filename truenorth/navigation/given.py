@@ -36,23 +36,6 @@ def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
     return dict(sorted(found.items(), key=lambda item: order.index(item[0]) if item[0] in order else len(order)))
 
 
-def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
-    """What of an alignment on the move holds for the aids, which are mounted so where nothing else is said."""
-    said = [note("odometer.taken_over")] if _sits_as_found(given, begin) else []
-    return said + ([note("gnss.delay_taken_over")] if _is_late_as_found(given, begin) else [])
-
-
-def _sits_as_found(given: dict[str, Any], begin: Start) -> bool:
-    """Whether the odometer sits and counts as an alignment on the move has found; mounts it so where nothing else is said."""
-    odometer, found = given.get("odometer"), begin.wheel
-    if found is None or not isinstance(odometer, Odometer):
-        return False
-    if odometer.mounting is None:
-        given["odometer"] = odometer.mounted(found)
-        return True
-    return bool(np.all(odometer.mounting.C_mb == found.C_mb)) and odometer.mounting.scale_sigma == found.scale_sigma
-
-
 def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
     """An antenna whose receiver is as late as an alignment on the move has found it, which is estimated on."""
     if begin.gnss_delay is None:
@@ -61,15 +44,30 @@ def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
     return replace(antenna, latency=late, latency_sigma=sigma)
 
 
-def _is_late_as_found(given: dict[str, Any], begin: Start) -> bool:
-    """Whether the receiver is late as an alignment on the move has found; mounts it so where nothing else is said."""
-    gnss = given.get("gnss")
-    if begin.gnss_delay is None or not isinstance(gnss, Gnss):
-        return False
-    if gnss.mounting is None:
-        given["gnss"] = gnss.mounted(late_as_found(ANTENNA, begin))
-        return True
-    return (gnss.mounting.latency, gnss.mounting.latency_sigma) == begin.gnss_delay
+def as_found(begin: Start) -> dict[str, Mounting]:
+    """How an alignment on the move has found the sensors to be mounted, by the keys of their aids."""
+    found = {} if begin.wheel is None else {Odometer.key: begin.wheel}
+    return found if begin.gnss_delay is None else found | {Gnss.key: late_as_found(ANTENNA, begin)}
+
+
+def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
+    """What of an alignment on the move holds for the aids, which are mounted so where nothing else is said."""
+    said = []
+    for key, found in as_found(begin).items():
+        if not isinstance(aid := given.get(key), Odometer | Gnss):
+            continue
+        if aid.mounting is None:
+            aid = given[key] = aid.mounted(found)
+        if _says_the_same(key, aid.mounting or found, found):
+            said.append(note("odometer.taken_over" if key == Odometer.key else "gnss.delay_taken_over"))
+    return said
+
+
+def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:
+    """Whether a mounting has what an alignment has found, whatever else is said of it."""
+    if key == Gnss.key:
+        return (given.latency, given.latency_sigma) == (found.latency, found.latency_sigma)
+    return given.scale_sigma == found.scale_sigma and bool(np.all(given.C_mb == found.C_mb))
 
 
 def record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:
