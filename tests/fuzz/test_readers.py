@@ -18,6 +18,7 @@ from scipy.io import savemat
 from tests.formats.corpus.dialects import DEG, SI, G, table
 from tests.formats.corpus.truth import truth
 from tests.formats.test_devices import dataflash_bytes, ulog_bytes
+from tests.formats.test_text_devices import numbers, phone_log, vn
 from tests.fuzz.forked import Reader
 from truenorth.core.errors import TruenorthError
 from truenorth.core.yaml_file import read_mapping
@@ -68,6 +69,7 @@ def logs(folder) -> dict[str, bytes]:
         write_imu(record, folder / f"whole.{suffix}")
     savemat(folder / "whole.mat", {"time": short.time, "gyro": short.gyro, "accel": short.accel})
     rows = [f"$GPGGA,{100000 + k:06d}.00,4806.0,N,01130.0,E,1,08,1.0,500.0,M,45.0,M,," for k in range(20)]
+    steps = list(zip(short.increments.gyro, short.increments.accel))
     return {
         "log.csv": table(short, SI).encode(),
         "odd.csv": table(short, "t;wx;wy;wz;ax;ay;az", sep=";", decimal=",", gyro=DEG, accel=G).encode(),
@@ -79,15 +81,18 @@ def logs(folder) -> dict[str, bytes]:
         "log.mat": (folder / "whole.mat").read_bytes(),
         "log.ulg": ulog_bytes()[:20_000],
         "dataflash.bin": dataflash_bytes()[:20_000],
+        "phone.txt": phone_log()[:20_000].encode(),
+        "fixes.txt": phone_log()[:20_000].encode(),
+        "vn.txt": "".join(vn(f"VNDTV,+0.01,{numbers(*a)},{numbers(*v)}") for a, v in steps).encode(),
         "log.nmea": ("\r\n".join(rows) + "\r\n").encode(),
         "odo.csv": b"time,speed [km/h]\n" + b"".join(b"%d,%d\n" % (k, 30 + k) for k in range(30)),
         "spec.yaml": b"gyro: {bias: 1 deg/h, random_walk: 0.1 deg/sqrt(h)}\naccel: &a {bias: 1 mg}\n",
     }
 
 
-READ = {"log.nmea": read_gnss, "odo.csv": read_odometer, "spec.yaml": read_mapping}
+READ = {"log.nmea": read_gnss, "fixes.txt": read_gnss, "odo.csv": read_odometer, "spec.yaml": read_mapping}
 NAMES = ["log.csv", "odd.csv", "bare.txt", "log.imu", "log.bin", "log.npz", "log.parquet", "log.mat", "log.ulg",
-         "dataflash.bin", "log.nmea", "odo.csv", "spec.yaml"]  # fmt: skip
+         "dataflash.bin", "phone.txt", "fixes.txt", "vn.txt", "log.nmea", "odo.csv", "spec.yaml"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
