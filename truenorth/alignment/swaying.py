@@ -46,7 +46,7 @@ WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
 FILTER_PASSES = 8
-FITS = 5  # of the motion, one a pass, behind which of 14 logs none grew likelier by more than 17 (twice the logarithm), most by none
+FITS = 5  # of the motion, one a pass: another would make 13 of 14 logs no likelier
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,8 @@ class _MotionFilter:
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
-        if 1 < self.passes <= 1 + self.fits:  # about a good attitude: what was in the first residual besides the motion is gone
+        # About a good attitude: what was in the first residual besides the motion is gone.
+        if 1 < self.passes <= 1 + self.fits:
             self.motion = _fit(system.z, self.interval, self.walks, self.motion, self.known)
         return self.filtered(system)
 
