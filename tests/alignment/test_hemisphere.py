@@ -1,10 +1,15 @@
 """A latitude of the wrong sign: gravity bends the other way, which a base that sways does not hide."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from tests.runs import some
+from truenorth.alignment import rotary
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
+from truenorth.state.limits import limit
 
 
 @pytest.mark.slow
@@ -19,3 +24,42 @@ def test_the_other_hemisphere_is_named_and_the_right_one_is_not(bench, run):
     assert wrong.status == "inconsistent"
     assert any("other hemisphere" in reason for reason in wrong.reasons)
     assert not any("other hemisphere" in reason for reason in sound.reasons)
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    """An indexer whose fitted motion takes up a part of the bend: answers in both hemispheres, and their filters."""
+    inputs, _ = BENCHES["rotary"].draw(90411, 1)
+    here, kept, of = inputs["place"], [], rotary.what_begins
+
+    def keep(fine, *rest, **more):
+        kept.append(fine)
+        return of(fine, *rest, **more)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rotary, "what_begins", keep)
+        places = here, replace(here, lat=-here.lat)
+        answers = [BENCHES["rotary"].align(inputs | {"place": place}) for place in places]
+    return places, answers, kept
+
+
+def test_a_bend_that_a_fitted_motion_hides_is_found_by_aligning_anew(hidden):
+    """Once silent: 15 sigmas of heading, by a ratio of 10 of the bend alone."""
+    _, (sound, wrong), _ = hidden
+    assert sound.status == "aligned"
+    assert any("other hemisphere" in reason for reason in wrong.reasons)
+
+
+def test_how_well_a_place_fits_depends_on_no_place_that_was_given(hidden):
+    """A log has one likelihood in each hemisphere, whichever the answer was made in: the ratio changes its sign with the place."""
+    places, _, fits = hidden
+    (here, there), by_the_other = ([fine.misfit_at(place) for place in places] for fine in fits)
+    np.testing.assert_allclose(by_the_other, [here, there], rtol=1e-9)
+    assert there - here > limit("hemisphere")
+
+
+def test_the_motion_is_fitted_until_it_settles(hidden):
+    """One fit about the first answer leaves this log some hundred less likely than it is (twice the logarithm)."""
+    places, _, fits = hidden
+    for place, fine in zip(places, fits, strict=True):
+        assert fine.misfit_at(place) < -2.0 * float(fine.estimates.log_likelihood) - 100.0

@@ -34,7 +34,7 @@ def test_a_noise_as_inferred_gives_the_ratio_of_the_signature(run, monkeypatch):
     inputs, found = drawn(70219, 30 + run), []
     matched = hemisphere.hemisphere_evidence
 
-    def both(match, fine, position, *, given=True):
+    def both(match, fine, position, *rest, **more):
         ratio, size = float(match.ratio[0]), float(match.size[0])
         z, off = fine.system.z, hemisphere.hemisphere_signature(fine, position).measured_course[..., 0]
         found.append(
@@ -43,7 +43,7 @@ def test_a_noise_as_inferred_gives_the_ratio_of_the_signature(run, monkeypatch):
                 hemisphere._of_any_noise(fine, z) - hemisphere._of_any_noise(fine, z - off),
             )
         )
-        return matched(match, fine, position, given=given)
+        return matched(match, fine, position, *rest, **more)
 
     monkeypatch.setattr(hemisphere, "WALKS", np.zeros(1))
     monkeypatch.setattr("truenorth.alignment.signatures.hemisphere_evidence", both)

@@ -6,10 +6,17 @@ way, by ``g (w t)^2 sin L cos L`` along north. Where the base sways, no mean rat
 A noise that is inferred from the log is not known. It may be five times too small by chance (one of 56 sound logs), and what bends
 by chance then seems to bend by more: a ratio of 19, which was 11. So each hemisphere is asked with the noise of the gyros with
 which the log is likeliest there, and what is usual of it counts as in the inference.
+
+Where a base sways, the fit of its motion may take up a part of that bend as a slow oscillator: of one indexer the ratio was 10,
+with a size of .7. So a log that is likelier in the other hemisphere, but no more than chance would have it, is aligned anew in
+both, the motion fitted in each. That shows more than the bend: a base moves along east and north, which turn in the inertial frame
+the other way round (the ratio of that indexer is 45).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -48,11 +55,24 @@ def _signature_over(times: bytes, lat: float, alt: float, n: int, by_velocity: b
     return Signatures(np.zeros(1, dtype=np.int64), none, off[:1].T, one, none, off[..., None])
 
 
-def hemisphere_evidence(match: Match, fine: FineAlignment, position: Position, *, given: bool = True) -> list[Evidence]:
+def hemisphere_evidence(
+    match: Match,
+    fine: FineAlignment,
+    position: Position,
+    elsewhere: Callable[[Position], float] | None = None,
+    *,
+    given: bool = True,
+) -> list[Evidence]:
     """Whether the log fits the other hemisphere better: twice the logarithm of the likelihood ratio of the two.
 
     Parameters
     ----------
+    match : Match
+        Of :func:`hemisphere_signature`.
+    fine : FineAlignment
+    position : Position
+    elsewhere : callable, optional
+        Minus twice the logarithm of the likelihood of the log aligned anew in a place, where a fitted motion may hide the bend.
     given : bool
         Whether somebody has given the specification; else its noise is open.
     """
@@ -64,6 +84,8 @@ def hemisphere_evidence(match: Match, fine: FineAlignment, position: Position, *
     if better > limit("hemisphere") and not given:
         off = hemisphere_signature(fine, position).measured_course[..., 0]
         better = min(better, _of_any_noise(fine, fine.system.z) - _of_any_noise(fine, fine.system.z - off))
+    elif 0.0 < better <= limit("hemisphere") and given and elsewhere is not None:
+        better = elsewhere(position) - elsewhere(replace(position, lat=-position.lat))
     return [contradiction("place.hemisphere", "latitude", ratio=better)] if better > limit("hemisphere") else []
 
 

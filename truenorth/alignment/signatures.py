@@ -38,6 +38,8 @@ def what_begins(
     )
     steps = bias_step_evidence(fine, spec, bias)
     steps += masked_evidence(fine, spec) if others is None else []
+    elsewhere = None
     if isinstance(fine, SwayAlignment):
+        elsewhere = fine.misfit_at
         steps += [*fine.begun, *(sway_noise_evidence(fine.noisier, spec, position.lat) if given else [])]
-    return detect_drift(fine, drift), steps, hemisphere_evidence(gravity, fine, position, given=given)
+    return detect_drift(fine, drift), steps, hemisphere_evidence(gravity, fine, position, elsewhere, given=given)

@@ -8,7 +8,7 @@ attitude, biases, lever arm and motion together, twice: the second time about th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -26,6 +26,7 @@ from truenorth.alignment.sway_noise import noisier_sensors
 from truenorth.alignment.swing import may_swing, swing_note, swings
 from truenorth.alignment.swing_fit import ARM, fit_swing
 from truenorth.alignment.windowed import BASE_VELOCITY, windowed_fit
+from truenorth.coarse import oba
 from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
@@ -36,7 +37,7 @@ from truenorth.estimate.staying import Prior, StayingLog, prior_of
 from truenorth.filters import LinearSystem, kalman
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.strapdown.inertial import InertialIntegrals, gravity_position
+from truenorth.strapdown.inertial import InertialIntegrals, gravity_position, integrate
 
 Array = NDArray[np.float64]
 
@@ -45,6 +46,7 @@ WINDOWED_PASSES = 6
 SMALL_TURN = 1e-6  # rad: a pass of the windowed fit that turns by less is the last
 DIVERGED = 1e-2  # rad: a windowed fit whose last pass turns by more has not settled
 FILTER_PASSES = 8
+FITS = 5  # of the motion, one a pass: another would make 13 of 14 logs no likelier
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class SwayAlignment(FineAlignment):
     arm: Array  # (3,) m
     arm_sigma: Array  # (3,) m
     late: Array  # (K, 3) what gyros that are late add to the measurements, by the second of their delay
+    misfit_at: Callable[[Position], float]  # how badly the log fits another place: :func:`misfit_at`
     begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
     noisier: Mapping[str, float] = field(default_factory=dict)  # times its specification, by sensor
     slow_arm: slice | None = None  # states of the arm of a base that swings on lines; None of another
@@ -88,16 +91,17 @@ _Known = dict[tuple[int, AxisMotion | None, bytes], AxisMotion]  # motions that 
 
 
 class _MotionFilter:
-    """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answer."""
+    """A Kalman filter whose states hold the base's motion, as fitted to a residual; fitted anew about the first answers."""
 
-    def __init__(self, residual: Array, interval: float, walks: Walks) -> None:
-        self.interval, self.walks, self.passes = interval, walks, 0
+    def __init__(self, residual: Array, interval: float, walks: Walks, fits: int = 1) -> None:
+        self.interval, self.walks, self.fits, self.passes = interval, walks, fits, 0
         self.known: _Known = {}
         self.motion = _fit(residual, interval, walks, None, self.known)
 
     def __call__(self, system: LinearSystem) -> Filtered:
         self.passes, self.base = self.passes + 1, system
-        if self.passes == 2:  # about a good attitude: what was in the first residual besides the motion is gone
+        # About a good attitude: what was in the first residual besides the motion is gone.
+        if 1 < self.passes <= 1 + self.fits:
             self.motion = _fit(system.z, self.interval, self.walks, self.motion, self.known)
         return self.filtered(system)
 
@@ -141,12 +145,9 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
     """
-    log, residual = _settled(start, mount, turned)
-    step = float(np.mean(log.integrals.intervals))
-    model, position = start.model, start.position
-    walks = Walks(model.accel_random_walk, model.gyro_random_walk * gravity_of_place(position.lat, position.alt))
-    estimator = _MotionFilter(residual, step, walks)
-    plain = _filtered(log, estimator)
+    log, estimator = _with_motion(start, mount, turned)
+    model, position, misfit = start.model, start.position, partial(misfit_at, start, mount, turned)
+    plain = _filtered(log, estimator, misfit)
     suspect = bool(plain.noisier) or any(item.kind != "hint" for item in plain.begun)
     if not may_swing(plain, plain.motion, position, suspect=suspect):
         return plain
@@ -164,14 +165,36 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         C_sb=mount.C_sb,
         taken=np.append(log.taken, np.zeros(len(prior.mean) - len(log.taken))),
     )
-    swung = _filtered(on_lines, _SwingFilter(estimator, prior.groups["slow arm"]))
+    swung = _filtered(on_lines, _SwingFilter(estimator, prior.groups["slow arm"]), misfit)
     clean = not swung.noisier and all(item.kind == "hint" for item in swung.begun)
     if not (clean and swings(swung, swung.motion, plain, plain.begun, position)):
         return plain
     return replace(swung, begun=(*swung.begun, swing_note(swung.motion)))
 
 
-def _filtered(log: StayingLog, estimator: _MotionFilter) -> SwayAlignment:
+def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position: Position) -> float:
+    """Minus twice the logarithm of the likelihood of a whole log in a place, aligned there from its coarse attitude on.
+
+    The motion is fitted until it settles: one fit may be some hundred short of the likeliest motion, which comparisons of places
+    cannot have. Parameters as in :func:`sway_align`; `start` may be of another place.
+    """
+    C_n0_i = oba(integrate(start.record, start.interval), position.lat, position.alt, history=False).C_n0_i
+    log, estimator = _with_motion(start._replace(C_n0_i=C_n0_i, position=position), mount, turned, FITS)
+    last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=1 + FITS)
+    return -2.0 * float(last.found.estimates.log_likelihood)
+
+
+def _with_motion(
+    start: CoarseStart, mount: Mount, turned: ImuSpec | None, fits: int = 1
+) -> tuple[StayingLog, _MotionFilter]:
+    """A log about its windowed fit, and the filter with the motion that the fit leaves."""
+    log, residual = _settled(start, mount, turned)
+    model, position = start.model, start.position
+    walks = Walks(model.accel_random_walk, model.gyro_random_walk * gravity_of_place(position.lat, position.alt))
+    return log, _MotionFilter(residual, float(np.mean(log.integrals.intervals)), walks, fits)
+
+
+def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Position], float]) -> SwayAlignment:
     """The log about its last pass, and what may have begun in it."""
     last = settle(log, estimator, in_sigmas(PHI), most=FILTER_PASSES, least=2)
     position, arm = log.position, log.prior.groups["arm"]
@@ -186,6 +209,7 @@ def _filtered(log: StayingLog, estimator: _MotionFilter) -> SwayAlignment:
         arm=log.taken[arm] + last.found.end[arm],
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
         late=response_to_late_gyros(log, last.found.system.z),
+        misfit_at=misfit,
         slow_arm=log.prior.groups.get("slow arm"),
     )
     return replace(
