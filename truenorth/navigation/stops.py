@@ -34,7 +34,9 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     """Seconds at rest, found from the IMU alone.
 
     Constant velocity looks like rest to an IMU, but a vehicle that drives shakes. Seconds without any motion above the
-    sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves.
+    sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves. A second next to one in
+    which it moves does not count: a vehicle that rolls to rest has a speed of .1 m/s in it, ten times the sigma of rest, and less
+    acceleration than tells motion from tilt.
 
     Returns
     -------
@@ -44,10 +46,11 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     motion = motion_summary(record)
     if motion.time.size == 0:
         return np.empty(0), np.empty(0)
-    moved = np.flatnonzero(motion.kind > DISTURBED)
-    before = np.arange(len(motion.kind)) < (moved[0] if moved.size else len(motion.kind))
+    moves = motion.kind > DISTURBED
+    before = ~np.logical_or.accumulate(moves)
+    apart = ~np.convolve(moves, np.ones(3), "same").astype(bool)
     middle = motion.time - 0.5
-    return middle[motion.kind == STILL], middle[(motion.kind == DISTURBED) & before]
+    return middle[apart & (motion.kind == STILL)], middle[apart & before & (motion.kind == DISTURBED)]
 
 
 def seconds_at_rest(
