@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.honesty.harness import Case, Log, main, place
 from truenorth.aiding.sensors import ODOMETER_SIGMA
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.alignment.in_motion_task import WHEEL
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, VELOCITY_FLOOR, WHEEL
 from truenorth.alignment.result import Alignment
 from truenorth.records import GnssRecord, VelocityRecord
 
@@ -167,6 +167,18 @@ def boasting_places(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
     return replace(gnss, v_n=None, velocity_sigma=None, position_sigma=gnss.position_sigma / math.sqrt(2.0))
 
 
+def assumed_fixes(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
+    """A receiver of which nothing is said, as it is assumed: late or early, fixes that wander, velocities with the floor as noise.
+
+    What it says of its places is that of their white part, and as much is taken for what wanders.
+    """
+    assert gnss.v_n is not None
+    assert gnss.position_sigma is not None
+    v_n = gnss.v_n + VELOCITY_FLOOR * rng.standard_normal(gnss.v_n.shape)
+    time = gnss.time + LATENCY_SIGMA * rng.standard_normal()
+    return replace(gnss, time=time, v_n=v_n, position_sigma=gnss.position_sigma / math.sqrt(2.0))
+
+
 def jittering(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
     """Stamped when they arrived, .1 to .5 s late."""
     time = gnss.time + np.clip(0.3 + 0.1 * rng.standard_normal(len(gnss)), 0.1, 0.5)
@@ -203,6 +215,12 @@ CASES = (
     Case("GNSS late by 1 s, car", vehicle("industrial", FIXES | {"latency": "1 s"}), by("industrial"), GOOD),
     Case(
         "GNSS late by 1 s, underwater", vehicle("tactical", FIXES | {"latency": "1 s"}, car=False), by("tactical"), GOOD
+    ),
+    Case(
+        "GNSS, underwater, errors as assumed",
+        vehicle("tactical", WANDERING, car=False),
+        by("tactical", assumed_fixes),
+        GOOD,
     ),
     Case("GNSS stamps late by .1 to .5 s, drawn", vehicle("industrial", FIXES), by("industrial", jittering), GOOD),
     Case("GNSS with positions only", vehicle("industrial", FIXES), by("industrial", places_only), GOOD),

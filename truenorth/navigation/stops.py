@@ -34,9 +34,9 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     """Seconds at rest, found from the IMU alone.
 
     Constant velocity looks like rest to an IMU, but a vehicle that drives shakes. Seconds without any motion above the
-    sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves. A second next to one in
-    which it moves does not count: a vehicle that rolls to rest has a speed of .1 m/s in it, ten times the sigma of rest, and less
-    acceleration than tells motion from tilt.
+    sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves. The second after one in
+    which it moves does not count: a vehicle sets off with a push, but rolls to rest, and may have .1 m/s in it, ten times the
+    sigma of rest, with less acceleration than tells motion from tilt.
 
     Returns
     -------
@@ -48,9 +48,9 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
         return np.empty(0), np.empty(0)
     moves = motion.kind > DISTURBED
     before = ~np.logical_or.accumulate(moves)
-    apart = ~np.convolve(moves, np.ones(3), "same").astype(bool)
+    rolls = np.concatenate([[False], moves[:-1]])
     middle = motion.time - 0.5
-    return middle[apart & (motion.kind == STILL)], middle[apart & before & (motion.kind == DISTURBED)]
+    return middle[~rolls & (motion.kind == STILL)], middle[before & (motion.kind == DISTURBED)]
 
 
 def seconds_at_rest(
