@@ -182,9 +182,18 @@ def sensed(rng: np.random.Generator, true: World, spec: ImuSpec, rate: float = 1
 
 
 def fixed(
-    rng: np.random.Generator, true: World, arm: Array, every: float = 1.0, jumps: int = 0, speeds: bool = True
+    rng: np.random.Generator,
+    true: World,
+    arm: Array,
+    every: float = 1.0,
+    jumps: int = 0,
+    speeds: bool = True,
+    stays: bool = False,
 ) -> GnssRecord:
-    """A receiver's fixes: white and slow errors, its own idea of their size, a latency, and the jumps of multipath."""
+    """A receiver's fixes: white and slow errors, its own idea of their size, a latency, the jumps of multipath.
+
+    `stays`: they have an error that stays, too, of which the receiver knows the size.
+    """
     time = np.arange(rng.uniform(0.2, 1.0), true.time[-1] - 0.5, every)
     at = time - rng.uniform(0.0, 0.03)  # of what a stamp says
     place, v, C = true.at(at)
@@ -197,6 +206,9 @@ def fixed(
     for _ in range(jumps):
         first = rng.uniform(0.0, time[-1])
         off[(time > first) & (time < first + rng.uniform(4.0, 12.0))] += rng.uniform(4.0, 15.0) * _way(rng)
+    constant = rng.uniform(1.0, 3.0) if stays else 0.0
+    if stays:
+        off = off + up * constant * rng.standard_normal(3)
     quick = rng.uniform(0.03, 0.08)
     dv = up * (quick * rng.standard_normal(v.shape) + coloured(rng, len(at), every, 0.5 * quick, 5.0))
     off = off + C @ arm
@@ -211,7 +223,7 @@ def fixed(
         lon,
         place[:, 2] + off[:, 2],
         v_n=v + turning + dv if speeds else None,
-        position_sigma=np.tile(says * math.hypot(slow, white) * up, (len(at), 1)),
+        position_sigma=np.tile(says * math.hypot(slow, white, constant) * up, (len(at), 1)),
         velocity_sigma=np.tile(says * 1.1 * quick * up, (len(at), 1)) if speeds else None,
     )
 

@@ -154,6 +154,11 @@ CASES = (
             (vehicles.ship, "navigation"),
         )
     ),
+    Case(
+        NAME,
+        "navigation, GNSS, consumer, multicopter, fixes with an error that stays",
+        navigated(vehicles.multicopter, "consumer", 240.0, stays=True),
+    ),
     Case(NAME, "navigation, GNSS, industrial, car, multipath", navigated(vehicles.car, "industrial", 240.0, jumps=3)),
 )
 

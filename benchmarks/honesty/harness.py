@@ -37,6 +37,7 @@ class Log:
     C_nb: Callable[[float], Array]  # true attitude of the body at a time, s, against the level at that place
     aiding: Mapping[str, Any] = field(default_factory=dict)  # records of the sensors besides the IMU, by their keys
     start: Position | None = None  # where the log begins
+    numbers: tuple[int, int] = (0, 0)  # seed and run: what a case spoils is drawn by them, anew in each run
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def simulated(scenario: Mapping[str, Any], seed: int, run: int, of_imu: bool = F
 
     records = {key: sensed.record for key, sensed in aiding.items()}
     start = Position(float(at.lat[0]), float(at.lon[0]), float(at.alt[0]))
-    return Log(record, records.get("encoder"), here, C_nb, records, start)
+    return Log(record, records.get("encoder"), here, C_nb, records, start, (seed, run))
 
 
 def outcome(case: Case, seed: int, run: int) -> Outcome:

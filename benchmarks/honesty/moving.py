@@ -22,9 +22,9 @@ import numpy as np
 from benchmarks.honesty.harness import Case, Log, main, place
 from truenorth.aiding.sensors import ODOMETER_SIGMA
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.alignment.in_motion_task import WHEEL
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, VELOCITY_FLOOR, WHEEL
 from truenorth.alignment.result import Alignment
-from truenorth.records import GnssRecord, OdometerRecord, VelocityRecord
+from truenorth.records import GnssRecord, VelocityRecord
 
 GOOD = ("aligned", "level_only", "not_converged")
 FLAGGED = (*GOOD, "inconsistent")  # of a wrong class of IMU: what is said must be right, and it may be refused
@@ -99,17 +99,23 @@ def askew(rng: np.random.Generator) -> Mapping[str, Any]:
 def as_assumed(
     scenario: Callable[[np.random.Generator], Mapping[str, Any]],
 ) -> Callable[[np.random.Generator], Mapping[str, Any]]:
-    """The same world, the wheel's scale, mounting and arm drawn from what is assumed of a wheel of which nothing is said."""
+    """The same world with a wheel whose scale, mounting and arm are drawn from what is assumed of one of which nothing is said.
+
+    What slides neither sideways nor upwards is the point of the vehicle above its wheel, along axes that the IMU's are turned
+    from: a velocity in three axes, at that arm and in those axes.
+    """
 
     def drawn(rng: np.random.Generator) -> Mapping[str, Any]:
-        found = dict(scenario(rng))
+        found = {key: value for key, value in scenario(rng).items() if key != "odometer"}
         arm = [f"{WHEEL.lever_arm_sigma * x:.3f} m" for x in rng.standard_normal(3)]
-        own = {
+        pitch, yaw = np.degrees(WHEEL.angle_sigma) * rng.standard_normal(2)
+        wheel = {
+            "rate": "10 Hz",
             "scale": f"{100.0 * WHEEL.scale_sigma * rng.standard_normal():.3f} %",
-            "mounting": [f"{np.degrees(WHEEL.angle_sigma) * x:.3f} deg" for x in rng.standard_normal(2)],
+            "misalignment": [f"{pitch:.3f} deg", "0 deg", f"{yaw:.3f} deg"],
             "lever_arm": arm,
         }
-        return found | {"odometer": {**found["odometer"], **own}}
+        return found | {"velocity_log": wheel}
 
     return drawn
 
@@ -121,37 +127,33 @@ WANDERING = FIXES | {"position_drift": "2 m", "correlation_time": "60 s"}
 def by(
     imu: str,
     change: Callable[[GnssRecord, np.random.Generator], GnssRecord] | None = None,
-    slip: Callable[[OdometerRecord, np.random.Generator], VelocityRecord] | None = None,
+    noise: float | None = None,
 ) -> Any:
-    """Aligned with what the log has; `change` spoils the fixes, `slip` the wheel."""
+    """Aligned with what the log has; `change` spoils the fixes, `noise` (m/s, forward) is that of a wheel in three axes."""
 
     def call(log: Log) -> Alignment:
-        gnss, odometer = log.aiding.get("gnss"), log.aiding.get("odometer")
-        rng = np.random.default_rng(len(log.record) + int(1e6 * log.record.gyro[0, 0]))
+        gnss, odometer, velocity = (log.aiding.get(name) for name in ("gnss", "odometer", "velocity_log"))
+        rng = np.random.default_rng([*log.numbers, 2])
         if gnss is not None and change is not None:
             gnss = change(gnss, rng)
         position = log.start if gnss is None else None
-        aids = {"odometer": odometer} if slip is None or odometer is None else {"velocity": slip(odometer, rng)}
-        wheel = WHEEL if odometer is not None else None
+        aids: dict[str, Any] = {"odometer": odometer}
+        if velocity is not None and noise is not None:
+            aids = {"velocity": slipping(velocity, noise, rng)}
+        wheel = WHEEL if odometer is not None or velocity is not None else None
         return align_in_motion(log.record, imu, gnss=gnss, position=position, wheel=wheel, **aids)
 
     return call
 
 
-def slipping(noise: float) -> Callable[[OdometerRecord, np.random.Generator], VelocityRecord]:
+def slipping(wheel: VelocityRecord, noise: float, rng: np.random.Generator) -> VelocityRecord:
     """A wheel as the aligner takes it: it slips sideways and upwards by what is assumed, and has such noise forward, m/s.
 
     A log of three axes says what a wheel's rows stand for: the constraint is measured, and its noise drawn.
     """
-
-    def change(odometer: OdometerRecord, rng: np.random.Generator) -> VelocityRecord:
-        sigma = np.array([WHEEL.slip, noise, WHEEL.slip])
-        drawn = rng.standard_normal((len(odometer), 3)) * [WHEEL.slip, math.sqrt(noise**2 - USUAL_NOISE**2), WHEEL.slip]
-        measured = drawn + np.outer(odometer.speed, [0.0, 1.0, 0.0])
-        time = odometer.time - 0.5 * odometer.steps
-        return VelocityRecord(time, measured, "body", np.tile(sigma, (len(odometer), 1)), odometer.source)
-
-    return change
+    sigma = np.tile([WHEEL.slip, noise, WHEEL.slip], (len(wheel), 1))
+    measured = wheel.velocity + sigma * rng.standard_normal(sigma.shape)
+    return VelocityRecord(wheel.time, measured, "body", sigma, wheel.source)
 
 
 def places_only(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
@@ -163,6 +165,18 @@ def boasting_places(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
     """Without velocities; what it says of its places is that of their white part, and as much is taken for what wanders."""
     assert gnss.position_sigma is not None
     return replace(gnss, v_n=None, velocity_sigma=None, position_sigma=gnss.position_sigma / math.sqrt(2.0))
+
+
+def assumed_fixes(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
+    """A receiver of which nothing is said, as it is assumed: late or early, fixes that wander, velocities with the floor as noise.
+
+    What it says of its places is that of their white part, and as much is taken for what wanders.
+    """
+    assert gnss.v_n is not None
+    assert gnss.position_sigma is not None
+    v_n = gnss.v_n + VELOCITY_FLOOR * rng.standard_normal(gnss.v_n.shape)
+    time = gnss.time + LATENCY_SIGMA * rng.standard_normal()
+    return replace(gnss, time=time, v_n=v_n, position_sigma=gnss.position_sigma / math.sqrt(2.0))
 
 
 def jittering(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
@@ -178,8 +192,7 @@ def boasting(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
     return replace(gnss, position_sigma=gnss.position_sigma / 3.0, velocity_sigma=gnss.velocity_sigma / 3.0)
 
 
-USUAL_NOISE = 0.02  # m/s, of the wheels here
-ODOMETER = {"noise": f"{USUAL_NOISE} m/s", "scale_sigma": "1 %"}
+ODOMETER = {"noise": "0.02 m/s", "scale_sigma": "1 %"}
 NOISY = vehicle("navigation", None, {"noise": "0.3 m/s"})
 QUIET = vehicle("navigation", None, ODOMETER)
 CASES = (
@@ -187,14 +200,14 @@ CASES = (
     Case(
         "odometer, S-turns, errors as assumed",
         as_assumed(askew),
-        by("navigation", slip=slipping(ODOMETER_SIGMA)),
+        by("navigation", noise=ODOMETER_SIGMA),
         GOOD,
     ),
     Case("odometer noisier than usual (.3 m/s)", NOISY, by("navigation"), GOOD),
     Case(
         "odometer noisier than usual (.3 m/s), errors as assumed",
         as_assumed(QUIET),
-        by("navigation", slip=slipping(0.3)),
+        by("navigation", noise=0.3),
         GOOD,
     ),
     Case("GNSS, car", vehicle("industrial", FIXES), by("industrial"), GOOD),
@@ -202,6 +215,12 @@ CASES = (
     Case("GNSS late by 1 s, car", vehicle("industrial", FIXES | {"latency": "1 s"}), by("industrial"), GOOD),
     Case(
         "GNSS late by 1 s, underwater", vehicle("tactical", FIXES | {"latency": "1 s"}, car=False), by("tactical"), GOOD
+    ),
+    Case(
+        "GNSS, underwater, errors as assumed",
+        vehicle("tactical", WANDERING, car=False),
+        by("tactical", assumed_fixes),
+        GOOD,
     ),
     Case("GNSS stamps late by .1 to .5 s, drawn", vehicle("industrial", FIXES), by("industrial", jittering), GOOD),
     Case("GNSS with positions only", vehicle("industrial", FIXES), by("industrial", places_only), GOOD),
@@ -216,7 +235,7 @@ CASES = (
     Case(
         "GNSS and odometer, errors as assumed",
         as_assumed(vehicle("industrial", WANDERING, ODOMETER)),
-        by("industrial", slip=slipping(ODOMETER_SIGMA)),
+        by("industrial", noise=ODOMETER_SIGMA),
         GOOD,
     ),
     Case("IMU industrial, given as tactical", vehicle("industrial", FIXES), by("tactical"), FLAGGED),

@@ -86,6 +86,12 @@ def test_a_tractor_that_pitches_on_its_springs_has_gyros_of_one_moment():
     assert case.run(1, 12).refused == ""
 
 
+def test_a_tractor_that_rough_ground_rocks_has_gyros_of_one_moment():
+    """Its receiver is .01 s late within its .03: gyros .03 s later bring what the delay's column lacks, a ratio of 30, refused."""
+    case = next(case for case in CASES if case.name == "by GNSS, tactical, tractor")
+    assert case.run(1, 8).refused == ""
+
+
 def test_a_wheel_says_nothing_of_the_road_to_clocks():
     """Sideways and forward it counts as before, and so do other sensors."""
     inputs, _ = BENCHES["odometer"].draw(SEED, 0)

@@ -7,8 +7,9 @@ from zlib import crc32
 import numpy as np
 import pytest
 
-from benchmarks.honesty import vehicles
+from benchmarks.honesty import foreign, vehicles
 from benchmarks.honesty.foreign import log, sensed
+from benchmarks.honesty.foreign_rows import CASES
 from tests.alignment.test_motion_fit import MOTIONS, WALKS, drawn
 from truenorth.alignment import align, swing
 from truenorth.alignment.motion_fit import _score
@@ -149,6 +150,19 @@ def test_a_ship_on_her_lines_is_aligned(seed, run):
     assert any(item.key == "sway.swing" for item in answer.evidence)
     # The slow arm stays behind: which part of a heading is slow shows itself afterwards.
     assert answer.ongoing.P.shape == (39, 39)
+
+
+@pytest.mark.parametrize(("leaves", "refused"), [(0.0, False), (3.0, True)])
+def test_a_drift_that_is_small_beside_sigma_refuses_no_ship(leaves, refused, monkeypatch):
+    """A slow heel looked like a drift by a ratio of 27, small beside the sigma of a tactical IMU; one to 3 m/s is one."""
+
+    def world(rng, start, v, *rest):
+        gone = np.clip(np.linspace(-1.0, 1.0, len(v)), 0.0, 1.0)[:, None] * np.array([leaves, 0.0, 0.0])
+        return foreign.world(rng, start, v + gone, *rest)
+
+    monkeypatch.setattr(vehicles, "world", world)
+    case = next(case for case in CASES if case.name == "swaying, tactical, ship moored")
+    assert bool(case.run(4242, 10).refused) == refused
 
 
 @pytest.mark.slow

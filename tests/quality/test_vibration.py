@@ -5,12 +5,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests import recordings
+from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, RECEIVER, Bench, misses
+from truenorth.core.earth import earth_rate_n, normal_gravity
+from truenorth.core.position import Position
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.vibration import SMALLEST, vibration_evidence
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
-from truenorth.records.vibration import coning_left, sampling_error
+from truenorth.records.vibration import cone_drift, coning_left, sampling_error
+from truenorth.simulation import rest
 from truenorth.strapdown.coning import BEFORE
 from truenorth.strapdown.level import increments
 
@@ -54,6 +58,49 @@ def test_both_errors_are_those_of_the_integration(frequency, rate):
     angle, drift = integrated(record, frequency)
     assert sampling_error(record.gyro, record.interval) == pytest.approx(angle, rel=0.03)
     assert coning_left(record) == pytest.approx(drift, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize(("frequency", "rate"), [(5.0, 200.0), (17.3, 200.0), (20.0, 100.0)])
+def test_the_mean_rate_of_a_base_that_trembles_is_short_of_its_turn_by_the_cone(frequency, rate, kind):
+    """It comes back to where it was; the mean of its gyros does not."""
+    if kind == "rates":
+        record = vibrating(frequency, rate)
+        mean = record.gyro.mean(axis=0)
+    else:
+        fine = vibrating(frequency, 10.0 * rate)
+        parts = fine.gyro.reshape(-1, 10, 3).sum(axis=1) * fine.interval
+        force = 9.8 / rate * np.array([0.0, 0.0, 1.0]) + np.zeros_like(parts)
+        record = ImuRecord(fine.time[9::10], parts, force, "increments")
+        mean = parts.mean(axis=0) * rate
+    assert np.abs(mean).max() > np.radians(0.5) / 3600.0
+    np.testing.assert_allclose(cone_drift(record), -mean, rtol=5e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.1])
+def test_a_base_on_a_cone_is_aligned_and_a_gyro_out_of_specification_on_it_is_not(off):
+    """Mean rates 4 deg/h short of the earth's were "missed": 7 of 7 sound logs at 200 Hz; one gyro off by ten sigmas is one."""
+    place, C = Position.from_degrees(45.0, 10.0), rest(Position.from_degrees(45.0, 10.0), 0.7).states(0.0).C_nb
+    shaken = vibrating(10.0, 200.0, duration=300.0)
+    swing = attitude(shaken.time, 10.0).inv()
+    earth, up = (
+        swing.apply(C.T @ earth_rate_n(place.lat)),
+        swing.apply(C.T @ [0.0, 0.0, normal_gravity(place.lat, 0.0)]),
+    )
+    spec, rng = imu_spec("navigation"), np.random.default_rng(8814)
+    noise = [
+        s * np.sqrt(200.0) * rng.standard_normal(up.shape) for s in (spec.gyro_random_walk, spec.accel_random_walk)
+    ]
+    gyro = shaken.gyro + earth + noise[0] + np.radians(off) / 3600.0 * np.array([0.0, 1.0, 0.0])
+    answer = align(ImuRecord(shaken.time, gyro, up + noise[1]), place, spec)
+    assert (answer.status == "inconsistent") == (off > 0.0)
+    if off:
+        assert any(item.key == "rate.misses" for item in answer.evidence)
+    else:
+        phi = -Rotation.from_matrix(
+            answer.C_nb @ (C @ attitude(answer.time * np.ones(1), 10.0).as_matrix()[0]).T
+        ).as_rotvec()
+        assert np.abs(phi[2]) < 4.0 * np.sqrt(answer.phi_covariance[2, 2])
 
 
 def test_axes_in_step_make_no_cone():

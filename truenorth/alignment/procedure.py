@@ -122,7 +122,7 @@ def align_base(
         refuse(method, get_args(Method))
     if not heading_limit > 0.0:
         raise UsageError(f"heading limit {np.degrees(heading_limit):g} deg; expected a positive angle")
-    spec = None if imu is None else noise_in(record, imu_spec(imu))
+    spec = None if imu is None else noise_in(record, imu_spec(imu)).with_coning_of(record)
     if calibration is not None:
         record = calibration.apply(record)
     record = bridged(record)
@@ -376,11 +376,11 @@ def _rocks_all_along(motion: MotionSummary) -> bool:
 def _explained(motion: MotionSummary, found: _Found) -> bool:
     """Whether a lever arm and bounded motion explain all that the base does: what moves by its arm goes nowhere.
 
-    A high sea moves a ship by more than a metre a second, and takes it nowhere either.
+    A high sea moves a ship by more than a metre a second, and takes it nowhere either. A drift that innovations show has an effect
+    of known size, which the judge weighs: of a ship on her lines, whose slow heel looks like one, it is a part of sigma.
     """
-    leaves = found.drift is not None and found.drift.sure
     small = float(np.max(found.answer.disturbance[:2])) < STAYS or found.way < GOES
-    return _rocks_all_along(motion) and found.settled and small and not leaves
+    return _rocks_all_along(motion) and found.settled and small
 
 
 def _moves_from(motion: MotionSummary) -> float | None:

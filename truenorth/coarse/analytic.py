@@ -17,6 +17,7 @@ from truenorth.core.compiled import compiled
 from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.core.linalg import add_rows
 from truenorth.records import ImuRecord
+from truenorth.records.vibration import cone_drift
 from truenorth.strapdown.increments import in_blocks, read_only
 
 Array = NDArray[np.float64]
@@ -31,6 +32,7 @@ class Means:
     Attributes
     ----------
     w_ib_b : (3,) array, rad/s
+        Of the base: with the drift of the cones in which its axes tremble, which is not in the mean of the gyros.
     f_b : (3,) array, m/s^2
     w_covariance, f_covariance : (3, 3) arrays
         From the scatter of block means: noise and the base's own motion alike.
@@ -53,7 +55,7 @@ def means(record: ImuRecord) -> Means:
     T, total = sums[:, :1], sums.sum(axis=0)
     w, f = sums[:, 1:4] / T, sums[:, 4:] / T
     return Means(
-        w_ib_b=total[1:4] / total[0],
+        w_ib_b=total[1:4] / total[0] + cone_drift(record),
         f_b=total[4:] / total[0],
         w_covariance=_scatter(w) / blocks,
         f_covariance=_scatter(f) / blocks,

@@ -34,7 +34,9 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     """Seconds at rest, found from the IMU alone.
 
     Constant velocity looks like rest to an IMU, but a vehicle that drives shakes. Seconds without any motion above the
-    sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves.
+    sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves. The second after one in
+    which it moves does not count: a vehicle sets off with a push, but rolls to rest, and may have .1 m/s in it, ten times the
+    sigma of rest, with less acceleration than tells motion from tilt.
 
     Returns
     -------
@@ -44,10 +46,11 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     motion = motion_summary(record)
     if motion.time.size == 0:
         return np.empty(0), np.empty(0)
-    moved = np.flatnonzero(motion.kind > DISTURBED)
-    before = np.arange(len(motion.kind)) < (moved[0] if moved.size else len(motion.kind))
+    moves = motion.kind > DISTURBED
+    before = ~np.logical_or.accumulate(moves)
+    rolls = np.concatenate([[False], moves[:-1]])
     middle = motion.time - 0.5
-    return middle[motion.kind == STILL], middle[(motion.kind == DISTURBED) & before]
+    return middle[~rolls & (motion.kind == STILL)], middle[before & (motion.kind == DISTURBED)]
 
 
 def seconds_at_rest(
