@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import json
 from pathlib import Path
 from typing import Any, Protocol
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +84,7 @@ def kml(result: Exported) -> str:
     )
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
-        f"<name>{escape(result.source)}</name><Placemark><name>track</name><MultiGeometry>{strings}</MultiGeometry>"
+        f"<name>{html.escape(result.source, quote=False)}</name><Placemark><name>track</name><MultiGeometry>{strings}</MultiGeometry>"
         "</Placemark></Document></kml>\n"
     )
 
