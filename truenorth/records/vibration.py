@@ -27,7 +27,6 @@ Sources: F. B. Hildebrand, "Introduction to Numerical Analysis", 2nd ed. (1974),
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +38,7 @@ Array = NDArray[np.float64]
 
 BLOCK = 20.0  # s, in which an engine runs as it does
 FEWEST = 32  # rows of a block
+LEAST_CONE = 2e-10  # rad/s, 4e-5 deg/h: no gyro has as small a bias
 
 SECOND = np.array([0.0, 0.0, 1.0, -2.0, 1.0, 0.0, 0.0])
 THIRD = np.array([0.0, -1.0, 2.0, 0.0, -2.0, 1.0, 0.0]) / 2.0
@@ -56,35 +56,41 @@ def sampling_error(rates: Array, interval: float) -> float:
     return math.sqrt(max(float(np.linalg.eigvalsh(error.T @ error / count)[-1]), 0.0))
 
 
-@remembered
 def coning_left(record: ImuRecord) -> float:
     """Drift about the worst axis that coning between rows leaves, rad/s: RMS over blocks of the log."""
-    if record.kind == "increments":
-        return 0.0
-    drift = _cones(record, _share_left)
-    return math.sqrt(float(np.max(np.mean(np.square(drift), axis=0)))) if len(drift) else 0.0
+    left = _cones(record)[..., 0]
+    return math.sqrt(float(np.max(np.mean(np.square(left), axis=0)))) if len(left) else 0.0
+
+
+def cone_drift(record: ImuRecord) -> Array:
+    """(3,) by which the mean rate of a base falls short of that at which it turns, since its axes vibrate in cones, rad/s."""
+    whole = _cones(record)[..., 1]
+    return np.asarray(whole.mean(axis=0)) if len(whole) else np.zeros(3)
 
 
 @remembered
-def cone_drift(record: ImuRecord) -> Array:
-    """(3,) by which the mean rate of a base falls short of that at which it turns, since its axes vibrate in cones, rad/s."""
-    drift = _cones(record, np.ones_like if record.kind == "rates" else _share_of_increments)
-    return np.asarray(drift.mean(axis=0)) if len(drift) else np.zeros(3)
+def _cones(record: ImuRecord) -> Array:
+    """(B, 3, 2) of blocks of the log, rad/s: what of ``<theta x w>/2`` is left by the rows, and what their mean lacks of it.
 
-
-def _cones(record: ImuRecord, share: Callable[[Array], Array]) -> Array:
-    """(B, 3) ``share <theta x w>/2`` of blocks of the log, rad/s; `share` is that of tones that turn by x rad an interval."""
+    No cone has more than the rates' variance over the slowest frequency of a block: where that is nothing, nothing is worked out.
+    """
     length = max(round(BLOCK / record.interval), FEWEST)
-    blocks = len(record) // length
+    rates = record.kind == "rates"
+    unit = 1.0 if rates else 1.0 / record.interval
+    mean = np.ones(len(record)) @ record.gyro / len(record)
+    variance = unit**2 * (np.einsum("ki,ki->i", record.gyro, record.gyro) / len(record) - mean**2)
+    slowest = 2.0 * math.pi / (length * record.interval)
+    blocks = len(record) // length if float(variance.max()) > LEAST_CONE * slowest else 0
     x = 2.0 * math.pi * np.arange(1, length // 2 + 1) / length
+    shares = (_share_left(x), np.ones_like(x)) if rates else (np.zeros_like(x), _share_of_increments(x))
     # <theta x w>/2 of a tone of amplitude A: Im(A x conj(A))/(4 w), of whose two products each is the other's conjugate. A window
     # of power 3/8 makes A of W.
-    unit = 1.0 if record.kind == "rates" else 1.0 / record.interval
-    weight = (8.0 / 3.0) * (2.0 * unit / length) ** 2 * share(x) * record.interval / (2.0 * x)
-    window, drift = np.hanning(length), np.empty((blocks, 3))
+    scale = (8.0 / 3.0) * (2.0 * unit / length) ** 2 * record.interval / (2.0 * x)
+    weight = np.stack(shares, axis=1) * scale[:, None]
+    window, drift = np.hanning(length), np.empty((blocks, 3, 2))
     ends = record.gyro[len(record) - blocks * length :].reshape(blocks, length, 3)
     for at, rows in enumerate(ends):
-        W = np.fft.rfft(rows.T * window)[:, 1:]
+        W = np.fft.rfft((rows - mean).T * window)[:, 1:]
         drift[at] = [(W[j].imag * W[k].real - W[j].real * W[k].imag) @ weight for j, k in ((1, 2), (2, 0), (0, 1))]
     return drift
 
