@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty.frame import Case, Outcome, main
+from truenorth.aiding.matching import What
 from truenorth.alignment.transfer import DELAY_WALK, align_transfer
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
@@ -64,7 +65,13 @@ def wandering(master: MasterRecord, rng: np.random.Generator) -> tuple[MasterRec
     return replace(master, time=master.time + late), float(late[-1])
 
 
-def transferred(motion: Any, errors: MasterErrors | None, grade: str = "tactical", walks: bool = False) -> Any:
+def transferred(
+    motion: Any,
+    errors: MasterErrors | None,
+    grade: str = "tactical",
+    walks: bool = False,
+    matching: What = "auto",
+) -> Any:
     """A run of a slave of a grade against a master with these errors; None: it is taken for the truth.
 
     With `walks` its clock walks against the slave's.
@@ -93,7 +100,7 @@ def transferred(motion: Any, errors: MasterErrors | None, grade: str = "tactical
         if walks:
             master, late = wandering(master, rng)
         tau += late
-        answer = align_transfer(slave, master, spec, master_errors=errors)
+        answer = align_transfer(slave, master, spec, matching=matching, master_errors=errors)
         t = answer.transfer
         phi = -rotation_vector_from_dcm(answer.C_nb @ way.states(np.array(answer.time)).C_nb.T)
         ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
@@ -114,7 +121,14 @@ CASES: tuple[Case, ...] = tuple(
     for name, motion in (("ship", ship), ("aircraft", aircraft), ("straight flight", straight_flight))
     for how, errors in (("considered", ERRORS), ("left out", None))
 )
-CASES += (Case("transfer", "aircraft, clock of the master as assumed", transferred(aircraft, ERRORS, walks=True)),)
+CASES += (
+    Case("transfer", "aircraft, clock of the master as assumed", transferred(aircraft, ERRORS, walks=True)),
+    Case(
+        "transfer",
+        "ship, consumer slave, by velocity alone",
+        transferred(ship, ERRORS, "consumer", matching="velocity"),
+    ),
+)
 
 if __name__ == "__main__":
     main(CASES)

@@ -153,8 +153,8 @@ def test_a_ship_on_her_lines_is_aligned(seed, run):
 
 
 @pytest.mark.parametrize(("leaves", "refused"), [(0.0, False), (3.0, True)])
-def test_a_drift_that_is_small_beside_sigma_refuses_no_ship(leaves, refused, monkeypatch):
-    """A slow heel looked like a drift by a ratio of 27, small beside the sigma of a tactical IMU; one to 3 m/s is one."""
+def test_a_drift_that_is_small_against_sigma_refuses_no_ship(leaves, refused, monkeypatch):
+    """A slow heel looked like a drift by a ratio of 27, small against the sigma of a tactical IMU; one to 3 m/s is one."""
 
     def world(rng, start, v, *rest):
         gone = np.clip(np.linspace(-1.0, 1.0, len(v)), 0.0, 1.0)[:, None] * np.array([leaves, 0.0, 0.0])

@@ -304,7 +304,8 @@ def _passes(
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None
         linear = _linear(part, master, track, assumed, begin)
         if cheap and not any(residuals.jumped.any() for residuals in track.residuals):
-            assumed, biases = as_found(track, start, assumed, biases)
+            given = part if master.C_nb is not None and not np.isfinite(noise[1]) else None
+            assumed, biases = as_found(track, start, assumed, biases, given)
     return noise, linear, assumed, biases
 
 

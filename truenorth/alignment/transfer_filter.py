@@ -61,6 +61,8 @@ class Assumed:
     C_mb: Array = field(default_factory=lambda: np.eye(3))  # (3, 3): slave to master axes
     mounting_sigma: float = 0.0  # rad
     heading: float | None = None  # rad; of the slave at the start, where no master gives attitude; else its course
+    # (3,) rad: by which a pass has found the slave turned at the start, from what the rest says, where no states hold its seat
+    tilt: Array = field(default_factory=lambda: np.zeros(3))
 
 
 NOTHING_BETWEEN = Assumed()
@@ -148,6 +150,8 @@ def transfer_filter(
         master_aiding(master, model, assumed, matching, linear, slave),
         interval=LONGEST_STEP,
         every=0,
+        # A poor IMU's attitude that translation alone shows is corrected by degrees, and velocity with it.
+        invariant=ACCEL_AXES in model.groups and not np.isfinite(matching.attitude_sigma),
         prior=(P, values),
     )
     if len(track) == 0:
