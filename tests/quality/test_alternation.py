@@ -79,6 +79,15 @@ def test_an_engine_near_a_third_of_the_rate_is_none(seed):
     assert not alternation_evidence(still(seed, kind, vibration=rng.uniform(0.05, 2.0), frequency=frequency))
 
 
+@pytest.mark.parametrize("period", [2, 3])
+def test_a_beat_that_goes_round_once_in_a_stretch_is_a_vibration(period):
+    """Of every stretch the same little is left then: of 36 shaken logs three alternated by that."""
+    beat = 32.0 / SPAN
+    for seed in range(4):
+        shaken = still(seed, vibration=2.0, frequency=RATE / period - 0.998 * beat)
+        assert not alternation_evidence(shaken)
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_sound_logs_do_not_alternate(seed):
     """Noise, an engine that idles near half the rate, and counters whose steps hide the noise."""

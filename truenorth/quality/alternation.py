@@ -28,7 +28,8 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
-STRETCHES = 32  # of the log
+# Of the log: a vibration whose beat goes round once in each of these stretches, and leaves as much in all, does not in those.
+STRETCHES = (32, 40)
 SHORTEST = 32  # rows of one
 PARTS = 8  # of the log, that must all agree
 # Rows in which sensors take their turns; of four every second row differs, too.
@@ -36,31 +37,31 @@ PERIODS = {2: "record.alternates", 3: "record.in_threes"}
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
-def alternation(record: ImuRecord, period: int = 2) -> Array:
+def alternation(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> Array:
     """(3,) size of what each accelerometer does once in so many rows, of two: half of what one has more than the other.
 
     Zero where chance may give it.
     """
-    length = _length(record, period)
+    length = _length(record, period, stretches)
     found = np.zeros(3)
     if length < SHORTEST:
         return found
     for channel, x in enumerate(record.accel.T):
-        means = _periodic(x, length, period).mean(axis=1)
+        means = _periodic(x, length, period, stretches).mean(axis=1)
         size = float(abs(means.mean()))
         if _keeps(means) and size > COUNTS * _step(x):
             found[channel] = size
     return found
 
 
-def turn_in_turn(record: ImuRecord, period: int = 2) -> float:
+def turn_in_turn(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> float:
     """By how much (rad) forces of one in so many rows are turned against the mean; zero where not all of the log shows it."""
-    length = _length(record, period)
+    length = _length(record, period, stretches)
     if length < SHORTEST:
         return 0.0
     columns = record.accel.T
-    q = np.stack([_periodic(x, length, period) for x in columns], axis=2)
-    f = np.stack([_smooth(x, length, period) for x in columns], axis=2)
+    q = np.stack([_periodic(x, length, period, stretches) for x in columns], axis=2)
+    f = np.stack([_smooth(x, length, period, stretches) for x in columns], axis=2)
     z = np.cross(f, q).sum(axis=1)  # of each stretch, as A: normal equations of q = theta x f
     A = np.sum(f * f, axis=(1, 2))[:, None, None] * np.eye(3) - np.einsum("kni,knj->kij", f, f)
     theta = np.linalg.pinv(A.sum(axis=0), rcond=limit("alternating turn"), hermitian=True) @ z.sum(axis=0)
@@ -73,24 +74,24 @@ def turn_in_turn(record: ImuRecord, period: int = 2) -> float:
     return size if size * force > COUNTS * counter and explains and _shown(shows, expected) else 0.0
 
 
-def _length(record: ImuRecord, period: int) -> int:
+def _length(record: ImuRecord, period: int, stretches: int) -> int:
     """Rows of a stretch, a multiple of the period."""
-    return (len(record) - 4) // STRETCHES // period * period
+    return (len(record) - 4) // stretches // period * period
 
 
-def _periodic(x: Array, length: int, period: int) -> Any:
-    """(STRETCHES, length / period) size and phase of what a channel does once in so many rows, of two a real number."""
+def _periodic(x: Array, length: int, period: int, stretches: int) -> Any:
+    """(stretches, length / period) size and phase of what a channel does once in so many rows, of two a real number."""
     quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / (2.0 * math.sin(math.pi / period)) ** 4
-    rows = quick[: STRETCHES * length].reshape(STRETCHES, length // period, period)
+    rows = quick[: stretches * length].reshape(stretches, length // period, period)
     if period == 2:
         return 0.5 * (rows[:, :, 0] - rows[:, :, 1])
     return rows @ np.exp(-2j * math.pi / period * np.arange(period)) * (2.0 / period)
 
 
-def _smooth(x: Array, length: int, period: int) -> Array:
+def _smooth(x: Array, length: int, period: int, stretches: int) -> Array:
     """The rest of it, at the same rows."""
     slow = (x[:-4] + 4.0 * x[1:-3] + 6.0 * x[2:-2] + 4.0 * x[3:-1] + x[4:]) / 16.0
-    return np.asarray(slow[: STRETCHES * length].reshape(STRETCHES, length // period, period).mean(axis=2))
+    return np.asarray(slow[: stretches * length].reshape(stretches, length // period, period).mean(axis=2))
 
 
 def _keeps(means: Any) -> bool:
@@ -124,15 +125,20 @@ def _shown(shows: Array, expected: Array) -> bool:
 @remembered
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:
     """That the rows of the accelerometers alternate, and by how much the mean of two sensors is turned against either."""
-    unit = record.interval if record.kind == "increments" else 1.0
     found = []
     for period, key in PERIODS.items():
-        offset = float(np.linalg.norm(alternation(record, period)))
-        turned = max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record, period))
+        turned = min(_turned(record, period, stretches) for stretches in STRETCHES)
         if turned > 0.0:
             figures: dict[str, Figure] = {"size": turned * GRAVITY_EQUATOR * period / (period - 1.0), "level": turned}
             found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
     return found
+
+
+def _turned(record: ImuRecord, period: int, stretches: int) -> float:
+    """By how much (rad) the mean is turned against one in so many rows, by the larger of both figures."""
+    unit = record.interval if record.kind == "increments" else 1.0
+    offset = float(np.linalg.norm(alternation(record, period, stretches)))
+    return max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record, period, stretches))
 
 
 def _step(values: Array) -> float:
