@@ -16,10 +16,11 @@ from truenorth.records import ImuRecord
 RATE, SPAN = 100.0, 240.0
 
 
-def two_in_turn(record, rotation):
+def two_in_turn(record, rotation, period=2):
+    """One in so many rows is another sensor's."""
     C = dcm_from_rotation_vector(np.array(rotation))
     gyro, accel = record.gyro.copy(), record.accel.copy()
-    gyro[1::2], accel[1::2] = gyro[1::2] @ C.T, accel[1::2] @ C.T
+    gyro[1::period], accel[1::period] = gyro[1::period] @ C.T, accel[1::period] @ C.T
     return replace(record, gyro=gyro, accel=accel)
 
 
@@ -42,6 +43,49 @@ def still(seed, kind="rates", vibration=0.0, frequency=0.0, step=0.0):
 def test_half_the_turn_of_one_against_the_other_is_found(kind, degrees):
     found = alternation_evidence(two_in_turn(still(1, kind), [np.radians(degrees), 0.0, 0.0]))
     assert found[0].effect.level == pytest.approx(np.radians(degrees) / 2.0, rel=0.06)
+
+
+@pytest.mark.parametrize("kind", ["rates", "increments"])
+@pytest.mark.parametrize("degrees", [0.05, 1.0])
+def test_of_one_in_three_two_thirds_of_its_turn_are_found(kind, degrees):
+    (found,) = alternation_evidence(two_in_turn(still(1, kind), [np.radians(degrees), 0.0, 0.0], 3))
+    assert found.key == "record.in_threes"
+    assert found.effect.level == pytest.approx(2.0 / 3.0 * np.radians(degrees), rel=0.06)
+
+
+@pytest.mark.parametrize("degrees", [0.1, 1.0])
+def test_of_one_in_four_every_second_row_differs(degrees):
+    """At half the rate a quarter of its turn is seen: as much as the mean of all is turned."""
+    (found,) = alternation_evidence(two_in_turn(still(1), [np.radians(degrees), 0.0, 0.0], 4))
+    assert found.key == "record.alternates"
+    assert found.effect.level == pytest.approx(np.radians(degrees) / 4.0, rel=0.06)
+
+
+@pytest.mark.parametrize("procedure", ["still", "swaying", "rotary", "gnss", "transfer", "attitude"])
+def test_one_in_three_is_found_on_every_procedure(procedure):
+    """Once silent: of twelve logs twelve, by 7 to 84 sigmas."""
+    for run in (0, 2):
+        record = BENCHES[procedure].draw(771240, run)[0]["record"]
+        assert not alternation_evidence(record)
+        (found,) = alternation_evidence(two_in_turn(record, np.radians([0.3, 0.2, 0.3]), 3))
+        assert found.key == "record.in_threes"
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_an_engine_near_a_third_of_the_rate_is_none(seed):
+    rng = np.random.default_rng([seed, 771241])
+    frequency = RATE / 3.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-2.0, 1.0)
+    kind = ("rates", "increments")[seed % 2]
+    assert not alternation_evidence(still(seed, kind, vibration=rng.uniform(0.05, 2.0), frequency=frequency))
+
+
+@pytest.mark.parametrize("period", [2, 3])
+def test_a_beat_that_goes_round_once_in_a_stretch_is_a_vibration(period):
+    """Of every stretch the same little is left then: of 36 shaken logs three alternated by that."""
+    beat = 32.0 / SPAN
+    for seed in range(4):
+        shaken = still(seed, vibration=2.0, frequency=RATE / period - 0.998 * beat)
+        assert not alternation_evidence(shaken)
 
 
 @pytest.mark.parametrize("seed", range(30))

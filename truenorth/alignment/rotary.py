@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.fine import CoarseStart, FineAlignment
@@ -164,7 +165,8 @@ def align_rotary(
     drift, steps, hemisphere = what_begins(fine, spec, task.position)
     evidence = model_evidence(drift, settled=fine.settled)
     evidence += base_speed(answer) + steps + bad_stretches(fine, record) + hemisphere
-    evidence += late_gyros_evidence(fine, fine.late, record) if isinstance(fine, SwayAlignment) else []
+    if isinstance(fine, SwayAlignment):
+        evidence += late_gyros_evidence(fine, fine.late, record) + accel_scale_evidence(fine, spec)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
     return judged(answer, _of_encoder(record, encoder, axes, task) + evidence + notes(encoder.notes), heading_limit)

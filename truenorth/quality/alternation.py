@@ -1,4 +1,4 @@
-"""Rows that alternate: two sensors, or two converters of one, in turn.
+"""Rows that alternate: two or three sensors, or converters of one, in turn.
 
 What keeps its phase at half the rate of rows over a whole log is no motion: a vibration there is off by some hundredths of a
 hertz, and turns over in the log. The alternating part of each accelerometer is looked at in stretches, with motion taken off by
@@ -7,11 +7,15 @@ turn makes of gravity, and so much is the mean of both turned against either sen
 
 Where gravity moves in the axes of the IMU, as on an indexer, the difference moves with it: a turn theta of one against the mean
 alternates as ``theta x f``. It is found by least squares over the log, and each part of it that can must show it.
+
+Three sensors in turn, or one in three, have the same at a third of the rate, where the fourth differences have the gain 9/16: a
+size with a phase, a complex number. One sensor in three that is turned by an angle stands 2/3 of it from the mean of all.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,72 +28,81 @@ from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
-STRETCHES = 32  # of the log
+# Of the log: a vibration whose beat goes round once in each of these stretches, and leaves as much in all, does not in those.
+STRETCHES = (32, 40)
 SHORTEST = 32  # rows of one
 PARTS = 8  # of the log, that must all agree
+# Rows in which sensors take their turns; of four every second row differs, too.
+PERIODS = {2: "record.alternates", 3: "record.in_threes"}
 COUNTS = 1.0  # steps of a coarse counter: it alternates by half of one by itself
 
 
-@remembered
-def alternation(record: ImuRecord) -> Array:
-    """(3,) half of what every second row of each accelerometer has more than the others; zero where chance may give it."""
-    length = _length(record)
+def alternation(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> Array:
+    """(3,) size of what each accelerometer does once in so many rows, of two: half of what one has more than the other.
+
+    Zero where chance may give it.
+    """
+    length = _length(record, period, stretches)
     found = np.zeros(3)
     if length < SHORTEST:
         return found
     for channel, x in enumerate(record.accel.T):
-        means = _alternating(x, length).mean(axis=1)
-        size = float(means.mean())
-        if _keeps(means) and abs(size) > COUNTS * _step(x):
+        means = _periodic(x, length, period, stretches).mean(axis=1)
+        size = float(abs(means.mean()))
+        if _keeps(means) and size > COUNTS * _step(x):
             found[channel] = size
     return found
 
 
-@remembered
-def turn_in_turn(record: ImuRecord) -> float:
-    """By how much (rad) every second row of forces is turned against the mean of all; zero where not all of the log shows it."""
-    length = _length(record)
+def turn_in_turn(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> float:
+    """By how much (rad) forces of one in so many rows are turned against the mean; zero where not all of the log shows it."""
+    length = _length(record, period, stretches)
     if length < SHORTEST:
         return 0.0
     columns = record.accel.T
-    q = np.stack([_alternating(x, length) for x in columns], axis=2)
-    f = np.stack([_smooth(x, length) for x in columns], axis=2)
+    q = np.stack([_periodic(x, length, period, stretches) for x in columns], axis=2)
+    f = np.stack([_smooth(x, length, period, stretches) for x in columns], axis=2)
     z = np.cross(f, q).sum(axis=1)  # of each stretch, as A: normal equations of q = theta x f
     A = np.sum(f * f, axis=(1, 2))[:, None, None] * np.eye(3) - np.einsum("kni,knj->kij", f, f)
     theta = np.linalg.pinv(A.sum(axis=0), rcond=limit("alternating turn"), hermitian=True) @ z.sum(axis=0)
     force = math.sqrt(float(np.mean(f**2)) * 3.0)
-    counter = max(_step(x) for x in columns)
-    shows, expected = z @ theta, np.einsum("i,kij,j->k", theta, A, theta)
+    shows, expected = np.real(z @ theta.conj()), np.real(np.einsum("i,kij,j->k", theta.conj(), A, theta))
     size = float(np.linalg.norm(theta))
     left = np.mean(q - np.cross(theta, f), axis=1)  # a vibration alternates where no force is turned, too
-    explains = float(np.sum(left**2)) < float(expected.sum()) / q.shape[1]
-    return size if size * force > COUNTS * counter and explains and _shown(shows, expected) else 0.0
+    explains = float(np.sum(abs(left) ** 2)) < float(expected.sum()) / q.shape[1]
+    if not (explains and _shown(shows, expected)):
+        return 0.0
+    return size if size * force > COUNTS * max(_step(x) for x in columns) else 0.0
 
 
-def _length(record: ImuRecord) -> int:
-    """Rows of a stretch, an even number."""
-    return (len(record) - 4) // STRETCHES // 2 * 2
+def _length(record: ImuRecord, period: int, stretches: int) -> int:
+    """Rows of a stretch, a multiple of the period."""
+    return (len(record) - 4) // stretches // period * period
 
 
-def _alternating(x: Array, length: int) -> Array:
-    """(STRETCHES, length / 2) alternating part of a channel, of two rows each."""
-    quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / 16.0
-    pairs = quick[: STRETCHES * length].reshape(STRETCHES, length // 2, 2)
-    return np.asarray(0.5 * (pairs[:, :, 0] - pairs[:, :, 1]))
+def _periodic(x: Array, length: int, period: int, stretches: int) -> Any:
+    """(stretches, length / period) size and phase of what a channel does once in so many rows, of two a real number."""
+    quick = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / (2.0 * math.sin(math.pi / period)) ** 4
+    rows = quick[: stretches * length].reshape(stretches, length // period, period)
+    if period == 2:
+        return 0.5 * (rows[:, :, 0] - rows[:, :, 1])
+    return rows @ np.exp(-2j * math.pi / period * np.arange(period)) * (2.0 / period)
 
 
-def _smooth(x: Array, length: int) -> Array:
+def _smooth(x: Array, length: int, period: int, stretches: int) -> Array:
     """The rest of it, at the same rows."""
     slow = (x[:-4] + 4.0 * x[1:-3] + 6.0 * x[2:-2] + 4.0 * x[3:-1] + x[4:]) / 16.0
-    return np.asarray(slow[: STRETCHES * length].reshape(STRETCHES, length // 2, 2).mean(axis=2))
+    return np.asarray(slow[: stretches * length].reshape(stretches, length // period, period).mean(axis=2))
 
 
-def _keeps(means: Array) -> bool:
+def _keeps(means: Any) -> bool:
     """Whether means of stretches have a mean beyond chance, and all parts of the log have it."""
-    size, spread = float(means.mean()), float(means.std(ddof=1))
+    mean, spread = means.mean(), float(means.std(ddof=1))
     parts = means.reshape(PARTS, -1).mean(axis=1)
-    steady = float(parts.std()) < limit("alternates alike") * abs(size) and bool(np.all(parts * size > 0.0))
-    return steady and abs(size) > limit("alternates") * spread / math.sqrt(len(means))
+    steady = float(parts.std()) < limit("alternates alike") * abs(mean) and bool(
+        np.all(np.real(parts * mean.conj()) > 0.0)
+    )
+    return steady and float(abs(mean)) > limit("alternates") * spread / math.sqrt(len(means))
 
 
 def _shown(shows: Array, expected: Array) -> bool:
@@ -110,15 +123,25 @@ def _shown(shows: Array, expected: Array) -> bool:
     )
 
 
+@remembered
 def alternation_evidence(record: ImuRecord) -> list[Evidence]:
     """That the rows of the accelerometers alternate, and by how much the mean of two sensors is turned against either."""
-    offset = float(np.linalg.norm(alternation(record)))
+    found = []
+    for period, key in PERIODS.items():
+        turned = _turned(record, period, STRETCHES[0])
+        if turned > 0.0:  # few logs come so far
+            turned = min(turned, _turned(record, period, STRETCHES[1]))
+        if turned > 0.0:
+            figures: dict[str, Figure] = {"size": turned * GRAVITY_EQUATOR * period / (period - 1.0), "level": turned}
+            found.append(Evidence(key, figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",)))
+    return found
+
+
+def _turned(record: ImuRecord, period: int, stretches: int) -> float:
+    """By how much (rad) the mean is turned against one in so many rows, by the larger of both figures."""
     unit = record.interval if record.kind == "increments" else 1.0
-    turned = max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record))
-    if turned == 0.0:
-        return []
-    figures: dict[str, Figure] = {"size": 2.0 * turned * GRAVITY_EQUATOR, "level": turned}
-    return [Evidence("record.alternates", figures, "known", Effect(heading=turned, level=turned), ("rows_of_one",))]
+    offset = float(np.linalg.norm(alternation(record, period, stretches)))
+    return max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record, period, stretches))
 
 
 def _step(values: Array) -> float:

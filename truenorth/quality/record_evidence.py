@@ -65,7 +65,7 @@ def moving_evidence(record: ImuRecord) -> list[Evidence]:
 def sampling_evidence(record: ImuRecord, *, turns: bool) -> list[Evidence]:
     """Evidence of faults of clock, logging and range; `turns`: whether the base turns."""
     _, findings = check_sampling(record)
-    found = alternation_evidence(record)
+    found = [*alternation_evidence(record)]
     for finding in findings:
         serious = finding.severity == "error" or (finding.code in TURNING and finding.severity != "note")
         # What an increment counts is lost where another is written in its place; a rate at rest is held without harm.

@@ -184,6 +184,10 @@ SENTENCES = {
         "this method claims more than the one that the library chooses finds in the same logs: heading {heading:angle}, "
         "level {level:angle} are added to sigma"
     ),
+    "bias.accel_scale": (
+        "the {axis} accelerometer reads {scale:+.1%} ± {sigma:.1%} too much (likelihood ratio {ratio:.0f}); heading moves by "
+        "{heading:angle}, level by {level:angle}"
+    ),
     "bias.gyro_steps": (
         "the {axis} gyro's bias changes by about {size:deg/h|} deg/h near {onset:.0f} s (likelihood ratio {ratio:.0f}, chance "
         "gives {chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle}"
@@ -232,6 +236,10 @@ SENTENCES = {
     "record.alternates": (
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
+    ),
+    "record.in_threes": (
+        "every third row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of three sensors in turn: "
+        "their mean is turned against one of them by {level:angle}"
     ),
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
