@@ -84,7 +84,8 @@ def kml(result: Exported) -> str:
     )
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
-        f"<name>{html.escape(result.source, quote=False)}</name><Placemark><name>track</name><MultiGeometry>{strings}</MultiGeometry>"
+        f"<name>{html.escape(result.source, quote=False)}</name>"
+        f"<Placemark><name>track</name><MultiGeometry>{strings}</MultiGeometry>"
         "</Placemark></Document></kml>\n"
     )
 
