@@ -37,6 +37,22 @@ def test_nothing_to_part_without_vibration_or_with_a_known_delay():
     assert shaken(turning([SLOW, FAST]), at, WALK, 0.001) is None
 
 
+def test_passes_over_one_slave_share_its_split_and_no_other_slave_has_it():
+    at, slave = np.linspace(10.0, 50.0, 301), turning([SLOW, FAST])
+    first, again, later = (
+        shaken(slave, at, WALK, 0.05),
+        shaken(slave, at, WALK, 0.05),
+        shaken(slave, at + 1.0, WALK, 0.05),
+    )
+    assert again.split is first.split is later.split
+    assert np.abs(later.slow - first.slow).max() > 0.01  # rad/s: the times are each call's own
+    # Nor is it that of another delay, or of other gyros.
+    assert shaken(slave, at, WALK, 0.03).split is not first.split
+    other = shaken(turning([0.3, FAST]), at, WALK, 0.05)
+    turn = 2.0 * np.pi * 0.3
+    np.testing.assert_allclose(other.slow[:, 0], 0.1 * np.sinc(0.3 / 50.0) * np.cos(turn * at), atol=3e-4)
+
+
 def test_rows_that_are_lost_shift_nothing():
     """A tenth of the rows: what is slow stays where it was, to what a straight line over a lost row is worth."""
     record = turning([SLOW, FAST])

@@ -23,7 +23,8 @@ from tests.runs import some
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-TUTORIALS = ("README.md", "README.zh.md", "docs/start.md", "docs/zh/start.md")
+CHINESE = {"README.zh.md": "README.md", "docs/zh/start.md": "docs/start.md"}  # and the page that it follows
+TUTORIALS = (*CHINESE.values(), *CHINESE)
 
 
 def anchors(page: Path) -> set[str]:
@@ -164,8 +165,21 @@ def test_calls_in_passing_are_calls_that_exist(page):
                 assert anything or keywords <= set(known), f"{page.name}: {ast.unparse(node)}"
 
 
-# The Chinese start has the commands of the English one, with `--lang zh`, as the Chinese README has.
-@pytest.mark.parametrize("page", some(TUTORIALS[:3], TUTORIALS[3:]))
+def steps_of(page: str) -> list[str]:
+    """Lines of a page's commands and code, without comments and language."""
+    blocks = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+    lines = "".join(code for language, code in blocks if language in ("sh", "python")).splitlines()
+    return [step for line in lines if (step := line.partition("  # ")[0].replace(" --lang zh", "").strip())]
+
+
+@pytest.mark.parametrize("page", CHINESE)
+def test_a_chinese_page_has_the_steps_of_the_english_one(page):
+    steps = steps_of(page)
+    assert steps
+    assert set(steps) <= set(steps_of(CHINESE[page]))
+
+
+@pytest.mark.parametrize("page", some(CHINESE.values(), CHINESE))
 def test_a_newcomer_can_follow_the_page(page, tmp_path):
     """The commands of the page, then its code, in one empty folder."""
     blocks = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))

@@ -2,6 +2,7 @@
 
 import ast
 import math
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,20 +13,25 @@ from truenorth.state.limits import LIMITS, limit
 FILES = sorted(Path(truenorth.__file__).parent.rglob("*.py"))
 
 
+@cache
+def _nodes(file: Path) -> list[ast.AST]:
+    """Of a file's code; read once for all tests here."""
+    return list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+
+
 def _words(file: Path) -> set[str]:
     """Texts in a file's code, but for docstrings and the table's own keys."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    keys = {id(key) for node in ast.walk(tree) if isinstance(node, ast.Dict) for key in node.keys}
+    keys = {id(key) for node in _nodes(file) if isinstance(node, ast.Dict) for key in node.keys}
     return {
         node.value
-        for node in ast.walk(tree)
+        for node in _nodes(file)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in keys
     }
 
 
 def _asked(file: Path) -> set[str]:
     """Names in ``limit("...")``."""
-    calls = (node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.Call))
+    calls = (node for node in _nodes(file) if isinstance(node, ast.Call))
     return {
         call.args[0].value
         for call in calls

@@ -16,11 +16,13 @@ A rate that vibrates stands out, and its phase is unknown where the delay is (:m
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.remembered import remembered
 from truenorth.records import ImuRecord
 from truenorth.state.limits import limit
 from truenorth.strapdown.increments import increments, interval_lengths
@@ -37,13 +39,98 @@ KNOWN, MEAN, UNKNOWN = 0.0, 1.0, 2.0
 FINER = 4
 
 
-class Shaken(NamedTuple):
-    """What a slave's rates are at the rows of a master, rad/s, (M, 3) each, body axes."""
+class Split:
+    """A slave's rates, split at a frequency: what a delay tells the phase of, and the rest.
 
-    slow: Array  # of which the delay tells the phase
-    spin: Array  # its derivative
-    fast: Array  # the rest
-    quarter: Array  # the same, a quarter of a period later
+    All passes of a filter over a slave ask for the same; each part is worked out once, where it is asked for.
+
+    Parameters
+    ----------
+    rates : (N, 3) array, rad/s
+        Means over intervals that are all alike.
+    begins, interval : float, s
+        The middle of the first interval, and its length.
+    edge : float, Hz
+        What is slower is slow, what is faster than twice of it is not.
+    """
+
+    def __init__(self, rates: Array, begins: float, interval: float, edge: float) -> None:
+        self.begins, self.interval, self.rows = begins, interval, len(rates)
+        self._whole = np.fft.rfft(np.concatenate([rates, rates[::-1]]), axis=0)  # there and back: no jump at the ends
+        self._f = np.arange(len(self._whole))[:, None] / (2.0 * len(rates) * interval)
+        self._passed = 0.5 * (1.0 + np.cos(math.pi * np.clip(self._f / edge - 1.0, 0.0, 1.0)))
+
+    @property
+    def _beyond(self) -> NDArray[np.complex128]:
+        return np.asarray(self._whole * (1.0 - self._passed))
+
+    @cached_property
+    def variance(self) -> float:
+        """Of what is beyond the frequency, (rad/s)^2."""
+        return float(np.mean(np.abs(self._beyond[1:]) ** 2)) / (2.0 * self.rows)
+
+    @cached_property
+    def slow(self) -> Array:
+        """(FINER N, 3) rad/s, FINER points a row."""
+        return self._points(self._whole * self._passed)
+
+    @cached_property
+    def spin(self) -> Array:
+        """(FINER N, 3) rad/s^2: the derivative of `slow`."""
+        return self._points(self._whole * self._passed * (2j * math.pi * self._f))
+
+    @cached_property
+    def fast(self) -> Array:
+        """(FINER N, 3) rad/s: what is beyond."""
+        return self._points(self._beyond)
+
+    @cached_property
+    def quarter(self) -> Array:
+        """(FINER N, 3) rad/s: the same, a quarter of a period later."""
+        return self._points(-1j * self._beyond)
+
+    def _points(self, spectrum: NDArray[np.complex128]) -> Array:
+        count = self.rows * FINER
+        return np.asarray(np.fft.irfft(spectrum, 2 * count, axis=0)[:count] * FINER)
+
+    def at(self, points: Array, times: Array) -> Array:
+        """(M, 3) a part at some times, s."""
+        then = self.begins + np.arange(len(points)) * self.interval / FINER
+        return np.stack([np.interp(times, then, axis) for axis in points.T], axis=1)
+
+
+class Shaken:
+    """What a slave's rates are at the rows of a master, rad/s, (M, 3) each, body axes.
+
+    Parameters
+    ----------
+    split : Split
+    times : (M,) array, s
+        When the rows held.
+    """
+
+    def __init__(self, split: Split, times: Array) -> None:
+        self.split, self.times = split, times
+
+    @property
+    def slow(self) -> Array:
+        """Of which the delay tells the phase."""
+        return self.split.at(self.split.slow, self.times)
+
+    @property
+    def spin(self) -> Array:
+        """Its derivative, rad/s^2."""
+        return self.split.at(self.split.spin, self.times)
+
+    @property
+    def fast(self) -> Array:
+        """The rest."""
+        return self.split.at(self.split.fast, self.times)
+
+    @property
+    def quarter(self) -> Array:
+        """The same, a quarter of a period later."""
+        return self.split.at(self.split.quarter, self.times)
 
 
 def turns_at(slave: ImuRecord, times: Array, walk: float, sigma: float) -> tuple[Array | None, float]:
@@ -126,23 +213,15 @@ def shaken(slave: ImuRecord, times: Array, walk: float, delay_sigma: float) -> S
     edge = 1.0 / (2.0 * math.pi * delay_sigma) if delay_sigma > 0.0 else math.inf  # Hz: a radian of phase
     if 2.0 * edge >= 0.5 / T:
         return None
-    rates, begins = _even_rates(slave)
-    whole = np.fft.rfft(np.concatenate([rates, rates[::-1]]), axis=0)  # there and back: no jump at the ends
-    f = np.arange(len(whole)) / (2.0 * len(rates) * T)
-    passed = 0.5 * (1.0 + np.cos(math.pi * np.clip(f / edge - 1.0, 0.0, 1.0)))[:, None]
-    beyond = whole * (1.0 - passed)
-    if float(np.mean(np.abs(beyond[1:]) ** 2)) < limit("vibrates") * 2.0 * len(rates) * walk**2 / T:
-        return None
+    split = _split(slave)(edge)
+    return None if split.variance < limit("vibrates") * walk**2 / T else Shaken(split, times)
 
-    def at(spectrum: NDArray[np.complex128]) -> Array:
-        count = 2 * len(rates) * FINER
-        series = np.fft.irfft(spectrum, count, axis=0) * FINER
-        return np.stack(
-            [np.interp(times, begins + np.arange(count // 2) * T / FINER, x[: count // 2]) for x in series.T], 1
-        )
 
-    slow = whole * passed
-    return Shaken(at(slow), at(slow * (2j * math.pi * f)[:, None]), at(beyond), at(-1j * beyond))
+@remembered
+def _split(slave: ImuRecord) -> Callable[[float], Split]:
+    """A slave's rates, split at a frequency in Hz; the last answer is remembered."""
+    rates, begins, T = *_even_rates(slave), slave.interval
+    return lru_cache(maxsize=1)(lambda edge: Split(rates, begins, T, edge))  # which does not hold the slave
 
 
 def _even_rates(slave: ImuRecord) -> tuple[Array, float]:

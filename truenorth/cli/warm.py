@@ -35,7 +35,10 @@ TASKS: dict[str, tuple[str, ...]] = {
         "align imu.parquet --odometer odometer.parquet --lat 39.9 --lon 116.3 --alt 50 --imu navigation --to 300 -o start",
         "navigate imu.parquet --start start --odometer odometer.parquet",
     ),
-    "transfer_flat_turn": ("align imu.parquet --master master.parquet --lat 34 --alt 5000 --imu tactical",),
+    "transfer_flat_turn": (
+        "align imu.parquet --master master.parquet --lat 34 --alt 5000 --imu tactical",
+        "advise --lat 34 --imu tactical --heading 0.2 --speed 200",
+    ),
     "quay": (
         "align imu.parquet --lat 53.54 --lon 9.97 --imu navigation --to 600 -o start",
         "navigate imu.parquet --start start",
@@ -49,6 +52,7 @@ TASKS: dict[str, tuple[str, ...]] = {
     "static_kalman": (
         "align imu.parquet --lat 45 --imu navigation",
         "align imu.parquet --lat 45",
+        "align imu.parquet --lat 45 --imu navigation --to 120",  # force is white there, and is measured
         "inspect imu.parquet",
     ),
 }
