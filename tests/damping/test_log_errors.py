@@ -1,6 +1,7 @@
 """Errors of the log: what they show, whether bands hold them, and how fast a drift is."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -115,6 +116,19 @@ def test_a_drift_that_wanders_a_little_is_no_constant(truth, seed):
     drift = gauss_markov(0.1, 12.0 * HOUR, truth.interval, len(truth.time), rng, axes=2)
     kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
     assert likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.5)).time <= 768.0 * HOUR
+
+
+def test_a_gate_goes_on_past_a_part_with_a_fix(truth):
+    """Parts of 3600 epochs, a fix in the second of them alone: a gate that lets all pass is no gate."""
+    course = truth[: round(11.9 * HOUR / 10)]
+    z, sigma = np.full((len(course.time), 3), np.nan), np.ones((len(course.time), 3))
+    z[4000], sigma[4000] = [20.0, -10.0, 1e-4], [10.0, 10.0, 1e-4]
+    whole = Filter(MarineModel(**WALKS), np.diag(SIGMA**2), 0.05, fixes=FixRows(z, sigma))
+    shown = reference(course, np.zeros(2))
+    kinds = {"plain": whole, "gated": replace(whole, gate=1.0 - 1e-12)}
+    plain, gated = run_filters(course, shown, start=0, kinds=kinds).values()
+    np.testing.assert_allclose(gated.x, plain.x, rtol=1e-9, atol=1e-12)
+    assert plain.sigma[4000, DP.start] < 0.5 * plain.sigma[3999, DP.start]
 
 
 @pytest.mark.slow

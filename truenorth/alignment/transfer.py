@@ -294,11 +294,9 @@ def _passes(
         part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
         # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
         velocity = kind == "acceleration" and number == 0
-        rows = (
-            Matching(FIRST_NOISE["velocity"], noise[1])
-            if velocity
-            else Matching(*noise, kind, limit("master's gate") if number > 0 else 0.0)
-        )
+        rows = Matching(*noise, kind, limit("master's gate") if number > 0 else 0.0)
+        if velocity:
+            rows = Matching(FIRST_NOISE["velocity"], noise[1])
         track = transfer_filter(part, master, model, start, rows, assumed, linear=linear)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None

@@ -202,10 +202,13 @@ class _Stream:
         self.state, self.done = found.state, self.done + K
 
     def _with_fixes(self, part: Track, z: Array, H: Array) -> tuple[Array, Array, Array]:
-        """Rows of place (east, north, m) and heading behind those of the velocity, where there are fixes in this part."""
+        """Rows of place (east, north, m) and heading behind those of the velocity, where the course has fixes at all.
+
+        In a part without one they are absent: a gate remembers as many rows as it has, from part to part.
+        """
         R = self.kind.sigma**2 * np.eye(2)[None]
         fixes, own = self.kind.fixes, slice(self.done, self.done + len(z))
-        if fixes is None or not np.isfinite(fixes.z[own]).any():
+        if fixes is None:
             return z, H, R
         rows = np.zeros((3, self.kind.model.states))
         rows[:2, DP], rows[2, PHI.stop - 1] = np.eye(2), 1.0
