@@ -319,7 +319,7 @@ def test_by_a_velocity_log(runs):
     for run in range(runs):
         sim = auv.simulate(seed=3, run=run)
         log = auv.simulate_aiding(seed=3, run=run)["velocity_log"].record
-        answer = align(sim.record, place, auv.imu_spec, aid=VelocityLog(log))
+        answer = align(sim.record, place, auv.imu_spec, aid=VelocityLog(log, errors="doppler-bottom"))
         assert answer.status == "aligned"
         assert answer.moving.wheel.sensor == "velocity log"
         assert abs(answer.moving.wheel.scale) < 4.0 * answer.moving.wheel.scale_sigma < 0.012

@@ -19,6 +19,7 @@ from truenorth.errors.log import LogErrors, log_errors
 from truenorth.errors.master import MasterErrors
 from truenorth.records import EncoderRecord, GnssRecord, HeightRecord, MasterRecord, OdometerRecord, VelocityRecord
 from truenorth.records.flexure import FlexureSpec
+from truenorth.state.evidence import Evidence, note
 from truenorth.state.mounting import Mounting
 
 ARM_SIGMA = 0.05  # m: how far an IMU may sit from a turntable's axes
@@ -108,17 +109,25 @@ class VelocityLog(_Mounted):
     record : VelocityRecord
     mounting : Mounting, optional
     errors : LogErrors or {"reference", "em", "doppler-water", "doppler-bottom"}, optional
-        Its slow errors. Left out, damping takes those that are usual for a log in its axes, and aiding what the mounting says.
+        Its slow errors; left out, those that are usual for a log in its axes: body axes, one in the water. ``LogErrors()``: none
+        but those of the mounting.
     """
 
     record: VelocityRecord
     errors: LogErrors | str | None = None
     key: ClassVar[str] = "velocity"
 
+    @property
+    def unsaid(self) -> list[Evidence]:
+        """That nobody has said what kind of log it is, and what is taken for possible then."""
+        if self.errors is not None:
+            return []
+        return [note("log.kind_unsaid", "log_kind", drift=log_errors(None, self.record.frame).drift)]
+
     def sources(self, altitude: str) -> list[Aiding]:
         """Velocities, in body or navigation axes."""
-        none = LogErrors() if self.errors is None else log_errors(self.errors, self.record.frame)
-        return from_velocity(self.record, self.mounting or Mounting(), none)
+        errors = log_errors(self.errors, self.record.frame)
+        return from_velocity(self.record, self.mounting or Mounting(), errors)
 
 
 @dataclass(frozen=True)

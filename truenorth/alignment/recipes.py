@@ -157,13 +157,13 @@ def in_motion(r: Request) -> Alignment:
             "on the move the errors of the IMU cannot be found from the log; expected imu: navigation, tactical, industrial, "
             "consumer, a YAML file or an ImuSpec"
         )
-    return align_in_motion(
+    found = align_in_motion(
         r.record,
         r.imu,
         odometer=None if odometer is None else odometer.record,
         gnss=None if gnss is None else gnss.record,
         velocity=None if log is None else log.record,
-        velocity_errors=LogErrors() if log is None or log.errors is None else log_errors(log.errors, "body"),
+        velocity_errors=LogErrors() if log is None else log_errors(log.errors, "body"),
         position=r.place,
         wheel=None if wheel is None else wheel.mounting,
         antenna=None if gnss is None else gnss.mounting,
@@ -172,6 +172,7 @@ def in_motion(r: Request) -> Alignment:
         calibration=r.calibration,
         **r.common,
     )
+    return found if log is None else replace(found, evidence=(*found.evidence, *log.unsaid))
 
 
 def by_master(r: Request) -> Alignment:

@@ -47,6 +47,10 @@ KnownLatency = Annotated[
     option("GNSS measurements are older than their stamps by this, s; estimated without it."),
     sets("antenna", known_latency),
 ]
+LogKind = Annotated[
+    str | None,
+    option("Kind of the velocity log: reference, em, doppler-water or doppler-bottom; sets its slow errors."),
+]
 OdometerNoise = Annotated[
     float | None, option("One-sigma noise of the odometer's speed, m/s."), sets("odometer", plain("noise"))
 ]
@@ -219,6 +223,7 @@ class OnTheMove:
         Path | None,
         option("Log of a Doppler or speed log in body axes (v_right, v_forward, v_up), in place of an odometer."),
     ] = None
+    log_kind: LogKind = None
     offset: Offset = None
     wheel_arm: Annotated[
         str | None,
@@ -268,7 +273,7 @@ class OnTheMove:
         if self.odometer is not None:
             found.append(Odometer(read_odometer(self.odometer), replace(wheel, **given(self, "odometer"))))
         if self.velocity is not None:
-            found.append(VelocityLog(read_velocity(self.velocity), wheel))
+            found.append(VelocityLog(read_velocity(self.velocity), wheel, self.log_kind))
         if self.gnss is not None:
             receiver = read_gnss(self.gnss)
             found.append(Gnss(receiver, replace(usual_antenna(receiver), **given(self, "antenna"))))

@@ -40,7 +40,8 @@ Examples:
   truenorth align imu.csv --lat 40 --imu navigation --indexer encoder.csv
   truenorth align drive.csv --odometer odo.csv --lat 39.9 --imu navigation
   truenorth align drive.csv --gnss gnss.csv --imu industrial -o start
-  truenorth align boat.csv --velocity dvl.csv --lat 59.4 --imu navigation
+  truenorth align boat.csv --velocity dvl.csv --log-kind doppler-bottom \\
+    --lat 59.4 --imu navigation
   truenorth align car.csv --gnss gnss.csv --imu consumer --magnetometer m.csv
 
 Exit codes: 0 aligned or level_only; 2 wrong usage; 3 bad data; 4 the data cannot be aligned.

@@ -26,6 +26,7 @@ BELONGS = {
     "--matching": ("--master",),
     "--delay": ("--master",),
     "--flexure": ("--master",),
+    "--log-kind": ("--velocity",),
     "--offset": MOVING,
     "--wheel-arm": ("--odometer", "--velocity"),
     "--attitude": MOVING,

@@ -36,7 +36,8 @@ Examples:
   truenorth navigate log.csv --start start -o track
   truenorth navigate log.csv --start start --gnss gnss.csv --smooth -o track
   truenorth navigate log.csv --start start --odometer odo.csv --zupt auto
-  truenorth navigate log.csv --start start --velocity dvl.csv --json
+  truenorth navigate log.csv --start start --velocity dvl.csv \\
+    --log-kind doppler-bottom --json
   truenorth navigate log.csv --start start --baro baro.csv --altitude baro
   truenorth navigate log.csv --master ins.csv --imu tactical --gnss gnss.csv
   truenorth navigate log.csv --start start --attitude ahrs.csv \\

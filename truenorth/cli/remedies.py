@@ -37,6 +37,7 @@ OPTIONS = {
     "transfer_geometry": "--axes, --lever-arm, --mounting, --delay",
     "flexure": "--flexure",
     "log_error": "--log-drift",
+    "log_kind": "--log-kind",
 }
 OF_A_START = {"place": "--position", "height": "--position"}  # of a navigation, which has no place but its start's
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.aiding_options import Baseline, Errors, OdometerNoise, Offset
+from truenorth.cli.aiding_options import Baseline, Errors, LogKind, OdometerNoise, Offset
 from truenorth.cli.fields import Fields, Read, angles, arm, given, plain, quantity, quantity_and_time, sets
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
@@ -64,10 +64,7 @@ class Sensors:
     gnss: Annotated[Path | None, option("GNSS log: CSV, Parquet, NMEA, ...")] = None
     odometer: Annotated[Path | None, option("Odometer log.")] = None
     velocity: Annotated[Path | None, option("Log of a Doppler or speed log, or of a reference velocity.")] = None
-    log_kind: Annotated[
-        str | None,
-        option("Kind of the velocity log: reference, em, doppler-water or doppler-bottom; sets its slow errors."),
-    ] = None
+    log_kind: LogKind = None
     log_drift: Annotated[
         str | None,
         option("Its drift east and north, such as a current, and how long it lasts: '0.5 m/s, 3 h'."),

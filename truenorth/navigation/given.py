@@ -70,6 +70,12 @@ def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:
     return given.scale_sigma == found.scale_sigma and bool(np.all(given.C_mb == found.C_mb))
 
 
+def kind_of_log(given: Mapping[str, Any]) -> list[Evidence]:
+    """What is taken for possible of a velocity log of which nothing is said."""
+    log = given.get(VelocityLog.key)
+    return log.unsaid if isinstance(log, VelocityLog) else []
+
+
 def record_of(given: Mapping[str, Aid], kind: type[Any]) -> Any:
     """The record of the aid of a kind; None where there is none."""
     return next((a.record for a in given.values() if isinstance(a, kind)), None)

@@ -28,6 +28,7 @@ from truenorth.estimate.warming import warming_rivals
 from truenorth.navigation.given import (
     by_key,
     kept_altitude,
+    kind_of_log,
     looked_at,
     mounted_as,
     record_of,
@@ -147,7 +148,7 @@ def navigate(
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None
     fixes = given.pop(Fixes.key, Fixes()) if damping is not None else Fixes()
-    taken = taken_over(given, begin)
+    taken = taken_over(given, begin) + kind_of_log(given)
     height, why = kept_altitude(altitude, given)
     groups = groups_of((*errors, *deflection.groups), noise)
     model = _model(begin, noise, groups, scale_factors, height)

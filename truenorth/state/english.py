@@ -237,10 +237,7 @@ SENTENCES = {
         "every second row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of two sensors in turn: "
         "their mean is turned against either by {level:angle}"
     ),
-    "record.in_threes": (
-        "every third row of the accelerometers differs by {size:.3g} m/s^2 all through the log, as those of three sensors in turn: "
-        "their mean is turned against one of them by {level:angle}"
-    ),
+    "record.in_threes": "every third row of accelerometers differs by {size:.3g} m/s^2: three sensors in turn, apart by {level:angle}",
     "record.stuck": "{name} stands still for {length:.1f} s from {begin:.1f} s on",
     "specification.gyro_noise": (
         "the gyros' white noise is {noise:deg/sqrt(h)|} deg/sqrt(h), where the specification ({imu:imu}) says "
@@ -383,6 +380,7 @@ SENTENCES = {
     "log.jump": (
         "velocity log: at {time:.0f} s its level jumps by {east:+.2f} m/s east, {north:+.2f} m/s north; held to the level before"
     ),
+    "log.kind_unsaid": "velocity log: its kind is not said; a drift of {drift:.2g} m/s (a current) is taken for possible",
     "log.silent": "velocity log: silent for {length:.0f} s after {time:.0f} s; undamped in between",
     "log.rejected": "velocity log: {count} measurements rejected by the filter's gate",
     "log.constant": "velocity log: its drift is most likely a constant",
