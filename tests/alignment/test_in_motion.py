@@ -18,6 +18,7 @@ from truenorth.alignment.in_motion_task import LATENCY_SIGMA, POSITION_FLOOR, VE
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
+from truenorth.errors.log import LogErrors
 from truenorth.navigation import Mounting
 from truenorth.quality.slow_aids import USUAL_TIME
 from truenorth.simulation import OdometerSpec, simulate, simulate_sensor
@@ -319,7 +320,7 @@ def test_by_a_velocity_log(runs):
     for run in range(runs):
         sim = auv.simulate(seed=3, run=run)
         log = auv.simulate_aiding(seed=3, run=run)["velocity_log"].record
-        answer = align(sim.record, place, auv.imu_spec, aid=VelocityLog(log, errors="doppler-bottom"))
+        answer = align(sim.record, place, auv.imu_spec, aid=VelocityLog(log, errors=LogErrors()))
         assert answer.status == "aligned"
         assert answer.moving.wheel.sensor == "velocity log"
         assert abs(answer.moving.wheel.scale) < 4.0 * answer.moving.wheel.scale_sigma < 0.012

@@ -85,7 +85,8 @@ def hemisphere_evidence(
         off = hemisphere_signature(fine, position).measured_course[..., 0]
         better = min(better, _of_any_noise(fine, fine.system.z) - _of_any_noise(fine, fine.system.z - off))
     elif 0.0 < better <= limit("hemisphere") and given and elsewhere is not None:
-        better = elsewhere(position) - elsewhere(replace(position, lat=-position.lat))
+        # Two fitted motions, of which each may be likelier by chance: a sound ship was by 19 in the other hemisphere.
+        better = 0.5 * (elsewhere(position) - elsewhere(replace(position, lat=-position.lat)))
     return [contradiction("place.hemisphere", "latitude", ratio=better)] if better > limit("hemisphere") else []
 
 
