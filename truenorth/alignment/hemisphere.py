@@ -10,7 +10,7 @@ which the log is likeliest there, and what is usual of it counts as in the infer
 Where a base sways, the fit of its motion may take up a part of that bend as a slow oscillator: of one indexer the ratio was 10,
 with a size of .7. So a log that is likelier in the other hemisphere, but no more than chance would have it, is aligned anew in
 both, the motion fitted in each. That shows more than the bend: a base moves along east and north, which turn in the inertial frame
-the other way round (the ratio of that indexer is 45).
+the other way round (the likelihoods of that indexer differ by 45).
 """
 
 from __future__ import annotations
