@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.alignment.test_bias_step import PLACE, ship
 from tests.runs import some
-from truenorth.alignment import rotary
+from truenorth.alignment import align, rotary
 from truenorth.campaign.fault_benches import BENCHES
 from truenorth.core.position import Position
 from truenorth.state.limits import limit
@@ -50,12 +51,24 @@ def test_a_bend_that_a_fitted_motion_hides_is_found_by_aligning_anew(hidden):
     assert any("other hemisphere" in reason for reason in wrong.reasons)
 
 
+@pytest.mark.slow
+def test_a_ratio_that_fitted_motions_reach_by_chance_is_a_warning():
+    """25 at a wrong latitude, the least of 90; 20 at a right one, of a ship's 240 s: neither is silent, nor refused."""
+    inputs, _ = BENCHES["rotary"].draw(771210, 1)
+    place = inputs["place"]
+    record, spec = ship(5)
+    wrong = BENCHES["rotary"].align(inputs | {"place": Position(-place.lat, place.lon, place.alt)})
+    for answer in (wrong, align(record, PLACE, spec)):
+        assert answer.status == "aligned"
+        assert any(item.key == "place.hemisphere_in_doubt" and item.urgent for item in answer.evidence)
+
+
 def test_how_well_a_place_fits_depends_on_no_place_that_was_given(hidden):
     """A log has one likelihood in each hemisphere, whichever the answer was made in: the ratio changes its sign with the place."""
     places, _, fits = hidden
     (here, there), by_the_other = ([fine.misfit_at(place) for place in places] for fine in fits)
     np.testing.assert_allclose(by_the_other, [here, there], rtol=1e-9)
-    assert there - here > limit("hemisphere")
+    assert there - here > limit("hemisphere refitted")
 
 
 def test_the_motion_is_fitted_until_it_settles(hidden):

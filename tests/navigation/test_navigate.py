@@ -10,6 +10,7 @@ from truenorth.aiding.aids import Barometer, Gnss, Odometer, VelocityLog
 from truenorth.alignment import align
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.position import Position
+from truenorth.errors.log import LogErrors
 from truenorth.navigation import Mounting, Start, navigate
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.records import GnssRecord, HeightRecord, ImuRecord, OdometerRecord, VelocityRecord
@@ -17,6 +18,7 @@ from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 from truenorth.simulation.course import course
 from truenorth.simulation.manoeuvres import accelerate, straight, turn
+from truenorth.state.layout import DV
 from truenorth.state.mounting import mounting_angles
 from truenorth.strapdown.wander import C_en
 
@@ -318,3 +320,22 @@ def test_a_track_over_the_date_line_is_two_lines():
     lines = _lines(Crossing())
     assert [len(line) for line in lines] == [2, 3]
     assert C_en(0.0, np.pi)[0, 2] == pytest.approx(-1.0)
+
+
+def test_a_log_of_which_nothing_is_said_may_be_in_a_current(drive):
+    """A drift of .5 m/s east: in sigma where nobody says what log it is, and said; with none stated, it is in the velocity."""
+    motion, record, start = drive
+    time = np.arange(0.5, 179.0, 0.5)
+    s = motion.states(time)
+    shown = np.einsum("kji,kj->ki", s.C_nb, s.v_n + np.array([0.5, 0.0, 0.0]))
+    log = VelocityRecord(time, shown, "body", source="log.csv")
+    results = {
+        errors: navigate(record, start, aid=VelocityLog(log, errors=errors), imu=SPEC) for errors in (None, "em")
+    }
+    for errors, result in results.items():
+        off = (result.v_n[-1] - motion.states(result.time[-1]).v_n) / result.track.sigma[-1, DV]
+        assert np.abs(off).max() < 4.0
+        assert ("log.kind_unsaid" in {item.key for item in result.evidence}) == (errors is None)
+    np.testing.assert_array_equal(results[None].track.P, results["em"].track.P)
+    sure = navigate(record, start, aid=VelocityLog(log, errors=LogErrors()), imu=SPEC)
+    assert sure.track.sigma[-1, DV.start] < 0.3 * results[None].track.sigma[-1, DV.start]

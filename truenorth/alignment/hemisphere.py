@@ -28,7 +28,7 @@ from truenorth.alignment.noise import PRIOR_WIDTH
 from truenorth.core.position import Position
 from truenorth.errors.staying import gravity_position, gravity_velocity
 from truenorth.filters import kalman
-from truenorth.state.evidence import Evidence, contradiction
+from truenorth.state.evidence import Evidence, contradiction, note
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
@@ -80,14 +80,17 @@ def hemisphere_evidence(
     if size <= 0.0:
         return []
     # Of a signature of size one: 2 match - energy.
-    better = ratio / size * (2.0 - 1.0 / size)
-    if better > limit("hemisphere") and not given:
+    better, sure = ratio / size * (2.0 - 1.0 / size), limit("hemisphere")
+    if better > sure and not given:
         off = hemisphere_signature(fine, position).measured_course[..., 0]
         better = min(better, _of_any_noise(fine, fine.system.z) - _of_any_noise(fine, fine.system.z - off))
-    elif 0.0 < better <= limit("hemisphere") and given and elsewhere is not None:
-        # Two fitted motions, of which each may be likelier by chance: a sound ship was by 19 in the other hemisphere.
-        better = 0.5 * (elsewhere(position) - elsewhere(replace(position, lat=-position.lat)))
-    return [contradiction("place.hemisphere", "latitude", ratio=better)] if better > limit("hemisphere") else []
+    elif 0.0 < better <= sure and given and elsewhere is not None:
+        better = elsewhere(position) - elsewhere(replace(position, lat=-position.lat))
+        sure = limit("hemisphere refitted")
+    if better > sure:
+        return [contradiction("place.hemisphere", "latitude", ratio=better)]
+    doubtful = better > limit("hemisphere")
+    return [note("place.hemisphere_in_doubt", "latitude", urgent=True, ratio=better)] if doubtful else []
 
 
 def _of_any_noise(fine: FineAlignment, z: Array) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from truenorth.cli.fields import (
+    Sets,
     angles,
     arm,
     arm_to_imu,
@@ -19,7 +20,6 @@ from truenorth.cli.fields import (
     quantity,
     quantity_and_time,
     second_antenna,
-    sets,
 )
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
@@ -29,30 +29,30 @@ if TYPE_CHECKING:
 
 GYROS = "gyros"
 
-IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first."), sets("indexer", axes)]
+IndexerAxes = Annotated[str, option("Axes of the indexer, the outermost first."), Sets("indexer", axes)]
 IndexerSigma = Annotated[
     str,
     option("One-sigma error of the indexer's own angles and axes: '10 arcsec'; the body's attitude has it in full."),
-    sets("indexer", quantity("angle_sigma", "angle")),
+    Sets("indexer", quantity("angle_sigma", "angle")),
 ]
 Baseline = Annotated[
     str | None,
     option(
         "Direction of the second GNSS antenna from the first on the vehicle, and its one sigma, deg; '0,1' without it."
     ),
-    sets("antenna", second_antenna),
+    Sets("antenna", second_antenna),
 ]
 KnownLatency = Annotated[
     float | None,
     option("GNSS measurements are older than their stamps by this, s; estimated without it."),
-    sets("antenna", known_latency),
+    Sets("antenna", known_latency),
 ]
 LogKind = Annotated[
     str | None,
     option("Kind of the velocity log: reference, em, doppler-water or doppler-bottom; sets its slow errors."),
 ]
 OdometerNoise = Annotated[
-    float | None, option("One-sigma noise of the odometer's speed, m/s."), sets("odometer", plain("noise"))
+    float | None, option("One-sigma noise of the odometer's speed, m/s."), Sets("odometer", plain("noise"))
 ]
 Errors = Annotated[list[str] | None, option("Error states of a plug-in, by name; more than one by repeating it.")]
 
@@ -96,7 +96,7 @@ class Turntable:
         str | None, option("auto: a turntable takes the IMU from position to position; turns are found in the gyros.")
     ] = None
     arm_sigma: Annotated[
-        float, option("How far the IMU may sit from the table's axes, m."), sets("positions", plain("arm_sigma"))
+        float, option("How far the IMU may sit from the table's axes, m."), Sets("positions", plain("arm_sigma"))
     ] = 0.05
     advise: Annotated[
         float | None,
@@ -133,8 +133,8 @@ class OnIndexer:
         option(
             "Right, forward, up, m, from the body's centre of rotation (or from the master) to the IMU; estimated without it."
         ),
-        sets("indexer", arm_to_imu),
-        sets("on master", arm_to_imu),
+        Sets("indexer", arm_to_imu),
+        Sets("on master", arm_to_imu),
     ] = None
 
     def aids(self) -> list[Any]:
@@ -161,19 +161,19 @@ class ByMaster:
     matching: Annotated[
         str,
         option("What is matched: auto, velocity, attitude or both; position, acceleration, or either with +attitude."),
-        sets("master", plain("matching")),
+        Sets("master", plain("matching")),
     ] = "auto"
     delay: Annotated[
         str | None,
         option(
             "By which the master's stamps are late: '30 ms', or with its uncertainty '30 ms,5 ms'; 0 and 50 ms without it."
         ),
-        sets("on master", quantity_and_time("latency", "time", "latency_sigma")),
+        Sets("on master", quantity_and_time("latency", "time", "latency_sigma")),
     ] = None
     lever_arm_sigma: Annotated[
         float,
         option("What --lever-arm (master to IMU) is uncertain by, m; 0: known."),
-        sets("on master", plain("lever_arm_sigma")),
+        Sets("on master", plain("lever_arm_sigma")),
     ] = 1.0
     master_sigma: Annotated[
         str | None,
@@ -182,12 +182,12 @@ class ByMaster:
             "velocity=0.05 m/s'; without it what its log says (sigma_heading .. sigma_VU). With neither, or none, the master is "
             "taken for the truth, and sigma is against it."
         ),
-        sets("master", plain("errors")),
+        Sets("master", plain("errors")),
     ] = None
     flexure: Annotated[
         str | None,
         option("The IMU's seat bends: '3 arcmin,5 s', one sigma of each axis and correlation time."),
-        sets("master", bending),
+        Sets("master", bending),
     ] = None
 
     def aids(self, *others: Any) -> list[Any]:
@@ -228,24 +228,24 @@ class OnTheMove:
     wheel_arm: Annotated[
         str | None,
         option("IMU to the odometer's wheel or the velocity log, m: right,forward,up; estimated without it."),
-        sets("wheel", arm),
+        Sets("wheel", arm),
     ] = None
     antenna_arm: Annotated[
-        str | None, option("IMU to the GNSS antenna, m: right,forward,up."), sets("antenna", arm)
+        str | None, option("IMU to the GNSS antenna, m: right,forward,up."), Sets("antenna", arm)
     ] = None
     latency: KnownLatency = None
     baseline: Baseline = None
     mounting: Annotated[
         str | None,
         option("Heading,pitch,roll of the IMU against the vehicle (or the master), deg."),
-        sets("wheel", angles),
-        sets("on master", angles),
+        Sets("wheel", angles),
+        Sets("on master", angles),
     ] = None
     mounting_sigma: Annotated[
         float,
         option("How far off those may be, one sigma, deg; estimated."),
-        sets("wheel", degrees("angle_sigma")),
-        sets("on master", degrees("angle_sigma")),
+        Sets("wheel", degrees("angle_sigma")),
+        Sets("on master", degrees("angle_sigma")),
     ] = 3.0
     odometer_noise: OdometerNoise = None
     error: Errors = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.fields import Fields, angles_with_sigma, given, sets
+from truenorth.cli.fields import Fields, Sets, angles_with_sigma, given
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
@@ -33,18 +33,18 @@ def iron(text: str, option: str) -> Fields:
 AttitudeSigma = Annotated[
     str | None,
     option("Its one-sigma noise; and its slow error, and the time of that: '0.1' or '0.1,0.3,300', deg and s."),
-    sets("attitude", attitude_sigmas),
+    Sets("attitude", attitude_sigmas),
 ]
 AttitudeMounting = Annotated[
     str | None,
     option("Heading,pitch,roll of the IMU against that system, and one sigma of them, deg."),
-    sets("attitude", angles_with_sigma),
+    Sets("attitude", angles_with_sigma),
 ]
 MagnetometerAxes = Annotated[str | None, option("Where its x, y and z point, such as FRD; RFU without it.")]
 MagnetometerIron = Annotated[
     str | None,
     option("One sigma of hard and soft iron, % of the earth's field; '10,3' (not calibrated) without it."),
-    sets("magnetometer", iron),
+    Sets("magnetometer", iron),
 ]
 
 FIRST_DATE = 1e9  # s since 1970: a clock beyond it holds dates

@@ -1,6 +1,6 @@
 """Options that are fields of a model: which field of which model an option sets, and how its text is read.
 
-An option of a group carries the mark ``sets("wheel", arm)``: its value is a field of the model that stands for the wheel. A
+An option of a group carries the mark ``Sets("wheel", arm)``: its value is a field of the model that stands for the wheel. A
 command takes the model as it usually is, and puts in what was given::
 
     wheel = replace(WHEEL, **given(group, "wheel"))
@@ -51,9 +51,6 @@ class Sets:
 
     part: str
     read: Read
-
-
-sets = Sets
 
 
 def marks(group: Any) -> list[tuple[str, Sets]]:

@@ -15,7 +15,7 @@ from truenorth.cli.attitude_options import (
     date_of,
     of_attitude,
 )
-from truenorth.cli.fields import arm, given, plain, sets
+from truenorth.cli.fields import Sets, arm, given, plain
 from truenorth.cli.options import option
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Aids:
     master_sigma: Annotated[
         str | None,
         option("Slow errors of that solution: navigation or tactical; without it what its rows say."),
-        sets("master", plain("errors")),
+        Sets("master", plain("errors")),
     ] = None
     magnetometer: Annotated[
         str | None, option("Source of a magnetometer's rows: CSV or a device; on the move and in navigation.")
@@ -86,7 +86,7 @@ class Aids:
     ] = None
     attitude_sigma: AttitudeSigma = None
     attitude_mounting: AttitudeMounting = None
-    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up."), sets("antenna", arm)] = None
+    lever_arm: Annotated[str | None, option("IMU to antenna, m: right,forward,up."), Sets("antenna", arm)] = None
     latency: KnownLatency = None
     baseline: Baseline = None
 

@@ -14,7 +14,7 @@ import typer
 from truenorth.cli.aiding_options import shifted
 from truenorth.cli.attitude_options import OfAttitude
 from truenorth.cli.console import in_reader_s_words, make_console, print_written, stages
-from truenorth.cli.fields import given, plain, sets
+from truenorth.cli.fields import Sets, given, plain
 from truenorth.cli.options import AsJson, command, option
 from truenorth.cli.reading import Calibrated, Log, Reading, numbers_of
 from truenorth.cli.remedies import reasons_of
@@ -61,23 +61,23 @@ class Damping:
         option(
             "Damp a free INS at sea: none, internal, external, kalman, double or augmented; --velocity is the reference."
         ),
-        sets("damping", plain("method")),
+        Sets("damping", plain("method")),
     ] = None
     damping_ratio: Annotated[
-        float, option("Of the networks (internal, external)."), sets("damping", plain("ratio"))
+        float, option("Of the networks (internal, external)."), Sets("damping", plain("ratio"))
     ] = 0.5
-    damping_order: Annotated[int, option("Of the networks: 1 or 2."), sets("damping", plain("order"))] = 2
+    damping_order: Annotated[int, option("Of the networks: 1 or 2."), Sets("damping", plain("order"))] = 2
     azimuth_damping: Annotated[
-        float, option("Ratio for the 24 h oscillation (external); 0: none."), sets("damping", plain("azimuth"))
+        float, option("Ratio for the 24 h oscillation (external); 0: none."), Sets("damping", plain("azimuth"))
     ] = 0.0
     damping_start: Annotated[
-        float, option("Seconds after the start, when it is switched on."), sets("damping", plain("start"))
+        float, option("Seconds after the start, when it is switched on."), Sets("damping", plain("start"))
     ] = 0.0
     damping_ramp: Annotated[
-        float, option("Seconds in which a network is switched on."), sets("damping", plain("ramp"))
+        float, option("Seconds in which a network is switched on."), Sets("damping", plain("ramp"))
     ] = 0.0
     damping_switching: Annotated[
-        bool, option("Internal damping is switched off in manoeuvres."), sets("damping", plain("switching"))
+        bool, option("Internal damping is switched off in manoeuvres."), Sets("damping", plain("switching"))
     ] = True
 
     def damper(self) -> Damper | None:

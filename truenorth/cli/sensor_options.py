@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from truenorth.cli.aiding_options import Baseline, Errors, LogKind, OdometerNoise, Offset
-from truenorth.cli.fields import Fields, Read, angles, arm, given, plain, quantity, quantity_and_time, sets
+from truenorth.cli.fields import Fields, Read, Sets, angles, arm, given, plain, quantity, quantity_and_time
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
 
@@ -68,18 +68,18 @@ class Sensors:
     log_drift: Annotated[
         str | None,
         option("Its drift east and north, such as a current, and how long it lasts: '0.5 m/s, 3 h'."),
-        sets("log", quantity_and_time("drift", "speed", "drift_time", drift_time=None)),
+        Sets("log", quantity_and_time("drift", "speed", "drift_time", drift_time=None)),
     ] = None
     log_scale: Annotated[
-        str | None, option("Its scale error, one sigma: '0.5 %'."), sets("log", quantity("scale", "ratio"))
+        str | None, option("Its scale error, one sigma: '0.5 %'."), Sets("log", quantity("scale", "ratio"))
     ] = None
     log_mounting: Annotated[
         str | None,
         option("Its error of mounting about the vertical: '0.3 deg'."),
-        sets("log", quantity("mounting", "angle")),
+        Sets("log", quantity("mounting", "angle")),
     ] = None
     log_bias: Annotated[
-        str | None, option("Its bias along the hull's axes: '0.1 m/s'."), sets("log", quantity("bias", "speed"))
+        str | None, option("Its bias along the hull's axes: '0.1 m/s'."), Sets("log", quantity("bias", "speed"))
     ] = None
     fix: Annotated[
         list[str] | None,
@@ -97,23 +97,23 @@ class Sensors:
     baro_loop: Annotated[
         float,
         option("Time constant of a third-order vertical loop on the barometer, s; 0: Kalman gain."),
-        sets("baro", plain("loop")),
+        Sets("baro", plain("loop")),
     ] = 0.0
-    lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up."), sets("antenna", arm)] = None
+    lever_arm: Annotated[str | None, option("IMU to GNSS antenna, m: right,forward,up."), Sets("antenna", arm)] = None
     baseline: Baseline = None
     wheel_arm: Annotated[
-        str | None, option("IMU to the odometer's wheel, m: right,forward,up."), sets("wheel", arm)
+        str | None, option("IMU to the odometer's wheel, m: right,forward,up."), Sets("wheel", arm)
     ] = None
     mounting: Annotated[
         str | None,
         option("Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log)."),
-        sets("wheel", angles),
+        Sets("wheel", angles),
     ] = None
     estimate: Annotated[
         str | None,
         option(f"What is not known and estimated, of: {', '.join(PARTS)}."),
-        sets("antenna", estimated("lever_arm", "latency")),
-        sets("wheel", estimated("scale", "mounting", "lever_arm")),
+        Sets("antenna", estimated("lever_arm", "latency")),
+        Sets("wheel", estimated("scale", "mounting", "lever_arm")),
     ] = None
     odometer_noise: OdometerNoise = None
     offset: Offset = None
@@ -122,12 +122,12 @@ class Sensors:
         option(
             "GNSS measurements are older than their stamps by this, s; without it by what the alignment found, else 0."
         ),
-        sets("antenna", plain("latency")),
+        Sets("antenna", plain("latency")),
     ] = None
     gnss_drift: Annotated[
         str | None,
         option("Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."),
-        sets("antenna", drift_of_places),
+        Sets("antenna", drift_of_places),
     ] = None
 
     @property

@@ -102,6 +102,7 @@ SENTENCES = {
         "the base swings slowly, as a ship does on her lines: by {east:.2f} m in {east_period:.0f} s along east, by {north:.2f} m "
         "in {north_period:.0f} s along north"
     ),
+    "place.hemisphere_in_doubt": "gravity rather turns as in the other hemisphere (likelihood ratio {ratio:.0f}), a doubt",
     "place.hemisphere": (
         "gravity turns as in the other hemisphere (likelihood ratio {ratio:.0f}): the latitude has the wrong sign"
     ),

@@ -64,6 +64,12 @@ LIMITS: dict[str, Limit] = {
         "1",
         "twice the log of a likelihood ratio; a sound log exceeds it in less than one of 1,800, by Markov's inequality",
     ),
+    "hemisphere refitted": Limit(
+        30.0,
+        "1",
+        "the same, of a log with a motion fitted in each hemisphere, which takes up noise by chance: a sound ship had 20, a wrong "
+        "latitude 25; between both limits it is a warning",
+    ),
     "half turn": Limit(
         15.0,
         "1",
