@@ -33,7 +33,7 @@ from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
-from truenorth.navigation.given import as_found, kept_altitude, turns_velocity
+from truenorth.navigation.given import kept_altitude, mountings_found, turns_velocity
 from truenorth.navigation.procedure import FINE, PLUMB_LINE, start_of
 from truenorth.navigation.result import Altitude, judged_navigation, last_sigma
 from truenorth.quality.absolute import known_as_fixes
@@ -102,7 +102,7 @@ class Navigator:
         self._given, self._imu = start, imu
         self.solution = start if isinstance(start, Alignment) else None
         self.feeds = {feed.key: feed for feed in feeds if feed.navigates}
-        self._mountings = as_found(self.start) | dict(mountings or {})
+        self._mountings = mountings_found(self.start) | dict(mountings or {})
         dummies: dict[str, Aid] = {key: feed.aid_of(feed.dummy()) for key, feed in self.feeds.items()}
         self.altitude, self._why = kept_altitude(altitude, dummies)
         self.intake, self.log = Intake(), Log(kind, most_rows)

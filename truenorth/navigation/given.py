@@ -44,7 +44,7 @@ def late_as_found(antenna: Mounting, begin: Start) -> Mounting:
     return replace(antenna, latency=late, latency_sigma=sigma)
 
 
-def as_found(begin: Start) -> dict[str, Mounting]:
+def mountings_found(begin: Start) -> dict[str, Mounting]:
     """How an alignment on the move has found the sensors to be mounted, by the keys of their aids."""
     found = {} if begin.wheel is None else {Odometer.key: begin.wheel}
     return found if begin.gnss_delay is None else found | {Gnss.key: late_as_found(ANTENNA, begin)}
@@ -53,7 +53,7 @@ def as_found(begin: Start) -> dict[str, Mounting]:
 def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
     """What of an alignment on the move holds for the aids, which are mounted so where nothing else is said."""
     said = []
-    for key, found in as_found(begin).items():
+    for key, found in mountings_found(begin).items():
         if not isinstance(aid := given.get(key), Odometer | Gnss):
             continue
         if aid.mounting is None:
