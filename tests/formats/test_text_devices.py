@@ -76,6 +76,30 @@ def test_a_phone_without_its_own_clock_has_utc(tmp_path):
     assert abs(read_gnss(path).time[0] - UTC) < 2e-3
 
 
+@pytest.mark.parametrize("first", ["UncalAccel", "# Uncal", "# Fix", "Fix,GPS"])
+def test_rows_of_a_phone_without_the_remarks_above_them(tmp_path, first):
+    """As they are after a search for the rows that somebody wants, which is how such logs are handed on."""
+    lines = phone_log().splitlines(keepends=True)
+    kept = [line for line in lines if line.startswith(("Uncal", "Fix,GPS", "# Uncal", "# Fix"))]
+    start = next(k for k, line in enumerate(kept) if line.startswith(first))
+    path = tmp_path / "rows.txt"
+    path.write_text("".join([kept[start], *kept[2:start], *kept[start + 1 :]]))
+    assert len(read_imu(path)) == len(TIME) - 1
+    np.testing.assert_allclose(np.degrees(read_gnss(path).lat), LAT, atol=1e-9)
+
+
+def test_fixes_of_an_old_phone_have_other_names(tmp_path):
+    head = "# Fix,Provider,Latitude,Longitude,Altitude,Speed,Accuracy,(UTC)TimeInMs\n"
+    rows = [f"Fix,gps,{LAT},{LON},{ALT},2.0,3.03,{(UTC + k) * 1e3:.0f}\n" for k in range(20)]
+    imu = [line for line in phone_log().splitlines(keepends=True) if line.startswith("Uncal")]
+    path = tmp_path / "pseudoranges_log.txt"
+    path.write_text(head + "".join(imu[:-1] + rows))
+    fixes = read_gnss(path)
+    np.testing.assert_allclose(fixes.time - BOOT, np.arange(20.0), atol=1e-3)
+    np.testing.assert_allclose(np.degrees(fixes.lat), LAT, atol=1e-9)
+    np.testing.assert_allclose(fixes.position_sigma[:, :2], 2.0, rtol=1e-2)
+
+
 def test_the_long_table_of_a_phone(tmp_path):
     path = tmp_path / "device_imu.csv"
     head = "MessageType,utcTimeMillis,elapsedRealtimeNanos,MeasurementX,MeasurementY,MeasurementZ,BiasX,BiasY,BiasZ"

@@ -59,6 +59,8 @@ BEGINNINGS = {
     b"#\n# Header Description": "gnsslogger",
     b"# Header Description": "gnsslogger",
     b"MessageType,utcTimeMillis": "gnsslogger",
+    **dict.fromkeys((b"# Raw,", b"# Fix,Provider,", b"Fix,GPS,", b"Fix,gps,"), "gnsslogger"),  # without its remarks
+    **dict.fromkeys((b"UncalAccel,", b"UncalGyro,", b"UncalMag,", b"# Uncal"), "gnsslogger"),  # nor other rows
 }
 FOLDERS = {"ros": ("metadata.yaml",), "kitti": ("timestamps.txt", "data")}  # what a folder of a format holds
 WANTED = {

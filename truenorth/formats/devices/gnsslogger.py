@@ -37,6 +37,8 @@ UTC, ELAPSED, FIRST = 0, 1, 2  # fields of a sensor's row: ms, ns, the first val
 FIX = ("Provider", "LatitudeDegrees", "LongitudeDegrees", "AltitudeMeters", "SpeedMps", "AccuracyMeters",
        "BearingDegrees", "UnixTimeMillis", "SpeedAccuracyMps", "BearingAccuracyDegrees", "elapsedRealtimeNanos",
        "VerticalAccuracyMeters")  # fmt: skip
+OLD = {"Latitude": FIX[1], "Longitude": FIX[2], "Altitude": FIX[3], "Speed": FIX[4], "Accuracy": FIX[5],
+       "(UTC)TimeInMs": FIX[7]}  # fmt: skip  # how logs of 2016 to 2020 name them
 SATELLITES = "gps"  # the provider that is a receiver; others mix it with networks and with the IMU itself
 OF_68 = 1.515  # of a circle that holds 68 % of the errors, in one sigma of an axis
 
@@ -81,7 +83,7 @@ def _lines(path: Path) -> tuple[Lines, dict[str, tuple[str, ...]]]:
             if cells[0] not in wanted:
                 continue
             if line.startswith("#"):
-                named[cells[0]] = tuple(cells[1:])
+                named[cells[0]] = tuple(OLD.get(name, name) for name in cells[1:])
             elif line.endswith("\n"):  # a last line that is cut is left out
                 lines[cells[0]].append((number, cells[1:]))
     return lines, named
