@@ -38,8 +38,8 @@ def _found(answer: Any, true: World) -> Outcome:
     return Outcome(known | {"level": ratio[:2]}, refused, said)
 
 
-def aligned(vehicle: Vehicle, grade: str, length: float, by: str = "", **more: Any) -> Any:
-    """A run of alignment: on a base that stays, or by what aids."""
+def aligned(vehicle: Vehicle, grade: str, length: float, by: str = "", given: bool = True, **more: Any) -> Any:
+    """A run of alignment: on a base that stays, or by what aids; `given`: with the specification."""
 
     def run(seed: int, number: int) -> Outcome:
         rng = np.random.default_rng([seed, number, 9])
@@ -48,7 +48,7 @@ def aligned(vehicle: Vehicle, grade: str, length: float, by: str = "", **more: A
         lat, lon, alt = (true.place.mean(axis=0) if not by else true.place[0]).tolist()
         place = Position(lat, lon, alt)
         if not by:
-            return _found(align(record, place, grade), true)
+            return _found(align(record, place, grade if given else None), true)
         aids: dict[str, Any] = {}
         if "gnss" in by:
             arm = np.array([0.3, -0.5, 1.2]) + 0.02 * rng.standard_normal(3)
@@ -120,6 +120,11 @@ CASES = (
         for g in ("navigation", "tactical", "industrial")
     ),
     *(Case(NAME, f"swaying, {g}, ship moored", aligned(moored, g, 400.0)) for g in ("navigation", "tactical")),
+    *(
+        Case(NAME, f"swaying, {g}, buoy, no specification", aligned(vehicles.buoy, g, 300.0, given=False))
+        for g in ("navigation", "tactical", "consumer")
+    ),
+    Case(NAME, "swaying, tactical, buoy", aligned(vehicles.buoy, "tactical", 300.0)),
     *(
         Case(NAME, f"by GNSS, {g}, {v.__name__}", aligned(v, g, 200.0, "gnss"))
         for v, g in (

@@ -268,6 +268,24 @@ def ship(rng: np.random.Generator, length: float, moored: bool = False, arm: flo
     return world(rng, _place(rng), speed[:, None] * along + moves, C, sits + shift, speed)
 
 
+def buoy(rng: np.random.Generator, length: float) -> World:
+    """A buoy on its chain in a rough sea of 60 waves: it follows their slope, and swings about the vertical by tens of degrees."""
+    fine = _grid(length)
+    sea = _sea(rng, fine, rng.uniform(0.5, 1.5), rng.uniform(4.0, 7.0))
+    roll = sea(_resonance(rng, 3.0 * DEG, rng.uniform(3.0, 5.0), 0.3))
+    pitch = sea(_resonance(rng, 3.0 * DEG, rng.uniform(3.0, 5.0), 0.3))
+    moves = np.gradient(
+        np.stack([sea(_resonance(rng, size, 4.0, 0.7)) for size in (0.5, 0.5, 0.7)], axis=1), STEP, axis=0
+    )
+    w = 2.0 * math.pi / rng.uniform(60.0, 150.0)
+    swing = rng.uniform(10.0, 25.0) * DEG * np.sin(w * fine + rng.uniform(0.0, 6.28))
+    heading = rng.uniform(0.0, 6.28) + swing + sea(_resonance(rng, 1.0 * DEG, 5.0, 0.5))
+    sits = rng.uniform(0.2, 1.0) * rng.standard_normal(3)
+    return world(
+        rng, _place(rng), moves, attitude(heading, pitch, roll), np.tile(sits, (len(fine), 1)), np.zeros_like(fine)
+    )
+
+
 def diver(rng: np.random.Generator, length: float) -> World:
     """An underwater vehicle at 1 to 2 m/s: legs, turns at some deg/s, dives; a slow swell and its own swaying."""
     t, fine = COARSE * np.arange(round(length / COARSE) + 1), _grid(length)

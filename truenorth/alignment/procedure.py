@@ -33,6 +33,7 @@ from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
 from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
 from truenorth.alignment.turning import (
     infer_turning,
+    rocks_all_along,
     sway_walks,
     turning_align,
     turning_noise,
@@ -65,8 +66,6 @@ SHORTEST = 1.0  # s: below that no mean is worth its name
 NO_NORTH = "the gyros do not see the earth turn: the mean force levels, nothing finds north"
 NO_FORCE = 1e-6  # m/s^2, mean specific force that shows no vertical: accelerometers that are dead
 SIMPLER = ("analytic", "inertial", "oba", *FADING, *STATIONARY)  # than the filters of this library
-MOSTLY = 0.95  # of the seconds
-ROCKING = ("disturbed", "swaying", "moving")  # what a ship does that goes nowhere
 GOES = 10.0  # m: of the way from where a base was in the mean, that still passes for sway
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
@@ -139,10 +138,11 @@ def align_base(
     chosen, why = _choose(method, task)
     tell(f"aligning: {chosen}")
     means = check_means(task.means, position.lat, task.gravity)
+    turned = False
     if is_blind(task.motion, means) or is_lost(task, means, spec, heading_limit):
         asked = "" if method == "auto" else f"{method} was asked for, but "
         chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _align_level(task, spec)
-    elif method == "auto" and turns_blindly(task, spec):
+    elif turned := (method == "auto" and turns_blindly(task, spec)):
         chosen = "kalman"
         why = (
             "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
@@ -157,7 +157,8 @@ def align_base(
             chosen, why, found = "analytic", NO_NORTH, _align_level(task, spec)
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
-    moves = None if chosen == "swaying" and _explained(task.motion, found) else _moves_from(task.motion)
+    fitted = chosen == "swaying" or turned
+    moves = None if fitted and _explained(task.motion, found) else _moves_from(task.motion)
     evidence = record_evidence(task.record, task.motion, sound=sound) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
@@ -204,7 +205,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
         why += POSITIONS
-    if task.record.duration < SHORTEST_SWAYING or not (overall in words or _rocks_all_along(task.motion)):
+    if task.record.duration < SHORTEST_SWAYING or not (overall in words or rocks_all_along(task.motion)):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
 
@@ -269,7 +270,11 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     else:
         coarse = oba(integrals, lat, alt, history=False, gains=not refined)
     usual = usual_noise()
-    walks = sway_walks(task.record) if spec is None and task.motion.overall == "swaying" else None
+    smooth = task.motion.overall in (
+        "swaying",
+        "moving",
+    )  # a rough sea shows as moving: the motion is slower than noise in both
+    walks = sway_walks(task.record) if spec is None and smooth else None
     if walks is not None:
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     filtered, noise = check_filter(
@@ -307,7 +312,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
         fine, noise = sway_inferred(start_of, noise, usual)
         used, P = infer_spec(check, noise), start_of(noise).P_bias
     elif sways:
-        fine = sway_align(start, turned=turned)
+        fine = sway_align(start, turned=turned, axes=spec)
     elif turned is not None:
         fine = fine_align(start, turned=turned)
     else:
@@ -319,7 +324,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is not None or turned is not None:
         C = answer.C_nb
         check = implied(check, C @ answer.gyro_bias, C @ fine.P[BG, BG] @ C.T, C @ P[:3, :3] @ C.T)
-    others = matrix_signatures(fine, used) if sways else None
+    others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
     steps += late_gyros_evidence(fine, fine.late, task.record) if isinstance(fine, SwayAlignment) else []
@@ -364,15 +369,6 @@ def answer_of(
     )
 
 
-def _rocks_all_along(motion: MotionSummary) -> bool:
-    """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does.
-
-    Its arm accelerates it now less and now more, and the waves that she meets come in groups: sway, acceleration and what is less
-    than a sway may take turns.
-    """
-    return len(motion.regimes) == 1 or sum(motion.fraction(kind) for kind in ROCKING) > MOSTLY
-
-
 def _explained(motion: MotionSummary, found: _Found) -> bool:
     """Whether a lever arm and bounded motion explain all that the base does: what moves by its arm goes nowhere.
 
@@ -380,7 +376,7 @@ def _explained(motion: MotionSummary, found: _Found) -> bool:
     of known size, which the judge weighs: of a ship on her lines, whose slow heel looks like one, it is a part of sigma.
     """
     small = float(np.max(found.answer.disturbance[:2])) < STAYS or found.way < GOES
-    return _rocks_all_along(motion) and found.settled and small
+    return rocks_all_along(motion) and found.settled and small
 
 
 def _moves_from(motion: MotionSummary) -> float | None:

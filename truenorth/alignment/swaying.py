@@ -134,7 +134,9 @@ class _SwingFilter(_MotionFilter):
         return self.filtered(system)
 
 
-def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None) -> SwayAlignment:
+def sway_align(
+    start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec | None = None, axes: ImuSpec | None = None
+) -> SwayAlignment:
     """Estimate attitude, biases, lever arm and the base's motion from a whole log.
 
     Parameters
@@ -144,9 +146,11 @@ def sway_align(start: CoarseStart, mount: Mount = UNKNOWN_ARM, turned: ImuSpec |
         Where the IMU sits.
     turned : ImuSpec, optional
         Of an IMU that is turned about in the base: its scale factors and misalignments are states then.
+    axes : ImuSpec, optional
+        Whose scale factors and misalignments are states where the log is asked whether it fits another place.
     """
     log, estimator = _with_motion(start, mount, turned)
-    model, position, misfit = start.model, start.position, partial(misfit_at, start, mount, turned)
+    model, position, misfit = start.model, start.position, partial(misfit_at, start, mount, turned or axes)
     plain = _filtered(log, estimator, misfit)
     suspect = bool(plain.noisier) or any(item.kind != "hint" for item in plain.begun)
     if not may_swing(plain, plain.motion, position, suspect=suspect):
@@ -176,7 +180,8 @@ def misfit_at(start: CoarseStart, mount: Mount, turned: ImuSpec | None, position
     """Minus twice the logarithm of the likelihood of a whole log in a place, aligned there from its coarse attitude on.
 
     The motion is fitted until it settles: one fit may be some hundred short of the likeliest motion, which comparisons of places
-    cannot have. Parameters as in :func:`sway_align`; `start` may be of another place.
+    cannot have. Nor can they have axes that are taken for perfect: on a raft that turns by 20 deg those of a tactical IMU made the
+    other hemisphere likelier by 84, and by none as states. Parameters as in :func:`sway_align`; `start` may be of another place.
     """
     C_n0_i = oba(integrate(start.record, start.interval), position.lat, position.alt, history=False).C_n0_i
     log, estimator = _with_motion(start._replace(C_n0_i=C_n0_i, position=position), mount, turned, FITS)

@@ -29,6 +29,7 @@ from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
 from truenorth.quality.density import noise_densities
+from truenorth.quality.regimes import MotionSummary
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -37,6 +38,8 @@ Array = NDArray[np.float64]
 
 FIRST = 8.0  # s, the shortest part; gyros that are off by .3 deg/s have turned by 2.4 deg in it
 LEVELLED = 1.0  # s, whose mean specific force levels to begin with
+MOSTLY = 0.95  # of the seconds
+ROCKING = ("disturbed", "swaying", "moving")  # what a ship does that goes nowhere
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
 ROUND, LAST = 10, 40  # passes over a part, and over the whole: they come to rest slowly where an arm of metres sways
@@ -44,7 +47,8 @@ ROUND, LAST = 10, 40  # passes over a part, and over the whole: they come to res
 
 def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
     """Whether the IMU turns or sways in its log, and its gyros are too poor to see the earth turn."""
-    if task.motion.overall not in ("rotating", "swaying"):
+    rough = task.motion.overall == "moving" and rocks_all_along(task.motion)
+    if not (rough or task.motion.overall in ("rotating", "swaying")):
         return False
     if spec is not None:
         return spec.gyro_bias > BLIND_RATE
@@ -54,6 +58,15 @@ def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
         walks = sway_walks(task.record)
         walk = None if walks is None else walks.gyro_random_walk
     return walk is not None and usual("gyro", "bias", walk) > BLIND_RATE
+
+
+def rocks_all_along(motion: MotionSummary) -> bool:
+    """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does.
+
+    Its arm accelerates it now less and now more, and the waves that she meets come in groups: sway, acceleration and what is less
+    than a sway may take turns.
+    """
+    return len(motion.regimes) == 1 or sum(motion.fraction(kind) for kind in ROCKING) > MOSTLY
 
 
 def infer_turning(task: Task) -> ImuSpec:
@@ -106,7 +119,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
     """
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large
-    sways = task.motion.overall == "swaying"
+    sways = task.motion.overall in ("swaying", "moving")
     arm = ARM_PRIOR if sways else TURN_ARM
     prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=arm, level_rate=rate)
     begin = record.time[0] - record.interval
