@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks.honesty import vehicles
+from benchmarks.honesty.foreign_rows import aligned
 from truenorth.alignment import align
 from truenorth.alignment.turning import sway_walks
 from truenorth.campaign.fault_benches import BENCHES, misses
@@ -42,3 +44,20 @@ def test_a_good_imu_of_which_nothing_is_said_keeps_its_heading() -> None:
     answer = align(record, place)
     assert answer.status == "aligned", answer.reasons
     assert max(float(np.abs(x).max()) for x in misses(answer, truth).values()) < 4.0
+
+
+@pytest.mark.parametrize(("imu", "given"), [("tactical", False), ("tactical", True)])
+def test_a_buoy_in_a_rough_sea_stays_and_its_level_is_honest(imu: str, given: bool) -> None:
+    """Its swing of tens of degrees was a table's turn, its waves a departure; noise of a navigation grade was assumed."""
+    found = aligned(vehicles.buoy, imu, 200.0, given=given)(1, 4)
+    assert not found.refused
+    assert np.max(np.abs(found.ratios["level"])) < 4.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("given", [True, False])
+def test_level_of_buoys_is_honest(given: bool) -> None:
+    """Of seven of these twelve the answer was refused, and level up to 17 sigmas off."""
+    runs = [aligned(vehicles.buoy, "tactical", 300.0, given=given)(1, number) for number in range(12)]
+    assert sum(bool(run.refused) for run in runs) <= 1
+    assert max(np.max(np.abs(run.ratios["level"])) for run in runs) < 4.0

@@ -53,14 +53,21 @@ def test_a_bend_that_a_fitted_motion_hides_is_found_by_aligning_anew(hidden):
 
 @pytest.mark.slow
 def test_a_ratio_that_fitted_motions_reach_by_chance_is_a_warning():
-    """25 at a wrong latitude, the least of 90; 20 at a right one, of a ship's 240 s: neither is silent, nor refused."""
+    """25 at a wrong latitude, the least of 90: not silent, nor refused."""
     inputs, _ = BENCHES["rotary"].draw(771210, 1)
     place = inputs["place"]
-    record, spec = ship(5)
     wrong = BENCHES["rotary"].align(inputs | {"place": Position(-place.lat, place.lon, place.alt)})
-    for answer in (wrong, align(record, PLACE, spec)):
-        assert answer.status == "aligned"
-        assert any(item.key == "place.hemisphere_in_doubt" and item.urgent for item in answer.evidence)
+    assert wrong.status == "aligned"
+    assert any(item.key == "place.hemisphere_in_doubt" and item.urgent for item in wrong.evidence)
+
+
+@pytest.mark.slow
+def test_axes_of_a_swaying_imu_are_no_other_hemisphere():
+    """Taken for perfect they made it likelier by 20 (twice the logarithm) where this ship is; as states by nothing."""
+    record, spec = ship(5)
+    answer = align(record, PLACE, spec)
+    assert answer.status == "aligned"
+    assert not any("hemisphere" in item.key for item in answer.evidence)
 
 
 def test_how_well_a_place_fits_depends_on_no_place_that_was_given(hidden):

@@ -270,10 +270,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     else:
         coarse = oba(integrals, lat, alt, history=False, gains=not refined)
     usual = usual_noise()
-    smooth = task.motion.overall in (
-        "swaying",
-        "moving",
-    )  # a rough sea shows as moving: the motion is slower than noise in both
+    # A rough sea shows as moving: its motion, too, is slower than the noise of sensors.
+    smooth = task.motion.overall in ("swaying", "moving")
     walks = sway_walks(task.record) if spec is None and smooth else None
     if walks is not None:
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)

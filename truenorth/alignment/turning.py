@@ -29,7 +29,7 @@ from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
 from truenorth.quality.density import noise_densities
-from truenorth.quality.regimes import MotionSummary
+from truenorth.quality.regimes import KINDS, Kind, MotionSummary
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
@@ -39,7 +39,8 @@ Array = NDArray[np.float64]
 FIRST = 8.0  # s, the shortest part; gyros that are off by .3 deg/s have turned by 2.4 deg in it
 LEVELLED = 1.0  # s, whose mean specific force levels to begin with
 MOSTLY = 0.95  # of the seconds
-ROCKING = ("disturbed", "swaying", "moving")  # what a ship does that goes nowhere
+ROCKING: tuple[Kind, ...] = ("disturbed", "swaying", "moving")  # what a ship does that goes nowhere
+ROCKED = math.radians(0.2)  # RMS about a steady turn, over 10 s
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
 ROUND, LAST = 10, 40  # passes over a part, and over the whole: they come to rest slowly where an arm of metres sways
@@ -47,12 +48,12 @@ ROUND, LAST = 10, 40  # passes over a part, and over the whole: they come to res
 
 def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
     """Whether the IMU turns or sways in its log, and its gyros are too poor to see the earth turn."""
-    rough = task.motion.overall == "moving" and rocks_all_along(task.motion)
-    if not (rough or task.motion.overall in ("rotating", "swaying")):
+    overall, rocks = task.motion.overall, rocks_all_along(task.motion)
+    if not (overall in ("rotating", "swaying") or (overall == "moving" and rocks)):
         return False
     if spec is not None:
         return spec.gyro_bias > BLIND_RATE
-    if task.motion.overall == "rotating":
+    if overall == "rotating" and not rocks:
         walk: float | None = float(np.max(task.motion.angle_noise))
     else:  # a sway has no quiet seconds: only what is faster than it is noise
         walks = sway_walks(task.record)
@@ -64,9 +65,11 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does.
 
     Its arm accelerates it now less and now more, and the waves that she meets come in groups: sway, acceleration and what is less
-    than a sway may take turns.
+    than a sway may take turns. A buoy that swings on its chain turns by tens of degrees, but rocks as it turns: no table does.
     """
-    return len(motion.regimes) == 1 or sum(motion.fraction(kind) for kind in ROCKING) > MOSTLY
+    rocks = np.isin(motion.kind, [KINDS.index(kind) for kind in ROCKING])
+    rocks |= (motion.kind == KINDS.index("rotating")) & (motion.wander > ROCKED)
+    return len(motion.regimes) == 1 or float(np.mean(rocks)) > MOSTLY
 
 
 def infer_turning(task: Task) -> ImuSpec:
@@ -119,7 +122,7 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
     """
     record, lat, alt = task.record, task.position.lat, task.position.alt
     rate = EARTH_RATE * math.cos(lat)  # one sigma of (0, 1) - (sin h, cos h) is about as large
-    sways = task.motion.overall in ("swaying", "moving")
+    sways = task.motion.overall == "swaying" or rocks_all_along(task.motion)
     arm = ARM_PRIOR if sways else TURN_ARM
     prior = prior_of(np.diag(spec.bias_variance), spec=spec, arm=np.zeros(3), arm_sigma=arm, level_rate=rate)
     begin = record.time[0] - record.interval
