@@ -97,3 +97,15 @@ def test_python_ends_without_looking_for_garbage():
     """What is left at the end goes with the process; to look through it was a tenth of `align`."""
     ends = "import atexit, gc\natexit.register(lambda: print('left out:', gc.get_freeze_count() > len(gc.get_objects())))\n"
     assert run(ends + STARTS["its version"]).splitlines()[-1] == "left out: True"
+
+
+@pytest.mark.parametrize("before", ["", "'--lang', 'zh', ", "'--lang=zh', "])
+def test_a_command_loads_no_other(before):
+    loaded = "\nprint([m for m in ('align', 'imu', 'navigate') if f'truenorth.cli.{m}' in sys.modules])"
+    assert run(HELP.format(arguments=f"{before}'imu', '--help'") + loaded).splitlines()[-1] == "['imu']"
+
+
+def test_help_and_what_is_no_command_know_all():
+    loaded = "\nprint([m for m in ('align', 'imu', 'navigate') if f'truenorth.cli.{m}' in sys.modules])"
+    for words in ("'--help'", "'aling', '--help'"):
+        assert run(HELP.format(arguments=words) + loaded).splitlines()[-1] == "['align', 'imu', 'navigate']"

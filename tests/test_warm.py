@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import importlib
-
+import numpy as np
 import pytest
 
+import truenorth
+from truenorth import papers
+from truenorth.aiding.magnetometer import FIELD
+from truenorth.cli import warm as commands
+from truenorth.cli.warm import STUDIES, TASKS, run_task, warm
 from truenorth.core import kernel_store
 from truenorth.simulation.scenario import shipped
-
-commands = importlib.import_module("truenorth.cli.warm")  # the package holds the function of this name
-TASKS, run_task, warm = commands.TASKS, commands.run_task, commands.warm
+from truenorth.strapdown.level import mechanise_increments
 
 
 def test_each_task_is_a_scenario_that_ships():
@@ -27,6 +29,31 @@ def test_what_is_done_is_not_done_again(tmp_path, monkeypatch, capsys):
     assert "warm already" in capsys.readouterr().out
 
 
+def test_studies_are_compiled_where_they_are_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(kernel_store, "write_folder", lambda: tmp_path)
+    ran = []
+    monkeypatch.setattr(commands, "_show", lambda pool, tasks: ran.append(tasks))
+    warm(workers=1)
+    warm(workers=1, studies=True)
+    warm(workers=1, studies=True)
+    assert ran == [list(TASKS), list(STUDIES)]
+    assert set(STUDIES) <= set(papers.STUDIES)
+
+
+def test_what_no_scenario_asks_for(tmp_path, monkeypatch):
+    """A magnetometer's measurement, and the mechanisation by itself: what is compiled is there for others."""
+    monkeypatch.chdir(tmp_path)
+    truenorth.write_imu(
+        truenorth.ImuRecord(0.01 * np.arange(1, 201), np.zeros((200, 3)), np.tile([0.0, 0.0, 9.8], (200, 1))),
+        "imu.parquet",
+    )
+    FIELD.function.__dict__.pop("compiled", None)
+    monkeypatch.delitem(mechanise_increments.__dict__, "dispatcher", raising=False)
+    commands._beyond_commands()
+    assert "compiled" in FIELD.function.__dict__
+    assert len(mechanise_increments.signatures) == 1
+
+
 def test_without_a_folder_it_says_so(monkeypatch, capsys):
     monkeypatch.setattr(kernel_store, "write_folder", lambda: None)
     warm()
@@ -34,6 +61,6 @@ def test_without_a_folder_it_says_so(monkeypatch, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", list(TASKS))
+@pytest.mark.parametrize("task", [*TASKS, *STUDIES])
 def test_every_task_runs(task):
     run_task(task)

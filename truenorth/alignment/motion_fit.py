@@ -154,7 +154,12 @@ class _Scale:
         return motion_of(self.orders, self.logs(u))
 
     def clipped(self, u: Array) -> Array:
-        return np.clip(u, self.low, self.high)
+        return np.minimum(np.maximum(u, self.low), self.high)
+
+
+def _bounded(step: Array) -> Array:
+    """No longer than is allowed: `np.clip` takes thrice as long to begin as this takes."""
+    return np.minimum(np.maximum(step, -LONGEST), LONGEST)
 
 
 def _score(series: Series, guess: AxisMotion) -> AxisMotion:
@@ -162,7 +167,9 @@ def _score(series: Series, guess: AxisMotion) -> AxisMotion:
     scale = _Scale(guess, float(series.lags[-1]))
     size = len(scale.centre)
     u, damping = np.zeros(size), 1e-2
-    around = DIFFERENCE * np.eye(size)
+    unit = np.eye(size)
+    around, least = DIFFERENCE * unit, 1e-6 * unit
+    periodogram = series.periodogram[LOWEST_BIN:]
 
     def expected(points: Array) -> Array:
         return series.expected(scale.orders, scale.logs(points))
@@ -171,13 +178,13 @@ def _score(series: Series, guess: AxisMotion) -> AxisMotion:
     cost = series.whittle(f)
     for _ in range(SCORINGS):
         J = ((expected(u + around) - f) / (DIFFERENCE * f)).T[LOWEST_BIN:]
-        slope = J.T @ (1.0 - series.periodogram[LOWEST_BIN:] / f[LOWEST_BIN:])
+        slope = J.T @ (1.0 - periodogram / f[LOWEST_BIN:])
         fisher = J.T @ J
-        diagonal = np.diag(np.diag(fisher)) + 1e-6 * np.eye(size)
+        diagonal = unit * fisher + least
         before = cost
         while True:
             step = np.linalg.solve(fisher + damping * diagonal, slope)
-            trial = scale.clipped(u - np.clip(step, -LONGEST, LONGEST))
+            trial = scale.clipped(u - _bounded(step))
             f = expected(trial[None])[0]  # nearby ones where the search goes on from there
             cost = series.whittle(f)
             if cost < before:
@@ -219,10 +226,10 @@ def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
     for _ in range(iterations):
         held = ((u <= scale.low) & (slope > 0)) | ((u >= scale.high) & (slope < 0))
         step = -np.where(held, 0.0, inverse @ np.where(held, 0.0, slope))
-        step = np.clip(step, -LONGEST, LONGEST)
+        step = _bounded(step)
         if step @ slope >= 0:
             inverse = inverse_curvatures(u, value)
-            step = np.clip(-np.where(held, 0.0, inverse @ slope), -LONGEST, LONGEST)
+            step = _bounded(-np.where(held, 0.0, inverse @ slope))
         length = 1.0
         while length > SHORTEST:
             trial = scale.clipped(u + length * step)

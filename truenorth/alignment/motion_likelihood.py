@@ -100,7 +100,7 @@ class Series:
     def whittle(self, expected: Array) -> float:
         """Minus twice the debiased Whittle log-likelihood, of an expected periodogram."""
         f = expected[LOWEST_BIN:]
-        return float(np.sum(np.log(f) + self.periodogram[LOWEST_BIN:] / f))
+        return float((np.log(f) + self.periodogram[LOWEST_BIN:] / f).sum())
 
     def exact(self, orders: Orders, logs: Array) -> Array:
         """Minus twice the restricted log-likelihoods (m,) of motions with logarithms (m, 1 + 3 q)."""

@@ -11,26 +11,14 @@ import gc
 import io
 import os
 import sys
+from collections.abc import Iterable
 from contextlib import nullcontext
+from importlib import import_module
 
 import typer
 
-from truenorth.cli.advise import advise
-from truenorth.cli.align import align
-from truenorth.cli.campaign import campaign
 from truenorth.cli.console import explain_compiling
-from truenorth.cli.example import example
-from truenorth.cli.faults import faults
 from truenorth.cli.files import FORCE, check_names, check_output, inputs, with_layout_name
-from truenorth.cli.imu import imu
-from truenorth.cli.inspect import inspect
-from truenorth.cli.live import live
-from truenorth.cli.navigate import navigate
-from truenorth.cli.noise import noise
-from truenorth.cli.reproduce import reproduce
-from truenorth.cli.simulate import simulate
-from truenorth.cli.tune import tune
-from truenorth.cli.warm import warm
 from truenorth.cli.wording import in_options
 from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
@@ -42,28 +30,23 @@ INTERRUPTED = 130
 # types), and with Python's own numbers (700, 10, 10) it looks through them again and again, a twentieth of its time.
 GARBAGE = (300_000, 50, 100)
 
-app = typer.Typer(
-    name="truenorth",
-    help="Find level and true north from an IMU log, and say how far the answer can be trusted.",
-    no_args_is_help=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+# In the order of the help; each is the function of that name in the module of that name.
+COMMANDS = (
+    "align",
+    "advise",
+    "imu",
+    "example",
+    "inspect",
+    "live",
+    "navigate",
+    "noise",
+    "simulate",
+    "campaign",
+    "faults",
+    "tune",
+    "warm",
+    "reproduce",
 )
-app.command("align")(align)
-app.command("advise")(advise)
-app.command("imu")(imu)
-app.command("example")(example)
-app.command("inspect")(inspect)
-app.command("live")(live)
-app.command("navigate")(navigate)
-app.command("noise")(noise)
-app.command("simulate")(simulate)
-app.command("campaign")(campaign)
-app.command("faults")(faults)
-app.command("tune")(tune)
-app.command("warm")(warm)
-app.command("reproduce")(reproduce)
 
 
 def _version(wanted: bool) -> None:
@@ -72,7 +55,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _main(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
     lang: str = typer.Option("en", "--lang", help="Language of verdicts and reports: en or zh; anywhere on the line."),
@@ -81,6 +63,37 @@ def _main(
     ),
 ) -> None:
     speak(lang)
+
+
+def program(commands: Iterable[str] = COMMANDS) -> typer.Typer:
+    """The program with all its commands, or with some: to load and to read the options of all takes a twentieth of `align`."""
+    made = typer.Typer(
+        name="truenorth",
+        help="Find level and true north from an IMU log, and say how far the answer can be trusted.",
+        no_args_is_help=True,
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    made.callback()(_main)
+    for name in commands:
+        made.command(name)(getattr(import_module(f"truenorth.cli.{name}"), name))
+    return made
+
+
+def __getattr__(name: str) -> typer.Typer:
+    """The whole program, `app`, for those that ask for it."""
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()["app"] = made = program()
+    return made
+
+
+def _asked(words: list[str]) -> Iterable[str]:
+    """The command of a line, as :func:`_language_first` leaves it, alone; all of them where another word stands there."""
+    first, *rest = [*words, ""]
+    command = rest[1] if first == "--lang" and len(rest) > 1 else rest[0] if first.startswith("--lang=") else first
+    return (command,) if command in COMMANDS else COMMANDS
 
 
 def _language_first(arguments: list[str]) -> list[str]:
@@ -126,7 +139,8 @@ def main() -> None:
         words = with_layout_name([word for word in words if word != FORCE])
         with nullcontext() if forced else protected(inputs(words), check_output(words)):
             check_names(words)
-            app(args=[*([FORCE] if forced else []), *_language_first(words)])
+            words = _language_first(words)
+            program(_asked(words))(args=[*([FORCE] if forced else []), *words])
     except TruenorthError as error:
         print(f"truenorth: {in_options(retold(str(error)))}", file=sys.stderr)
         sys.exit(error.exit_code)

@@ -23,6 +23,7 @@ EXAMPLES = """
 Examples:
   truenorth warm
   truenorth warm --workers 1
+  truenorth warm --studies
 
 Exit codes: 0 done; 2 wrong usage.
 """
@@ -40,7 +41,8 @@ TASKS: dict[str, tuple[str, ...]] = {
         "advise --lat 34 --imu tactical --heading 0.2 --speed 200",
     ),
     "quay": (
-        "align imu.parquet --lat 53.54 --lon 9.97 --imu navigation --to 600 -o start",
+        # Of its 900 s, in which this ship swings on lines, too.
+        "align imu.parquet --lat 53.54 --lon 9.97 --imu navigation --at 600 -o start",
         "navigate imu.parquet --start start",
     ),
     "rotary_ship": ("align imu.parquet --indexer encoder.parquet --lat 40 --lon 118 --imu navigation",),
@@ -58,9 +60,15 @@ TASKS: dict[str, tuple[str, ...]] = {
 }
 
 
+STUDIES = ("transfer", "static", "rotary", "odometer", "damping")  # of papers; the longest first
+
+
 @command(EXAMPLES)
 def warm(
     workers: Annotated[int | None, option("Processes at once; one a core without it.", min=1)] = None,
+    studies: Annotated[
+        bool, option("Also what `truenorth reproduce` needs, which takes minutes.", "--studies")
+    ] = False,
 ) -> None:
     """Compile what the other commands need and keep it for all that follow; a second call finds it done."""
     from concurrent.futures import ProcessPoolExecutor
@@ -72,15 +80,20 @@ def warm(
     if folder is None:
         print("truenorth: no cache folder can be written to; each command compiles for itself", file=sys.stderr)
         return
-    stamp = folder / f"warm-{_digest()}"
-    if stamp.exists():
+    digest = _digest()
+    wanted = {folder / f"warm-{digest}": list(TASKS)}
+    if studies:
+        wanted[folder / f"warm-studies-{digest}"] = list(STUDIES)
+    tasks = [task for stamp, some in wanted.items() if not stamp.exists() for task in some]
+    if not tasks:
         print(f"warm already: {folder}")
         return
     begun = time.monotonic()
-    count = min(workers or os.cpu_count() or 1, len(TASKS))
+    count = min(workers or os.cpu_count() or 1, len(tasks))
     with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        _show(pool, list(TASKS))
-    stamp.touch()
+        _show(pool, tasks)
+    for stamp in wanted:
+        stamp.touch()
     number = sum(1 for _ in folder.glob("*.kernel"))
     print(f"{number} kernels in {folder} after {time.monotonic() - begun:.0f} s")
 
@@ -116,7 +129,7 @@ def run_task(name: str) -> None:
     Parameters
     ----------
     name : str
-        A key of `TASKS`.
+        A key of `TASKS`; or one of `STUDIES`, of which two runs are made.
 
     Raises
     ------
@@ -125,6 +138,7 @@ def run_task(name: str) -> None:
     """
     from truenorth.cli import app
     from truenorth.filters.linear import always_own_size
+    from truenorth.papers import reproduce
 
     always_own_size()
     before = Path.cwd()
@@ -136,7 +150,25 @@ def run_task(name: str) -> None:
     ):
         os.chdir(folder)
         try:
+            if name in STUDIES:
+                reproduce(name, runs=2)
+                return
             for command in (f"simulate {name} -o . --no-plot", *TASKS[name]):
                 app(command.split(), standalone_mode=False)
+            if name == "van":
+                _beyond_commands()
         finally:
             os.chdir(before)
+
+
+def _beyond_commands() -> None:
+    """What a scenario does not ask for: a magnetometer's measurement, and the mechanisation by itself, of a log that lies here."""
+    import numpy as np
+
+    from truenorth.aiding.magnetometer import FIELD
+    from truenorth.formats import read_imu
+    from truenorth.state import State
+    from truenorth.strapdown import mechanise
+
+    _ = FIELD.function.address
+    mechanise(read_imu(Path("imu.parquet")).between(None, 1.0), State.at(np.eye(3), 0.8, 0.0), every=2)
