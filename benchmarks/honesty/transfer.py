@@ -71,15 +71,22 @@ def transferred(
     grade: str = "tactical",
     walks: bool = False,
     matching: What = "auto",
+    far: bool = False,
 ) -> Any:
     """A run of a slave of a grade against a master with these errors; None: it is taken for the truth.
 
-    With `walks` its clock walks against the slave's.
+    With `walks` its clock walks against the slave's. Where it is `far`, the arm is 15 to 40 m, known to .5 m.
     """
 
     def run(seed: int, number: int) -> Outcome:
         rng = np.random.default_rng([seed, number])
         arm, tau, mount = rng.standard_normal(3), 0.05 * rng.standard_normal(), 3 * DEG * rng.standard_normal(3)
+        known: dict[str, Any] = {}
+        if far:
+            toward = rng.standard_normal(3)
+            given = rng.uniform(15.0, 40.0) * toward / np.linalg.norm(toward)
+            arm = given + 0.5 * arm
+            known = {"lever_arm": tuple(given), "lever_arm_sigma": 0.5}
         of_master = MasterSpec(
             clock_offset=tau,
             lever_arm=tuple(arm),
@@ -100,7 +107,7 @@ def transferred(
         if walks:
             master, late = wandering(master, rng)
         tau += late
-        answer = align_transfer(slave, master, spec, matching=matching, master_errors=errors)
+        answer = align_transfer(slave, master, spec, matching=matching, master_errors=errors, **known)
         t = answer.transfer
         phi = -rotation_vector_from_dcm(answer.C_nb @ way.states(np.array(answer.time)).C_nb.T)
         ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
@@ -128,6 +135,19 @@ CASES += (
         "ship, consumer slave, by velocity alone",
         transferred(ship, ERRORS, "consumer", matching="velocity"),
     ),
+    Case(
+        "transfer",
+        "ship, consumer slave, by position alone",
+        transferred(ship, ERRORS, "consumer", matching="position"),
+    ),
+)
+CASES += tuple(
+    Case(
+        "transfer",
+        f"ship, {grade} slave 15 to 40 m away, by position alone",
+        transferred(ship, ERRORS, grade, matching="position", far=True),
+    )
+    for grade in ("tactical", "consumer")
 )
 
 if __name__ == "__main__":

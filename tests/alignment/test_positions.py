@@ -152,6 +152,22 @@ def test_gyros_that_walk_touch_no_table():
     assert find_touch(np.arange(300.0), stepped, 9.8, walk).time == pytest.approx(150.0, abs=10.0)
 
 
+def test_a_rate_that_stays_is_no_touch_and_hides_none():
+    """A MEMS on a table for two minutes, its gyros off by 30 deg/h for 300 s at a time: of 300 none; most steps of 8 mg are."""
+    rng, walk, rate = np.random.default_rng(2), math.radians(0.5) / 60.0, math.radians(30.0) / 3600.0
+    kept, found = math.exp(-0.5 / 300.0), 0
+    for _ in range(300):
+        bias = rate * rng.standard_normal((254, 2))
+        for k in range(1, len(bias)):
+            bias[k] = kept * bias[k - 1] + math.sqrt(1.0 - kept**2) * bias[k]
+        tilt = np.cumsum(0.5 * bias + walk * math.sqrt(0.5) * rng.standard_normal(bias.shape), axis=0)
+        force, time = 9.8 * tilt + 0.01 * rng.standard_normal(bias.shape), 0.5 * np.arange(254.0)
+        assert find_touch(time, force, 9.8, walk, rate) is None
+        stepped = force + np.array([0.08, 0.0]) * (time > 90.0)[:, None]
+        found += find_touch(time, stepped, 9.8, walk, rate) is not None
+    assert found > 120  # 1 where all of the rate counted
+
+
 @pytest.mark.slow
 def test_industrial_gyros_touch_no_table():
     """Two positions: two of the first seven were refused for a table that somebody touched."""

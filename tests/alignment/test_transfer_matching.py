@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from tests.alignment.test_transfer import ARCMIN, DEG, DEG_PER_HOUR, SPAN, TACTICAL
-from tests.runs import some
+from tests.alignment.test_transfer_axes import ARM, ship
+from tests.runs import few_and_all, some
 from truenorth.alignment.transfer import align_transfer
-from truenorth.alignment.transfer_filter import Assumed, Matching, _slopes, transfer_filter
+from truenorth.alignment.transfer_filter import Assumed, Matching, _slopes, master_aiding, transfer_filter
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.errors import UsageError
-from truenorth.errors.master import DELAY, TransferModel
+from truenorth.errors.master import DELAY, MasterErrors, TransferModel
+from truenorth.estimate.linear import rows_along
 from truenorth.papers.transfer.truth import Case, Flights
-from truenorth.records import ImuRecord
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.records.specs import imu_spec
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
-from truenorth.simulation.gnss import moved
+from truenorth.simulation.gnss import moved, place_of
 from truenorth.state.state import Start, State
 
 ARM_TRUE = np.array([0.5, 1.0, -0.3])
@@ -54,6 +57,51 @@ def test_without_noise_it_finds_the_truth(flight, ideal, kind, sigma, tau):
     assert track.sensors[-1][model.slice_of(DELAY)][0] == pytest.approx(tau, abs=5e-4)
     phi = rotation_vector_from_dcm(track.C_nb[-1:] @ np.swapaxes(true, 1, 2))
     np.testing.assert_allclose(phi, 0, atol=0.2 * ARCMIN)
+
+
+def test_a_position_tells_a_delay_by_the_velocity_of_the_master():
+    """Its column is the derivative of where the master is: on an arm of 26 m of a ship that rolls, not that of the slave."""
+    way, model, at = ship(np.random.default_rng(1), 60.0), TransferModel(), np.array([41.3, 42.3])
+
+    def measured(late):
+        lat, lon, alt, v_n = place_of(way.states(at - late), -ARM)
+        master = MasterRecord(at, v_n=v_n, lat=lat, lon=lon, alt=alt, source="made")
+        (source,) = master_aiding(master, model, Assumed(ARM), Matching(1.0, translation="position"))
+        return rows_along(way.states(at), [source], model.ins)
+
+    (early, _), (now, H), (late, _) = (measured(tau) for tau in (-1e-3, 0.0, 1e-3))
+    column = H[:, :, model.slice_of(DELAY)][..., 0]
+    np.testing.assert_allclose((late - early) / 2e-3, column, atol=1e-3)
+    np.testing.assert_allclose(now, 0.0, atol=1e-4)
+    assert np.abs(column - way.states(at).v_n).max() > 0.3  # m/s
+
+
+@few_and_all(12, few=2)
+@pytest.mark.parametrize("grade", ["tactical", "consumer"])
+def test_positions_of_a_master_far_away(grade, runs):
+    """15 to 40 m away, the arm known to .5 m, its axes to 3 deg: aligned and honest; two of five were refused.
+
+    The master's velocity is .05 m/s off, as is said of it: against its positions it is turned by half a degree.
+    """
+    spec, total, errors = imu_spec(grade), 0.0, MasterErrors(velocity=0.05)
+    for run in range(runs):
+        rng = np.random.default_rng([44, run])
+        way, toward = ship(rng, 200.0), rng.standard_normal(3) * [1.0, 1.0, 0.3]
+        arm = rng.uniform(15.0, 40.0) * toward / np.linalg.norm(toward)
+        late, mount = 0.05 * rng.standard_normal(), 3 * DEG * rng.standard_normal(3)
+        sensor = MasterSpec(clock_offset=late, lever_arm=tuple(arm), mounting=tuple(mount), velocity=0.05)
+        slave = simulate(way, rate=100.0, duration=200.0, imu=spec, seed=44, run=run).record
+        master = simulate_sensor(way, sensor, duration=200.0, seed=44, run=run).record
+        given = tuple(arm + 0.5 * rng.standard_normal(3))
+        known = {"lever_arm": given, "lever_arm_sigma": 0.5, "master_errors": errors}
+        answer = align_transfer(slave, master, spec, matching="position", **known)
+        t, phi = answer.transfer, -rotation_vector_from_dcm(answer.C_nb @ way.states(np.array(answer.time)).C_nb.T)
+        ratio = phi / np.sqrt(np.diag(answer.phi_covariance))
+        rest = np.append((t.lever_arm - arm) / t.lever_arm_sigma, (t.delay - late) / t.delay_sigma)
+        assert answer.status == "aligned", answer.reasons
+        assert max(np.abs(ratio).max(), np.abs(rest).max()) < 4.0, (ratio, rest)
+        total += float(ratio @ ratio)
+    assert total / (3 * runs) < 1.0 + 3.1 * np.sqrt(2 / (3 * runs))  # false alarms 1 in 1000
 
 
 @pytest.mark.slow

@@ -118,6 +118,9 @@ def test_what_lasts_below_a_usual_noise_of_a_master_is_no_contradiction(size, fo
     innovation, sigma = size * bend, np.full_like(bend, max(size, 0.01))
     rows = Residuals("master velocity", time, innovation, sigma, np.ones(len(time)), used, 0, time, ~used)
     assert [e.key for e in _lasting(SimpleNamespace(residuals=[rows]), 0.1)] == found
+    # A first row of a start that is hardly known is large, as it says, and no size of the others.
+    innovation[0], sigma[0] = 100.0, 100.0
+    assert [e.key for e in _lasting(SimpleNamespace(residuals=[rows]), 0.1)] == found
 
 
 def test_errors_of_the_master_by_name():

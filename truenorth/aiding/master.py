@@ -86,7 +86,7 @@ def turned_from_north(now: Any, q: Any, first: int) -> Any:
 
 
 @compiled
-def _beyond_noise(rate: Any, variance: float) -> float:
+def beyond_noise(rate: Any, variance: float) -> float:
     """Share of a rate that is not within its noise: squares of noise are no knowledge."""
     size = rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
     return max(0.0, 1.0 - _BY_CHANCE * variance / max(size, 1e-30))
@@ -132,7 +132,7 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
     velocity_row(now, C, w_eb, push, away, lag_now(now, assumed, at[AT_LAG]), -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
         turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
-        seen = _beyond_noise(turn, figures[OWN])
+        seen = beyond_noise(turn, figures[OWN])
         for j in range(3):
             m = times(C, cross(turn, (seen * (j == 0), seen * (j == 1), seen * (j == 2))))
             a = at[AT_ARM] + j
@@ -140,7 +140,7 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
             H[0, a], H[1, a], H[2, a] = c * x - s * y, s * x + c * y, m[2]
     if at[AT_OWN] >= 0:  # as biases of the gyros; by a rate of another noise, as the arm
-        seen = _beyond_noise(other, figures[OWN])
+        seen = beyond_noise(other, figures[OWN])
         for i in range(3):
             for j in range(3):
                 for k in range(3):
@@ -207,7 +207,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         mean = (measured[7] - assumed[_BG], measured[8] - assumed[_BG + 1], measured[9] - assumed[_BG + 2])
         turn = times(C, mean)
         turn = (turn[0] - w_n[0], turn[1] - w_n[1], turn[2] - w_n[2])
-    seen = _beyond_noise(turn, figures[OWN])
+    seen = beyond_noise(turn, figures[OWN])
     for j in range(3):
         e = (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2))
         m = rotate(q_linear, e)

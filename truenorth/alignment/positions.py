@@ -244,7 +244,8 @@ def _touched(task: Task, fine: FineAlignment, stretches: list[tuple[float, float
     for stretch in stretches:
         here = _resting(fine.integrals, [stretch])
         at, level = (fine.integrals.start + time[1:])[here], force[here, :2]
-        touch = find_touch(at, level, task.gravity, spec.gyro_random_walk, spec.gyro_bias_instability)
+        of_gyros = spec.gyro_random_walk, spec.gyro_bias_instability, spec.correlation_time
+        touch = find_touch(at, level, task.gravity, *of_gyros)
         if touch is not None:
             found.append(touch)
     return max(found, key=lambda touch: touch.size, default=None)

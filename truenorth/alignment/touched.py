@@ -53,9 +53,17 @@ class Touch:
 
 
 def find_touch(
-    time: Array, force: Array, gravity: float, angle_walk: float = 0.0, rate_sigma: float = 0.0
+    time: Array,
+    force: Array,
+    gravity: float,
+    angle_walk: float = 0.0,
+    rate_sigma: float = 0.0,
+    correlation_time: float = 300.0,
 ) -> Touch | None:
     """The largest step within one position, if it is not chance.
+
+    A rate that gyros are off by throughout the position tilts these axes alike from each block to the next, and is no step: the
+    median of the steps is taken off. What is left of their biases is how these wander about their mean in it.
 
     Parameters
     ----------
@@ -66,6 +74,8 @@ def find_touch(
     angle_walk, rate_sigma : float, rad/sqrt(s) and rad/s
         Random walk of the gyros that carry these axes, and what their biases wander by: they tilt the axes from the blocks before
         to those after, more than neighbouring blocks tell.
+    correlation_time : float, s
+        Of that wander.
     """
     length = max(1, len(time) // BLOCKS)
     count = len(time) // length
@@ -76,6 +86,7 @@ def find_touch(
     before = (sums[ASIDE:] - sums[:-ASIDE])[: -ASIDE - GAP] / ASIDE
     after = (sums[ASIDE:] - sums[:-ASIDE])[ASIDE + GAP :] / ASIDE
     steps = after - before
+    steps -= np.median(steps, axis=0)
     size = np.hypot(steps[:, 0], steps[:, 1])
     # Neighbouring blocks tell what is usual: a step is in few of their differences, and the median does not see it.
     usual = median_of_rows(np.abs(blocks[1:] - blocks[:-1]).T)[:, 0] / 0.6745 / math.sqrt(ASIDE)
@@ -83,10 +94,26 @@ def find_touch(
     # Means of m blocks, g blocks apart, of a walk of q a block differ by a variance of q (g + 2 m/3), from centre to centre m + g.
     block = length * float(time[-1] - time[0]) / max(len(time) - 1, 1)
     walk = angle_walk * math.sqrt(block * (GAP + 2.0 * ASIDE / 3.0))
-    carried = gravity * math.hypot(walk, rate_sigma * block * (ASIDE + GAP))
+    wander = rate_sigma * wander_about_mean(float(time[-1] - time[0]), correlation_time)
+    carried = gravity * math.hypot(walk, wander * block * (ASIDE + GAP))
     best = int(np.argmax(size))
-    by_chance = math.hypot(limit("touched") * scatter, limit("carried") * carried)
+    # Of these, neighbours show q 2/3 already, which is not to count twice: what is left of their scatter is white.
+    shown = gravity * angle_walk * math.sqrt(2.0 * (2.0 / 3.0) * block / ASIDE)
+    white = math.sqrt(max(scatter**2 - shown**2, 0.0))
+    by_chance = math.hypot(limit("touched") * white, limit("carried") * carried)
     if size[best] < max(by_chance, STILL_ANGLE * gravity):
         return None
     middle = (best + ASIDE) * length + GAP * length // 2
     return Touch(float(time[middle]), steps[best], scatter)
+
+
+def wander_about_mean(duration: float, correlation_time: float) -> float:
+    """RMS of a first-order Gauss-Markov process about its mean over a time, by its sigma; both times in s.
+
+    The mean has the variance ``2 (x - 1 + exp(-x)) / x^2``, x the time in correlation times: the integral of the correlation.
+    Source: A. Papoulis, "Probability, Random Variables, and Stochastic Processes", 3rd ed. (1991), sec. 12-1.
+    """
+    x = duration / correlation_time
+    if x < 1e-3:
+        return math.sqrt(max(x, 0.0) / 3.0)
+    return math.sqrt(1.0 - 2.0 * (x + math.expm1(-x)) / x**2)

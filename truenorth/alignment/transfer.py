@@ -180,7 +180,7 @@ def align_transfer(
     rows = Matching(*noise, what.kind, limit("master's gate"))
     run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
     track = run(part, model=model, start=start)
-    seen = _seen(slave, master, model, C_mb) + _rivals(part, run, track, model, start, spec)
+    seen = _seen(slave, master, errors, C_mb) + _rivals(part, run, track, model, start, spec)
     seen += shaken_evidence(run, track, part, master, model, start, assumed, linear, what)
     track = as_said_together(track, model, assumed, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
@@ -307,10 +307,10 @@ def _passes(
     return noise, linear, assumed, biases
 
 
-def _seen(slave: ImuRecord, master: MasterRecord, model: TransferModel, C_mb: Array) -> list[Evidence]:
-    """What clocks, positions and samples show."""
+def _seen(slave: ImuRecord, master: MasterRecord, errors: MasterErrors, C_mb: Array) -> list[Evidence]:
+    """What clocks, positions and samples show; the master's errors are all it has, also those that no row that is matched bears."""
     parted = parted_clocks(slave, master, C_mb)
-    slow = math.hypot(model.master.velocity, model.master.velocity_drift)
+    slow = math.hypot(errors.velocity, errors.velocity_drift)
     return [
         *([] if parted is None else [parted]),
         *master_evidence(master, slow),

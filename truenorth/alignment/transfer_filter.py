@@ -189,30 +189,25 @@ def master_aiding(
     patience = max(2, round(matching.patience / master.interval))
     found, place = [], None
     held = stamps - (0.0 if linear is None else linear.delay)  # when they held, as far as is known
-    of_sample, pushed = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval, KNOWN
+    of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
+    own: tuple[float, ...] = (OTHER_NOISE * of_sample, KNOWN)
     if master.lat is not None and master.lon is not None and master.alt is not None:
         place = np.column_stack([master.lat, master.lon, master.alt])
     if place is not None and kind != "position":
         sigma = np.full((count, 3), PLACE_SIGMA)
-        lag = _states(groups, {"lag": DELAY})
+        lag, arm = _states(groups, {"lag": DELAY}), -assumed.lever_arm
         found.append(
-            Aiding(
-                "master place",
-                "position",
-                stamps,
-                place,
-                sigma,
-                -assumed.lever_arm,
-                states=lag,
-                retimed=True,
-                does="place",
-            )
+            Aiding("master place", "position", stamps, place, sigma, arm, states=lag, retimed=True, does="place")
         )
     measured = _translation(master, kind, place, linear) if np.isfinite(matching.sigma) else None
-    if measured is not None and kind == "acceleration" and slave is not None:
-        measured[:, 3:] = _slopes(slave, held)
-    elif measured is not None and kind == "velocity" and slave is not None:
-        pushed = _add_turns(measured, slave, master, model, assumed, held)
+    if measured is not None and slave is not None:
+        if kind == "acceleration":
+            measured[:, 3:] = _slopes(slave, held)
+        elif kind == "velocity":
+            own = (own[0], _add_turns(measured, slave, master, model, assumed, held))
+        elif (reach := _reach(assumed)) > 0.0:
+            turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.sigma / reach)
+            measured[:, 3:], own = np.nan if turns is None else turns, (of_turn,)
     has_C = master.C_nb is not None and np.isfinite(matching.attitude_sigma)
     known_C = np.isfinite(master.C_nb).all(axis=(1, 2)) if has_C and master.C_nb is not None else np.zeros(count, bool)
     if measured is not None:
@@ -232,7 +227,7 @@ def master_aiding(
                 assumed.lever_arm,
                 states=_states(groups, roles if error is None else {**roles, "bias": error}),
                 gate=matching.gate,
-                figures=at_rest if kind == "acceleration" else (OTHER_NOISE * of_sample, pushed),
+                figures=at_rest if kind == "acceleration" else own,
                 retimed=True,
                 patience=patience if opens is not None else 0,
                 opens=opens,
@@ -277,6 +272,11 @@ def arm_of(track: Track, assumed: Assumed) -> Array:
     return np.asarray(np.hypot(assumed.lever_arm + found, sigma))
 
 
+def _reach(assumed: Assumed) -> float:
+    """How long an arm may be, m, its sigma included."""
+    return math.hypot(*assumed.lever_arm, math.sqrt(3.0) * assumed.lever_arm_sigma)
+
+
 def _add_turns(
     measured: Array, slave: ImuRecord, master: MasterRecord, model: TransferModel, assumed: Assumed, held: Array
 ) -> float:
@@ -285,8 +285,7 @@ def _add_turns(
     assert master.v_n is not None
     own = bool(np.isfinite(measured[:, 3:6]).any())  # the master says its acceleration
     if not own:
-        arm = math.hypot(*assumed.lever_arm, math.sqrt(3.0) * assumed.lever_arm_sigma)
-        spins, pushed = spins_at(slave, held, walk, arm, push_of(master.time, master.v_n))
+        spins, pushed = spins_at(slave, held, walk, _reach(assumed), push_of(master.time, master.v_n))
         measured[:, 3:6] = np.nan if spins is None else spins
     if (rates := shaken(slave, held, walk, assumed.delay_sigma)) is not None:
         measured[:, 10:] = rates.slow
@@ -309,7 +308,7 @@ TRANSLATIONS = tuple(row.name for row, _, _ in _ROWS.values())
 def _translation(master: MasterRecord, kind: Translation, place: Array | None, linear: Linear | None) -> Array | None:
     """(M, k) what the row of a translation is given; None where the master does not hold it."""
     if kind == "position":
-        return place
+        return None if place is None else np.column_stack([place, np.full((len(master), 3), np.nan)])
     if kind == "acceleration":
         if master.C_nb is None or master.f_b is None:
             return None

@@ -13,7 +13,7 @@ from truenorth.alignment.in_motion_start import backtracked
 from truenorth.alignment.transfer_delay import WINDOW, find_delay, runs_backwards
 from truenorth.alignment.transfer_filter import Assumed
 from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
-from truenorth.core.earth import GRAVITY_EQUATOR
+from truenorth.core.earth import GRAVITY_EQUATOR, radii
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import turning_axes
@@ -185,6 +185,10 @@ def hand_over(
         C = _from_course(master, assumed, f)
         phi = np.array([LEVEL_SIGMA, LEVEL_SIGMA, COURSE_SIGMA])
     v = np.zeros(3) if at["v_n"] is None else at["v_n"] + C @ np.cross(w, assumed.lever_arm)
+    if at["lat"] is not None:  # a place of the master that is off by an arm of 40 m is four sigmas off
+        R_M, R_N = radii(lat)
+        east, north, up = C @ assumed.lever_arm
+        lat, lon, alt = lat + north / (R_M + alt), lon + east / ((R_N + alt) * math.cos(lat)), alt + up
     force = float(np.linalg.norm(C @ f - [0.0, 0.0, GRAVITY_EQUATOR]))
     slack = math.hypot(force * assumed.delay_sigma, float(np.linalg.norm(w)) * assumed.lever_arm_sigma)
     dv = math.hypot(0.1 if at["v_n"] is not None else 300.0, slack)

@@ -100,7 +100,8 @@ def _lasting(transfer: Transfer, least: float) -> list[Evidence]:
     e = (residuals.innovation / residuals.sigma)[residuals.used]
     whole = e[:, np.isfinite(e).all(axis=0)]
     found = whiteness(whole, float(np.median(np.diff(residuals.time))) if len(residuals.time) > 1 else 1.0)
-    size = float(np.sqrt(np.nanmean(residuals.innovation[residuals.used] ** 2)))
+    # By what sigma they have for most of the log: a first row from a start that is known to 10 m only is no size of them all.
+    size = found.size * float(np.nanmedian(residuals.sigma[residuals.used]))
     if not found.sure or found.turning < limit("growth") or found.turning * size < least:
         return []
     return [
