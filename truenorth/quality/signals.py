@@ -70,8 +70,8 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
     full = length > 0.5 * interval
     if not full.any():
         raise DataError(
-            f"{record.source}: column time: half of the rows come {record.interval:.3g} s after the row before, but {len(record)} of "
-            f"them take {record.duration:.0f} s; expected the times of the samples: rows that arrive in blocks were stamped as "
+            f"{record.source}: column time: half of the rows come {record.interval:.3g} s after the row before, but {len(record)} "
+            f"rows take {record.duration:.0f} s; expected the times of the samples: rows that arrive in blocks were stamped as "
             "they arrived"
         )
     rates = np.empty((6, cells))
