@@ -48,6 +48,19 @@ def test_counters_and_fine_steps_claim_nothing() -> None:
     assert rounding_walks(_record(np.zeros(ROWS))) == (0.0, 0.0)
 
 
+def test_counters_whose_third_axis_is_hidden_by_a_vibration_claim_nothing() -> None:
+    """A ring-laser IMU on a vehicle that idles: two accelerometers show that they carry on, the third does not."""
+    rng = np.random.default_rng(15)
+    accel = np.stack([0.3 + 0.05 * rng.standard_normal(ROWS) for _ in range(3)], axis=1)
+    accel[:, 0] += 1.1 * np.sin(2.0 * np.pi * 11.3 / RATE * np.arange(ROWS))
+    counts = np.diff(np.round(np.cumsum(accel, axis=0)), axis=0)
+    gyro = rng.standard_normal(counts.shape)
+    record = ImuRecord(np.arange(1, ROWS) / RATE, gyro, counts, "increments")
+    assert rounding_walks(record) == (0.0, 0.0)
+    alone = ImuRecord(record.time, gyro, np.where(np.arange(3) == 0, counts, gyro), "increments")
+    assert rounding_walks(alone)[1] > 0.0
+
+
 def test_a_specification_that_counts_is_left_as_it_is() -> None:
     rng = np.random.default_rng(14)
     record = _record(np.round(0.3 * rng.standard_normal(ROWS)))

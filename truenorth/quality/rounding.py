@@ -62,13 +62,16 @@ def rounding_walks(record: ImuRecord) -> tuple[float, float]:
     """
     rows = max(FEWEST, round(WINDOW / record.interval))
     scale = record.interval if record.kind == "rates" else 1.0
-    walks = [max(_lost(x, rows) for x in sensor.T) for sensor in (record.gyro, record.accel)]
-    gyro, accel = (scale * walk / math.sqrt(record.interval) for walk in walks)
+    lost = [[_lost(x, rows) for x in sensor.T] for sensor in (record.gyro, record.accel)]
+    # One logger wrote them: where most axes of a sensor carry on, so do those whose motion hides it.
+    if any(sensor.count(None) > 1 for sensor in lost):
+        return 0.0, 0.0
+    gyro, accel = (scale * max(x or 0.0 for x in sensor) / math.sqrt(record.interval) for sensor in lost)
     return gyro, accel
 
 
-def _lost(values: Array, rows: int) -> float:
-    """Root of the variance by which the sum of a channel's values (N,) grows in each row; zero where nothing is lost."""
+def _lost(values: Array, rows: int) -> float | None:
+    """Root of the variance by which the sum of a channel's values (N,) grows in each row; None where remainders are carried on."""
     if np.count_nonzero(np.diff(values) == 0.0) < REPEATS * len(values):
         return 0.0
     step, counts = lattice(values)
@@ -77,7 +80,7 @@ def _lost(values: Array, rows: int) -> float:
         return 0.0
     counts = counts[: windows * rows].reshape(windows, rows)
     if _carried(counts):
-        return 0.0
+        return None
     mean, spread, floor = counts.mean(axis=1), counts.std(axis=1), _floor(counts)
     of_noise = np.array([_of_noise(x) for x in counts])
     bounds = [0, *(1 + np.flatnonzero(np.abs(np.diff(mean)) > 0.5)), windows]
