@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
-from truenorth.quality.signals import _neighbours, angle_wander, box_mean, offset, rate_bias
+from truenorth.core.errors import DataError
+from truenorth.quality.signals import _neighbours, angle_wander, box_mean, even_rates, offset, rate_bias
+from truenorth.records import ImuRecord
 
 
 @pytest.mark.parametrize("width", [1, 2, 3, 10, 21, 31, 40])
@@ -34,3 +36,11 @@ def test_the_rate_of_a_still_base_is_found_in_its_quiet_windows():
     wander = angle_wander(rates, 0.1, 10)
     bias = rate_bias(rates, wander, 10, np.full(3, 1e-6))
     np.testing.assert_allclose(bias, [1e-4, -2e-4, 5e-5], atol=5e-7)
+
+
+def test_rows_that_arrived_in_blocks_are_named():
+    """Stamped .1 ms apart, ten at a time: an error with its cause, where the grid had no cell."""
+    time = 0.2 * (1 + np.arange(2000) // 10) + 1e-4 * (np.arange(2000) % 10)
+    record = ImuRecord(time, np.zeros((2000, 3)), np.full((2000, 3), 9.8), "rates")
+    with pytest.raises(DataError, match="arrive in blocks"):
+        even_rates(record)

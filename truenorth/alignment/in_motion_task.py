@@ -30,6 +30,7 @@ from truenorth.navigation.stops import seconds_at_rest, updates_at, velocity_at_
 from truenorth.navigation.whereabouts import check_fixes
 from truenorth.quality.absolute import known_as_fixes
 from truenorth.quality.regimes import motion_summary
+from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import (
     FIXES,
     USUAL_TIME,
@@ -209,6 +210,7 @@ def moving_task(
         )
     if imu is None:
         raise UsageError("alignment on the move needs the IMU's specification: imu='navigation', a file or an ImuSpec")
+    spec = with_rounding(imu_spec(imu), record)
     if calibration is not None:
         record = calibration.apply(record)
     record, _, gaps = bridge_gaps(record)
@@ -224,7 +226,7 @@ def moving_task(
         position = first_fix(record, gnss) if has_fixes(gnss) else Position(SOMEWHERE)
     elif gnss is not None:
         check_fixes(gnss, position, float(record.time[0]))
-    spec = imu_spec(imu).seen_in(record).with_coning_of(record)
+    spec = spec.seen_in(record).with_coning_of(record)
     stops: list[Aiding] = list(gaps)
     if zupt:
         still, disturbed = seconds_at_rest(record, odometer, gnss)

@@ -46,6 +46,7 @@ from truenorth.quality.density import burst_evidence
 from truenorth.quality.gnss import gnss_evidence
 from truenorth.quality.innovations import innovation_evidence
 from truenorth.quality.record_evidence import moving_evidence
+from truenorth.quality.rounding import with_rounding
 from truenorth.quality.slow_aids import Slow, one_less
 from truenorth.records import GnssRecord, ImuRecord, Late
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -139,11 +140,11 @@ def navigate(
     given = by_key(aid)
     begin, spec, imu_source = start_of(start, imu)
     check_start(begin)
-    record = ImuRecord.of(record)
-    record = _from_start(record if calibration is None else calibration.apply(record), begin)
+    log = ImuRecord.of(record)
+    record = _from_start(log if calibration is None else calibration.apply(log), begin)
     check_start_at_rest(begin, record)
     record, gaps, disturbances = bridge_gaps(record)
-    noise = spec.seen_in(record)
+    noise = with_rounding(spec, log).seen_in(record)
     said = [item for a in given.values() for item in notes(getattr(a.record, "notes", ()))]
     late = {key: a.record.late for key, a in given.items() if getattr(a.record, "late", NEVER).rows}
     reference = given.pop(VelocityLog.key, None) if damping is not None else None

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 REPEATS = 0.3  # of the rows that repeat the one before: fewer do where the noise is as large as a step
 NEAR = 3.0  # steps from the fullest level, from which on a value is no noise
 LATTICE = 1e-3  # of a step, by which values may miss multiples of it
+SAME = 1e-9  # of the range: values that are closer are one, but for the last digits
 SUMS = (1, 2, 4, 8, 16, 32)  # rows that are summed up to see whether remainders are carried on
 FEWEST = 50  # of such sums
 QUIET = 0.98  # of the rows near the fullest level: where more are not, motion moves the channel over many steps
@@ -64,20 +65,31 @@ def mean_error(values: Array) -> tuple[float, float]:
     """
     if np.count_nonzero(np.diff(values) == 0.0) < REPEATS * len(values):
         return 0.0, 0.0
-    levels, counts = np.unique(values, return_counts=True)
-    if len(levels) < 2:
+    step, places = lattice(values)
+    if step == 0.0:
         return 0.0, 0.0
-    step = float(np.min(np.diff(levels)))
-    place = np.round((levels - levels[np.argmax(counts)]) / step)
-    if np.any(
-        np.abs(levels - levels[np.argmax(counts)] - step * place) > LATTICE * step * np.maximum(np.abs(place), 1.0)
-    ):
-        return 0.0, 0.0
-    rest = np.clip(np.round((values - levels[np.argmax(counts)]) / step), -NEAR, NEAR)
+    rest = np.clip(places, -NEAR, NEAR)
     if np.mean(np.abs(rest) < NEAR) < QUIET or _carries(rest):
         return step, 0.0
-    error = _rounded(float(np.mean(rest[np.abs(rest) < NEAR] < 0.0)), float(np.mean(rest[np.abs(rest) < NEAR] > 0.0)))
+    error = rounded(float(np.mean(rest[np.abs(rest) < NEAR] < 0.0)), float(np.mean(rest[np.abs(rest) < NEAR] > 0.0)))
     return step, step * error if error > NEGLIGIBLE else 0.0
+
+
+def lattice(values: Array) -> tuple[float, Array]:
+    """The step of which a channel's values (N,) are multiples, and how many steps (N,) they are from the fullest level.
+
+    Zero, and no values, where they are not.
+    """
+    levels, counts = np.unique(values, return_counts=True)
+    if len(levels) < 2:
+        return 0.0, np.zeros(0)
+    apart, fullest = np.diff(levels), levels[np.argmax(counts)]
+    step = float(np.min(apart[apart > SAME * np.ptp(levels)]))
+    off = (levels - fullest) / step
+    place = np.round(off)
+    if np.any(np.abs(off - place) > LATTICE * np.maximum(np.abs(place), 1.0)):
+        return 0.0, np.zeros(0)
+    return step, np.round((values - fullest) / step)
 
 
 def _carries(counts: Array) -> bool:
@@ -94,7 +106,7 @@ def _carries(counts: Array) -> bool:
     return bool(min(scatter, default=0.0) < CARRIED * scatter[0]) if scatter and scatter[0] > 0.0 else False
 
 
-def _rounded(below: float, above: float) -> float:
+def rounded(below: float, above: float) -> float:
     """One sigma of the error of the mean, in steps, of noise that leaves the fullest level downwards and upwards so often."""
     if (
         min(below, above) == 0.0

@@ -43,7 +43,8 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
     Raises
     ------
     DataError
-        A log of a few rows over so long a time that the grid does not fit into memory: it names the longest gap.
+        A log of a few rows over so long a time that the grid does not fit into memory: it names the longest gap. Rows that came
+        in blocks, stamped one right after the other.
     """
     rows_a_cell = max(1, round(CELL / record.interval))
     interval = rows_a_cell * record.interval
@@ -67,6 +68,12 @@ def even_rates(record: ImuRecord) -> tuple[float, Array]:
     covered = np.interp(edges, record.time, clock, left=0.0)
     length = np.diff(covered)
     full = length > 0.5 * interval
+    if not full.any():
+        raise DataError(
+            f"{record.source}: column time: half of the rows come {record.interval:.3g} s after the row before, but {len(record)} "
+            f"rows take {record.duration:.0f} s; expected the times of the samples: rows that arrive in blocks were stamped as "
+            "they arrived"
+        )
     rates = np.empty((6, cells))
     middle = 0.5 * (edges[1:] + edges[:-1])
     for channel in range(6):

@@ -1,0 +1,85 @@
+"""What rounding leaves on the move: as much as drawn means lose, and nothing of counters that carry their remainders on."""
+
+import numpy as np
+import pytest
+
+from truenorth.aiding.aids import Odometer
+from truenorth.alignment import align
+from truenorth.campaign.fault_benches import BENCHES, misses
+from truenorth.quality.rounding import rounding_walks, with_rounding
+from truenorth.records import ImuRecord
+from truenorth.records.specs import imu_spec
+
+RATE, ROWS, RUNS = 50.0, 2000, 60
+
+
+def _record(values: np.ndarray, kind: str = "rates") -> ImuRecord:
+    """One channel that counts in steps of one; the others are noise."""
+    rng = np.random.default_rng(4)
+    gyro, accel = rng.standard_normal((len(values), 3)), rng.standard_normal((len(values), 3))
+    accel[:, 1] = values
+    return ImuRecord(np.arange(1, len(values) + 1) / RATE, gyro, accel, kind)
+
+
+@pytest.mark.parametrize(("amplitude", "noise"), [(0.8, 0.05), (1.1, 0.0), (1.1, 0.15), (1.6, 0.1), (0.0, 0.25)])
+def test_a_vibration_leaves_no_more_than_is_claimed(amplitude: float, noise: float) -> None:
+    """Over means drawn anywhere between two steps: the error of the velocity after the log, in its sigma."""
+    rng = np.random.default_rng(12)
+    time = np.arange(1, ROWS + 1) / RATE
+    off = []
+    for mean in rng.uniform(0.0, 1.0, RUNS):
+        true = mean + amplitude * np.sin(2.0 * np.pi * (11.3 * time + rng.random()))
+        true += noise * rng.standard_normal(ROWS)
+        counts = np.round(true)
+        if len(np.unique(counts)) > 1:  # else nothing tells how long a step is
+            sigma = rounding_walks(_record(counts))[1] * np.sqrt(time[-1])
+            off.append((counts - true).sum() / RATE / sigma)
+    assert len(off) > 15
+    assert 0.15 < np.sqrt(np.mean(np.square(off))) < 1.5
+    assert np.max(np.abs(off)) < 4.0
+
+
+def test_counters_and_fine_steps_claim_nothing() -> None:
+    rng = np.random.default_rng(13)
+    whole = np.cumsum(0.3 + 0.2 * np.sin(0.01 * np.arange(ROWS)) + 0.05 * rng.standard_normal(ROWS))
+    assert rounding_walks(_record(np.diff(np.round(whole)), "increments")) == (0.0, 0.0)
+    assert rounding_walks(_record(np.round(9.0 * rng.standard_normal(ROWS)))) == (0.0, 0.0)
+    assert rounding_walks(_record(rng.standard_normal(ROWS))) == (0.0, 0.0)
+    assert rounding_walks(_record(np.zeros(ROWS))) == (0.0, 0.0)
+
+
+def test_counters_whose_third_axis_is_hidden_by_a_vibration_claim_nothing() -> None:
+    """A ring-laser IMU on a vehicle that idles: two accelerometers show that they carry on, the third does not."""
+    rng = np.random.default_rng(15)
+    accel = np.stack([0.3 + 0.05 * rng.standard_normal(ROWS) for _ in range(3)], axis=1)
+    accel[:, 0] += 1.1 * np.sin(2.0 * np.pi * 11.3 / RATE * np.arange(ROWS))
+    counts = np.diff(np.round(np.cumsum(accel, axis=0)), axis=0)
+    gyro = rng.standard_normal(counts.shape)
+    record = ImuRecord(np.arange(1, ROWS) / RATE, gyro, counts, "increments")
+    assert rounding_walks(record) == (0.0, 0.0)
+    alone = ImuRecord(record.time, gyro, np.where(np.arange(3) == 0, counts, gyro), "increments")
+    assert rounding_walks(alone)[1] > 0.0
+
+
+def test_a_specification_that_counts_is_left_as_it_is() -> None:
+    rng = np.random.default_rng(14)
+    record = _record(np.round(0.3 * rng.standard_normal(ROWS)))
+    plain = imu_spec("tactical")
+    assert with_rounding(plain, record).accel_random_walk > plain.accel_random_walk
+    counter = imu_spec({**plain.to_mapping(), "accel": {**plain.to_mapping()["accel"], "quantisation": "0.01 m/s"}})
+    assert with_rounding(counter, record) == counter
+
+
+@pytest.mark.parametrize(("run", "steps"), [(1, 1.04), (16, 1.16)])
+def test_a_shaken_car_with_few_digits_is_no_more_sure_than_it_may_be(run: int, steps: float) -> None:
+    """A vibration of about one step: 7.6 and 5.6 sigmas of heading, `aligned`, where rounding was in no sigma."""
+    inputs, truth = BENCHES["odometer"].draw(9917, run)
+    record = inputs["record"]
+    gyro, accel = (
+        step * np.round(values / step)
+        for values, step in ((x, steps * np.median(np.abs(np.diff(x, axis=0)))) for x in (record.gyro, record.accel))
+    )
+    coarse = ImuRecord(record.time, gyro, accel, record.kind)
+    answer = align(coarse, inputs["place"], inputs["imu"], aid=Odometer(inputs["odometer"], inputs["mounting"]))
+    off = np.concatenate(list(misses(answer, truth).values()))
+    assert answer.status != "aligned" or np.abs(off).max() < 4.0
