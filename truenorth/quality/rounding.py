@@ -29,9 +29,7 @@ Array = NDArray[np.float64]
 REPEATS = 0.05  # of the rows that repeat the one before: fewer do where the noise is larger than a step
 WINDOW, FEWEST = 4.0, 64  # s, and rows at least, of a window in which motion is looked at
 SUMS = (1, 2, 4, 8, 16)  # rows that are summed up to see whether remainders are carried on
-VIBRATION = (
-    1.2  # of what independent rows would scatter: sums of a vibration scatter more at one length than at another
-)
+VIBRATION = 1.2  # of what independent rows scatter by: sums of a vibration scatter more at one length than at another
 TWO = 0.9  # of the rows on the two fullest levels at least: else noise is wider than .4 of a step
 NOISE = 0.9  # of the white part that is found: overtones of a rounded vibration add a tenth
 LARGE = 4.0  # steps: motion that is larger passes over all places between two steps
