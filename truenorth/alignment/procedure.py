@@ -205,7 +205,8 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     why = words.get(overall, f"the base is {overall}: only the inertial frame follows it")
     if overall == "rotating":
         why += POSITIONS
-    if task.record.duration < SHORTEST_SWAYING or not (overall in words or rocks_all_along(task.motion)):
+    one_way = len(task.motion.regimes) == 1 or rocks_all_along(task.motion)
+    if task.record.duration < SHORTEST_SWAYING or not (overall in words or one_way):
         return "kalman", why
     return "swaying", f"{why}; its own motion is fitted to the log"
 

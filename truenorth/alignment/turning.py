@@ -69,7 +69,7 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     """
     rocks = np.isin(motion.kind, [KINDS.index(kind) for kind in ROCKING])
     rocks |= (motion.kind == KINDS.index("rotating")) & (motion.wander > ROCKED)
-    return len(motion.regimes) == 1 or float(np.mean(rocks)) > MOSTLY
+    return bool(rocks.size) and float(np.mean(rocks)) > MOSTLY
 
 
 def infer_turning(task: Task) -> ImuSpec:
