@@ -47,7 +47,7 @@
     const size = paper ? 8 : 13, rows = Object.keys(layout).filter(key => key.startsWith("yaxis")).length;
     const found = { ...layout, paper_bgcolor: read("--paper"), plot_bgcolor: read("--paper"),
       font: { family: "system-ui, 'Noto Sans', 'Noto Sans CJK SC', sans-serif", size, color: ink },
-      margin: paper ? { l: 40, r: 6, t: 14, b: 26 } : { l: 70, r: 14, t: named ? 58 : 40, b: 50 },  // buttons above the names
+      margin: paper ? { l: 40, r: 6, t: 14, b: 26 } : { l: 70, r: 22, t: named ? 58 : 40, b: 50 },  // buttons above the names
       hovermode: layout.hovermode || "x unified", hoverlabel: { bgcolor: read("--paper"), font: { color: ink } },
       legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0, itemsizing: "constant", ...(layout.legend || {}) } };
     for (const key of Object.keys(found)) if (/^[xy]axis/.test(key)) {
