@@ -43,7 +43,7 @@ ROCKING: tuple[Kind, ...] = ("disturbed", "swaying", "moving")  # what a ship do
 ROCKED = math.radians(0.2)  # RMS about a steady turn, over 10 s
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
-ROUND, LAST = 10, 40  # passes over a part, and over the whole: they come to rest slowly where an arm of metres sways
+ROUND, LAST = 10, 200  # passes over a part, and over the whole: swings of tens of degrees take 40 to 150
 
 
 def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
