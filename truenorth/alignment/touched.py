@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.errors.whole_bias import time_average
 from truenorth.quality.signals import STILL_ANGLE, median_of_rows
 from truenorth.state.evidence import Evidence, contradiction
 from truenorth.state.limits import limit
@@ -94,7 +95,8 @@ def find_touch(
     # Means of m blocks, g blocks apart, of a walk of q a block differ by a variance of q (g + 2 m/3), from centre to centre m + g.
     block = length * float(time[-1] - time[0]) / max(len(time) - 1, 1)
     walk = angle_walk * math.sqrt(block * (GAP + 2.0 * ASIDE / 3.0))
-    wander = rate_sigma * wander_about_mean(float(time[-1] - time[0]), correlation_time)
+    of_mean, _ = time_average(float(time[-1] - time[0]) / correlation_time)
+    wander = rate_sigma * math.sqrt(1.0 - of_mean)  # about their mean
     carried = gravity * math.hypot(walk, wander * block * (ASIDE + GAP))
     best = int(np.argmax(size))
     # Of these, neighbours show q 2/3 already, which is not to count twice: what is left of their scatter is white.
@@ -105,15 +107,3 @@ def find_touch(
         return None
     middle = (best + ASIDE) * length + GAP * length // 2
     return Touch(float(time[middle]), steps[best], scatter)
-
-
-def wander_about_mean(duration: float, correlation_time: float) -> float:
-    """RMS of a first-order Gauss-Markov process about its mean over a time, by its sigma; both times in s.
-
-    The mean has the variance ``2 (x - 1 + exp(-x)) / x^2``, x the time in correlation times: the integral of the correlation.
-    Source: A. Papoulis, "Probability, Random Variables, and Stochastic Processes", 3rd ed. (1991), sec. 12-1.
-    """
-    x = duration / correlation_time
-    if x < 1e-3:
-        return math.sqrt(max(x, 0.0) / 3.0)
-    return math.sqrt(1.0 - 2.0 * (x + math.expm1(-x)) / x**2)
