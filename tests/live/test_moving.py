@@ -12,7 +12,7 @@ from truenorth.core.errors import AlignmentError
 from truenorth.core.position import Position
 from truenorth.live import Aligner, GnssFeed, Navigator, OdometerFeed
 from truenorth.simulation.scenario import read_scenario
-from truenorth.state.layout import DP
+from truenorth.state.layout import DP, DV
 from truenorth.state.state import Start
 
 DURATION = 120.0
@@ -249,3 +249,24 @@ def test_a_receiver_that_never_brought_a_fix_leaves_navigation_by_the_imu_alone(
         found = run.finish()
     assert (run.altitude, found.altitude) == ("gnss", "fixed")
     assert any("gnss: fewer than two rows came" in reason for reason in found.reasons)
+
+
+def test_rounding_grows_the_sigma_of_a_live_run_as_that_of_the_whole_log(van):
+    """Few digits under a vibration: the loop reads from its newest rows what `navigate` reads from all; the same in any chunks."""
+    record = van[0].record.between(None, 90.0)
+    steps = [2.0 * np.median(np.abs(np.diff(x, axis=0))) for x in (record.gyro, record.accel)]
+    gyro, accel = (step * np.round(x / step) for step, x in zip(steps, (record.gyro, record.accel), strict=True))
+    coarse = tn.ImuRecord(record.time, gyro, accel, record.kind)
+    P = np.diag(np.repeat([1e-10, 1e-6, 1e-6, 1e-16, 1e-10], 3))
+    start = Start(float(record.time[0]), np.eye(3), np.zeros(3), 0.8, 0.2, 100.0, np.zeros(3), np.zeros(3), P)
+    sigma = {}
+    for name, log, chunk in (("fine", record, 100), ("coarse", coarse, 100), ("in other chunks", coarse, 37)):
+        with Navigator(start, "tactical", altitude="free", kind=log.kind) as run:
+            for first in range(0, len(log), chunk):
+                part = slice(first, first + chunk)
+                run.push(log.time[part], log.gyro[part], log.accel[part])
+            sigma[name] = run.answer.motion.v_sigma
+    whole = tn.navigate(coarse, start, imu="tactical", altitude="free", check_clocks=False)
+    assert np.array_equal(sigma["coarse"], sigma["in other chunks"])
+    assert np.all(sigma["coarse"] > 2.0 * sigma["fine"])
+    np.testing.assert_allclose(sigma["coarse"], whole.track.sigma[-1][DV], rtol=0.4)

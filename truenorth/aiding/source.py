@@ -27,6 +27,7 @@ Does = Literal["measurement", "disturbance", "place"]
 
 KINDS: dict[str, Row] = {row.name: row for row in (POSITION, VELOCITY, BODY_VELOCITY, HEIGHT, ROTATION)}
 NO_GATE = math.inf
+LEAST_TURN = 1e-12  # rad: a sigma is positive
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,20 @@ class Aiding:
             length = self.row.sizes.get(role, 0)
             if len(group.sigma) != length:
                 raise UsageError(f"{self.name}: {role} has {len(group.sigma)} states; expected {length}")
+
+    @classmethod
+    def disturbance(cls, name: str, time: ArrayLike = (), push: ArrayLike = 0.0, turn: ArrayLike = 0.0) -> Aiding:
+        """What may have happened to an IMU unseen, no measurement: an addition to the covariance.
+
+        Parameters
+        ----------
+        time : (M,) array, s
+        push, turn : (M, 1) arrays, m/s and rad
+            One sigma of the velocity and of the attitude that came in, each axis.
+        """
+        push, turn = np.asarray(push, np.float64), np.maximum(np.asarray(turn, np.float64), LEAST_TURN)
+        # The kernel's form: variance of velocity as measured, of attitude as variance.
+        return cls(name, "velocity", np.asarray(time, np.float64), push**2, turn, does="disturbance")
 
     @property
     def row(self) -> Row:

@@ -33,6 +33,5 @@ def bridge_gaps(record: ImuRecord) -> tuple[ImuRecord, tuple[tuple[float, float]
     scale = 1.0 if record.kind == "rates" else 1.0 / record.interval
     unrest = [np.std(values * scale, axis=0).max() for values in (record.gyro, record.accel)]
     gaps = tuple((float(record.time[row - 1]), float(length)) for row, length in zip(rows, lengths))
-    turn, push = (np.tile(missing[:, None] * max(rate, 1e-9), 3) for rate in unrest)
-    # The kernel's form of a disturbance: variance of velocity as measured, of attitude as variance.
-    return across_gaps(record), gaps, [Aiding("gap", "velocity", record.time[rows], push**2, turn, does="disturbance")]
+    turn, push = (missing[:, None] * rate for rate in unrest)
+    return across_gaps(record), gaps, [Aiding.disturbance("gap", record.time[rows], push, turn)]

@@ -16,10 +16,11 @@ from truenorth.live.going import Going
 from truenorth.live.intake import Intake
 from truenorth.live.known_feeds import FEEDS
 from truenorth.live.log import Log
+from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.live.recent import Recent
 
-PLAIN: dict[str, type[Any]] = {kind.__name__: kind for kind in (Log, Intake, Past, Recent, Carry, Going)}
+PLAIN: dict[str, type[Any]] = {kind.__name__: kind for kind in (Log, Intake, Past, Recent, Carry, Going, NoiseSeen)}
 PLAIN |= {kind.__name__: kind for kind in FEEDS.values()}  # type: ignore[misc]  # classes, called as functions
 
 

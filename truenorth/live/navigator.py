@@ -31,6 +31,7 @@ from truenorth.live.feed import Feed
 from truenorth.live.intake import LATE, Intake, as_rows
 from truenorth.live.kept import keep, kept
 from truenorth.live.log import MOST_ROWS, Kind, Log
+from truenorth.live.noise_seen import NoiseSeen
 from truenorth.live.past import Past
 from truenorth.navigation import Navigation, navigate
 from truenorth.navigation.given import kept_altitude, mountings_found, turns_velocity
@@ -52,7 +53,7 @@ Array = NDArray[np.float64]
 # What a run goes on from; the rest is made anew from it.
 KEPT = (
     "start", "spec", "_given", "_imu", "_imu_source", "feeds", "_mountings", "altitude", "intake", "log", "output", "failure",
-    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps",
+    "past", "_waiting", "_state", "_interval", "_loop_end", "_sent", "_gaps", "_noise",
 )  # fmt: skip
 FIRST = 20  # rows that show the interval of sampling
 STEP = 0.25  # s: rows are taken in blocks of this length, or when an answer is asked for
@@ -117,6 +118,7 @@ class Navigator:
         self._loop_end = self.start.time
         self._sent: dict[str, dict[str, float]] = {key: {} for key in self.feeds}
         self._gaps: list[tuple[float, float]] = []
+        self._noise = NoiseSeen(self.spec, kind)
         self._lock = threading.Lock()
 
     def __repr__(self) -> str:
@@ -269,7 +271,7 @@ class Navigator:
         sources: list[Aiding] = []
         for key, feed in self.feeds.items():
             sources += feed.sources(self.altitude, self._mountings.get(key))
-        sources.append(Aiding("gap", "velocity", np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), does="disturbance"))
+        sources += [Aiding.disturbance("gap"), Aiding.disturbance("noise")]
         noise, fixed = self.spec.with_random_walks(self._interval), self.altitude == "fixed"
         model = InsModel.from_spec(
             noise, standing=standing(self.start.C_nb), groups=PLUMB_LINE.groups, fixed_altitude=fixed
@@ -297,7 +299,7 @@ class Navigator:
         assert self._setting is not None
         assert self._state is not None
         try:
-            aiding = [*self._measurements(), *self._bridges(part)]
+            aiding = [*self._measurements(), *self._bridges(part), self._noise.growth(part)]
             self._state, track = go_on(self._setting, self._state, self._samples(part), aiding)
         except DataError as error:
             self.failure = str(error)
@@ -341,10 +343,9 @@ class Navigator:
         before = self.log.record(self.log.end - UNREST)
         scale = 1.0 if before.kind == "rates" else 1.0 / before.interval
         turn, push = (
-            np.tile(missing[:, None] * max(float(np.std(values * scale, axis=0).max()), 1e-9), 3)
-            for values in (before.gyro, before.accel)
+            missing[:, None] * float(np.std(values * scale, axis=0).max()) for values in (before.gyro, before.accel)
         )
-        return [Aiding("gap", "velocity", part[rows, 0], push**2, turn, does="disturbance")]
+        return [Aiding.disturbance("gap", part[rows, 0], push, turn)]
 
     def _now(self) -> Track | None:
         """One row: the loop carried over the rows that wait, which it does not take."""

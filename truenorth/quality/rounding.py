@@ -5,9 +5,8 @@ more than a step makes it white. Where less goes on it stays as it is, as long a
 amplitude A a mean error of at most ``(q / pi) |J_0(2 pi A / q)|`` is left, of noise of sigma s it has ``exp(-2 pi^2 s^2 / q^2)``
 of that. A regime is a time in which the mean stays between the same two steps; its error acts over all of it.
 
-A counter that carries the remainder on loses nothing: sums of many rows scatter by less than independent rows do. Under a
-vibration of a few steps without noise both look alike (simulated: sums of 2 to 50 rows scatter by the same). There remainders
-are taken for lost, unless the specification says that the sensor counts.
+A counter that carries the remainder on loses nothing: the error of its rows is the difference of white noise, so that the floor of
+its spectrum, between the lines of a vibration, falls towards low frequencies. That of lost remainders does not.
 
 Source: B. Widrow and I. Kollar, *Quantization Noise*, Cambridge 2008, ch. 4 and appendix G (Gaussian and sine waves).
 """
@@ -20,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.quality.quantum import CARRIED, lattice, rounded
+from truenorth.quality.quantum import lattice, rounded
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
 
@@ -28,8 +27,9 @@ Array = NDArray[np.float64]
 
 REPEATS = 0.05  # of the rows that repeat the one before: fewer do where the noise is larger than a step
 WINDOW, FEWEST = 4.0, 64  # s, and rows at least, of a window in which motion is looked at
-SUMS = (1, 2, 4, 8, 16)  # rows that are summed up to see whether remainders are carried on
-VIBRATION = 1.2  # of what independent rows scatter by: sums of a vibration scatter more at one length than at another
+LOW, HIGH = (0.03, 0.15), (0.25, 0.5)  # of the rate of rows: bands in which the error of rounding is looked at
+CARRIED = 0.4  # of what remainders that are carried on make of their ratio; simulated: 0 of lost ones, .5 to 1 below .2 of noise
+FLOOR = 0.02  # of a step squared, of at least .2: a vibration without noise has nothing between its lines
 TWO = 0.9  # of the rows on the two fullest levels at least: else noise is wider than .4 of a step
 NOISE = 0.9  # of the white part that is found: overtones of a rounded vibration add a tenth
 LARGE = 4.0  # steps: motion that is larger passes over all places between two steps
@@ -77,9 +77,10 @@ def _lost(values: Array, rows: int) -> float | None:
     if step == 0.0 or windows == 0:
         return 0.0
     counts = counts[: windows * rows].reshape(windows, rows)
-    if _carried(counts):
+    mean, spread, lines = counts.mean(axis=1), counts.std(axis=1), _lines(counts)
+    if spread.any() and _carried(lines[spread > 0.0].mean(axis=0)):
         return None
-    mean, spread, floor = counts.mean(axis=1), counts.std(axis=1), _floor(counts)
+    floor = _floor(lines)
     of_noise = np.array([_of_noise(x) for x in counts])
     bounds = [0, *(1 + np.flatnonzero(np.abs(np.diff(mean)) > 0.5)), windows]
     total = windows * rows / 12.0
@@ -93,28 +94,32 @@ def _lost(values: Array, rows: int) -> float | None:
     return step * math.sqrt(total / (windows * rows))
 
 
-def _carried(counts: Array) -> bool:
-    """Whether what a row leaves is counted in the next: most windows (W, n) in which the counts go to and fro look so.
+def _carried(lines: Array) -> bool:
+    """Whether what a row leaves is counted in the next, by the mean logarithms of a periodogram (n / 2 + 1,) of counts.
 
-    Sums of a vibration scatter less over its period, too, but more over half of it.
+    The error of rounding is then the difference of white noise: its spectrum goes with ``4 sin^2(pi f)``, at low frequencies by
+    tens below that of lost remainders, which is white. Medians leave out lines of a vibration, however tall; one without any noise
+    hides whether remainders are carried on.
     """
-    scatter = []
-    for rows in SUMS:
-        sums = counts[:, : counts.shape[1] // rows * rows].reshape(len(counts), -1, rows).sum(axis=2)
-        scatter.append(np.mean(np.diff(sums, axis=1) ** 2, axis=1) / rows)
-    first = scatter[0]
-    carried = (np.min(scatter, axis=0) < CARRIED * first) & (np.max(scatter, axis=0) < VIBRATION * first)
-    return bool(2 * np.count_nonzero(carried) > np.count_nonzero(first > 0.0))
+    frequency = np.arange(len(lines)) / (2.0 * (len(lines) - 1))  # of the rate of rows
+    low, high = (lines[(frequency > a) & (frequency < b)] for a, b in (LOW, HIGH))
+    expected = 2.0 * math.log(math.sin(math.pi * np.mean(HIGH)) / math.sin(math.pi * np.mean(LOW)))
+    return bool(np.median(high) > math.log(FLOOR) and np.median(high) - np.median(low) > CARRIED * expected)
 
 
-def _floor(counts: Array) -> Array:
-    """(W,) variance of the white part of the counts (W, n): what a prediction from all rows before would miss.
+def _lines(counts: Array) -> Array:
+    """(W, n / 2 + 1) logarithms of the periodograms of counts (W, n), tapered."""
+    taper = np.hanning(counts.shape[1])
+    tapered = (counts - counts.mean(axis=1, keepdims=True)) * taper
+    return np.log(np.maximum(np.abs(np.fft.rfft(tapered, axis=1)) ** 2 / np.sum(taper**2), 1e-12))
+
+
+def _floor(lines: Array) -> Array:
+    """(W,) variance of the white part of counts, by their periodograms: what a prediction from all rows before would miss.
 
     Source: the formula of Szego and Kolmogorov; the mean logarithm of a periodogram is low by Euler's constant.
     """
-    taper = np.hanning(counts.shape[1])
-    lines = np.abs(np.fft.rfft((counts - counts.mean(axis=1, keepdims=True)) * taper, axis=1)) ** 2 / np.sum(taper**2)
-    return np.asarray(np.exp(np.euler_gamma + np.log(np.maximum(lines[:, LOWEST:-1], 1e-12)).mean(axis=1)))
+    return np.asarray(np.exp(np.euler_gamma + lines[:, LOWEST:-1].mean(axis=1)))
 
 
 def _of_noise(counts: Array) -> float:
