@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 
 from truenorth.aiding.aids import Indexer as IndexerAid
 from truenorth.alignment import align
-from truenorth.alignment.rotary import align_rotary, angles_at, angles_from_gyros
+from truenorth.alignment.encoder_angles import angles_at
+from truenorth.alignment.rotary import align_rotary, angles_from_gyros
 from truenorth.cli import app
 from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, ecef_axes, normal_gravity

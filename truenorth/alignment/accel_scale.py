@@ -8,6 +8,9 @@ below is 400 and the size .912 ± .004.
 Along the other axes, which gravity turns through, the fit of the base's motion takes up a half of it and more; there other checks
 see it.
 
+Whether there is one is asked of gravity alone: the noise of the accelerometers is in their readings and in the innovations, and a
+scale factor of one would explain the one by the other. Its size is asked of the force as measured, which has the sway.
+
 An IMU whose specification names no scale factors has small ones all the same. So what was found counts by what it does.
 """
 
@@ -16,6 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import matrix_signatures
 from truenorth.alignment.fine import FineAlignment
@@ -26,6 +30,9 @@ from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit
 
+Array = NDArray[np.float64]
+
+BEND = 3  # degree of a polynomial: the earth turns by 15 deg in an hour
 SCALES = (9, 13, 17)  # of x, y and z, in the columns of signatures of matrices
 
 
@@ -39,21 +46,22 @@ def accel_scale_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
     spec : ImuSpec
     """
     ones = replace(spec, gyro_scale_factor=0.0, gyro_misalignment=0.0, accel_scale_factor=1.0, accel_misalignment=0.0)
-    signatures = matrix_signatures(fine, ones)
-    assert signatures is not None  # of sizes that are not zero
+    both = [matrix_signatures(fine, ones, force) for force in (_gravity_i(fine), None)]
+    signatures = np.concatenate([x[:, :, SCALES] for x in both if x is not None], axis=2)
     seen = innovations_of(fine)
-    made, left = through(fine.gains, np.ascontiguousarray(signatures[:, :, SCALES]))
+    made, left = through(fine.gains, np.ascontiguousarray(signatures))
     white = whitened(seen.L, made)
     match, energy = np.einsum("kms,km->s", white, seen.white[..., 0]), np.sum(white**2, axis=(0, 1))
     ratio = match**2 / np.maximum(energy, 1e-300)
-    best = int(np.argmax(ratio))
+    best = int(np.argmax(ratio[: len(SCALES)]))
     if ratio[best] <= limit("drift"):
         return []
+    axis, best = "xyz"[best], best + len(SCALES)
     size = match[best] / energy[best]
     moved = np.abs(size * left[PHI, best])
     effect = Effect(heading=float(moved[2]), level=float(np.hypot(moved[0], moved[1])))
     figures: dict[str, Figure] = {
-        "axis": "xyz"[best],
+        "axis": axis,
         "scale": float(size),
         "sigma": float(energy[best] ** -0.5),
         "ratio": float(ratio[best]),
@@ -61,3 +69,11 @@ def accel_scale_evidence(fine: FineAlignment, spec: ImuSpec) -> list[Evidence]:
         "level": effect.level,
     }
     return [Evidence("bias.accel_scale", figures, "bounded", effect, ("specification", "units"))]
+
+
+def _gravity_i(fine: FineAlignment) -> Array:
+    """(K, 3) what gravity is of the specific force in i: it turns with the earth, and what the base does is about it."""
+    log = fine.integrals
+    middle = 0.5 * (log.time[1:] + log.time[:-1])
+    curve = np.polynomial.polynomial.polyfit(middle, log.mean_force, BEND)
+    return np.asarray(np.polynomial.polynomial.polyval(middle, curve).T)

@@ -89,8 +89,16 @@ def _signatures_over(count: int, n: int, rows: int, courses: tuple[tuple[str, fl
     return Signatures(begin, state, np.zeros((rows, len(begin))), after, course, np.zeros((count, rows, 6)))
 
 
-def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:
-    """Signatures (K, 3, 18) of scale factors and misalignments of one sigma; None where the specification has none."""
+def matrix_signatures(fine: FineAlignment, spec: ImuSpec, force_i: Array | None = None) -> Array | None:
+    """Signatures (K, 3, 18) of scale factors and misalignments of one sigma; None where the specification has none.
+
+    Parameters
+    ----------
+    fine : FineAlignment
+    spec : ImuSpec
+    force_i : (K, 3) array, m/s^2, optional
+        Mean specific force of each interval in i; as measured where it is left out, with the noise of the accelerometers.
+    """
     one = np.eye(3, dtype=np.bool_)
     gyro = np.where(one, spec.gyro_scale_factor, spec.gyro_misalignment)
     accel = np.where(one, spec.accel_scale_factor, spec.accel_misalignment)
@@ -98,7 +106,10 @@ def matrix_signatures(fine: FineAlignment, spec: ImuSpec) -> Array | None:
         return None
     log = fine.integrals
     turn = rotation_vector_from_dcm(np.swapaxes(log.C_ib[:-1], 1, 2) @ log.C_ib[1:])
-    rate, force = turn / log.intervals[:, None], np.einsum("kji,kj->ki", log.C_mean, log.mean_force)
+    rate, force = (
+        turn / log.intervals[:, None],
+        np.einsum("kji,kj->ki", log.C_mean, log.mean_force if force_i is None else force_i),
+    )
     bias = np.zeros((len(rate), 6, 18))
     for i, j in product(range(3), range(3)):
         bias[:, i, 3 * i + j] = gyro[i, j] * (rate[:, j] - rate[:, j].mean())

@@ -214,7 +214,7 @@ def on_indexer(r: Request) -> Alignment:
         r.record if r.calibration is None else r.calibration.apply(r.record),
         indexer.record,
         r.needed_place(),
-        r.imu or "navigation",
+        r.imu,
         axes=indexer.axes,
         lever_arm=None if indexer.lever_arm is None else -np.asarray(indexer.lever_arm, dtype=np.float64),
         angle_sigma=indexer.angle_sigma,

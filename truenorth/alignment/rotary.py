@@ -2,7 +2,7 @@
 
 The IMU's own attitude is found as that of any IMU on a base that sways: in the inertial frame its turning is motion like any
 other, and it turns the biases about, so that they average out or can be estimated. The encoder ties the IMU to the body, at the
-epoch of the answer and wherever the body's lever arm moves the IMU.
+epoch of the answer and wherever the body's lever arm moves the IMU; between its rows the gyros carry its angles.
 
 Without an encoder the angles can be read from the gyros where the body is still: it turns with the earth alone, and what the
 gyros show besides that is the indexer.
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from truenorth.alignment.accel_scale import accel_scale_evidence
 from truenorth.alignment.assumptions import reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
+from truenorth.alignment.encoder_angles import angles_at, carried_angles
 from truenorth.alignment.fine import CoarseStart, FineAlignment
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.procedure import HEADING_LIMIT, answer_of
@@ -30,6 +31,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.swaying import ARM_PRIOR, Mount, SwayAlignment, sway_align
 from truenorth.alignment.task import Task, bridged, make_task, noise_in
+from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
 from truenorth.core.errors import AlignmentError, DataError, UsageError
@@ -49,7 +51,6 @@ SHORTEST = 60.0  # s: below that sway cannot be separated from tilt
 KNOWN_ARM = 0.1  # m, one sigma along each axis of an arm that was measured
 OFFSET = 0.01  # m, one sigma along each of its axes: of an IMU from the axes of its indexer
 INDEXER_METHODS = ("auto", "swaying", *FADING)
-COVER = 0.05  # s by which an encoder's log may begin late or end early
 OFF_AXIS = math.radians(0.5)  # of a body that is said to be still, and an indexer of two axes
 
 
@@ -57,7 +58,7 @@ def align_rotary(
     record: ImuRecord,
     encoder: EncoderRecord | None,
     position: Position,
-    imu: ImuSpec | str | PathLike[str] | dict[str, Any] = "navigation",
+    imu: ImuSpec | str | PathLike[str] | dict[str, Any] | None = None,
     *,
     axes: Sequence[str] = ("z", "x"),
     lever_arm: ArrayLike | None = None,
@@ -76,8 +77,8 @@ def align_rotary(
         Of the IMU, its own axes; at angles of zero they are the body's (RFU).
     encoder : EncoderRecord or None
         Angles of the indexer, over the whole record. None: the body is still, its axes are the IMU's at the record's beginning.
-    imu : ImuSpec, str, path or mapping
-        Specification, a preset's name, or a YAML file.
+    imu : ImuSpec, str, path or mapping, optional
+        Specification, a preset's name, or a YAML file; left out, it is what is usual of sensors with the noise that the log shows.
     axes : sequence of {"x", "y", "z"}
         Of the indexer, the outermost first.
     lever_arm : (3,) array, m, optional
@@ -115,13 +116,14 @@ def align_rotary(
         raise UsageError(f"angle_sigma is {angle_sigma}; expected no negative angle, rad")
     if not 0.0 <= offset_sigma < math.inf:
         raise UsageError(f"offset_sigma is {offset_sigma}; expected no negative length, m")
-    spec = noise_in(record, imu_spec(imu))
+    given = None if imu is None else noise_in(record, imu_spec(imu))
     record = bridged(record)
     if record.duration < SHORTEST:
         raise AlignmentError(
             f"{record.source}: {record.duration:.1f} s; a base that may sway needs {SHORTEST:g} s at least: record longer"
         )
     task = make_task(record, position, at)
+    spec = infer_turning(task) if given is None else given
     rows = np.array([task.epoch.row])
     coarse = integrate(record, task.interval, rows_at=rows)
     C_n0_i = oba(coarse, position.lat, position.alt, history=False).C_n0_i
@@ -131,7 +133,8 @@ def align_rotary(
     if encoder is None:
         mount = Mount(np.zeros(3), offset_sigma)  # along the IMU's axes
     else:
-        angles = angles_at(encoder, coarse.start + coarse.time, axes)
+        carried = carried_angles(encoder, record, axes)
+        angles = angles_at(carried.record, coarse.start + coarse.time, axes)
         C_sb = np.swapaxes(C_bs_from_angles(axes, angles), -1, -2)
         mount = Mount(*_arm(lever_arm), C_sb, offset_sigma)
     start = CoarseStart(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
@@ -140,14 +143,15 @@ def align_rotary(
         fine: FineAlignment = faded_align(start, own, arm)
     else:
         fine = sway_align(start, mount, _turned(spec))
-    source = f"specification {spec.name!r}"
+    source = "inferred from the noise of the log" if given is None else f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 
     if encoder is None:
         C_sb_at = _still_body(task, fine, axes)
         how = "angles from the gyros of a still body"
     else:
-        C_sb_at = C_bs_from_angles(axes, angles_at(encoder, np.array([task.epoch.time]), axes))[0].T
+        C_sb_at = C_bs_from_angles(axes, angles_at(carried.record, [task.epoch.time], axes))[0].T
+        angle_sigma = math.hypot(angle_sigma, carried.sigma(task.epoch.time))
         how = f"angles of {len(axes)} axes from {encoder.source}"
     if answer.history is not None and mount.C_sb is not None:
         answer = replace(answer, history=replace(answer.history, C_nb=answer.history.C_nb @ mount.C_sb[1:]))
@@ -169,14 +173,19 @@ def align_rotary(
         evidence += late_gyros_evidence(fine, fine.late, record) + accel_scale_evidence(fine, spec)
     if encoder is None:
         return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
-    return judged(answer, _of_encoder(record, encoder, axes, task) + evidence + notes(encoder.notes), heading_limit)
+    return judged(
+        answer, _of_encoder(record, encoder, axes, task, spec) + evidence + notes(encoder.notes), heading_limit
+    )
 
 
-def _of_encoder(record: ImuRecord, encoder: EncoderRecord, axes: Sequence[str], task: Task) -> list[Evidence]:
+def _of_encoder(
+    record: ImuRecord, encoder: EncoderRecord, axes: Sequence[str], task: Task, spec: ImuSpec
+) -> list[Evidence]:
     """What the encoder's angles and the record say against each other."""
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
     given = readings.pop("given")
-    found = encoder_evidence(record, given, readings) + record_evidence(record, task.motion, given)
+    bias = math.sqrt(float(spec.bias_variance[:3].max()))
+    found = encoder_evidence(record, given, readings, bias) + record_evidence(record, task.motion, given)
     if len(axes) == 2:
         found += zero_evidence(record, given, _inner(encoder, axes))
     return found
@@ -209,48 +218,6 @@ def _inner(encoder: EncoderRecord, axes: Sequence[str]) -> Callable[[Array], Arr
     """Direction (K, 3) of the inner axis in the body at times."""
     e = np.eye(3)["xyz".index(axes[1])]
     return lambda time: C_bs_from_angles(axes[:1], angles_at(encoder, time, axes)[:, :1]) @ e
-
-
-def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:
-    """(K, A) angles of an encoder at times (s), rad; straight lines between its rows.
-
-    Raises
-    ------
-    UsageError
-        Axes that do not fit its columns.
-    DataError
-        Times that its log does not cover.
-    """
-    time = np.asarray(time, dtype=np.float64)
-    angles = encoder.angles if encoder.angles.ndim == 2 else encoder.angles[:, None]
-    if angles.shape[1] != len(axes) or not set(axes) <= set("xyz"):
-        raise UsageError(
-            f"axes {','.join(axes)} for {angles.shape[1]} angle(s) in {encoder.source}; expected one of x, y and z for each "
-            "angle, the outermost first, such as z,x"
-        )
-    slack = _slack(encoder)
-    if time.min() < encoder.time[0] - slack or time.max() > encoder.time[-1] + slack:
-        raise DataError(
-            f"{encoder.source}: angles from {encoder.time[0]:.3f} s to {encoder.time[-1]:.3f} s, wanted from {time.min():.3f} s to "
-            f"{time.max():.3f} s: expected the encoder's log to cover the IMU's; cut the IMU's log (`record.between`)"
-        )
-    columns = [np.interp(time, encoder.time, column) for column in angles.T]
-    # Beyond its ends by a row at most: on along the first or last two rows.
-    for column, given in zip(columns, angles.T, strict=True):
-        for outside, (a, b) in ((time < encoder.time[0], (0, 1)), (time > encoder.time[-1], (-2, -1))):
-            slope = (given[b] - given[a]) / (encoder.time[b] - encoder.time[a])
-            edge = 0 if a == 0 else -1
-            column[outside] = given[edge] + slope * (time[outside] - encoder.time[edge])
-    return np.stack(columns, axis=-1)
-
-
-def _slack(encoder: EncoderRecord) -> float:
-    return COVER + 1.5 * float(np.median(np.diff(encoder.time)))
-
-
-def covered_until(encoder: EncoderRecord) -> float:
-    """Time up to which an encoder's log covers an IMU's, s."""
-    return float(encoder.time[-1]) + _slack(encoder)
 
 
 def angles_from_gyros(

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from truenorth.aiding.aids import Indexer, Positions
+from truenorth.alignment.encoder_angles import covered_until
 from truenorth.alignment.recipes import RECIPES
-from truenorth.alignment.rotary import covered_until
 from truenorth.live.feed import Feed
 
 Turner = Positions | Indexer

@@ -20,13 +20,17 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 Array = NDArray[np.float64]
 
 NET_TURN = math.radians(8.0)  # of the base's mean attitude from the first third of a log to the last: more is no sway
+BIASED = 4.0  # sigmas of a gyro's bias
 FEWEST_TURNS = 4  # of the outer axis, that show a wobble
 LEAST_ZERO = math.radians(0.05)  # rad: indexers are mounted no better
 FASTEST = math.radians(60.0)  # rad/s RMS: no ship or vehicle that stays turns faster
 
 
 def encoder_evidence(
-    record: ImuRecord, C_sb: Callable[[Array], Array], others: Mapping[str, Callable[[Array], Array]]
+    record: ImuRecord,
+    C_sb: Callable[[Array], Array],
+    others: Mapping[str, Callable[[Array], Array]],
+    gyro_bias: float = 0.0,
 ) -> list[Evidence]:
     """Whether the base turns as no base does, and with which other reading of the angles it would not.
 
@@ -36,6 +40,8 @@ def encoder_evidence(
         Attitude (K, 3, 3) of the base in the IMU at times (s), by the angles as given.
     others : mapping
         The same by other readings of the angles, by their names.
+    gyro_bias : float, rad/s
+        One sigma: what it turns by itself between the thirds is no turn of the base.
     """
     theta, interval, time = whole_cells(record)
     C_is = dcm_from_quaternion(integrate_attitude(theta))
@@ -52,7 +58,8 @@ def encoder_evidence(
     best, name = min((turns(reading)[0], name) for name, reading in others.items())
     if given**2 > limit("clearer encoder") * best**2:
         return [contradiction("encoder.turns", "encoder", given=given, best=best, reading=name)]
-    if net > NET_TURN or given > FASTEST:
+    drifted = BIASED * gyro_bias * record.duration * 2.0 / 3.0
+    if net > NET_TURN + drifted or given > FASTEST:
         return [contradiction("encoder.drifts", "encoder", net=net, rate=given)]
     return []
 

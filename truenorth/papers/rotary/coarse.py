@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.rotary import angles_at
+from truenorth.alignment.encoder_angles import angles_at
 from truenorth.coarse.lever_arm import RateSource, arm_velocity
 from truenorth.coarse.wahba import q_method, triad
 from truenorth.core.attitude import misalignment

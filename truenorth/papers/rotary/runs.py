@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.alignment.encoder_angles import angles_at
 from truenorth.alignment.fine import CoarseStart
-from truenorth.alignment.rotary import angles_at
 from truenorth.alignment.swaying import UNKNOWN_ARM, sway_align, windowed_align
 from truenorth.coarse import oba
 from truenorth.core.attitude import dcm_from_rotation_vector, misalignment

@@ -1,0 +1,147 @@
+"""Angles of an indexer at any time: an encoder's rows, and between them the gyros of the IMU that it carries.
+
+An encoder of 10 Hz has no row within a start or stop of a slew, and its last row lies before the log's end: straight lines are off
+by tenths of a degree there, and so is the body's attitude. The gyros see each turn as it is. What they see more is the turn of the
+body, which is smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truenorth.core.errors import DataError, UsageError
+from truenorth.core.indexing import DIRECTIONS, C_bs_from_angles
+from truenorth.records import EncoderRecord, ImuRecord
+from truenorth.strapdown.increments import increments
+
+Array = NDArray[np.float64]
+
+COVER = 0.05  # s by which an encoder's log may begin late or end early
+FEWEST = 4  # rows that a spline needs
+PASSES = 2  # the direction of an outer axis in the IMU is known by straight lines at first
+
+
+@dataclass(frozen=True)
+class CarriedAngles:
+    """Angles of an indexer at each row of the IMU that it carries.
+
+    Attributes
+    ----------
+    record : EncoderRecord
+        At the edges of the IMU's rows.
+    last : float, s
+        The encoder's own last row: beyond it the gyros alone carry the angles, and take what the body does for what it did.
+    swing : float, rad/s^2
+        RMS of the body's angular acceleration about the axes, which they do not know of there.
+    """
+
+    record: EncoderRecord
+    last: float
+    swing: float
+
+    def sigma(self, time: float) -> float:
+        """One sigma at a time (s), rad: what the body may have turned since the encoder's last row."""
+        return 0.5 * self.swing * max(time - self.last, 0.0) ** 2
+
+
+def carried_angles(encoder: EncoderRecord, record: ImuRecord, axes: Sequence[str]) -> CarriedAngles:
+    """Angles at each row of the IMU: the encoder's own at its rows, carried between them and beyond by the gyros.
+
+    The turn rate of the IMU in the body is ``J(angles) d angles/dt``, the columns of ``J`` being the axes as the IMU sees them.
+    What the gyros have turned about these axes is the angle, less what the body turns about them: that is smooth, and is read from
+    the encoder's rows by a spline.
+
+    Parameters
+    ----------
+    encoder : EncoderRecord
+    record : ImuRecord
+    axes : sequence of {"x", "y", "z"}
+        The outermost first.
+
+    Raises
+    ------
+    DataError, UsageError
+        As :func:`angles_at`.
+    """
+    from scipy.interpolate import CubicSpline
+
+    dtheta, _ = increments(record)
+    edges = np.append(record.time[0] - record.interval, record.time)
+    angles = angles_at(encoder, edges, axes)
+    slack = 0.5 * record.interval
+    rows = (encoder.time >= edges[0] - slack) & (encoder.time <= edges[-1] + slack)
+    if np.count_nonzero(rows) < FEWEST:
+        return CarriedAngles(replace(encoder, time=edges, angles=_shaped(angles)), float(encoder.time[-1]), 0.0)
+    time = encoder.time[rows]
+    given = angles_at(encoder, time, axes)
+    for _ in range(PASSES):
+        J = _axes_seen(axes, 0.5 * (angles[1:] + angles[:-1]))
+        turned = np.einsum("kai,ki->ka", np.linalg.pinv(J), dtheta)
+        by_gyros = np.concatenate([np.zeros((1, len(axes))), np.cumsum(turned, axis=0)])
+        at_rows = np.stack([np.interp(time, edges, column) for column in by_gyros.T], axis=-1)
+        of_body = CubicSpline(time, given - at_rows)
+        # Beyond its ends on along its tangents: its cubics would run away.
+        inside = np.clip(edges, time[0], time[-1])
+        angles = by_gyros + of_body(inside) + (edges - inside)[:, None] * of_body(inside, 1)
+    swing = float(np.sqrt(np.max(np.mean(of_body(time, 2) ** 2, axis=0))))
+    return CarriedAngles(replace(encoder, time=edges, angles=_shaped(angles)), float(time[-1]), swing)
+
+
+def _axes_seen(axes: Sequence[str], angles: Array) -> Array:
+    """(K, 3, A) directions of an indexer's axes as its IMU sees them, at angles (K, A)."""
+    seen = [
+        np.swapaxes(C_bs_from_angles(axes[i + 1 :], angles[:, i + 1 :]), -1, -2) @ np.array(DIRECTIONS[axis])
+        for i, axis in enumerate(axes)
+    ]
+    return np.stack(seen, axis=-1)
+
+
+def _shaped(angles: Array) -> Array:
+    """As a record has them: (N,) of a single axis."""
+    return angles[:, 0] if angles.shape[1] == 1 else angles
+
+
+def angles_at(encoder: EncoderRecord, time: ArrayLike, axes: Sequence[str]) -> Array:
+    """(K, A) angles of an encoder at times (s), rad; straight lines between its rows (see :func:`carried_angles`).
+
+    Raises
+    ------
+    UsageError
+        Axes that do not fit its columns.
+    DataError
+        Times that its log does not cover.
+    """
+    time = np.asarray(time, dtype=np.float64)
+    angles = encoder.angles if encoder.angles.ndim == 2 else encoder.angles[:, None]
+    if angles.shape[1] != len(axes) or not set(axes) <= set("xyz"):
+        raise UsageError(
+            f"axes {','.join(axes)} for {angles.shape[1]} angle(s) in {encoder.source}; expected one of x, y and z for each "
+            "angle, the outermost first, such as z,x"
+        )
+    slack = _slack(encoder)
+    if time.min() < encoder.time[0] - slack or time.max() > encoder.time[-1] + slack:
+        raise DataError(
+            f"{encoder.source}: angles from {encoder.time[0]:.3f} s to {encoder.time[-1]:.3f} s, wanted from {time.min():.3f} s to "
+            f"{time.max():.3f} s: expected the encoder's log to cover the IMU's; cut the IMU's log (`record.between`)"
+        )
+    columns = [np.interp(time, encoder.time, column) for column in angles.T]
+    # Beyond its ends by a row at most: on along the first or last two rows.
+    for column, given in zip(columns, angles.T, strict=True):
+        for outside, (a, b) in ((time < encoder.time[0], (0, 1)), (time > encoder.time[-1], (-2, -1))):
+            slope = (given[b] - given[a]) / (encoder.time[b] - encoder.time[a])
+            edge = 0 if a == 0 else -1
+            column[outside] = given[edge] + slope * (time[outside] - encoder.time[edge])
+    return np.stack(columns, axis=-1)
+
+
+def _slack(encoder: EncoderRecord) -> float:
+    return COVER + 1.5 * float(np.median(np.diff(encoder.time)))
+
+
+def covered_until(encoder: EncoderRecord) -> float:
+    """Time up to which an encoder's log covers an IMU's, s."""
+    return float(encoder.time[-1]) + _slack(encoder)
