@@ -166,29 +166,33 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
+    evidence = _of_encoder(record, encoder, axes, task, spec) + _of_filter(answer, fine, spec, task)
+    return judged(answer, evidence, heading_limit)
+
+
+def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task) -> list[Evidence]:
+    """What the innovations say."""
     drift, steps, hemisphere = what_begins(fine, spec, task.position)
     evidence = model_evidence(drift, settled=fine.settled)
-    evidence += base_speed(answer) + steps + bad_stretches(fine, record) + hemisphere
+    evidence += base_speed(answer) + steps + bad_stretches(fine, task.record) + hemisphere
     if isinstance(fine, SwayAlignment):
-        evidence += late_gyros_evidence(fine, fine.late, record) + accel_scale_evidence(fine, spec)
-    if encoder is None:
-        return judged(answer, evidence + record_evidence(record, task.motion), heading_limit)
-    return judged(
-        answer, _of_encoder(record, encoder, axes, task, spec) + evidence + notes(encoder.notes), heading_limit
-    )
+        evidence += late_gyros_evidence(fine, fine.late, task.record) + accel_scale_evidence(fine, spec)
+    return evidence
 
 
 def _of_encoder(
-    record: ImuRecord, encoder: EncoderRecord, axes: Sequence[str], task: Task, spec: ImuSpec
+    record: ImuRecord, encoder: EncoderRecord | None, axes: Sequence[str], task: Task, spec: ImuSpec
 ) -> list[Evidence]:
     """What the encoder's angles and the record say against each other."""
+    if encoder is None:
+        return record_evidence(record, task.motion)
     readings = {name: _reading(encoder, axes, order) for name, order in _orders(len(axes)).items()}
     given = readings.pop("given")
     bias = math.sqrt(float(spec.bias_variance[:3].max()))
     found = encoder_evidence(record, given, readings, bias) + record_evidence(record, task.motion, given)
     if len(axes) == 2:
         found += zero_evidence(record, given, _inner(encoder, axes))
-    return found
+    return found + notes(encoder.notes)
 
 
 def _arm_velocity(
