@@ -209,3 +209,19 @@ def test_bands_of_the_double_filter_follow_imu_and_place(runs):
     room = 3.3 / math.sqrt(8 * runs)
     assert 1.0 - room < rms < 1.0 + room
     assert own_rms > 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_current_that_is_smooth_from_row_to_row_is_no_constant(truth, seed):
+    """A sea's current does not step: over minutes the errors of the INS follow it, and over hours it wanders all the same."""
+    rng = np.random.default_rng(20 + seed)
+    model = MarineModel(**WALKS, groups=LogErrors(0.5).groups())
+    _, course = free(truth, model, rng)
+    steps = gauss_markov(0.4, 3.0 * HOUR, truth.interval, len(truth.time), rng, axes=2)
+    window = np.hanning(2 * round(300.0 / truth.interval) + 1)
+    drift = np.stack(
+        [np.convolve(np.pad(x, len(window) // 2, "edge"), window / window.sum(), "valid") for x in steps.T], axis=1
+    )
+    kind = Filter(model, model.prior(np.diag(SIGMA**2)), 0.05)
+    assert likely_drift(course, reference(truth, drift), 0, kind, LogErrors(0.5)).time < 48.0 * HOUR

@@ -9,6 +9,10 @@ with the size as it is given, then both along the same walk, where a size twice 
 log-likelihood. A drift that is taken for a constant while it wanders is believed far beyond its sigma, one that is taken for
 too fast costs a little of it: of walks within one sigma of the most likely one the fastest is taken.
 
+A current that the sea has changes smoothly over minutes, and over hours it wanders. From row to row it is a constant, which the
+errors of the INS follow, whatever it is over hours. And what wanders in an hour may be the deflection of the vertical. So the same
+is asked of rows that are `SMOOTH` apart, on a sea without deflections: the faster of both walks is taken.
+
 Source: F. Schweppe, "Evaluation of likelihood functions for Gaussian signals", IEEE Trans. Inf. Theory 11 (1965).
 """
 
@@ -22,17 +26,23 @@ from numpy.typing import NDArray
 
 from truenorth.damping.filters import Filter, run_filters
 from truenorth.damping.loop import LONGEST_STEP
+from truenorth.errors.deflection import NAME as DEFLECTION
 from truenorth.errors.log import DRIFT, LogErrors
 from truenorth.state.track import Track
 
 Array = NDArray[np.float64]
+Pair = tuple[float, float]  # size, m/s, and correlation time, s
 
 HOUR = 3600.0
+SMOOTH = 600.0  # s, in which a current may be smooth
+NO_DEFLECTION = 1e-9  # rad
 TIMES = (math.inf, *(HOUR * x for x in (768.0, 384.0, 192.0, 96.0, 48.0, 24.0, 12.0, 6.0, 3.0, 1.5, 0.75, 0.375)))  # s
 SIZES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8)  # times the given one
 DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
-# Of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same
-AS_LIKELY = 0.5
+# Of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same:
+AS_LIKELY = 0.5  # one sigma
+AS_LIKELY_APART = 2.0  # two: few rows say little
+TOLD_APART = 8.0  # four sigmas, between the slowest walk and the fastest: rows that say less do not count
 
 
 def likely_drift(course: Track, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
@@ -50,34 +60,59 @@ def likely_drift(course: Track, reference: Array, start: int, kind: Filter, give
     """
     stride = max(1, int(LONGEST_STEP / course.interval + 1e-9))
     coarse, seen = course[start::stride], reference[start::stride]
+    sparse = np.full_like(seen, np.nan)
+    every = max(1, round(SMOOTH / coarse.interval))
+    sparse[::every] = seen[::every]
 
-    def best(pairs: list[tuple[float, float]], slack: float = 0.0) -> tuple[float, float]:
-        kinds = {str(pair): _with(kind, *pair) for pair in pairs}
-        found = run_filters(coarse, seen, start=0, kinds=kinds)
+    def best(rows: Array, base: Filter, pairs: list[Pair], slack: float = 0.0, seen: Pair | None = None) -> Pair:
+        """The fastest walk that is as likely as the likeliest but for `slack`; `seen`, where the rows hardly tell any apart."""
+        kinds = {str(pair): _with(base, *pair) for pair in pairs}
+        found = run_filters(coarse, rows, start=0, kinds=kinds)
 
-        def weighed(pair: tuple[float, float]) -> float:
+        def weighed(pair: Pair) -> float:
             doubt = math.log(pair[0] / given.drift) / DOUBT
             return found[str(pair)].likelihood - 0.5 * doubt**2
 
         most = max(map(weighed, pairs))
-        return max(
-            (pair for pair in pairs if weighed(pair) >= most - slack), key=lambda p: (p[0] ** 2 / p[1], weighed(p))
-        )
+        if seen and most - min(map(weighed, pairs)) < TOLD_APART:
+            return seen
+        return max((pair for pair in pairs if weighed(pair) >= most - slack), key=lambda p: (_walk(p), weighed(p)))
 
-    size, time = best([(given.drift, time) for time in TIMES], AS_LIKELY)
-    if math.isfinite(time):
-        size, time = best([(size * f, time * f**2) for f in SIZES])
-    return replace(given, drift=size, drift_time=time)
+    def sized(rows: Array, base: Filter, pair: Pair) -> Pair:
+        size, time = pair
+        return best(rows, base, [(size * f, time * f**2) for f in SIZES]) if math.isfinite(time) else pair
+
+    times = [(given.drift, time) for time in TIMES]
+    walk = sized(seen, kind, best(seen, kind, times, AS_LIKELY))
+    still = _with_sigma(kind, DEFLECTION, NO_DEFLECTION)
+    apart = best(sparse, still, times, AS_LIKELY_APART, walk)
+    if _walk(apart) > _walk(walk):
+        walk = sized(sparse, still, apart)
+    return replace(given, drift=walk[0], drift_time=walk[1])
+
+
+def _walk(pair: Pair) -> float:
+    """Of a drift's size and correlation time: half the rate at which its variance grows."""
+    return pair[0] ** 2 / pair[1]
 
 
 def _with(kind: Filter, size: float, time: float) -> Filter:
     """The filter with this drift."""
+    return _with_sigma(kind, DRIFT, size, time)
+
+
+def _with_sigma(kind: Filter, name: str, size: float, time: float | None = None) -> Filter:
+    """The filter with one group of this size, and correlation time where that is given; as it is where there is no such group."""
+    own = kind.model.slice_of(name)
+    if own is None:
+        return kind
     groups = tuple(
-        replace(group, sigma=np.full_like(group.sigma, size), correlation_time=time) if group.name == DRIFT else group
+        replace(group, sigma=np.full_like(group.sigma, size), correlation_time=time or group.correlation_time)
+        if group.name == name
+        else group
         for group in kind.model.groups
     )
-    model, P0 = replace(kind.model, groups=groups), kind.P0.copy()
-    own = model.slice_of(DRIFT)
-    assert own is not None  # it has a drift
-    P0[own, own] = size**2 * np.eye(2)
-    return replace(kind, model=model, P0=P0)
+    P0 = kind.P0.copy()
+    P0[own, :] = P0[:, own] = 0.0
+    P0[own, own] = size**2 * np.eye(own.stop - own.start)
+    return replace(kind, model=replace(kind.model, groups=groups), P0=P0)
