@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
-from truenorth.core.linalg import Size, copy_corner, four_rows, padded, transpose_block
+from truenorth.core.linalg import Size, copy_corner, four_rows, four_rows_within, mirror_upper, padded, transpose_block
+from truenorth.core.vectors import load8, store8
 from truenorth.errors.staying import STARTS
 from truenorth.filters.gains import Gains, through
 
@@ -321,11 +322,15 @@ def _sum_back(
         for i in range(n + m):
             for j in range(wide):
                 below[i, j] = T[i, j] if i < n else G[i - n, j]
-        for i in range(0, rows, 4):
-            four_rows(deep, above_t, below, None, i, wide, form_before)
+        for i in range(0, rows, 4):  # what stands before the diagonal is what stands behind it
+            four_rows_within(len(deep), above_t, below, None, i, i, wide, form_before)
         for i in range(n, rows):
             for j in range(wide):
                 form_before[i, j] += T[i, j]
+        mirror_upper(4 * (used // 4), form_before)
+        for i in range(4 * (used // 4), used):
+            for j in range(i):
+                form_before[i, j] = form_before[j, i]
         form, form_before = form_before, form
         _times_course(states, n, end, F, end_before)
         end, end_before = end_before, end
@@ -343,8 +348,12 @@ def _keep(values: Any, place: Any) -> None:
 def _go_on(states: Size, step: Any, H_Phi: Any, gain: Any, A: Any, course: Any, F: Any, G: Any) -> None:
     """``F = step [I, U] - gain [0, A]`` and ``G = H Phi [I, U] + [0, A]``, with ``course = [I, U]``."""
     n, m = gain.shape[0], gain.shape[1]
+    known = 8 * (n // 8)  # columns of the step itself
     for i in range(0, len(states), 4):
-        four_rows(states, step, course, None, i, F.shape[1], F)
+        four_rows_within(len(states), step, course, None, i, known, F.shape[1], F)
+    for i in range(n):
+        for j in range(0, known, 8):
+            store8(F, (i, j), load8(step, (i, j)))
     for i in range(n):
         for r in range(m):
             for j in range(A.shape[1]):
