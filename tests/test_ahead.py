@@ -49,7 +49,7 @@ def test_its_kernels_are_those_of_an_alignment():
 
 def kinds(kernel):
     """Signatures but for the size, which is the first where there is one."""
-    return {signature[kernel in (linear_runs, _sum_back) :] for signature in kernel.signatures}
+    return {signature[kernel is linear_runs :] for signature in kernel.signatures}
 
 
 def test_it_starts_where_the_kernels_are_not_on_the_disk(tmp_path, monkeypatch):

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.core.compiled import borrowing, compiled
-from truenorth.core.linalg import Size, copy_corner, four_rows, padded, transpose_block
+from truenorth.core.linalg import copy_corner, four_rows_within, mirror_upper, transpose_block
+from truenorth.core.vectors import load8, store8
 from truenorth.errors.staying import STARTS
 from truenorth.filters.gains import Gains, through
 
@@ -148,8 +149,7 @@ def matched(seen: Innovations, *banks: Signatures) -> tuple[Match, ...]:
     ends = np.empty((len(behind), 3, n + courses))
     of_gains = tuple(np.ascontiguousarray(a) for a in (gains.step, gains.H_Phi, gains.gain, seen.L))
     white = np.ascontiguousarray(seen.white)
-    sizes = padded(n), padded(n + seen.L.shape[1]), len(padded(n + courses + right))
-    _sum_back(*sizes, *of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
+    _sum_back(*of_gains, all_of.measured_course, all_of.state_course, white, behind, forms, ends)
     count = len(all_of.epoch)
     energy, match, left = np.empty(count), np.empty((count, right)), np.empty((3, count))
     _match_each(all_of, *of_gains, white, forms, ends, np.empty((2, n + courses)), energy, match, left)
@@ -262,9 +262,6 @@ def _match_each(
 
 @compiled
 def _sum_back(
-    states: Size,
-    deep: Size,
-    wide: int,
     step: Any,
     H_Phi: Any,
     gain: Any,
@@ -278,12 +275,11 @@ def _sum_back(
 ) -> None:
     """Forms of ``(e_k, w)``, summed over the epochs behind each k of `behind`, which ascends, and the last misalignment of it.
 
-    The quadratic form comes first, the linear ones of the innovations are columns behind it. All are `wide`, with zeros at their
-    ends; of the states there are as many as `states` says, of states and rows of a measurement as `deep` says, the last zero.
+    The quadratic form comes first, the linear ones of the innovations are columns behind it. Rows have zeros at their ends.
     """
     misalignment = STARTS[0]
     n, m, used, right = step.shape[1], gain.shape[2], forms.shape[1], seen.shape[2]
-    N, rows = len(states), 4 * ((used + 3) // 4)
+    N, rows, wide = 4 * ((n + 3) // 4), 4 * ((used + 3) // 4), 8 * ((used + right + 7) // 8)
     form, end = np.zeros((rows, wide)), np.zeros((4, wide))
     for i in range(3):
         end[i, misalignment + i] = 1.0
@@ -295,7 +291,7 @@ def _sum_back(
         for j in range(U.shape[1]):
             course[i, n + j] = U[i, j]
     F, G = np.zeros((N, wide)), np.zeros((m, wide))
-    above_t, below = np.zeros((rows, len(deep))), np.zeros((len(deep), wide))
+    above_t, below = np.zeros((rows, N + m)), np.zeros((n + m, wide))
     row = len(behind) - 1
     for k in range(step.shape[0] - 1, -1, -1):
         while row >= 0 and behind[row] == k:
@@ -305,12 +301,12 @@ def _sum_back(
         if row < 0:
             break
         copy_corner(step[k], whole, n, n)
-        _go_on(states, whole, H_Phi[k], gain[k], A[k], course, F, G)
+        _go_on(whole, H_Phi[k], gain[k], A[k], course, F, G)
         _whiten(L[k], used, G)
         for i in range(m):
             for j in range(right):
                 G[i, used + j] = seen[k, i, j]
-        _times_course(states, n, form, F, T)
+        _times_course(n, form, F, T)
         # [F; G]' [T; G], and T itself of the courses: M' form M + G' G.
         for i in range(0, rows, 4):
             for j in range(0, N, 4):
@@ -321,13 +317,17 @@ def _sum_back(
         for i in range(n + m):
             for j in range(wide):
                 below[i, j] = T[i, j] if i < n else G[i - n, j]
-        for i in range(0, rows, 4):
-            four_rows(deep, above_t, below, None, i, wide, form_before)
+        for i in range(0, rows, 4):  # what stands before the diagonal is what stands behind it
+            four_rows_within(n + m, above_t, below, None, i, i, wide, form_before)
         for i in range(n, rows):
             for j in range(wide):
                 form_before[i, j] += T[i, j]
+        mirror_upper(4 * (used // 4), form_before)
+        for i in range(4 * (used // 4), used):
+            for j in range(i):
+                form_before[i, j] = form_before[j, i]
         form, form_before = form_before, form
-        _times_course(states, n, end, F, end_before)
+        _times_course(n, end, F, end_before)
         end, end_before = end_before, end
 
 
@@ -340,11 +340,15 @@ def _keep(values: Any, place: Any) -> None:
 
 
 @borrowing(forceinline=True)
-def _go_on(states: Size, step: Any, H_Phi: Any, gain: Any, A: Any, course: Any, F: Any, G: Any) -> None:
+def _go_on(step: Any, H_Phi: Any, gain: Any, A: Any, course: Any, F: Any, G: Any) -> None:
     """``F = step [I, U] - gain [0, A]`` and ``G = H Phi [I, U] + [0, A]``, with ``course = [I, U]``."""
     n, m = gain.shape[0], gain.shape[1]
-    for i in range(0, len(states), 4):
-        four_rows(states, step, course, None, i, F.shape[1], F)
+    known = 8 * (n // 8)  # columns of the step itself
+    for i in range(0, len(step), 4):
+        four_rows_within(n, step, course, None, i, known, F.shape[1], F)
+    for i in range(n):
+        for j in range(0, known, 8):
+            store8(F, (i, j), load8(step, (i, j)))
     for i in range(n):
         for r in range(m):
             for j in range(A.shape[1]):
@@ -371,10 +375,10 @@ def _whiten(L: Any, used: int, G: Any) -> None:
 
 
 @borrowing(forceinline=True)
-def _times_course(states: Size, n: int, X: Any, F: Any, Y: Any) -> None:
+def _times_course(n: int, X: Any, F: Any, Y: Any) -> None:
     """``Y = X M`` with ``M = [F; 0 I]``, the identity behind the first n."""
     for i in range(0, X.shape[0], 4):
-        four_rows(states, X, F, None, i, Y.shape[1], Y)
+        four_rows_within(n, X, F, None, i, 0, Y.shape[1], Y)
     for i in range(X.shape[0]):
         for j in range(n, Y.shape[1]):
             Y[i, j] += X[i, j]

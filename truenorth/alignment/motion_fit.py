@@ -248,4 +248,6 @@ def climb(series: Series, guess: AxisMotion, iterations: int) -> AxisMotion:
             rho = 1.0 / (s @ y)
             left = np.eye(size) - rho * np.outer(s, y)
             inverse = left @ inverse @ left.T + rho * np.outer(s, s)
-    return scale.motion(u)
+    motion = scale.motion(u)
+    series.known[motion] = value
+    return motion

@@ -90,6 +90,9 @@ class Series:
         self.periodogram = np.abs(np.fft.rfft(taper * self.detrended)) ** 2
         self.frequencies = 2 * np.pi * np.fft.rfftfreq(K, interval)
         self.lags: Array = interval * np.arange(K, dtype=np.float64)
+        self.known: dict[
+            AxisMotion, float
+        ] = {}  # minus twice the restricted log-likelihood of motions that a search ended in
 
     def expected(self, orders: Orders, logs: Array) -> Array:
         """Expected periodograms (m, K // 2 + 1) of the tapered series, of motions with logarithms (m, 1 + 3 q)."""
@@ -133,7 +136,9 @@ class Series:
     def score(self, motion: AxisMotion) -> float:
         """Schwarz's criterion."""
         orders, logs = parameters(motion)
-        return float(self.exact(orders, logs[None])[0]) + math.log(len(self.lags)) * len(logs)
+        if motion not in self.known:
+            self.known[motion] = float(self.exact(orders, logs[None])[0])
+        return self.known[motion] + math.log(len(self.lags)) * len(logs)
 
 
 @lru_cache(maxsize=1)

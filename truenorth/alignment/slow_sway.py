@@ -140,7 +140,7 @@ def _smaller(system: LinearSystem, motion: Sequence[AxisMotion], duration: float
                 Q[:, states, states] *= share**2
                 P0[states, states] *= share**2
             at += part.states
-    return system.with_arrays(Q=Q, P0=P0)
+    return system.with_made(Q=Q, P0=P0)
 
 
 def causes(fine: FineAlignment) -> Iterator[Cause]:

@@ -114,7 +114,7 @@ class _MotionFilter:
         """With so much (K, 3) off the measurements, the motion fitted anew: -2 log-likelihood, and phi (3,) at the end."""
         left = self.base.with_arrays(z=self.base.z - seen)
         motion = _fit(left.z, self.interval, self.walks, self.motion, self.known)
-        estimates = kalman(with_motion(left, self.interval, motion), history="full")
+        estimates = kalman(with_motion(left, self.interval, motion))
         return -2.0 * float(estimates.log_likelihood), np.asarray(estimates.x[-1][PHI])
 
 

@@ -63,9 +63,16 @@ def table_of(rows: Sequence[Row]) -> Any:
     arrays = []
     for field, column in zip(SCHEMA, columns, strict=True):
         if pa.types.is_dictionary(field.type):
-            arrays.append(words(column).dictionary_encode().cast(field.type))
+            arrays.append(_listed(column))
         elif field.type == pa.string():
             arrays.append(words(column))
         else:
             arrays.append(numbers(column, field.type))
     return pa.Table.from_arrays(arrays, schema=SCHEMA)
+
+
+def _listed(column: Sequence[str]) -> Any:
+    """Words by their place in a list of those that differ: as Arrow does it, without its functions, which load in .03 s."""
+    places: dict[str, int] = {}
+    at = [places.setdefault(word, len(places)) for word in column]
+    return pa.DictionaryArray.from_arrays(numbers(at, _WORD.index_type), words(list(places)))

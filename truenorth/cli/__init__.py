@@ -19,6 +19,7 @@ import typer
 
 from truenorth.cli.console import explain_compiling
 from truenorth.cli.files import FORCE, check_names, check_output, inputs, with_layout_name
+from truenorth.cli.plain import PlainCommand, PlainGroup
 from truenorth.cli.wording import in_options
 from truenorth.core.atomic import protected
 from truenorth.core.errors import TruenorthError
@@ -69,6 +70,7 @@ def program(commands: Iterable[str] = COMMANDS) -> typer.Typer:
     """The program with all its commands, or with some: to load and to read the options of all takes a twentieth of `align`."""
     made = typer.Typer(
         name="truenorth",
+        cls=PlainGroup,
         help="Find level and true north from an IMU log, and say how far the answer can be trusted.",
         no_args_is_help=True,
         rich_markup_mode="rich",
@@ -77,7 +79,7 @@ def program(commands: Iterable[str] = COMMANDS) -> typer.Typer:
     )
     made.callback()(_main)
     for name in commands:
-        made.command(name)(getattr(import_module(f"truenorth.cli.{name}"), name))
+        made.command(name, cls=PlainCommand)(getattr(import_module(f"truenorth.cli.{name}"), name))
     return made
 
 

@@ -218,7 +218,7 @@ def with_motion(system: LinearSystem, interval: float, motion: Sequence[AxisMoti
         bigger["Phi"][:, part, part], bigger["Q"][:, part, part] = Phi, Q
         bigger["P0"][part, part], bigger["H"][:, axis, part] = P, h
         white[axis] = item.white
-    return replace(system, **bigger, R=system.R + np.diag(white**2 - QUIETEST_BASE**2))
+    return system.with_made(**bigger, R=system.R + np.diag(white**2 - QUIETEST_BASE**2))
 
 
 def without_sway(integrals: InertialIntegrals, C_sb: Array | None = None) -> InertialIntegrals:

@@ -54,7 +54,7 @@ def truth(base: str = "still", grade: str = "tactical", rate: float = 100.0, sec
         roll = roll + 2 * DEG * np.sin(2 * np.pi * time / 11)
         pitch = pitch + 3 * DEG * np.sin(2 * np.pi * time / 13)
         speed = 6.0 + 2.0 * np.sin(2 * np.pi * time / 20)
-    C_nb = np.array([_attitude(*angles) for angles in zip(heading, pitch, roll)])
+    C_nb = _attitude(heading, pitch, roll)
     relative = np.einsum("kji,kjl->kil", C_nb, np.gradient(C_nb, time, axis=0))
     turning = np.stack([relative[:, 2, 1], relative[:, 0, 2], relative[:, 1, 0]], axis=1)
     velocity = speed[:, None] * np.stack([np.sin(heading), np.cos(heading), np.zeros_like(time)], axis=1)
@@ -68,10 +68,11 @@ def truth(base: str = "still", grade: str = "tactical", rate: float = 100.0, sec
     return Truth(time, gyro, accel)
 
 
-def _attitude(heading: float, pitch: float, roll: float) -> Array:
-    """``C_nb = Rz(-heading) Rx(pitch) Ry(roll)``."""
-    s, c = np.sin, np.cos
-    Rz = np.array([[c(heading), s(heading), 0], [-s(heading), c(heading), 0], [0, 0, 1]])
-    Rx = np.array([[1, 0, 0], [0, c(pitch), -s(pitch)], [0, s(pitch), c(pitch)]])
-    Ry = np.array([[c(roll), 0, s(roll)], [0, 1, 0], [-s(roll), 0, c(roll)]])
+def _attitude(heading: Array, pitch: Array, roll: Array) -> Array:
+    """``C_nb = Rz(-heading) Rx(pitch) Ry(roll)``, (N, 3, 3)."""
+    s, c, zero, one = np.sin, np.cos, np.zeros_like(heading), np.ones_like(heading)
+    Rz = [[c(heading), s(heading), zero], [-s(heading), c(heading), zero], [zero, zero, one]]
+    Rx = [[one, zero, zero], [zero, c(pitch), -s(pitch)], [zero, s(pitch), c(pitch)]]
+    Ry = [[c(roll), zero, s(roll)], [zero, one, zero], [-s(roll), zero, c(roll)]]
+    Rz, Rx, Ry = (np.moveaxis(np.array(R), 2, 0) for R in (Rz, Rx, Ry))
     return Rz @ Rx @ Ry
