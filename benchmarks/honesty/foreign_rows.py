@@ -126,6 +126,11 @@ CASES = (
     ),
     Case(NAME, "swaying, tactical, buoy", aligned(vehicles.buoy, "tactical", 300.0)),
     *(
+        Case(NAME, f"swaying, {g}, {v.__name__}, no specification", aligned(v, g, 300.0, given=False))
+        for v, g in ((vehicles.raft, "tactical"), (vehicles.gondola, "tactical"), (vehicles.gondola, "consumer"))
+    ),
+    Case(NAME, "swaying, tactical, raft", aligned(vehicles.raft, "tactical", 300.0)),
+    *(
         Case(NAME, f"by GNSS, {g}, {v.__name__}", aligned(v, g, 200.0, "gnss"))
         for v, g in (
             (vehicles.car, "industrial"),
