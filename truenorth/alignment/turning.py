@@ -34,6 +34,7 @@ from truenorth.quality.regimes import KINDS, Kind, MotionSummary
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
@@ -86,11 +87,12 @@ def infer_turning(task: Task) -> ImuSpec:
 
 def sway_walks(record: ImuRecord) -> StaticModel | None:
     """Random walks of the worst axes under a smooth motion, or between the lines of what shakes; None where neither shows them."""
-    density = noise_densities(record)[1]
+    density, floor = noise_densities(record)[1], white_floor(record)
     white = np.isfinite(density).sum(axis=0) > 0.5 * len(density)
-    walks = np.where(white, 0.0, white_floor(record)) if not white.all() else np.zeros(6)
+    walks = floor.copy()
     if white.any():
         walks[white] = np.nanmedian(density[:, white], axis=0)
+        walks = np.where(walks > limit("one noise") * floor, floor, walks)  # no white noise is louder than the floor
     if not np.isfinite(walks).all():
         return None
     return StaticModel(float(walks[:3].max()), float(walks[3:].max()))
