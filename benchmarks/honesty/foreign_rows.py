@@ -120,6 +120,7 @@ CASES = (
         for g in ("navigation", "tactical", "industrial")
     ),
     *(Case(NAME, f"swaying, {g}, ship moored", aligned(moored, g, 400.0)) for g in ("navigation", "tactical")),
+    Case(NAME, "swaying, tactical, ship moored, no specification", aligned(moored, "tactical", 300.0, given=False)),
     *(
         Case(NAME, f"swaying, {g}, buoy, no specification", aligned(vehicles.buoy, g, 300.0, given=False))
         for g in ("navigation", "tactical", "consumer")
