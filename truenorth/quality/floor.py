@@ -37,7 +37,7 @@ def white_floor(record: ImuRecord) -> Array:
     if count < FEWEST or np.count_nonzero(band) < FEWEST or record.gaps.size:
         return np.full(6, np.nan)
     phase = 2.0 * math.pi * (np.arange(rows) + 0.5) / rows
-    window = sum(a * np.cos(k * phase) for k, a in enumerate(HARRIS))
+    window = np.cos(np.outer(phase, np.arange(len(HARRIS)))) @ np.array(HARRIS)
     rates = np.hstack([record.gyro, record.accel]) / (record.interval if record.kind == "increments" else 1.0)
     power = np.zeros((np.count_nonzero(band), 6))
     for part in rates[: count * rows].reshape(count, rows, 6):
