@@ -120,11 +120,17 @@ CASES = (
         for g in ("navigation", "tactical", "industrial")
     ),
     *(Case(NAME, f"swaying, {g}, ship moored", aligned(moored, g, 400.0)) for g in ("navigation", "tactical")),
+    Case(NAME, "swaying, tactical, ship moored, no specification", aligned(moored, "tactical", 300.0, given=False)),
     *(
         Case(NAME, f"swaying, {g}, buoy, no specification", aligned(vehicles.buoy, g, 300.0, given=False))
         for g in ("navigation", "tactical", "consumer")
     ),
     Case(NAME, "swaying, tactical, buoy", aligned(vehicles.buoy, "tactical", 300.0)),
+    *(
+        Case(NAME, f"swaying, {g}, {v.__name__}, no specification", aligned(v, g, 300.0, given=False))
+        for v, g in ((vehicles.raft, "tactical"), (vehicles.gondola, "tactical"), (vehicles.gondola, "consumer"))
+    ),
+    Case(NAME, "swaying, tactical, raft", aligned(vehicles.raft, "tactical", 300.0)),
     *(
         Case(NAME, f"by GNSS, {g}, {v.__name__}", aligned(v, g, 200.0, "gnss"))
         for v, g in (

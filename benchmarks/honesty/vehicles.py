@@ -1,4 +1,4 @@
-"""Vehicles of the foreign world, each by its own equations: car, tractor, aircraft, multicopter, ship, underwater vehicle.
+"""Vehicles of the foreign world, each by its own equations: on wheels, in the air, on and under water, on a rope.
 
 Each takes a generator and a length in seconds and gives a :class:`benchmarks.honesty.foreign.World`. Commands (speeds, steering,
 banks, waypoints) are drawn; the vehicle's equations of motion are integrated in steps of 10 ms and joined by splines.
@@ -284,6 +284,57 @@ def buoy(rng: np.random.Generator, length: float) -> World:
     return world(
         rng, _place(rng), moves, attitude(heading, pitch, roll), np.tile(sits, (len(fine), 1)), np.zeros_like(fine)
     )
+
+
+def _hung(up: Array, heading: Array) -> Array:
+    """(M, 3, 3) attitude of a body whose z axis has these east and north parts (2, M)."""
+    z = np.sqrt(1.0 - np.sum(up**2, axis=0))
+    right = np.cos(heading) * up[0] - np.sin(heading) * up[1]
+    ahead = np.sin(heading) * up[0] + np.cos(heading) * up[1]
+    return attitude(heading, -np.arcsin(ahead), np.arctan2(right, z))
+
+
+def raft(rng: np.random.Generator, length: float) -> World:
+    """A round raft on its line in a sea of 60 waves from about one side: it follows slope and water, each with its own lag.
+
+    Linear waves on deep water: the surface accelerates level by ``-g`` times its slope. What follows both perfectly feels no tilt.
+    """
+    fine = _grid(length)
+    sea = _sea(rng, fine, rng.uniform(0.3, 1.5), rng.uniform(4.0, 8.0))
+    way = rng.uniform(0.0, 6.28) + rng.uniform(0.1, 0.6) * rng.standard_normal(60)
+    quick, damping = 2.0 * math.pi / rng.uniform(1.5, 3.5), rng.uniform(0.15, 0.5)
+    part, lag = rng.uniform(0.5, 1.0), rng.uniform(0.0, 0.6)
+    push = rng.uniform(0.3, 1.0), rng.uniform(0.0, 0.6)
+
+    def tilts(w: Array) -> Array:
+        return np.asarray(part * quick**2 / (quick**2 - w * w + 2j * damping * quick * w))
+
+    def goes(w: Array) -> Array:  # velocity by the level acceleration of the water
+        return np.asarray(push[0] / (1.0 + 1j * push[1] * w) / (1j * w))
+
+    up, moves = np.zeros((2, len(fine))), np.zeros((len(fine), 3))
+    for axis, along in enumerate((np.sin(way), np.cos(way))):
+        up[axis] = sea(lambda w, along=along: 1j * w * w / G * along * tilts(w))
+        moves[:, axis] = sea(lambda w, along=along: 1j * w * w * along * goes(w))
+    moves[:, 2] = sea(lambda w: 1j * w / (1.0 + 1j * lag * w))
+    w = 2.0 * math.pi / rng.uniform(60.0, 150.0)
+    heading = rng.uniform(0.0, 6.28) + rng.uniform(2.0, 15.0) * DEG * np.sin(w * fine + rng.uniform(0.0, 6.28))
+    sits = np.tile(rng.uniform(0.2, 1.0) * rng.standard_normal(3), (len(fine), 1))
+    return world(rng, _place(rng), moves, _hung(up, heading), sits, np.zeros_like(fine))
+
+
+def gondola(rng: np.random.Generator, length: float) -> World:
+    """A gondola on a rope of 5 to 20 m, in gusts: it swings as a pendulum does, in antiphase with gravity, and twists."""
+    fine, rope = _grid(length), rng.uniform(5.0, 20.0)
+    hertz, damping = math.sqrt(G / rope) / (2.0 * math.pi), rng.uniform(0.005, 0.03)
+    gusts = coloured(rng, len(fine), STEP, 1.0, rng.uniform(3.0, 10.0), 2).T
+    up = np.stack([_spring(a, hertz, damping) for a in gusts])
+    up *= rng.uniform(0.3, 3.0) * DEG / np.std(up)
+    twist = _spring(coloured(rng, len(fine), STEP, 1.0, 10.0, 1)[:, 0], 1.0 / rng.uniform(15.0, 40.0), 0.05)
+    heading = rng.uniform(0.0, 6.28) + rng.uniform(2.0, 10.0) * DEG / np.std(twist) * twist
+    sits = np.tile([0.3 * rng.standard_normal(), 0.3 * rng.standard_normal(), -rope], (len(fine), 1))
+    C = _hung(up, heading)
+    return world(rng, _place(rng), np.zeros((len(fine), 3)), C, sits, np.zeros_like(fine))
 
 
 def diver(rng: np.random.Generator, length: float) -> World:

@@ -8,7 +8,8 @@ from truenorth.alignment import align
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.position import Position
 from truenorth.quality.regimes import motion_summary
-from truenorth.quality.tilt import IDENTITY, Tilt, _changes, check_tilt
+from truenorth.quality.tilt import IDENTITY, Tilt, check_tilt
+from truenorth.quality.tilt_bench import changes
 from truenorth.simulation.scenario import read_scenario
 
 
@@ -19,7 +20,7 @@ def test_changes_over_cells_are_exact_for_a_cubic():
     whole = np.polynomial.Polynomial(a).integ()
     means = np.diff(whole(edges)) / np.diff(edges)
     exact = np.diff(np.polynomial.Polynomial(a)(edges))
-    assert np.allclose(_changes(means[None, :, None])[0, :, 0], exact, atol=1e-12)
+    assert np.allclose(changes(means[None, :, None])[0, :, 0], exact, atol=1e-12)
 
 
 def _swaying(tones, duration, *, lat, lon, heading, arm, **more):

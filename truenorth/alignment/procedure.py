@@ -271,8 +271,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     else:
         coarse = oba(integrals, lat, alt, history=False, gains=not refined)
     usual = usual_noise()
-    # A rough sea shows as moving: its motion, too, is slower than the noise of sensors.
-    smooth = task.motion.overall in ("swaying", "moving")
+    # A rough sea shows as moving, a ship whose engine runs as disturbed: their motion, too, is slower than the noise of sensors.
+    smooth = task.motion.overall in ("swaying", "moving") or rocks_all_along(task.motion)
     walks = sway_walks(task.record) if spec is None and smooth else None
     if walks is not None:
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)

@@ -29,10 +29,12 @@ from truenorth.estimate.batch import Filtered, in_sigmas, settle
 from truenorth.estimate.staying import StayingLog, prior_of
 from truenorth.filters import LinearSystem
 from truenorth.quality.density import noise_densities
+from truenorth.quality.floor import white_floor
 from truenorth.quality.regimes import KINDS, Kind, MotionSummary
 from truenorth.quality.signals import white_noise
 from truenorth.records import ImuRecord
 from truenorth.records.specs import ImuSpec
+from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
 
@@ -84,12 +86,15 @@ def infer_turning(task: Task) -> ImuSpec:
 
 
 def sway_walks(record: ImuRecord) -> StaticModel | None:
-    """Random walks of the worst axes under a smooth motion; None where a sensor does not look white."""
-    density = noise_densities(record)[1]
-    known = np.isfinite(density).sum(axis=0)
-    if len(density) == 0 or not (known > 0.5 * len(density)).all():
+    """Random walks of the worst axes under a smooth motion, or between the lines of what shakes; None where neither shows them."""
+    density, floor = noise_densities(record)[1], white_floor(record)
+    white = np.isfinite(density).sum(axis=0) > 0.5 * len(density)
+    walks = floor.copy()
+    if white.any():
+        walks[white] = np.nanmedian(density[:, white], axis=0)
+        walks = np.where(walks > limit("one noise") * floor, floor, walks)  # no white noise is louder than the floor
+    if not np.isfinite(walks).all():
         return None
-    walks = np.nanmedian(density, axis=0)
     return StaticModel(float(walks[:3].max()), float(walks[3:].max()))
 
 

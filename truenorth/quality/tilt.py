@@ -9,7 +9,8 @@ error ``k`` the tilt swings by ``k`` times the sway. A base that sways with one 
 
 A ship's accelerations are made by the waves that make her roll and pitch, and go with these: of a moored one, that hardly rolls,
 they are half of what the tilt makes. So they pass for a delay, but for another one about each axis, which the gyros of one clock do
-not have; and for scale errors, which only a base shows whose gyros explain nearly all of gravity's swing.
+not have, or for one that leaves much of what goes with the tilt (:mod:`truenorth.quality.pushed`); and for scale errors, which only
+a base shows whose gyros explain nearly all of gravity's swing.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.analysis.student import student_limit
-from truenorth.core.attitude import dcm_from_quaternion, skew
 from truenorth.core.earth import GRAVITY_EQUATOR
+from truenorth.quality.pushed import NO_PUSH, Push, push_in_step
+from truenorth.quality.tilt_bench import TiltBench, shifted
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import ANY_EFFECT, Effect, Evidence, Figure
 from truenorth.state.limits import limit
 from truenorth.strapdown.increments import increments
-from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 
@@ -39,9 +40,6 @@ MOST_TIME = 160.0  # s of a log that are looked at: its middle
 LEAST_TURN = math.radians(0.3)  # rad, RMS of the turns in a piece: below it nothing is said
 SHIFTS = (-0.6, -0.4, -0.2, 0.2, 0.4, 0.6)  # s, by which gyros may be late, tried with the columns as given
 IDENTITY = "+x +y +z"
-AXES = np.eye(3)
-# Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
-EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
 
 
 @dataclass(frozen=True)
@@ -73,6 +71,8 @@ class Tilt:
     turn : float, rad
         RMS of the turn about the vertical that the delay makes: gravity does not show it, and an IMU that spins on its base has it
         all along.
+    pushed : Push
+        Of a rough base: what goes with its tilt and is no delay.
     """
 
     given: float
@@ -89,6 +89,7 @@ class Tilt:
     by_axis: Array = field(default_factory=lambda: np.zeros(3))
     by_axis_sigma: Array = field(default_factory=lambda: np.full(3, np.inf))
     turn: float = 0.0
+    pushed: Push = NO_PUSH
 
     def evidence(self) -> list[Evidence]:
         """Another reading that explains what the one given does not."""
@@ -102,7 +103,8 @@ class Tilt:
         if explains and self.axes != IDENTITY:
             return [Evidence("tilt.axes", figures, "unknown", ANY_EFFECT, ("imu_axes",))]
         late = "tilt.gyros_late" if self.delay > 0.0 else "tilt.gyros_early"
-        if explains:
+        alone = self.pushed.share <= limit("pushed in step")
+        if explains and alone:
             return [Evidence(late, figures, "unknown", ANY_EFFECT, ("common_clock",))]
         found = []
         sure, clear, hint = (
@@ -111,9 +113,10 @@ class Tilt:
         )
         agree = self._axes_agree(0.0 if self.rough else clear)  # on a rough base it has to be seen
         if abs(self.delay) >= max(limit("late sensor"), hint * self.delay_sigma) and (agree or not self.rough):
-            certain = agree and abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
+            certain = agree and alone and abs(self.delay) >= sure * self.delay_sigma and self._on_two_axes(sure)
             # What the gyros do not explain may be the base's own, and have hidden as much of a delay as it may have made.
-            level = self.tilt if certain else math.hypot(self.tilt, self.given / GRAVITY_EQUATOR)
+            own = self.pushed.level or self.given  # heave hides none
+            level = self.tilt if certain else math.hypot(self.tilt, own / GRAVITY_EQUATOR)
             effect = Effect(heading=self.turn, level=level)
             found.append(Evidence(late, figures, "bounded" if certain else "hint", effect, ("common_clock",)))
         off = np.abs(self.scale)
@@ -157,7 +160,7 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     if cells is None:
         return None
     theta, force, interval, middle = cells
-    bench = _Bench(force, interval, None if C_sb is None else C_sb(middle.ravel()).reshape(*middle.shape, 3, 3))
+    bench = TiltBench(force, interval, None if C_sb is None else C_sb(middle.ravel()).reshape(*middle.shape, 3, 3))
     turned = np.cumsum(theta - theta.mean(axis=1, keepdims=True), axis=1)
     turns = np.sqrt(np.mean(turned**2, axis=(0, 1)))
     if float(np.linalg.norm(turns)) < LEAST_TURN:
@@ -171,11 +174,15 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
         left = bench.left(theta[..., order] * signs)
         if left < 0.99 * best:
             best, axes = left, _columns(order, signs)
-    squares = {shift: bench.left(_shifted(theta, shift / interval)) ** 2 for shift in SHIFTS if rough} | {0.0: given**2}
+    may_be_pushed = rough and C_sb is None  # a base that turns within itself, on an indexer, goes with no wave
+    squares = {shift: bench.left(shifted(theta, shift / interval)) ** 2 for shift in SHIFTS if rough} | {0.0: given**2}
     shift = min(squares, key=squares.__getitem__)
     if squares[shift] < min(0.98 * best**2, 0.5 * given**2):
         delay, small = _lowest(squares, shift)
-        return Tilt(given, unturned, math.sqrt(small), IDENTITY, delay, 0.0, abs(delay) * bench.rate(theta))
+        pushed = push_in_step(bench, theta, delay) if may_be_pushed else NO_PUSH
+        tilt = abs(delay) * bench.rate(theta)
+        turn = abs(delay) * bench.rate_up(theta)
+        return Tilt(given, unturned, math.sqrt(small), IDENTITY, delay, 0.0, tilt, turn=turn, pushed=pushed)
     if given >= unturned:
         # Gyros that leave more than if they were at rest turn something else than gravity: no small error is what is wrong.
         return Tilt(given, unturned, best, axes, 0.0, 0.0, 0.0)
@@ -189,14 +196,13 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     wrong = np.where(np.abs(scale) >= np.maximum(least_scale(turns), clear * sigma_scale), scale, 0.0)
     if wrong.any():
         half, whole = (bench.left(theta / np.maximum(1.0 + part * wrong, 0.1)) for part in (0.5, 1.0))
-        # A base that turns within itself, on an indexer, goes with no wave.
-        if not whole < half < given or (rough and C_sb is None):
+        if not whole < half < given or may_be_pushed:
             sigma_scale = np.full(3, np.inf)
     each = little[4:], sigma[4:]
     turn = abs(late) * bench.rate_up(theta)
-    return Tilt(
-        given, unturned, best, axes, late, float(sigma[0]), tilt, scale, sigma_scale, turns, len(theta), *each, turn
-    )
+    pushed = push_in_step(bench, theta, late) if may_be_pushed else NO_PUSH
+    one_delay = given, unturned, best, axes, late, float(sigma[0]), tilt
+    return Tilt(*one_delay, scale, sigma_scale, turns, len(theta), *each, turn, pushed)
 
 
 def least_scale(turned: Array) -> Array:
@@ -222,84 +228,6 @@ def _lowest(squares: dict[float, float], at: float) -> tuple[float, float]:
     return low, max(float(a * low**2 + b * low + c), 1e-12)
 
 
-class _Bench:
-    """Specific force (P, L, 3) of pieces, and what readings of the gyros leave of it."""
-
-    def __init__(self, force: Array, interval: float, C_sb: Array | None) -> None:
-        self.force, self.interval, self.C_sb = force, interval, C_sb
-        self.basis = _line(force.shape[1])
-
-    def _carried(self, theta: Array) -> tuple[Array, Array]:
-        """Force and the arm's columns (P L 3, 4) in axes that do not turn, pieces freed of a line, and ``C_is`` (P, L, 3, 3)."""
-        C = np.stack([dcm_from_quaternion(integrate_attitude(piece)) for piece in theta])
-        C = 0.5 * (C[:, 1:] + C[:, :-1])  # in the middle of a cell, to second order in its turn
-        base = C if self.C_sb is None else C @ self.C_sb
-        w = theta / self.interval
-        if self.C_sb is not None:
-            turn = np.swapaxes(base[:, :-1], -1, -2) @ base[:, 1:]
-            w = np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1) / self.interval
-            w = np.concatenate([w[:, :1], 0.5 * (w[:, 1:] + w[:, :-1]), w[:, -1:]], axis=1)
-        W = skew(_changes(w) / self.interval) + skew(w) @ skew(w)
-        columns = np.concatenate([C @ self.force[..., None], base @ W], axis=3)
-        return self._freed(columns).reshape(-1, 4), C
-
-    def _freed(self, x: Array) -> Array:
-        """Without a constant and a slope in each piece."""
-        flat = x.reshape(len(x), x.shape[1], -1)
-        return np.asarray((flat - self.basis @ (self.basis.T @ flat)).reshape(x.shape))
-
-    def left(self, theta: Array) -> float:
-        """RMS of specific force that gyros with these increments do not explain, m/s^2."""
-        flat, _ = self._carried(theta)
-        return math.sqrt(_left(flat[:, 0], flat[:, 1:]) / len(flat))
-
-    def small(self, theta: Array) -> tuple[Array, Array]:
-        """(7,) a small delay of the gyros, s, errors of their scale factors, delays by turns about each axis; and one-sigmas.
-
-        The base's own motion is in these, and what a single piece alone shows has no small one.
-        """
-        flat, C = self._carried(theta)
-        up = (C @ self.force[..., None])[..., 0]
-        rate = (C @ (theta / self.interval)[..., None])[..., 0]
-        rate -= rate.mean(axis=1, keepdims=True)
-        turns = C * theta[..., None, :]  # about each axis, in axes that do not turn
-        angle = np.cumsum(turns, axis=1) - 0.5 * turns
-        # Gyros that are late have not turned yet.
-        late = [self._freed(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
-        scale = [self._freed(np.cross(angle[..., i], up)).ravel() for i in range(3)]
-        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale])
-        of_each = _by_pieces(len(theta), flat, [*late, *scale])
-        off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
-        return off, sigma
-
-    def rate(self, theta: Array) -> float:
-        """RMS of the rates, rad/s."""
-        return float(np.sqrt(np.mean(np.sum((theta / self.interval) ** 2, axis=-1))))
-
-    def rate_up(self, theta: Array) -> float:
-        """RMS of the rate about the vertical, rad/s."""
-        up = self.force.mean(axis=1, keepdims=True) if self.C_sb is None else self.force
-        up = up / np.linalg.norm(up, axis=-1, keepdims=True)
-        return float(np.sqrt(np.mean(np.sum(theta / self.interval * up, axis=-1) ** 2)))
-
-
-def _by_pieces(pieces: int, flat: Array, columns: list[Array]) -> tuple[Array, Array]:
-    """Sizes of columns (P L 3,) that explain the force best, with the best arm, and one-sigmas by leaving out piece after piece."""
-    A = np.column_stack([*columns, flat[:, 1:]])
-    scale = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
-    parts = (A / scale).reshape(pieces, -1, len(scale))
-    squares, products = (np.swapaxes(parts, 1, 2) @ other for other in (parts, flat[:, 0].reshape(pieces, -1, 1)))
-
-    def solved(N: Array, b: Array) -> Array:
-        return np.asarray((np.linalg.pinv(N, rcond=1e-9, hermitian=True) @ b)[..., 0])
-
-    whole, right = squares.sum(axis=0), products.sum(axis=0)
-    without = solved(whole - squares, right - products)
-    variance = (pieces - 1) / pieces * np.sum((without - without.mean(axis=0)) ** 2, axis=0)
-    count = len(columns)
-    return solved(whole, right)[:count] / scale[:count], np.sqrt(variance[:count]) / scale[:count]
-
-
 def whole_cells(record: ImuRecord) -> tuple[Array, float, Array]:
     """Turns (K, 3) of even cells of a whole record, rad; their length, s; the times of their middles (K,), s."""
     rows = max(1, round(CELL / record.interval))
@@ -323,39 +251,6 @@ def _cells(record: ImuRecord) -> tuple[Array, Array, float, Array] | None:
     dtheta, dvel = (x[part].reshape(pieces, length, rows, 3).sum(axis=2) for x in increments(record))
     time = record.time[part].reshape(pieces, length, rows)
     return dtheta, dvel / interval, interval, 0.5 * (time[..., 0] - record.interval + time[..., -1])
-
-
-def _line(length: int) -> Array:
-    """(L, 2) orthonormal constant and slope."""
-    t = np.arange(length) - 0.5 * (length - 1)
-    return np.stack([np.full(length, length**-0.5), t / np.linalg.norm(t)], axis=1)
-
-
-def _left(y: Array, A: Array) -> float:
-    """Squares that least squares leaves, by the normal equations."""
-    size = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
-    unit = A / size
-    b = unit.T @ y
-    return max(float(y @ y - b @ np.linalg.pinv(unit.T @ unit, rcond=1e-9) @ b), 0.0)
-
-
-def _changes(w: Array) -> Array:
-    """(P, L, 3) change over each cell of what has these means in the cells: by its values at their edges, to fourth order.
-
-    A lever arm of 14 m on a ship makes 2 m/s^2; a central difference over two cells would miss a hundredth of it.
-    """
-    inner = (7.0 * (w[:, 1:-2] + w[:, 2:-1]) - w[:, :-3] - w[:, 3:]) / 12.0
-    first = np.tensordot(EDGES, w[:, :4], (1, 1)).swapaxes(0, 1)
-    last = np.tensordot(EDGES[::-1, ::-1], w[:, -4:], (1, 1)).swapaxes(0, 1)
-    edges = np.concatenate([first, inner, last], axis=1)
-    return np.diff(edges, axis=1)
-
-
-def _shifted(theta: Array, cells: float) -> Array:
-    """The turns (P, L, 3) of gyros late by so many cells, put right; the ends stay."""
-    flat = theta.reshape(-1, 3)
-    at = np.arange(len(flat)) + cells
-    return np.stack([np.interp(at, np.arange(len(flat)), column) for column in flat.T], axis=1).reshape(theta.shape)
 
 
 def _columns(order: tuple[int, ...], signs: tuple[float, ...]) -> str:

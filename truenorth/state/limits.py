@@ -226,6 +226,11 @@ LIMITS: dict[str, Limit] = {
     "one delay": Limit(
         0.3, "of the delay", "that it may differ by between axes: a base's own motion hides or adds a part about each"
     ),
+    "pushed in step": Limit(
+        0.1,
+        "of the squares",
+        "that a delay explains, that may go with the tilt beyond it: of sound buoys, rafts and ships at the quay it is more",
+    ),
     "vibrates": Limit(
         2.0,
         "variance of the gyros' noise",
