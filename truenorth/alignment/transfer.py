@@ -18,12 +18,7 @@ from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged, noise_in
 from truenorth.alignment.transfer_answer import LastPass, assemble_transfer
 from truenorth.alignment.transfer_axes import slave_axes
-from truenorth.alignment.transfer_filter import (
-    TRANSLATIONS,
-    Assumed,
-    Matching,
-    transfer_filter,
-)
+from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching, transfer_filter
 from truenorth.alignment.transfer_passes import found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
 from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
@@ -173,8 +168,8 @@ def align_transfer(
             "`mounting.latency` and the clocks"
         )
     rows = Matching(*noise, what.kind, limit("master's gate"))
-    along = {"assumed": said, "linear": found.linear, "nominal": found.nominal}
-    run = partial(transfer_filter, master=master, matching=rows, **along)
+    along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
+    run = partial(along, master=master, matching=rows)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, errors, C_mb) + _rivals(part, run, track, model, start, spec)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)

@@ -126,7 +126,7 @@ def transfer_filter(
         Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
         rows (as much as 1 rad^-2 of information a row), would otherwise give a little false information on mounting and delay.
     nominal : Nominal, optional
-        The motion to linearise about in an open loop, whatever the start says, which stays the prior; a closed loop when left out.
+        The motion to linearise about in an open loop; the start stays the prior. A closed loop when left out.
 
     Raises
     ------
@@ -191,9 +191,8 @@ def master_aiding(
 ) -> list[Aiding]:
     """The master's rows as the loop takes them: its place, its translation, its attitude; what is not matched is left out."""
     count, groups, kind = len(master), model.groups, matching.translation
-    stamps = master.time - assumed.delay
+    stamps, found, place = master.time - assumed.delay, [], None
     patience = max(2, round(matching.patience / master.interval))
-    found, place = [], None
     held = stamps - (0.0 if linear is None else linear.delay)  # when they held, as far as is known
     of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
     own: tuple[float, ...] = (OTHER_NOISE * of_sample, KNOWN)
