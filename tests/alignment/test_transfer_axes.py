@@ -11,6 +11,7 @@ from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_axes import slave_axes
 from truenorth.alignment.transfer_filter import Assumed, Matching, master_aiding
 from truenorth.alignment.transfer_system import seen_states, system_along
+from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
 from truenorth.core.position import Position
 from truenorth.errors.axes import accel_axes, gyro_axes, turning_axes
@@ -25,6 +26,7 @@ from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.simulation.sway import Disturbed
 from truenorth.simulation.tones import Tone
 from truenorth.state.layout import ACCEL_AXES, BA, GYRO_AXES
+from truenorth.state.track import Track
 
 CONSUMER, TACTICAL = imu_spec("consumer"), imu_spec("tactical")
 DEG = np.radians(1.0)
@@ -135,6 +137,24 @@ def turned_alike(s, C_nb, model):
         x[model.slice_of(name)] = value
     x[BA], x[model.slice_of(MOUNTING)] = skew(s) @ FORCE, s
     return x, C_nb @ dcm_from_rotation_vector(s)
+
+
+def test_what_only_was_said_stays_as_it_was_said():
+    """A filter that took the turning of all for known is brought back, with the covariance that was said; else nothing changes."""
+    model = TransferModel(mounting=True, axes=(gyro_axes(CONSUMER), accel_axes(CONSUMER, FORCE)))
+    said = Assumed(ARM, 0.3, C_mb=np.eye(3), mounting_sigma=3 * DEG)
+    C_nb, s = dcm_from_rotation_vector([0.1, 0.2, 2.0]), np.array([0.001, -0.00075, 0.0015])
+    x, turned = turned_alike(s, C_nb, model)
+    P = 1e-12 * np.eye(model.states)
+    track = Track(np.zeros(1), turned[None], np.zeros((1, 3)), np.zeros((1, 3)), x[None], P[None], model.layout, ())
+    back = as_said_together(track, model, said, True)
+    np.testing.assert_allclose(rotation_vector_from_dcm(back.C_nb[0] @ C_nb.T), 0.0, atol=1e-5)
+    np.testing.assert_allclose(back.sensors[0], 0.0, atol=1e-4)  # of 2e-2; to the second order in s
+    sigma = 0.5 * DEG
+    information = (4.0 / sigma**2 + 1.0 / (3 * DEG) ** 2) * np.eye(3) - skew(ARM) @ skew(ARM) / 0.3**2
+    np.testing.assert_allclose(C_nb.T @ back.P[0][:3, :3] @ C_nb, np.linalg.inv(information), rtol=2e-2, atol=1e-8)
+    known = replace(model, mounting=False)
+    assert as_said_together(track, known, said, True) is track
 
 
 def test_nothing_measured_shows_seat_arm_and_sensors_turned_alike():

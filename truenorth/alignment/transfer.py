@@ -22,6 +22,7 @@ from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching,
 from truenorth.alignment.transfer_passes import found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
 from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
+from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
@@ -173,6 +174,7 @@ def align_transfer(
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, errors, C_mb) + _rivals(part, run, track, model, start, spec)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
+    track = as_said_together(track, model, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
     last = LastPass(part, master, model, said, start, what, noise, track, carried, least)

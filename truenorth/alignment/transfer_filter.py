@@ -157,7 +157,7 @@ def transfer_filter(
         # A poor IMU's attitude that translation alone shows is corrected by degrees, and velocity with it.
         invariant=nominal is None and ACCEL_AXES in model.groups and not np.isfinite(matching.attitude_sigma),
         prior=(P, values),
-        open_loop=nominal is not None,
+        open_until=None if nominal is None else nominal.until,
         off=off,
     )
     if len(track) == 0:

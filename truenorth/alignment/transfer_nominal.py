@@ -6,16 +6,17 @@ turning of its own columns for knowledge: of heading, of the arm, and of seat, g
 axes: ``M_g = M_a = [s x]``, ``dr = -s x r``, ``mu = C_mb s``, ``phi = C s``), which nothing shows. So the last passes feed nothing
 back. They begin where the pass before leads back to, with its sensors, seat and delay, and with the *prior* covariance. What lies
 between the start as it was given and this one is an error that is known at the start. That is Gauss and Newton's method on the
-whole log, and the prior counts once.
+log, and the prior counts once. Of a log so long that what the gyros walk in it is no small angle the first part is open; then the
+loop is closed.
 
 Sources: B. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4 (1994); of the defect, G. Huang,
 A. Mourikis, S. Roumeliotis, "Observability-based rules for designing consistent EKF SLAM estimators", Int. J. Robotics Research 29
-(2010). That the motion is led back from the end by the gyros, their noise left out, is ours: it is as good as they walk.
+(2010). That the motion is led back by the gyros, their noise left out, is ours: it is as good as they walk.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 from truenorth.core.attitude import dcm_from_quaternion, dcm_from_rotation_vector, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, transport_rate_n
 from truenorth.errors.master import ARM, DELAY, MOUNTING
+from truenorth.errors.walks import Walks
 from truenorth.estimate.loop import SAME_TIME
 from truenorth.records import ImuRecord
 from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI
@@ -32,6 +34,7 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 
+LINEAR = 0.02  # rad: of an attitude to linearise with, one sigma
 CONSTANTS = (DELAY, ARM, MOUNTING, GYRO_AXES, ACCEL_AXES)  # groups of what does not change in a log, or hardly
 
 
@@ -41,6 +44,7 @@ class Nominal:
 
     C_nb: Array  # (3, 3) at the start
     values: Array  # (n,) in the places of the states
+    until: float  # s: the loop is closed then
 
     def off(self, C_nb: Array, values: Array, mounting: slice | None) -> Array:
         """(n,) errors that it has where an attitude at the start and values (n,) are true, ENU."""
@@ -58,16 +62,27 @@ class Nominal:
         if mounting is not None:
             seat = dcm_from_rotation_vector(x[mounting]) @ dcm_from_rotation_vector(self.values[mounting])
             values[mounting] = rotation_vector_from_dcm(seat)
-        return Nominal(np.asarray(dcm_from_rotation_vector(x[PHI]) @ self.C_nb), values)
+        return replace(self, C_nb=np.asarray(dcm_from_rotation_vector(x[PHI]) @ self.C_nb), values=values)
 
 
-def found_by(slave: ImuRecord, track: Track) -> Nominal:
-    """The motion that the end of a track leads back to."""
+def found_by(slave: ImuRecord, track: Track, model: Walks) -> Nominal:
+    """The motion that a track leads back to, from where the slave's gyros still tell it well."""
+    begin = float(slave.time[0] - slave.steps[0])
+    until = begin + _told(model.gyro_random_walk, model.gyro_rate_walk, float(slave.time[-1]) - begin)
+    last = max(1, int(np.searchsorted(track.time, until)))
     values = np.zeros(track.sensors.shape[1])
-    for part in (BG, BA, *(track.layout.slice_of(name) for name in CONSTANTS)):
-        if part is not None:
-            values[part] = track.sensors[-1, part]
-    return Nominal(_led_back(slave, track)[1], values)
+    for part in (BG, BA):
+        values[part] = track.sensors[last - 1, part]
+    for name in CONSTANTS:
+        if (at := track.layout.slice_of(name)) is not None:
+            values[at] = track.sensors[-1, at]
+    return Nominal(_led_back(slave, track[:last])[1], values, until)
+
+
+def _told(walk: float, rate_walk: float, longest: float) -> float:
+    """How long, s, gyros (rad/sqrt(s), rad/s/sqrt(s)) carry an attitude before their noise is `LINEAR`; `longest` at the most."""
+    t = np.linspace(0.0, longest, 1001)
+    return float(t[np.searchsorted(walk**2 * t + rate_walk**2 * t**3 / 3.0, LINEAR**2, side="right") - 1])
 
 
 def final_attitudes(slave: ImuRecord, track: Track) -> Array:

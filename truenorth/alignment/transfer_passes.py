@@ -127,11 +127,11 @@ def found_in_passes(
     for _ in range(CLOSED):
         track = once(None)
     part, mounting = handed(noise)[0], model.slice_of(MOUNTING)
-    log = _Log(found_by(part, track), mounting)
+    log = _Log(found_by(part, track, model), mounting)
 
     def open_loop(nominal: Nominal) -> _Pass:
         track = once(nominal)
-        led_back = found_by(part, track)
+        led_back = found_by(part, track, model)
         return _Pass(track, nominal.off(led_back.C_nb, led_back.values, mounting))
 
     last = settle(log, open_loop, lambda found: found.moved, enough=SETTLED, most=MOST)

@@ -2,8 +2,8 @@
 
 An event is an epoch of the filter's own grid, an epoch of output, or a measurement at any time: the sample in which it
 falls is taken in two parts. A re-timed measurement holds at its stamp less a delay as it is known *now*: when it comes is
-decided as the loop goes. Corrections are fed back at once, so that the error state is zero between events; an open loop keeps
-them apart, and is linear about the motion that its start leads to.
+decided as the loop goes. Corrections are fed back at once, so that the error state is zero between events; before a loop is closed
+they are kept apart, and all is linear about the motion that the start leads to.
 
 ``run(task, memory)``: all that the loop knows is in its memory, and samples after the last event stay
 with the caller; handed in again with the next ones, chunks of any size give the bits of one batch.
@@ -105,7 +105,7 @@ def correct(
         w.R[a, a] = R[a]
         if np.isnan(events.variance[k, a]):
             w.z[a] = np.nan
-        if model.open_loop:
+        if model.opened:
             for b in range(len(m.x)):
                 w.z[a] -= w.H[a, b] * m.x[b]
         kept.innovation[number, a] = w.z[a]
@@ -150,8 +150,11 @@ def correct(
     if smoothing:
         for b in range(len(m.aux)):
             kept.dx[link, b] = w.x[b]
-    if model.open_loop:
+    if model.opened:
         keep_apart(m.x, w.x)
+        if time >= model.until:
+            feed_back(m.s, m.aux, m.x, model.dynamics.turns)
+            set_matrix(m.s, m.sums.C_now)
         return SOUND
     if model.invariant:
         if smoothing:
@@ -169,7 +172,7 @@ def keep(m: Memory, model: Model, w: Any, room: Room, time: float, j: int, kept:
         room.s[a] = m.s[a]
     for a in range(len(m.aux)):
         room.aux[a], room.x[a] = m.aux[a], m.x[a]
-    if model.open_loop:
+    if model.opened:
         feed_back(room.s, room.aux, room.x, model.dynamics.turns)
     kept.time[j] = time
     for a in range(12):

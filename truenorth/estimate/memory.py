@@ -59,7 +59,7 @@ class Sources(NamedTuple):
 class Model(NamedTuple):
     """What of the error model the kernel needs.
 
-    `spare` (s): an event of the grid so soon after another is passed over; `open_loop`: corrections are not fed back.
+    `spare` (s): an event of the grid so soon after another is passed over; `opened`: no correction is fed back before `until` (s).
     """
 
     dynamics: Dynamics
@@ -71,7 +71,8 @@ class Model(NamedTuple):
     covariance: bool
     held: bool
     spare: float = 0.0
-    open_loop: bool = False
+    opened: bool = False
+    until: float = 0.0
 
 
 class Task(NamedTuple):

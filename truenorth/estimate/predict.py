@@ -232,7 +232,7 @@ def predict_to_event(
         for i in range(DYNAMIC):
             for j in range(d.first[g], d.first[g] + d.width[g]):
                 w.x[i] += w.Phi[i, j] * aux[j]  # what is assumed of a group that acts is taken off
-    if model.open_loop:
+    if model.opened:
         carry(d.pair, w.Phi, m.x, w.a)
     for i in range(n):
         w.Q[i, i] = 0.5 * T * (d.noise[i] + speed * d.wander[i])

@@ -178,7 +178,7 @@ def navigate_track(
     smooth: bool = False,
     invariant: bool = False,
     prior: tuple[Array, Array] | None = None,
-    open_loop: bool = False,
+    open_until: float | None = None,
     off: Array | None = None,
 ) -> Track:
     """Mechanise a log from a start, aided by measurements.
@@ -201,8 +201,8 @@ def navigate_track(
         Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
     prior : (P, values), optional
         Of all states, see :func:`begin`.
-    open_loop : bool
-        Corrections are not fed back: all is linear about the motion that the start leads to. The track is that less its errors.
+    open_until : float, optional, s
+        Before it no correction is fed back: all is linear about the motion that the start leads to, less whose errors the track is.
     off : (n,) array, optional
         Of an open loop, see :func:`begin`.
 
@@ -217,12 +217,12 @@ def navigate_track(
         raise UsageError("a vertical loop has fixed gains and cannot be smoothed; expected a Kalman gain (no loop)")
     if smooth and (any(g.considered for g in model.groups) or any(source.retimed for source in aiding)):
         raise UsageError("considered states and re-timed measurements are not smoothed; expected smooth=False")
-    if open_loop and (smooth or invariant or any(source.loop > 0.0 for source in aiding)):
+    if open_until is not None and (smooth or invariant or any(source.loop > 0.0 for source in aiding)):
         raise UsageError("an open loop feeds nothing back; expected no smooth, no invariant, no vertical loop")
     steps = interval_lengths(record)
     time = float(record.time[0] - steps[0])
     stride = max(1, round(interval * len(record) / (record.time[-1] - time)))
-    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant, open_loop)
+    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant, open_until)
     state, tracks = begin(setting, start, time, record.interval, prior, off), []
     for rows in [slice(0, len(record))] if smooth else row_blocks(len(record)):
         part = ImuRows(record.time[rows], record.gyro[rows], record.accel[rows], record.kind, record.source)
@@ -267,7 +267,8 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         setting.covariance,
         any(group.considered for group in model.groups),
         setting.spare(state.interval),
-        setting.open_loop,
+        setting.open_until is not None,
+        setting.open_until or 0.0,
     )
     seen = kernel_sources(sources, model)
     task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)

@@ -1,0 +1,91 @@
+"""Seat, arm and sensors of a slave turned alike: what no motion shows, and what a filter must not think that it knows.
+
+Turn gyros, accelerometers, lever arm and mounting together by `s` (slave axes): ``M_g = M_a = [s x]``, ``dr = -s x r``,
+``mu = C_mb s``, ``phi = C s``. Nothing that the master or the slave measures changes. What is known of `s` is what was said of
+each before:
+
+    information   sum of squares of derivatives of (M_g, M_a, mu, r), each by its sigma
+
+for a consumer IMU (30 arcmin each) .25 deg. A filter whose columns turn with what it learns takes that turning for knowledge: its
+sigma of heading was .13 deg, and its answer six of these off. Where a loop is closed (:mod:`truenorth.alignment.transfer_nominal`)
+its columns turn. So the answer is brought back to where the prior is likeliest along
+`s`, which is where a consistent filter would have left it, and its covariance along `s` is no smaller than the prior's.
+
+Source of the defect, and of the remedy's idea: G. Huang, A. Mourikis, S. Roumeliotis, "Observability-based rules for designing
+consistent EKF SLAM estimators", Int. J. Robotics Research 29 (2010). The projection onto the prior is ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.transfer_filter import Assumed, axes_along
+from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
+from truenorth.errors.master import ARM, MOUNTING, TransferModel
+from truenorth.state.layout import ACCEL_AXES, BA, GYRO_AXES, PHI
+from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
+
+# (9, 3): elements of [s x] by rows
+TURNED = np.stack([skew(e).ravel() for e in np.eye(3)], axis=1)
+
+
+def as_said_together(track: Track, model: TransferModel, said: Assumed, seats: bool) -> Track:
+    """The track with what only the prior says left to the prior; the same one where something shows it.
+
+    Parameters
+    ----------
+    said : Assumed
+        Besides which the states stand.
+    seats : bool
+        Attitude is matched: the mounting must be a state then.
+    """
+    groups = model.groups
+    if not {GYRO_AXES, ACCEL_AXES, ARM} <= groups.keys() or (seats and MOUNTING not in groups):
+        return track
+    last, C_mb = track.sensors[-1], axes_along(track, said)[-1]
+    arm = said.lever_arm + last[track.layout.slice_of(ARM)]
+    terms = [(TURNED, last[track.layout.slice_of(name)], groups[name].sigma) for name in (GYRO_AXES, ACCEL_AXES)]
+    terms.append((skew(arm), arm - said.lever_arm, np.full(3, said.lever_arm_sigma)))
+    if MOUNTING in groups:
+        off = rotation_vector_from_dcm(C_mb @ said.C_mb.T)
+        terms.append((C_mb, off, np.full(3, said.mounting_sigma)))
+    known = [(J / sigma[:, None], x / sigma) for J, x, sigma in terms if np.all(sigma > 0.0)]
+    J, x = np.vstack([J for J, _ in known]), np.concatenate([x for _, x in known])
+    information = J.T @ J
+    s = -np.linalg.solve(information, J.T @ x)
+    return _turned(track, model, said, s, np.asarray(np.linalg.inv(information), dtype=np.float64))
+
+
+def _turned(track: Track, model: TransferModel, assumed: Assumed, s: Array, variance: Array) -> Track:
+    """A track whose seat, arm and sensors are turned by s, and known together no better than by this covariance, slave axes."""
+    at = {name: track.layout.slice_of(name) for name in (GYRO_AXES, ACCEL_AXES, ARM, MOUNTING)}
+    C_mb, force = axes_along(track, assumed), np.array(model.groups[ACCEL_AXES].figures)
+    N = np.zeros((len(track), model.states, 3))
+    N[:, PHI], N[:, BA] = track.C_nb, -skew(force)
+    for name in (GYRO_AXES, ACCEL_AXES):
+        N[:, at[name]] = TURNED
+    N[:, at[ARM]] = skew(assumed.lever_arm + track.sensors[:, at[ARM]])
+    sensors = track.sensors.copy()
+    if at[MOUNTING] is not None:
+        N[:, at[MOUNTING]] = C_mb
+        turned = dcm_from_rotation_vector(C_mb @ s) @ C_mb
+        sensors[:, at[MOUNTING]] = rotation_vector_from_dcm(turned @ assumed.C_mb.T)
+    for name in (GYRO_AXES, ACCEL_AXES, ARM):
+        sensors[:, at[name]] += N[:, at[name]] @ s
+    sensors[:, BA] += N[:, BA] @ s
+    P_b = np.swapaxes(track.C_nb, 1, 2) @ track.P[:, PHI, PHI] @ track.C_nb
+    P = track.P + N @ (_no_less(P_b, variance) - P_b) @ np.swapaxes(N, 1, 2)
+    return replace(track, C_nb=track.C_nb @ dcm_from_rotation_vector(s), sensors=sensors, P=P)
+
+
+def _no_less(P: Array, least: Array) -> Array:
+    """(K, 3, 3) covariances that are no smaller than one (3, 3) in any direction: the least addition."""
+    root = np.linalg.cholesky(least)
+    back = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(back @ P @ back.T)
+    return root @ (vectors * np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2) @ root.T
