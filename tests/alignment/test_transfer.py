@@ -107,7 +107,7 @@ def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
 
 
 def test_an_open_loop_does_not_depend_on_what_it_is_about(flight, ideal):
-    """About a motion 1 mrad and 2 ms off the answer is the same to .02 of its sigma, and from it the prior counts as it was given.
+    """About a motion 1 mrad and 2 ms off, the answer moves by 3 % of that at the most: the prior counts as it was given.
 
     The covariance is that of the linear filter along the true motion, before the turn too, without any attitudes given.
     """
@@ -125,11 +125,12 @@ def test_an_open_loop_does_not_depend_on_what_it_is_about(flight, ideal):
         transfer_filter(slave, master, model, start, matching, Assumed(delay=TAU_TRUE), nominal=about)
         for about in (true, true.corrected(off, mount))
     )
-    apart = rotation_vector_from_dcm(first.C_nb[-1] @ other.C_nb[-1].T) / first.sigma[-1, :3]
-    assert np.abs(apart).max() < 0.02
-    moved = (other.sensors[-1] - first.sensors[-1])[9:] / first.sigma[-1, 9:]
-    assert np.abs(moved).max() < 0.02
-    np.testing.assert_allclose(other.sigma[-1], first.sigma[-1], rtol=0.01)
+    sigma = first.sigma[-1]
+    moved = other.sensors[-1] - first.sensors[-1]
+    moved[:3] = rotation_vector_from_dcm(first.C_nb[-1] @ other.C_nb[-1].T)
+    assert np.abs(off / sigma).max() > 5.0
+    assert np.abs(moved / sigma).max() < 0.03 * np.abs(off / sigma).max()
+    np.testing.assert_allclose(other.sigma[-1], sigma, rtol=0.01)
     R = np.repeat([0.05**2, (2 * ARCMIN) ** 2], 3)
     system = system_of_motion(flight, model, start.P, R, SPAN - 0.1, step=0.1, C_mb=C_mb)
     expected, seen = np.squeeze(kalman(system, history="sigma", innovations=False).sigma), seen_states(model)
