@@ -12,11 +12,12 @@ from tests import recordings
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_delay import find_delay
 from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, axes_along, transfer_filter
+from truenorth.alignment.transfer_nominal import Nominal, found_by
 from truenorth.alignment.transfer_start import parted_clocks
 from truenorth.alignment.transfer_system import seen_states, system_of_motion
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.errors import DataError, UsageError
-from truenorth.errors.master import ARM, DELAY, MasterErrors, TransferModel
+from truenorth.errors.master import ARM, DELAY, MOUNTING, MasterErrors, TransferModel
 from truenorth.filters import kalman
 from truenorth.records import MasterRecord
 from truenorth.records.specs import ImuSpec, imu_spec
@@ -44,6 +45,23 @@ def _start(flight, model, C_mb_true):
     P = model.prior(0.1, 1e-6, 1e-2, 5 * DEG_PER_HOUR, tau=0.05, arm=1.0, mounting=3 * DEG, C_nb=at.C_nb)
     C = at.C_nb @ C_mb_true.T
     return Start.of(State.at(C, at.lat, at.lon, at.alt, at.v_n), P)
+
+
+def test_the_motion_found_begins_where_the_slave_did(flight, ideal):
+    """Led back from the end by ideal gyros: to an arcsec at the start, with what was found of seat and delay."""
+    spec = replace(MASTER, velocity_noise=0.0, attitude_noise=0.0)
+    slave, master = simulate(ideal).record, simulate_sensor(flight, spec, duration=SPAN).record
+    model = TransferModel(1e-7, 1e-6, mounting=True)
+    track = transfer_filter(
+        slave, master, model, _start(flight, model, dcm_from_euler(*MOUNT_TRUE)), Matching(1e-3, 1e-5)
+    )
+    found = found_by(slave, track, model)
+    true = flight.states(np.array(0.0)).C_nb
+    end = rotation_vector_from_dcm(track.C_nb[-1] @ flight.states(track.time[-1]).C_nb.T)
+    np.testing.assert_allclose(rotation_vector_from_dcm(found.C_nb @ true.T), end, atol=ARCMIN / 60.0)
+    for part in (MOUNTING, DELAY):
+        at = model.slice_of(part)
+        np.testing.assert_array_equal(found.values[at], track.sensors[-1, at])
 
 
 def test_without_noise_it_finds_the_truth(flight, ideal):
@@ -86,6 +104,39 @@ def test_its_covariance_is_that_of_the_linear_filter(flight, ideal):
     for at, tolerance in ((5.0, 0.02), (9.0, 0.02), (20.0, 0.005), (30.0, 0.005), (59.0, 0.005)):
         k, j = np.argmin(np.abs(track.time - at)), round(at / 0.1) - 1
         np.testing.assert_allclose(track.sigma[k][seen], expected[j], rtol=tolerance)
+
+
+def test_an_open_loop_does_not_depend_on_what_it_is_about(flight, ideal):
+    """About a motion 1 mrad and 2 ms off, the answer moves by 3 % of that at the most: the prior counts as it was given.
+
+    The covariance is that of the linear filter along the true motion, before the turn too, without any attitudes given.
+    """
+    spec, C_mb = replace(MASTER, lever_arm=(0.0, 0.0, 0.0)), dcm_from_euler(*MOUNT_TRUE)
+    slave, master = simulate(ideal).record, simulate_sensor(flight, spec, duration=SPAN).record
+    model = TransferModel(TACTICAL.gyro_random_walk, TACTICAL.accel_random_walk, mounting=True)
+    start, matching = _start(flight, model, C_mb), Matching(0.05, 2 * ARCMIN)
+    mount, tau = model.slice_of(MOUNTING), model.slice_of(DELAY)
+    values = np.zeros(model.states)
+    values[mount] = rotation_vector_from_dcm(C_mb)
+    true = Nominal(flight.states(np.array(0.0)).C_nb, values, np.inf)
+    off = np.zeros(model.states)
+    off[:3], off[mount], off[tau] = [1e-3, -5e-4, 7e-4], [-5e-4, 1e-3, 3e-4], 2e-3
+    first, other = (
+        transfer_filter(slave, master, model, start, matching, Assumed(delay=TAU_TRUE), nominal=about)
+        for about in (true, true.corrected(off, mount))
+    )
+    sigma = first.sigma[-1]
+    moved = other.sensors[-1] - first.sensors[-1]
+    moved[:3] = rotation_vector_from_dcm(first.C_nb[-1] @ other.C_nb[-1].T)
+    assert np.abs(off / sigma).max() > 5.0
+    assert np.abs(moved / sigma).max() < 0.03 * np.abs(off / sigma).max()
+    np.testing.assert_allclose(other.sigma[-1], sigma, rtol=0.01)
+    R = np.repeat([0.05**2, (2 * ARCMIN) ** 2], 3)
+    system = system_of_motion(flight, model, start.P, R, SPAN - 0.1, step=0.1, C_mb=C_mb)
+    expected, seen = np.squeeze(kalman(system, history="sigma", innovations=False).sigma), seen_states(model)
+    for at in (5.0, 9.0, 20.0, 59.0):
+        k, j = np.argmin(np.abs(first.time - at)), round(at / 0.1) - 1
+        np.testing.assert_allclose(first.sigma[k][seen], expected[j], rtol=0.02)
 
 
 def test_sigmas_are_honest(flight, ideal):

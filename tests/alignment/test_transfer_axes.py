@@ -10,7 +10,6 @@ from truenorth.aiding.matching import matched
 from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_axes import slave_axes
 from truenorth.alignment.transfer_filter import Assumed, Matching, master_aiding
-from truenorth.alignment.transfer_start import as_found
 from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_rotation_vector, rotation_vector_from_dcm, skew
@@ -148,14 +147,14 @@ def test_what_only_was_said_stays_as_it_was_said():
     x, turned = turned_alike(s, C_nb, model)
     P = 1e-12 * np.eye(model.states)
     track = Track(np.zeros(1), turned[None], np.zeros((1, 3)), np.zeros((1, 3)), x[None], P[None], model.layout, ())
-    back = as_said_together(track, model, said, said, True)
+    back = as_said_together(track, model, said, True)
     np.testing.assert_allclose(rotation_vector_from_dcm(back.C_nb[0] @ C_nb.T), 0.0, atol=1e-5)
     np.testing.assert_allclose(back.sensors[0], 0.0, atol=1e-4)  # of 2e-2; to the second order in s
     sigma = 0.5 * DEG
     information = (4.0 / sigma**2 + 1.0 / (3 * DEG) ** 2) * np.eye(3) - skew(ARM) @ skew(ARM) / 0.3**2
     np.testing.assert_allclose(C_nb.T @ back.P[0][:3, :3] @ C_nb, np.linalg.inv(information), rtol=2e-2, atol=1e-8)
     known = replace(model, mounting=False)
-    assert as_said_together(track, known, said, said, True) is track
+    assert as_said_together(track, known, said, True) is track
 
 
 def test_nothing_measured_shows_seat_arm_and_sensors_turned_alike():
@@ -179,28 +178,3 @@ def test_nothing_measured_shows_seat_arm_and_sensors_turned_alike():
         parts.append(np.abs(z).max(axis=0))
     whole, of_attitude = parts
     assert np.all(whole < 5e-3 * of_attitude.max()), (whole, of_attitude)
-
-
-def test_a_pass_begins_with_what_is_known_far_better_than_was_said():
-    """Its mean is no news then; what is known no better is left as it was."""
-    model = TransferModel(mounting=True)
-    before = model.prior(0.1, 0.01, 0.3, 1e-3, mounting=0.05)
-    after = before.copy()
-    mount = model.slice_of("mounting")
-    after[mount, mount] *= 0.04
-    sensors = np.zeros((2, model.states))
-    sensors[-1, mount], sensors[-1, BA] = [0.01, -0.02, 0.03], 0.1
-    track = _Track(model.layout, np.stack([before, after]), sensors)
-    assumed, biases = as_found(track, _Start(before), Assumed(), np.zeros(6))
-    np.testing.assert_allclose(rotation_vector_from_dcm(assumed.C_mb), [0.01, -0.02, 0.03])
-    assert not biases.any()
-
-
-class _Track:
-    def __init__(self, layout, P, sensors):
-        self.layout, self.P, self.sensors = layout, P, sensors
-
-
-class _Start:
-    def __init__(self, P):
-        self.P = P

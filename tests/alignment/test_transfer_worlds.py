@@ -11,9 +11,10 @@ from benchmarks.honesty.transfer import ERRORS, aircraft, ship
 from tests.alignment.test_transfer import ARCMIN, DEG, MASTER, TACTICAL
 from truenorth.aiding.aids import Master
 from truenorth.alignment import align
-from truenorth.alignment.transfer import _colour, align_transfer
+from truenorth.alignment.transfer import align_transfer
 from truenorth.alignment.transfer_answer import _bent
 from truenorth.alignment.transfer_delay import find_delay, runs_backwards
+from truenorth.alignment.transfer_passes import _colour
 from truenorth.alignment.transfer_verdict import _lasting
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm

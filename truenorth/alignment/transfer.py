@@ -12,24 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.matching import FIRST_NOISE, Matched, Translation, What, first_noise, matched
+from truenorth.aiding.matching import FIRST_NOISE, Matched, What, first_noise, matched
 from truenorth.alignment.procedure import HEADING_LIMIT
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import bridged, noise_in
-from truenorth.alignment.transfer_answer import LastPass, assemble_transfer, final_attitudes
+from truenorth.alignment.transfer_answer import LastPass, assemble_transfer
 from truenorth.alignment.transfer_axes import slave_axes
-from truenorth.alignment.transfer_filter import (
-    TRANSLATIONS,
-    Assumed,
-    Linear,
-    Matching,
-    axes_along,
-    by_rows,
-    delay_found,
-    transfer_filter,
-)
+from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching, transfer_filter
+from truenorth.alignment.transfer_passes import found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
-from truenorth.alignment.transfer_start import as_found, common_clock, hand_over, model_from_spec, parted_clocks
+from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.errors import DataError, UsageError
@@ -37,20 +29,17 @@ from truenorth.core.position import Position
 from truenorth.errors.group import Group
 from truenorth.errors.master import DELAY, MasterErrors, TransferModel, own_errors
 from truenorth.errors.master import master_errors as errors_of
-from truenorth.estimate.memory import REOPENED, USED
 from truenorth.estimate.rivals import likelihood_ratio, noise_evidence, wandering_evidence
 from truenorth.estimate.sensor_delay import gyro_delay_evidence
 from truenorth.estimate.warming import warming_rivals
 from truenorth.quality.gnss import master_evidence
 from truenorth.quality.record_evidence import moving_evidence
 from truenorth.quality.rounding import with_rounding
-from truenorth.quality.whiteness import whiteness
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.calibration import Calibration
 from truenorth.records.flexure import FlexureSpec
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import ACCEL_AXES
 from truenorth.state.limits import limit
 from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
@@ -169,24 +158,26 @@ def align_transfer(
     model = _model(spec, said, what, flexure, errors, slave_axes(slave, master, spec, said, what))
     given = {"velocity": velocity_noise, "position": position_noise, "acceleration": acceleration_noise}
     noise, fitted = first_noise(what, {**given, "attitude": attitude_noise})
-    found = _passes(slave, master, model, spec, said, noise, fitted, what.kind, position, tell)
-    noise, linear, assumed, biases = found
+    handed = partial(hand_over, slave, master, model, spec, said, position=position)
+    found = found_in_passes(slave, master, model, handed, said, noise, fitted, what.kind, tell)
+    noise = found.noise
     tell("aligning")
-    part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
+    part, start = handed(noise)
     if part.duration < SHORTEST:
         raise DataError(
             f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
             "`mounting.latency` and the clocks"
         )
     rows = Matching(*noise, what.kind, limit("master's gate"))
-    run = partial(transfer_filter, master=master, matching=rows, assumed=assumed, linear=linear)
+    along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
+    run = partial(along, master=master, matching=rows)
     track = run(part, model=model, start=start)
     seen = _seen(slave, master, errors, C_mb) + _rivals(part, run, track, model, start, spec)
-    seen += shaken_evidence(run, track, part, master, model, start, assumed, linear, what)
-    track = as_said_together(track, model, assumed, said, what.attitude)
+    seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
+    track = as_said_together(track, model, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
     least = FIRST_NOISE[what.kind] if fitted[0] else noise[0]
-    last = LastPass(part, master, model, assumed, start, what, noise, track, carried, least, said)
+    last = LastPass(part, master, model, said, start, what, noise, track, carried, least)
     answer = assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
 
@@ -274,40 +265,6 @@ def _model(
     return replace(model, arm_considered=what.translation == "acceleration")
 
 
-def _passes(
-    slave: ImuRecord,
-    master: MasterRecord,
-    model: TransferModel,
-    spec: ImuSpec,
-    assumed: Assumed,
-    noise: tuple[float, float],
-    fitted: Sequence[bool],
-    kind: Translation,
-    position: Position | None,
-    tell: Callable[[str], None],
-) -> tuple[tuple[float, float], Linear | None, Assumed, Array]:
-    """Passes that fit the noise of the master's rows, and find the attitudes to linearise with, and where to begin."""
-    linear: Linear | None = None
-    biases = np.zeros(6)
-    cheap = ACCEL_AXES in model.groups  # then the first pass begins far from where it ends
-    for number in range(PASSES + cheap):
-        tell(f"pass {number + 1}")
-        part, start = hand_over(slave, master, model, spec, assumed, noise, position, biases)
-        # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
-        velocity = kind == "acceleration" and number == 0
-        rows = Matching(*noise, kind, limit("master's gate") if number > 0 else 0.0)
-        if velocity:
-            rows = Matching(FIRST_NOISE["velocity"], noise[1])
-        track = transfer_filter(part, master, model, start, rows, assumed, linear=linear)
-        noise = noise if velocity else _refitted(track, noise, fitted, kind)
-        begin = linear.begin if linear is not None else delay_found(track) if velocity else None
-        linear = _linear(part, master, track, assumed, begin)
-        if cheap and not any(residuals.jumped.any() for residuals in track.residuals):
-            given = part if master.C_nb is not None and not np.isfinite(noise[1]) else None
-            assumed, biases = as_found(track, start, assumed, biases, given)
-    return noise, linear, assumed, biases
-
-
 def _seen(slave: ImuRecord, master: MasterRecord, errors: MasterErrors, C_mb: Array) -> list[Evidence]:
     """What clocks, positions and samples show; the master's errors are all it has, also those that no row that is matched bears."""
     parted = parted_clocks(slave, master, C_mb)
@@ -340,61 +297,3 @@ def _three(values: Sequence[float], name: str, meaning: str) -> Array:
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise UsageError(f"{name} is {values!r}; expected three finite numbers, {meaning}")
     return array
-
-
-def _linear(
-    slave: ImuRecord,
-    master: MasterRecord,
-    track: Track,
-    assumed: Assumed,
-    begin: tuple[float, float] | None = None,
-) -> Linear:
-    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own."""
-    C_nb = np.full((len(master), 3, 3), np.nan)
-    C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = final_attitudes(slave, track)
-    C_nm = C_nb @ axes_along(track, assumed)[-1].T
-    if master.C_nb is not None:
-        C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
-    tau = track.layout.slice_of(DELAY)
-    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.sensors[-1, tau][0]), begin)
-
-
-def _refitted(
-    track: Track, noise: tuple[float, float], fitted: Sequence[bool], first: Translation
-) -> tuple[float, float]:
-    """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout.
-
-    Where they are coloured (a seat that bends, vibration between the rows), as much as white noise of their density: so many rows
-    tell delay, arm and mounting no better than fewer.
-    """
-    later, said = slice(len(track) // 4, None), by_rows(track)
-    result = list(noise)
-    for kind, (sigma, least) in enumerate(zip(noise, (FIRST_NOISE[first], FIRST_NOISE["attitude"]), strict=True)):
-        if not fitted[kind]:
-            continue
-        columns = slice(3 * kind, 3 * kind + 3)
-        nu, claimed = said.innovation[later, columns], said.sigma[later, columns]
-        if np.isfinite(nu).any():
-            spread = (1.4826 * float(np.nanmedian(np.abs(nu)))) ** 2
-            of_state = max(0.0, float(np.nanmedian(claimed**2)) - sigma**2)
-            used = np.isin(said.verdict[later, kind], (USED, REOPENED))
-            colour = _colour(track.time[later][used], (nu / claimed)[used])
-            result[kind] = max(colour * math.sqrt(max(spread - of_state, 0.0)), LEAST * least)
-    return result[0], result[1]
-
-
-def _colour(time: Array, e: Array) -> float:
-    """By how much a mean of innovations (K, 3), each by its sigma, errs more than one of white ones: the least of all pieces.
-
-    A line is taken off each piece: what drifts, or jumps once, is no noise, and is judged as such.
-    """
-    if len(time) == 0:
-        return 1.0
-    pieces = max(1, int((time[-1] - time[0]) / PIECE))
-    found = []
-    for x in np.array_split(e[:, np.isfinite(e).all(axis=0)], pieces):
-        line = np.column_stack([np.ones(len(x)), np.arange(len(x))])
-        x = x - line @ np.linalg.lstsq(line, x, rcond=None)[0]
-        seen = whiteness(x / max(float(np.sqrt(np.mean(x**2))), 1e-300))
-        found.append(seen.colour if seen.sure else 1.0)
-    return min(found)

@@ -12,33 +12,30 @@ from numpy.typing import NDArray
 from truenorth.aiding.matching import Matched
 from truenorth.alignment.result import Alignment, History
 from truenorth.alignment.transfer_filter import Assumed, MasterRows, axes_along, by_rows
+from truenorth.alignment.transfer_nominal import final_attitudes
 from truenorth.alignment.transfer_result import Relation, Transfer
 from truenorth.alignment.transfer_start import bias_sigmas, misalignment_covariance, sigma_of_mounting
 from truenorth.alignment.transfer_system import seen_states, system_along
 from truenorth.alignment.transfer_verdict import judge_transfer
 from truenorth.analysis.observability import observability
 from truenorth.core.attitude import (
-    dcm_from_quaternion,
     dcm_from_rotation_vector,
     euler_from_dcm,
     euler_sigma,
     rotation_vector_from_dcm,
 )
-from truenorth.core.earth import earth_rate_n, transport_rate_n
 from truenorth.core.position import Position
 from truenorth.errors.master import ARM, ATTITUDE_ERROR, DELAY, MOUNTING, VELOCITY_ERROR, MasterErrors, TransferModel
-from truenorth.estimate.loop import SAME_TIME
 from truenorth.estimate.memory import REJECTED, REOPENED, USED
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.motion import MotionStates
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence
-from truenorth.state.layout import BA, BG, DP, DV, GYRO_AXES, PHI, STATES
+from truenorth.state.layout import BA, BG, DP, DV, PHI, STATES
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments, interval_lengths
-from truenorth.strapdown.inertial_integration import integrate_attitude
 
 Array = NDArray[np.float64]
 
@@ -89,7 +86,6 @@ class LastPass(NamedTuple):
     # m/s: error of the master's velocity that its positions bear, and the slave's velocity with them
     carried: float = 0.0
     least: float = 0.0  # noise of its translation, as given, or what the fit begins with
-    said: Assumed | None = None  # what was assumed at first, where the pass begins with another mounting
 
 
 def assemble_transfer(
@@ -132,9 +128,7 @@ def assemble_transfer(
         source=slave.source,
         transfer=transfer,
     )
-    return judge_transfer(
-        answer, transfer, track, (last.said or assumed, assumed), heading_limit, of_master, last.least
-    )
+    return judge_transfer(answer, transfer, track, assumed, heading_limit, of_master, last.least)
 
 
 def _transfer(last: LastPass, said: MasterRows, notes: tuple[str, ...]) -> Transfer:
@@ -343,26 +337,3 @@ def _history(slave: ImuRecord, track: Track, said: MasterRows, what: Matched) ->
         innovation_of=f"{what.translation or 'attitude'} of the master",
         innovation_unit=UNITS[what.translation],
     )
-
-
-def final_attitudes(slave: ImuRecord, track: Track) -> Array:
-    """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases and axes taken off."""
-    dtheta, _ = increments(slave)
-    axes = track.layout.slice_of(GYRO_AXES)
-    M = np.zeros((3, 3)) if axes is None else track.sensors[-1, axes].reshape(3, 3)
-    dtheta = dtheta - track.sensors[-1, BG] * interval_lengths(slave)[:, None]
-    dtheta = dtheta - dtheta @ M.T
-    # The sample that each row falls into, and how much of it is past by then.
-    ends, steps_of = slave.time, interval_lengths(slave)
-    inside = np.clip(np.searchsorted(ends, track.time - SAME_TIME), 0, len(ends) - 1)
-    part = 1.0 - (ends[inside] - track.time) / steps_of[inside]
-    C_0b = dcm_from_quaternion(integrate_attitude(dtheta)[inside]) @ dcm_from_rotation_vector(
-        part[:, None] * dtheta[inside]
-    )
-    lat, alt, v = track.position[:, 0], track.position[:, 2], track.v_n
-    w_in = earth_rate_n(lat) + transport_rate_n(lat, alt, v)
-    steps = np.diff(track.time, prepend=track.time[0])[:, None]
-    turned = np.cumsum(w_in * steps, axis=0)
-    # Of n against its last orientation; the turn is small enough to be one about one axis.
-    C_last_n = dcm_from_rotation_vector(turned[-1] - turned)
-    return C_last_n @ track.C_nb[-1] @ np.swapaxes(C_0b[-1:], 1, 2) @ C_0b

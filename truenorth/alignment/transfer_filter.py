@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from truenorth.aiding.master_position import MASTER_POSITION
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
+from truenorth.alignment.transfer_nominal import Nominal
 from truenorth.alignment.transfer_turns import KNOWN, MEAN, push_of, shaken, spins_at, turns_at
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
@@ -61,8 +62,6 @@ class Assumed:
     C_mb: Array = field(default_factory=lambda: np.eye(3))  # (3, 3): slave to master axes
     mounting_sigma: float = 0.0  # rad
     heading: float | None = None  # rad; of the slave at the start, where no master gives attitude; else its course
-    # (3,) rad: by which a pass has found the slave turned at the start, from what the rest says, where no states hold its seat
-    tilt: Array = field(default_factory=lambda: np.zeros(3))
 
 
 NOTHING_BETWEEN = Assumed()
@@ -109,8 +108,9 @@ def transfer_filter(
     assumed: Assumed = NOTHING_BETWEEN,
     *,
     linear: Linear | None = None,
+    nominal: Nominal | None = None,
 ) -> Track:
-    """Run the closed loop over two records on one clock.
+    """Run the loop over two records on one clock.
 
     Parameters
     ----------
@@ -125,6 +125,8 @@ def transfer_filter(
     linear : Linear, optional
         Attitudes to linearise with, such as those of an earlier pass. The filter's own corrections, and the noise of the master's
         rows (as much as 1 rad^-2 of information a row), would otherwise give a little false information on mounting and delay.
+    nominal : Nominal, optional
+        The motion to linearise about in an open loop; the start stays the prior. A closed loop when left out.
 
     Raises
     ------
@@ -139,10 +141,12 @@ def transfer_filter(
     values = np.zeros(model.states)
     values[BG], values[BA] = start.gyro_bias, start.accel_bias
     P = start.P.copy()
-    if (axes := model.slice_of(ACCEL_AXES)) is not None:  # gravity on them is a part of the bias
-        values[axes] = P[axes, BA] @ np.linalg.solve(P[BA, BA], start.accel_bias)
     if linear is not None and linear.begin is not None and (tau := model.slice_of(DELAY)) is not None:
         values[tau], P[tau, tau] = linear.begin[0], linear.begin[1] ** 2
+    off = None
+    if nominal is not None:
+        off = nominal.off(start.C_nb, values, model.slice_of(MOUNTING))
+        start, values = replace(start, C_nb=nominal.C_nb), nominal.values
     track = navigate_track(
         slave,
         start,
@@ -151,8 +155,10 @@ def transfer_filter(
         interval=LONGEST_STEP,
         every=0,
         # A poor IMU's attitude that translation alone shows is corrected by degrees, and velocity with it.
-        invariant=ACCEL_AXES in model.groups and not np.isfinite(matching.attitude_sigma),
+        invariant=nominal is None and ACCEL_AXES in model.groups and not np.isfinite(matching.attitude_sigma),
         prior=(P, values),
+        open_until=None if nominal is None else nominal.until,
+        off=off,
     )
     if len(track) == 0:
         raise DataError(
@@ -185,9 +191,8 @@ def master_aiding(
 ) -> list[Aiding]:
     """The master's rows as the loop takes them: its place, its translation, its attitude; what is not matched is left out."""
     count, groups, kind = len(master), model.groups, matching.translation
-    stamps = master.time - assumed.delay
+    stamps, found, place = master.time - assumed.delay, [], None
     patience = max(2, round(matching.patience / master.interval))
-    found, place = [], None
     held = stamps - (0.0 if linear is None else linear.delay)  # when they held, as far as is known
     of_sample = 0.0 if slave is None else model.gyro_random_walk**2 / slave.interval
     own: tuple[float, ...] = (OTHER_NOISE * of_sample, KNOWN)

@@ -9,25 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.in_motion_start import backtracked
 from truenorth.alignment.transfer_delay import WINDOW, find_delay, runs_backwards
 from truenorth.alignment.transfer_filter import Assumed
-from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, euler_from_dcm, rotation_vector_from_dcm
+from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR, radii
 from truenorth.core.errors import DataError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.axes import turning_axes
 from truenorth.errors.group import Group
 from truenorth.errors.ins import TURN_TIME
-from truenorth.errors.master import ATTITUDE_ERROR, MOUNTING, PLACE_SIGMA, MasterErrors, TransferModel
+from truenorth.errors.master import ATTITUDE_ERROR, PLACE_SIGMA, MasterErrors, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.records.interpolation import interpolated
 from truenorth.records.specs import ImuSpec
 from truenorth.state.evidence import Evidence, contradiction
-from truenorth.state.layout import ACCEL_AXES, BA, BG, GYRO_AXES, PHI
+from truenorth.state.layout import ACCEL_AXES, BG, GYRO_AXES, PHI
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
-from truenorth.state.track import Track
 from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
@@ -35,8 +33,6 @@ Array = NDArray[np.float64]
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
-LEVEL = slice(PHI.start, PHI.start + 2)
-BETTER = 4.0  # sigmas: a prior's mean moves what is known so much better by less than a sixteenth of it
 
 
 def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:
@@ -139,8 +135,6 @@ def hand_over(
     assumed: Assumed,
     noise: tuple[float, float],  # (velocity, attitude) m/s and rad: of the master's rows
     position: Position | None,  # where the master gives none
-    biases: Array
-    | None = None,  # (6,) rad/s and m/s^2, of gyros and accelerometers, to begin with; zeros when left out
 ) -> tuple[ImuRecord, Start]:
     """The slave's record from the master's first row on, and its first state as the master gives it.
 
@@ -174,7 +168,7 @@ def hand_over(
     w, f = dtheta[:2].mean(axis=0) / part.interval, dvel[:rows].mean(axis=0) / part.interval
     C_nm = at["C_nb"]
     if C_nm is not None:
-        C = np.asarray(dcm_from_rotation_vector(assumed.tilt) @ C_nm @ assumed.C_mb)
+        C = np.asarray(C_nm @ assumed.C_mb)
         phi = np.full(3, noise[1] if np.isfinite(noise[1]) else math.radians(0.02))
         phi = np.hypot(phi, float(np.linalg.norm(w)) * assumed.delay_sigma)
         if not model.mounting:
@@ -211,42 +205,7 @@ def hand_over(
         C_nb=None if C_nm is None else C,
         C_mb=assumed.C_mb,
     )
-    gyro_bias, accel_bias = np.zeros(6).reshape(2, 3) if biases is None else biases.reshape(2, 3)
-    return part, Start(begin, C, v, lat, lon, alt, gyro_bias, accel_bias, P)
-
-
-def as_found(
-    track: Track, start: Start, assumed: Assumed, biases: Array, part: ImuRecord | None = None
-) -> tuple[Assumed, Array]:
-    """Seat, level and biases (6,) to begin another pass with, where this one found them far better than was said.
-
-    A pass is linear about what it holds at the time. One that begins 3 deg off turns its columns while it learns, and takes that
-    for knowledge of what the motion does not separate: seat, gyros and accelerometers turned alike. What is begun with moves the
-    mean of the prior, which is no news of what is known `BETTER` times as well by the log. Where translation alone is matched the
-    seat is no state, and the slave's level at the start is what its record `part` leads back to: without that, and without
-    corrections that turn velocity, level of a consumer IMU was 3.7 of its sigmas off (RMS of 12 ships, 7.4 at the worst).
-    """
-    P, first, biases = track.P[-1], start.P, biases.copy()
-    found = track.sensors[-1]
-    mount = track.layout.slice_of(MOUNTING)
-    if mount is None:
-        if part is not None and _better(P, first, LEVEL):
-            as_given = dcm_from_rotation_vector(assumed.tilt).T @ start.C_nb
-            tilt = rotation_vector_from_dcm(backtracked(part, track) @ as_given.T)
-            assumed = replace(assumed, tilt=tilt * [1.0, 1.0, 0.0])
-    elif _better(P, first, mount):
-        C_mb = np.asarray(dcm_from_rotation_vector(found[mount]) @ assumed.C_mb)
-        assumed = replace(assumed, C_mb=C_mb)
-    for number, of in enumerate((BG, BA)):
-        if _better(P, first, of):
-            biases[3 * number : 3 * number + 3] = found[of]
-    return assumed, biases
-
-
-def _better(P: Array, before: Array, of: slice) -> bool:
-    """Whether each component is known `BETTER` times as well as before."""
-    now, then = np.linalg.eigvalsh(P[of, of])[-1], np.linalg.eigvalsh(before[of, of])[0]
-    return bool(now * BETTER**2 < then)
+    return part, Start(begin, C, v, lat, lon, alt, np.zeros(3), np.zeros(3), P)
 
 
 def _from_course(master: MasterRecord, assumed: Assumed, f: Array) -> Array:

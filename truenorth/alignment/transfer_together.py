@@ -7,7 +7,8 @@ each before:
     information   sum of squares of derivatives of (M_g, M_a, mu, r), each by its sigma
 
 for a consumer IMU (30 arcmin each) .25 deg. A filter whose columns turn with what it learns takes that turning for knowledge: its
-sigma of heading was .13 deg, and its answer six of these off. So the answer is brought back to where the prior is likeliest along
+sigma of heading was .13 deg, and its answer six of these off. Where a loop is closed (:mod:`truenorth.alignment.transfer_nominal`)
+its columns turn. So the answer is brought back to where the prior is likeliest along
 `s`, which is where a consistent filter would have left it, and its covariance along `s` is no smaller than the prior's.
 
 Source of the defect, and of the remedy's idea: G. Huang, A. Mourikis, S. Roumeliotis, "Observability-based rules for designing
@@ -33,21 +34,21 @@ Array = NDArray[np.float64]
 TURNED = np.stack([skew(e).ravel() for e in np.eye(3)], axis=1)
 
 
-def as_said_together(track: Track, model: TransferModel, assumed: Assumed, said: Assumed, seats: bool) -> Track:
+def as_said_together(track: Track, model: TransferModel, said: Assumed, seats: bool) -> Track:
     """The track with what only the prior says left to the prior; the same one where something shows it.
 
     Parameters
     ----------
-    assumed, said : Assumed
-        What the pass of the track began with, and what was said at first.
+    said : Assumed
+        Besides which the states stand.
     seats : bool
         Attitude is matched: the mounting must be a state then.
     """
     groups = model.groups
     if not {GYRO_AXES, ACCEL_AXES, ARM} <= groups.keys() or (seats and MOUNTING not in groups):
         return track
-    last, C_mb = track.sensors[-1], axes_along(track, assumed)[-1]
-    arm = assumed.lever_arm + last[track.layout.slice_of(ARM)]
+    last, C_mb = track.sensors[-1], axes_along(track, said)[-1]
+    arm = said.lever_arm + last[track.layout.slice_of(ARM)]
     terms = [(TURNED, last[track.layout.slice_of(name)], groups[name].sigma) for name in (GYRO_AXES, ACCEL_AXES)]
     terms.append((skew(arm), arm - said.lever_arm, np.full(3, said.lever_arm_sigma)))
     if MOUNTING in groups:
@@ -57,7 +58,7 @@ def as_said_together(track: Track, model: TransferModel, assumed: Assumed, said:
     J, x = np.vstack([J for J, _ in known]), np.concatenate([x for _, x in known])
     information = J.T @ J
     s = -np.linalg.solve(information, J.T @ x)
-    return _turned(track, model, assumed, s, np.asarray(np.linalg.inv(information), dtype=np.float64))
+    return _turned(track, model, said, s, np.asarray(np.linalg.inv(information), dtype=np.float64))
 
 
 def _turned(track: Track, model: TransferModel, assumed: Assumed, s: Array, variance: Array) -> Track:

@@ -28,19 +28,19 @@ def judge_transfer(
     answer: Alignment,
     transfer: Transfer,
     track: Track,
-    assumed: tuple[Assumed, Assumed],
+    assumed: Assumed,
     heading_limit: float,
     of_master: list[Evidence],
     least: float,
 ) -> Alignment:
     """The answer with its verdict; `of_master` is what was found of the master before, its clock included.
 
-    `assumed` is what was said at first, and what the pass of the track began with; `least` is the noise of its translation that is
+    `assumed` is what was said at first; `least` is the noise of its translation that is
     no surprise: as given, or what the fit begins with.
     """
     evidence = list(of_master)
     evidence += _rejected(transfer)
-    evidence += _misses(transfer, track, *assumed)
+    evidence += _misses(transfer, track, assumed)
     lopsided = _lopsided(track, transfer)
     evidence += [] if lopsided else _lasting(transfer, least)
     if lopsided:
@@ -72,13 +72,13 @@ def _rejected(transfer: Transfer) -> list[Evidence]:
     return [contradiction("transfer.rejected", "transfer_geometry", "flexure", share=share)]
 
 
-def _misses(transfer: Transfer, track: Track, assumed: Assumed, begun: Assumed) -> list[Evidence]:
+def _misses(transfer: Transfer, track: Track, assumed: Assumed) -> list[Evidence]:
     """A delay, an arm or a mounting that comes out far from what was said of it."""
     found = []
     for name, off, prior in (
         ("delay", transfer.delay - assumed.delay, transfer.delay_prior),
         ("lever_arm", transfer.lever_arm - assumed.lever_arm, transfer.lever_arm_prior[0]),
-        ("mounting", _between(assumed.C_mb, axes_along(track, begun)[-1]), transfer.mounting_prior[0]),
+        ("mounting", _between(assumed.C_mb, axes_along(track, assumed)[-1]), transfer.mounting_prior[0]),
     ):
         miss = float(np.max(np.abs(off)))
         if prior > 0.0 and miss > limit("mounting") * prior:

@@ -25,11 +25,14 @@ LITTLE = 0.7  # a pass that moves back by more than this part of the one before 
 BACK = -0.5  # likeness of two steps, from 1 (the same) to -1 (opposite), that go to and fro
 
 
-class Log(Protocol):
+S_co = TypeVar("S_co", covariant=True)
+
+
+class Log(Protocol[S_co]):
     """A log about a nominal solution."""
 
-    def linearise(self) -> LinearSystem:
-        """The system of the errors of the nominal solution."""
+    def linearise(self) -> S_co:
+        """The system of the errors of the nominal solution; or what a loop finds them by, row by row."""
         ...
 
     def correct(self, x: Array) -> None:
@@ -64,6 +67,7 @@ class Filtered:
         return self.estimates.P[-1]
 
 
+S = TypeVar("S")
 E = TypeVar("E", bound=HasState)
 
 
@@ -82,8 +86,8 @@ def in_sigmas(states: slice) -> Callable[[Filtered], float]:
 
 
 def settle(
-    log: Log,
-    estimate: Callable[[LinearSystem], E],
+    log: Log[S],
+    estimate: Callable[[S], E],
     moved: Callable[[E], float],
     *,
     enough: float = CONVERGED,

@@ -172,6 +172,14 @@ def feed_back(s: Any, aux: Any, x: Any, turns: Any) -> None:
 
 
 @borrowing(forceinline=True)
+def keep_apart(known: Any, x: Any) -> None:
+    """Add what was found to the errors that are known and not fed back; the estimate is zero again."""
+    for j in range(len(known)):
+        known[j] += x[j]
+        x[j] = 0.0
+
+
+@borrowing(forceinline=True)
 def set_place(size: Any, m: Memory, now: Any, variance: Any, w: Any) -> None:
     """Put the vehicle where a row of position says (`z`, along east, north, up), its error independent of all others."""
     s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
@@ -181,3 +189,4 @@ def set_place(size: Any, m: Memory, now: Any, variance: Any, w: Any) -> None:
             w.P[_DP + i, j] = 0.0
             w.P[j, _DP + i] = 0.0
         w.P[_DP + i, _DP + i] = variance[i]
+        m.x[_DP + i] = 0.0

@@ -34,6 +34,8 @@ class Setting:
     covariance: bool = True  # carry the covariance; needed for any aiding
     smooth: bool = False  # keep what the smoother needs: of a log in one chunk
     invariant: bool = False  # corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`)
+    # s; before it corrections are not fed back: all is linearised about the motion as the start leads to it. None: they always are
+    open_until: float | None = None
 
     @property
     def grid(self) -> int:

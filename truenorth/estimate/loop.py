@@ -2,7 +2,8 @@
 
 An event is an epoch of the filter's own grid, an epoch of output, or a measurement at any time: the sample in which it
 falls is taken in two parts. A re-timed measurement holds at its stamp less a delay as it is known *now*: when it comes is
-decided as the loop goes. Corrections are fed back at once, so that the error state is zero between events.
+decided as the loop goes. Corrections are fed back at once, so that the error state is zero between events; before a loop is closed
+they are kept apart, and all is linear about the motion that the start leads to.
 
 ``run(task, memory)``: all that the loop knows is in its memory, and samples after the last event stay
 with the caller; handed in again with the next ones, chunks of any size give the bits of one batch.
@@ -19,7 +20,16 @@ from truenorth.aiding.row import AT_LAG
 from truenorth.core.compiled import borrowing, compiled
 from truenorth.core.linalg import copy_corner, load
 from truenorth.errors.invariant import keep_reset, reset
-from truenorth.estimate.correct import damp_height, feed_back, joint_nis, measure, set_place, touched, update_held
+from truenorth.estimate.correct import (
+    damp_height,
+    feed_back,
+    joint_nis,
+    keep_apart,
+    measure,
+    set_place,
+    touched,
+    update_held,
+)
 from truenorth.estimate.memory import (
     ABSENT,
     DISTURB,
@@ -50,7 +60,8 @@ _PHI, _DV = 0, 3
 class Room(NamedTuple):
     """What an event is worked out in.
 
-    `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0); places of `columns` (N,).
+    `F` (N, N), `rate` (n,), `S` (3, 4), `R` (3,), `now`; `Phi`, `Q` since it, or (0, 0); places of `columns` (N,); `s`, `aux`, `x`
+    of an output.
     """
 
     F: Array
@@ -61,6 +72,9 @@ class Room(NamedTuple):
     Phi: Array
     Q: Array
     columns: NDArray[np.int64]
+    s: Array
+    aux: Array
+    x: Array
 
 
 @borrowing(forceinline=True)
@@ -91,6 +105,9 @@ def correct(
         w.R[a, a] = R[a]
         if np.isnan(events.variance[k, a]):
             w.z[a] = np.nan
+        if model.opened:
+            for b in range(len(m.x)):
+                w.z[a] -= w.H[a, b] * m.x[b]
         kept.innovation[number, a] = w.z[a]
     kept.when[number] = time
     columns = room.columns[: touched(w.H, room.columns)]
@@ -133,6 +150,12 @@ def correct(
     if smoothing:
         for b in range(len(m.aux)):
             kept.dx[link, b] = w.x[b]
+    if model.opened:
+        keep_apart(m.x, w.x)
+        if time >= model.until:
+            feed_back(m.s, m.aux, m.x, model.dynamics.turns)
+            set_matrix(m.s, m.sums.C_now)
+        return SOUND
     if model.invariant:
         if smoothing:
             keep_reset(m.s, w.x, link, kept.D)
@@ -143,13 +166,19 @@ def correct(
 
 
 @borrowing(forceinline=True)
-def keep(m: Memory, w: Any, time: float, j: int, kept: Kept) -> None:
-    """Put out the state at an epoch."""
+def keep(m: Memory, model: Model, w: Any, room: Room, time: float, j: int, kept: Kept) -> None:
+    """Put out the state at an epoch, less its known errors."""
+    for a in range(len(m.s)):
+        room.s[a] = m.s[a]
+    for a in range(len(m.aux)):
+        room.aux[a], room.x[a] = m.aux[a], m.x[a]
+    if model.opened:
+        feed_back(room.s, room.aux, room.x, model.dynamics.turns)
     kept.time[j] = time
     for a in range(12):
-        kept.state[j, a] = m.s[a]
+        kept.state[j, a] = room.s[a]
     for a in range(9, len(m.aux)):
-        kept.aux[j, a] = m.aux[a]
+        kept.aux[j, a] = room.aux[a]
     if kept.P.shape[0] > 0:
         copy_corner(w.P, kept.P[j], len(m.aux), len(m.aux))
 
@@ -286,7 +315,7 @@ def go_through(size: Any, task: Task, m: Memory, kept: Kept, w: Any, room: Room)
             keep_link(kept, link, n, Phi, Q)
             link += 1
         if of.output[e] and not (retimed and kept.verdict[number] == ABSENT):
-            keep(m, w, kept.when[number] if retimed else time, j, kept)
+            keep(m, model, w, room, kept.when[number] if retimed else time, j, kept)
             j += 1
         if retimed:
             r += 1
@@ -327,6 +356,9 @@ def run(size: Any, task: Task, m: Memory, kept: Kept) -> Any:
         np.zeros((links, links)),
         np.zeros((links, links)),
         np.zeros(N, dtype=np.int64),
+        np.zeros(len(m.s)),
+        np.zeros(n),
+        np.zeros(n),
     )
     for a in range(links):
         room.Phi[a, a] = 1.0

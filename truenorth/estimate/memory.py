@@ -57,7 +57,10 @@ class Sources(NamedTuple):
 
 
 class Model(NamedTuple):
-    """What of the error model the kernel needs; `spare` (s): an event of the grid so soon after another is passed over."""
+    """What of the error model the kernel needs.
+
+    `spare` (s): an event of the grid so soon after another is passed over; `opened`: no correction is fed back before `until` (s).
+    """
 
     dynamics: Dynamics
     sensors: Integers
@@ -68,6 +71,8 @@ class Model(NamedTuple):
     covariance: bool
     held: bool
     spare: float = 0.0
+    opened: bool = False
+    until: float = 0.0
 
 
 class Task(NamedTuple):
@@ -119,13 +124,15 @@ class Memory(NamedTuple):
     """All that the loop goes on from: with it, chunks of any size give the bits of one batch.
 
     `s` (24,) the state of :mod:`truenorth.strapdown.wander`; `aux` (n,) what is assumed in the places of the states;
-    `P` (n, n) along w; `largest` (n,) variances so far; `sums` since the last event, `means` up to it; `done` (1,) part of
-    the next sample that is taken; `heard` (1,) when the vertical loop was fed; `refused` (S,) rows rejected in a row.
+    `P` (n, n) along w; `x` (n,) errors that are known and not fed back, along w: zeros in a closed loop; `largest` (n,) variances
+    so far; `sums` since the last event, `means` up to it; `done` (1,) part of the next sample that is taken; `heard` (1,) when the
+    vertical loop was fed; `refused` (S,) rows rejected in a row.
     """
 
     s: Array
     aux: Array
     P: Array
+    x: Array
     largest: Array
     sums: Sums
     means: Sums
@@ -136,15 +143,24 @@ class Memory(NamedTuple):
     def copy(self) -> Memory:
         """Arrays of its own."""
         sums, means = (Sums(*(a.copy() for a in part)) for part in (self.sums, self.means))
-        s, aux, P, largest = (a.copy() for a in self[:4])
-        return Memory(s, aux, P, largest, sums, means, self.done.copy(), self.heard.copy(), self.refused.copy())
+        s, aux, P, x, largest = (a.copy() for a in self[:5])
+        return Memory(s, aux, P, x, largest, sums, means, self.done.copy(), self.heard.copy(), self.refused.copy())
 
 
-def memory(s: Array, aux: Array, P: Array, begin: float, sources: int) -> Memory:
-    """At the beginning."""
+def memory(s: Array, aux: Array, P: Array, begin: float, sources: int, x: Array | None = None) -> Memory:
+    """At the beginning; `x` (n,) are errors of the start that are known, along w."""
     n = len(aux)
     sums, means = (Sums(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((4, 3)), np.zeros(1)) for _ in range(2))
     assert len(s) == wander.LENGTH
     return Memory(
-        s, aux, P, np.zeros(n), sums, means, np.zeros(1), np.array([begin]), np.zeros(sources, dtype=np.int64)
+        s,
+        aux,
+        P,
+        np.zeros(n) if x is None else np.array(x, dtype=np.float64),
+        np.zeros(n),
+        sums,
+        means,
+        np.zeros(1),
+        np.array([begin]),
+        np.zeros(sources, dtype=np.int64),
     )

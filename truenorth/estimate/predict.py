@@ -232,6 +232,8 @@ def predict_to_event(
         for i in range(DYNAMIC):
             for j in range(d.first[g], d.first[g] + d.width[g]):
                 w.x[i] += w.Phi[i, j] * aux[j]  # what is assumed of a group that acts is taken off
+    if model.opened:
+        carry(d.pair, w.Phi, m.x, w.a)
     for i in range(n):
         w.Q[i, i] = 0.5 * T * (d.noise[i] + speed * d.wander[i])
     for i in range(9, n):
@@ -265,6 +267,24 @@ def predict_to_event(
     if len(link) > 0:
         propagate_covariance(size, w.Phi, w.Phi_t, w.Q, Q, w.temporary)
     propagate_errors(reach_of(model), d.pair, w.Phi, w.Phi_t, w.Q, w.P, w.temporary, w.t)
+
+
+@borrowing
+def carry(pair: Any, Phi: Any, x: Any, work: Any) -> None:
+    """``x = Phi x``; rows of ``Phi`` behind those of phi, dv and dp hold an element of the diagonal, or of a second-order pair."""
+    n = len(x)
+    for i in range(DYNAMIC):
+        work[i] = 0.0
+        for j in range(n):
+            work[i] += Phi[i, j] * x[j]
+    for v in range(DYNAMIC, n):
+        r = pair[v]
+        if r >= 0:
+            work[v], work[r] = Phi[v, v] * x[v] + Phi[v, r] * x[r], Phi[r, v] * x[v] + Phi[r, r] * x[r]
+        elif r == ALONE:
+            work[v] = Phi[v, v] * x[v]
+    for i in range(n):
+        x[i] = work[i]
 
 
 @borrowing

@@ -53,7 +53,12 @@ NEVER = 2**62  # rows: a jump is never believed
 
 
 def begin(
-    setting: Setting, start: Start, time: float, interval: float, prior: tuple[Array, Array] | None = None
+    setting: Setting,
+    start: Start,
+    time: float,
+    interval: float,
+    prior: tuple[Array, Array] | None = None,
+    off: Array | None = None,
 ) -> LoopState:
     """A loop at the beginning of its first sample.
 
@@ -67,6 +72,8 @@ def begin(
         Nominal, of the samples.
     prior : (P, values), optional
         Covariance (n, n), ENU, and assumed values (n,) of all states; from the start and the groups when left out.
+    off : (n,) array, optional
+        Errors of start and values that are known, ENU, none of position: what an open loop is about is not what is likeliest.
     """
     model = setting.model
     n = model.states
@@ -95,7 +102,7 @@ def begin(
     nothing = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, width)), np.zeros((0, 3)))
     empty = Samples(np.zeros(0), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
     state = LoopState(
-        memory(s, aux, P0[0], time, len(setting.sources)),
+        memory(s, aux, P0[0], time, len(setting.sources), off),
         empty,
         0,
         0,
@@ -171,6 +178,8 @@ def navigate_track(
     smooth: bool = False,
     invariant: bool = False,
     prior: tuple[Array, Array] | None = None,
+    open_until: float | None = None,
+    off: Array | None = None,
 ) -> Track:
     """Mechanise a log from a start, aided by measurements.
 
@@ -192,11 +201,15 @@ def navigate_track(
         Corrections turn velocity with attitude (:mod:`truenorth.errors.invariant`): for starts with a heading that is far off.
     prior : (P, values), optional
         Of all states, see :func:`begin`.
+    open_until : float, optional, s
+        Before it no correction is fed back: all is linear about the motion that the start leads to, less whose errors the track is.
+    off : (n,) array, optional
+        Of an open loop, see :func:`begin`.
 
     Raises
     ------
     UsageError
-        Smoothing with a vertical loop, of considered states or of re-timed measurements.
+        Smoothing with a vertical loop, of considered states or of re-timed measurements; an open loop with any such option.
     DataError
         The filter broke down (see :func:`truenorth.filters.kalman`).
     """
@@ -204,11 +217,13 @@ def navigate_track(
         raise UsageError("a vertical loop has fixed gains and cannot be smoothed; expected a Kalman gain (no loop)")
     if smooth and (any(g.considered for g in model.groups) or any(source.retimed for source in aiding)):
         raise UsageError("considered states and re-timed measurements are not smoothed; expected smooth=False")
+    if open_until is not None and (smooth or invariant or any(source.loop > 0.0 for source in aiding)):
+        raise UsageError("an open loop feeds nothing back; expected no smooth, no invariant, no vertical loop")
     steps = interval_lengths(record)
     time = float(record.time[0] - steps[0])
     stride = max(1, round(interval * len(record) / (record.time[-1] - time)))
-    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant)
-    state, tracks = begin(setting, start, time, record.interval, prior), []
+    setting = Setting(model, tuple(aiding), stride, every, covariance or bool(aiding), smooth, invariant, open_until)
+    state, tracks = begin(setting, start, time, record.interval, prior, off), []
     for rows in [slice(0, len(record))] if smooth else row_blocks(len(record)):
         part = ImuRows(record.time[rows], record.gyro[rows], record.accel[rows], record.kind, record.source)
         state, track = go_on(setting, state, part, last=rows.stop == len(record))
@@ -252,6 +267,8 @@ def _run(setting: Setting, state: LoopState, last: bool) -> tuple[LoopState, Tra
         setting.covariance,
         any(group.considered for group in model.groups),
         setting.spare(state.interval),
+        setting.open_until is not None,
+        setting.open_until or 0.0,
     )
     seen = kernel_sources(sources, model)
     task = Task(state.samples, state.taken, Events(*plan), Events(*late), seen, of_model, horizon)

@@ -1,0 +1,197 @@
+"""The passes of a transfer alignment: they fit the noise of the master's rows, and lead to the motion to linearise about.
+
+The first two are closed loops, which find their way from a start that is off by degrees. Those after them are open loops about what
+the pass before has found (:mod:`truenorth.alignment.transfer_nominal`), until they find nothing new.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.aiding.matching import FIRST_NOISE, Translation
+from truenorth.alignment.transfer_filter import (
+    Assumed,
+    Linear,
+    Matching,
+    axes_along,
+    by_rows,
+    delay_found,
+    transfer_filter,
+)
+from truenorth.alignment.transfer_nominal import Nominal, final_attitudes, found_by
+from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
+from truenorth.estimate.batch import settle
+from truenorth.estimate.memory import REOPENED, USED
+from truenorth.quality.whiteness import whiteness
+from truenorth.records import ImuRecord, MasterRecord
+from truenorth.state.layout import PHI
+from truenorth.state.limits import limit
+from truenorth.state.state import Start
+from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
+
+CLOSED = 2  # passes of a closed loop
+MOST = 8  # open ones
+SETTLED = 0.3  # of a sigma: a pass that moves attitude, arm, delay and seat by less is the last
+PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
+LEAST = 0.1  # of the noise to begin with: less is not believed
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the passes lead to."""
+
+    noise: tuple[float, float]  # of translation and attitude of the master's rows
+    linear: Linear
+    nominal: Nominal
+    left: float = 0.0  # sigmas that the last pass has still moved what it found by
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """An open loop about a motion, and how far off it found that to be."""
+
+    track: Track
+    end: Array  # (n,) errors of the motion, as led back to the start
+
+    @property
+    def moved(self) -> float:
+        """The largest of attitude, arm, delay and seat in units of its sigma."""
+        layout, sigma = self.track.layout, self.track.sigma[-1]
+        parts = (PHI, *(part for name in (DELAY, ARM, MOUNTING) if (part := layout.slice_of(name)) is not None))
+        known = np.concatenate([np.arange(part.start, part.stop) for part in parts])
+        known = known[sigma[known] > 0.0]
+        return float(np.max(np.abs(self.end[known]) / sigma[known]))
+
+
+class _Log:
+    """Two logs, and the motion that they are linearised about: the loop does it row by row."""
+
+    def __init__(self, nominal: Nominal, mounting: slice | None) -> None:
+        self.nominal, self.mounting = nominal, mounting
+
+    def linearise(self) -> Nominal:
+        """The motion."""
+        return self.nominal
+
+    def correct(self, x: Array) -> None:
+        """Take what was found off it."""
+        self.nominal = self.nominal.corrected(x, self.mounting)
+
+
+def found_in_passes(
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    handed: Callable[[tuple[float, float]], tuple[ImuRecord, Start]],
+    assumed: Assumed,
+    noise: tuple[float, float],
+    fitted: Sequence[bool],
+    kind: Translation,
+    tell: Callable[[str], None],
+) -> Found:
+    """Passes that fit the noise of the master's rows, and find the motion to linearise about.
+
+    Parameters
+    ----------
+    handed : callable
+        The slave's record and its start, by the noise of the rows.
+    fitted : two of bool
+        Whether each noise is to be fitted.
+    """
+    linear: Linear | None = None
+    passes = 0
+
+    def once(nominal: Nominal | None) -> Track:
+        nonlocal noise, linear, passes
+        tell(f"pass {passes + 1}")
+        part, start = handed(noise)
+        # Of an acceleration the columns must be known at the right time: the first look at the delay is by velocity.
+        velocity = kind == "acceleration" and passes == 0
+        rows = Matching(*noise, kind, limit("master's gate") if passes > 0 else 0.0)
+        if velocity:
+            rows = Matching(FIRST_NOISE["velocity"], noise[1])
+        track = transfer_filter(part, master, model, start, rows, assumed, linear=linear, nominal=nominal)
+        noise = noise if velocity else _refitted(track, noise, fitted, kind)
+        begin = linear.begin if linear is not None else delay_found(track) if velocity else None
+        linear = _linear(part, master, track, assumed, begin)
+        passes += 1
+        return track
+
+    for _ in range(CLOSED):
+        track = once(None)
+    part, mounting = handed(noise)[0], model.slice_of(MOUNTING)
+    log = _Log(found_by(part, track, model), mounting)
+
+    def open_loop(nominal: Nominal) -> _Pass:
+        track = once(nominal)
+        led_back = found_by(part, track, model)
+        return _Pass(track, nominal.off(led_back.C_nb, led_back.values, mounting))
+
+    last = settle(log, open_loop, lambda found: found.moved, enough=SETTLED, most=MOST)
+    assert linear is not None
+    return Found(noise, linear, log.nominal.corrected(last.found.end, mounting), last.moved)
+
+
+def _linear(
+    slave: ImuRecord,
+    master: MasterRecord,
+    track: Track,
+    assumed: Assumed,
+    begin: tuple[float, float] | None = None,
+) -> Linear:
+    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own."""
+    C_nb = np.full((len(master), 3, 3), np.nan)
+    C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = final_attitudes(slave, track)
+    C_nm = C_nb @ axes_along(track, assumed)[-1].T
+    if master.C_nb is not None:
+        C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
+    tau = track.layout.slice_of(DELAY)
+    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.sensors[-1, tau][0]), begin)
+
+
+def _refitted(
+    track: Track, noise: tuple[float, float], fitted: Sequence[bool], first: Translation
+) -> tuple[float, float]:
+    """Noise by which the innovations of the later three quarters have the spread that the filter says, medians throughout.
+
+    Where they are coloured (a seat that bends, vibration between the rows), as much as white noise of their density: so many rows
+    tell delay, arm and mounting no better than fewer.
+    """
+    later, said = slice(len(track) // 4, None), by_rows(track)
+    result = list(noise)
+    for kind, (sigma, least) in enumerate(zip(noise, (FIRST_NOISE[first], FIRST_NOISE["attitude"]), strict=True)):
+        if not fitted[kind]:
+            continue
+        columns = slice(3 * kind, 3 * kind + 3)
+        nu, claimed = said.innovation[later, columns], said.sigma[later, columns]
+        if np.isfinite(nu).any():
+            spread = (1.4826 * float(np.nanmedian(np.abs(nu)))) ** 2
+            of_state = max(0.0, float(np.nanmedian(claimed**2)) - sigma**2)
+            used = np.isin(said.verdict[later, kind], (USED, REOPENED))
+            colour = _colour(track.time[later][used], (nu / claimed)[used])
+            result[kind] = max(colour * math.sqrt(max(spread - of_state, 0.0)), LEAST * least)
+    return result[0], result[1]
+
+
+def _colour(time: Array, e: Array) -> float:
+    """By how much a mean of innovations (K, 3), each by its sigma, errs more than one of white ones: the least of all pieces.
+
+    A line is taken off each piece: what drifts, or jumps once, is no noise, and is judged as such.
+    """
+    if len(time) == 0:
+        return 1.0
+    pieces = max(1, int((time[-1] - time[0]) / PIECE))
+    found = []
+    for x in np.array_split(e[:, np.isfinite(e).all(axis=0)], pieces):
+        line = np.column_stack([np.ones(len(x)), np.arange(len(x))])
+        x = x - line @ np.linalg.lstsq(line, x, rcond=None)[0]
+        seen = whiteness(x / max(float(np.sqrt(np.mean(x**2))), 1e-300))
+        found.append(seen.colour if seen.sure else 1.0)
+    return min(found)
