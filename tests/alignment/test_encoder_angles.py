@@ -99,7 +99,7 @@ def test_an_encoder_of_five_hertz_and_a_log_that_ends_in_a_slew(said):
     plain = tn.imu_spec("tactical")
     spec = ImuSpec(
         gyro_bias=plain.gyro_bias, gyro_random_walk=plain.gyro_random_walk,
-        accel_bias=0.1 * plain.accel_bias, accel_random_walk=plain.accel_random_walk,
+        accel_bias=plain.accel_bias, accel_random_walk=plain.accel_random_walk,
     )  # fmt: skip
     record, encoder, place, C_nb = indexed(spec, 7)
     answer = tn.align(record, place, said if said is None else spec, aid=tn.Indexer(encoder, axes=("z",)))
@@ -113,7 +113,7 @@ def test_a_gyro_bias_of_many_degrees_an_hour_is_no_turn_of_the_base():
     plain = tn.imu_spec("industrial")
     spec = ImuSpec(
         gyro_bias=plain.gyro_bias, gyro_random_walk=plain.gyro_random_walk,
-        accel_bias=0.1 * plain.accel_bias, accel_random_walk=plain.accel_random_walk,
+        accel_bias=plain.accel_bias, accel_random_walk=plain.accel_random_walk,
     )  # fmt: skip
     record, encoder, place, C_nb = indexed(spec, 8)
     turn = 1.5 * NET_TURN / (record.duration * 2.0 / 3.0)

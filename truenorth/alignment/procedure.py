@@ -159,7 +159,8 @@ def align_base(
     answer = replace(found.answer, method=chosen, method_reason=why)
     fitted = chosen == "swaying" or turned
     moves = None if fitted and _explained(task.motion, found) else _moves_from(task.motion)
-    evidence = record_evidence(task.record, task.motion, sound=sound) + leaves(moves)
+    biased = math.sqrt(float(answer.imu.bias_variance[3:].max()))
+    evidence = record_evidence(task.record, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)

@@ -163,11 +163,7 @@ def align_transfer(
     noise = found.noise
     tell("aligning")
     part, start = handed(noise)
-    if part.duration < SHORTEST:
-        raise DataError(
-            f"{slave.source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
-            "`mounting.latency` and the clocks"
-        )
+    _check_length(part, slave.source)
     rows = Matching(*noise, what.kind, limit("master's gate"))
     along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
     run = partial(along, master=master, matching=rows)
@@ -180,6 +176,21 @@ def align_transfer(
     last = LastPass(part, master, model, said, start, what, noise, track, carried, least)
     answer = assemble_transfer(last, spec, where, (*notes, *master.notes), heading_limit, seen)
     return answer if position is None or master.lat is not None else _known_as_well_as(position, answer)
+
+
+def _check_length(part: ImuRecord, source: str) -> None:
+    """Enough in common with the master.
+
+    Raises
+    ------
+    DataError
+        Too little.
+    """
+    if part.duration < SHORTEST:
+        raise DataError(
+            f"{source}: {part.duration:.1f} s in common with the master; at least {SHORTEST:g} s are needed: check "
+            "`mounting.latency` and the clocks"
+        )
 
 
 def _errors(master: MasterRecord, given: MasterErrors | str | None) -> MasterErrors:

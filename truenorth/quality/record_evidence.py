@@ -31,6 +31,7 @@ def record_evidence(
     C_sb: Callable[[Array], Array] | None = None,
     *,
     sound: bool = False,
+    accel_bias: float = 0.0,
 ) -> list[Evidence]:
     """Evidence of a record on a base that stays where it is.
 
@@ -42,6 +43,8 @@ def record_evidence(
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
     sound : bool
         Whether clock, logging and range are known to be without fault, and the units and axes of the gyros.
+    accel_bias : float, m/s^2
+        One sigma: where the IMU turns it passes for gravity that turns.
     """
     found = [] if sound else sampling_evidence(record, turns=motion.overall not in QUIET)
     doubts = unit_findings(record, motion, gyros=not sound)
@@ -53,7 +56,7 @@ def record_evidence(
     if quiet:  # its attitude is a mean, not integrated to the last row
         return found
     found += vibration_evidence(record)
-    tilt = check_tilt(record, C_sb)
+    tilt = check_tilt(record, C_sb, accel_bias)
     return found if tilt is None else found + tilt.evidence()
 
 

@@ -143,13 +143,15 @@ class Tilt:
         return bool(np.count_nonzero(shown) > 1)
 
 
-def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) -> Tilt | None:
+def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, accel_bias: float = 0.0) -> Tilt | None:
     """Try all readings of the gyros on the middle of a record.
 
     Parameters
     ----------
     C_sb : callable, optional
         Attitude (K, 3, 3) of the base in the IMU at times (s): of an IMU that turns on it.
+    accel_bias : float, m/s^2
+        One sigma.
 
     Returns
     -------
@@ -160,7 +162,9 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None) 
     if cells is None:
         return None
     theta, force, interval, middle = cells
-    bench = TiltBench(force, interval, None if C_sb is None else C_sb(middle.ravel()).reshape(*middle.shape, 3, 3))
+    bench = TiltBench(
+        force, interval, None if C_sb is None else C_sb(middle.ravel()).reshape(*middle.shape, 3, 3), accel_bias
+    )
     turned = np.cumsum(theta - theta.mean(axis=1, keepdims=True), axis=1)
     turns = np.sqrt(np.mean(turned**2, axis=(0, 1)))
     if float(np.linalg.norm(turns)) < LEAST_TURN:

@@ -20,8 +20,8 @@ EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
 class TiltBench:
     """Specific force (P, L, 3) of pieces, and what readings of the gyros leave of it."""
 
-    def __init__(self, force: Array, interval: float, C_sb: Array | None) -> None:
-        self.force, self.interval, self.C_sb = force, interval, C_sb
+    def __init__(self, force: Array, interval: float, C_sb: Array | None, accel_bias: float = 0.0) -> None:
+        self.force, self.interval, self.C_sb, self.accel_bias = force, interval, C_sb, accel_bias
         self.basis = _line(force.shape[1])
 
     def carried(self, theta: Array) -> tuple[Array, Array]:
@@ -51,7 +51,8 @@ class TiltBench:
     def small(self, theta: Array) -> tuple[Array, Array]:
         """(7,) a small delay of the gyros, s, errors of their scale factors, delays by turns about each axis; and one-sigmas.
 
-        The base's own motion is in these, and what a single piece alone shows has no small one.
+        The base's own motion is in these, and what a single piece alone shows has no small one. So is a bias of the accelerometers:
+        in axes that do not turn it turns with the IMU, as gravity does in the IMU's, and passes for gyros that turn too far.
         """
         flat, C = self.carried(theta)
         up = (C @ self.force[..., None])[..., 0]
@@ -62,8 +63,9 @@ class TiltBench:
         # Gyros that are late have not turned yet.
         late = [self.freed(-rate[..., i, None] * np.cross(AXES[i], up)).ravel() for i in range(3)]
         scale = [self.freed(np.cross(angle[..., i], up)).ravel() for i in range(3)]
-        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale])
-        of_each = _by_pieces(len(theta), flat, [*late, *scale])
+        biased = self.accel_bias * self.freed(C).reshape(-1, 3)
+        of_all = _by_pieces(len(theta), flat, [late[0] + late[1] + late[2], *scale], biased)
+        of_each = _by_pieces(len(theta), flat, [*late, *scale], biased)
         off, sigma = (np.append(whole[:4], each[:3]) for whole, each in zip(of_all, of_each, strict=True))
         return off, sigma
 
@@ -78,8 +80,11 @@ class TiltBench:
         return float(np.sqrt(np.mean(np.sum(theta / self.interval * up, axis=-1) ** 2)))
 
 
-def _by_pieces(pieces: int, flat: Array, columns: list[Array]) -> tuple[Array, Array]:
-    """Sizes of columns (P L 3,) that explain the force best, with the best arm, and one-sigmas by leaving out piece after piece."""
+def _by_pieces(pieces: int, flat: Array, columns: list[Array], biased: Array) -> tuple[Array, Array]:
+    """Sizes of columns (P L 3,) that explain the force best, with the best arm; one-sigmas by leaving out piece after piece.
+
+    `biased` (P L 3, 3) is what a bias of one sigma along each axis makes of the force: what the columns take of it is in sigma.
+    """
     A = np.column_stack([*columns, flat[:, 1:]])
     scale = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
     parts = (A / scale).reshape(pieces, -1, len(scale))
@@ -91,6 +96,8 @@ def _by_pieces(pieces: int, flat: Array, columns: list[Array]) -> tuple[Array, A
     whole, right = squares.sum(axis=0), products.sum(axis=0)
     without = solved(whole - squares, right - products)
     variance = (pieces - 1) / pieces * np.sum((without - without.mean(axis=0)) ** 2, axis=0)
+    taken = np.linalg.pinv(whole, rcond=1e-9, hermitian=True) @ ((A / scale).T @ biased)
+    variance += np.sum(taken**2, axis=1)
     count = len(columns)
     return solved(whole, right)[:count] / scale[:count], np.sqrt(variance[:count]) / scale[:count]
 
