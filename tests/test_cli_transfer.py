@@ -52,7 +52,9 @@ def test_sigma_is_absolute_where_the_master_s_own_errors_are_given(logs):
     alone, tactical, poor = found.values()
     assert alone["sigma_is"] == "relative to the master"
     assert tactical["sigma_is"] == poor["sigma_is"] == "absolute"
-    assert alone["heading_sigma_deg"] < 0.9 * tactical["heading_sigma_deg"] < 0.9 * poor["heading_sigma_deg"]
+    # A master without errors of velocity shows the slave's heading by its accelerations, however poor its own heading is.
+    assert alone["heading_sigma_deg"] < 0.9 * min(tactical["heading_sigma_deg"], poor["heading_sigma_deg"])
+    assert poor["heading_sigma_deg"] < 1.0
     result = CliRunner().invoke(app, ["align", slave, "--master", master, "--master-sigma", "tactical"])
     assert "sigma is absolute" in result.stdout
 
