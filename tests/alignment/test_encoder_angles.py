@@ -1,11 +1,21 @@
 """Angles of an indexer between an encoder's rows: the gyros see a slew as it is; what remains is the body's own turn."""
 
+from dataclasses import dataclass
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import truenorth as tn
+from truenorth.alignment import rotary
 from truenorth.alignment.encoder_angles import angles_at, carried_angles
-from truenorth.core.attitude import dcm_from_euler, misalignment, rotation_vector_from_dcm
+from truenorth.alignment.fine import CoarseStart
+from truenorth.core.attitude import (
+    dcm_from_euler,
+    dcm_from_rotation_vector,
+    misalignment,
+    rotation_vector_from_dcm,
+)
 from truenorth.core.earth import normal_gravity
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.quality.encoder import NET_TURN
@@ -123,3 +133,32 @@ def test_a_gyro_bias_of_many_degrees_an_hour_is_no_turn_of_the_base():
     assert not any(item.key == "encoder.drifts" for item in answer.evidence)
     off = misalignment(answer.C_nb, C_nb) / np.sqrt(np.diag(answer.phi_covariance))
     assert np.abs(off).max() < 4.0
+
+
+@dataclass
+class Fitted:
+    """A fit of this likelihood that ended at a heading."""
+
+    heading: float
+    likelihood: float
+
+    @property
+    def estimates(self):
+        return SimpleNamespace(log_likelihood=self.likelihood)
+
+    def misalignment_at(self, C, time):
+        return dcm_from_rotation_vector([0.0, 0.0, -self.heading]) @ C, None, None
+
+
+@pytest.mark.parametrize(("ratio", "unsure"), [(166.0, 0.0), (3.0, 2.0)])
+def test_of_fits_from_headings_all_round_the_likeliest_counts(monkeypatch, ratio, unsure):
+    """Where another is as likely, its heading is in sigma; gyros that see the earth turn fit once."""
+    ends = iter([Fitted(1.0, 50.0 - 0.5 * ratio), Fitted(-1.0, 50.0), *4 * [Fitted(1.0, 50.0 - 0.5 * ratio)]])
+    monkeypatch.setattr(rotary, "sway_align", lambda start, mount, turned: next(ends))
+    start = CoarseStart(None, np.eye(3), None, None, None, 0.1, None)
+    found, off = rotary._from_headings(start, None, tn.imu_spec("industrial"), 0.6)
+    assert found.heading == -1.0
+    assert off == pytest.approx(unsure)
+    ends = iter([Fitted(1.0, 10.0)])
+    found, off = rotary._from_headings(start, None, tn.imu_spec("tactical"), 0.6)
+    assert (found.heading, off) == (1.0, 0.0)

@@ -34,6 +34,8 @@ from truenorth.alignment.task import Task, bridged, make_task, noise_in
 from truenorth.alignment.turning import infer_turning
 from truenorth.alignment.verdict import base_speed, grown, judged, model_evidence
 from truenorth.coarse import oba
+from truenorth.core.attitude import dcm_from_rotation_vector, misalignment
+from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, DataError, UsageError
 from truenorth.core.indexing import C_bs_from_angles
 from truenorth.core.position import Position
@@ -43,6 +45,7 @@ from truenorth.quality.record_evidence import record_evidence
 from truenorth.records import EncoderRecord, ImuRecord
 from truenorth.records.specs import ImuSpec, imu_spec
 from truenorth.state.evidence import Effect, Evidence, notes
+from truenorth.state.limits import limit
 from truenorth.strapdown.inertial import InertialIntegrals, earth_rotation, integrate
 
 Array = NDArray[np.float64]
@@ -51,6 +54,8 @@ SHORTEST = 60.0  # s: below that sway cannot be separated from tilt
 KNOWN_ARM = 0.1  # m, one sigma along each axis of an arm that was measured
 OFFSET = 0.01  # m, one sigma along each of its axes: of an IMU from the axes of its indexer
 INDEXER_METHODS = ("auto", "swaying", *FADING)
+BLIND = 0.3  # of the earth's level rate: a gyro's bias of more may turn a coarse heading by 20 deg and more
+HEADINGS = 6  # all round
 OFF_AXIS = math.radians(0.5)  # of a body that is said to be still, and an indexer of two axes
 
 
@@ -140,9 +145,9 @@ def align_rotary(
     start = CoarseStart(record, C_n0_i, position, StaticModel.of(spec), P_bias, task.interval, rows)
     if own in FADING:
         arm = _arm_velocity(record, encoder, axes, mount.arm, task.interval)
-        fine: FineAlignment = faded_align(start, own, arm)
+        fine, unsure = faded_align(start, own, arm), 0.0
     else:
-        fine = sway_align(start, mount, _turned(spec))
+        fine, unsure = _from_headings(start, mount, spec, position.lat)
     source = "inferred from the noise of the log" if given is None else f"specification {spec.name!r}"
     answer = answer_of(task, fine, spec, source, P_bias, sways=True)
 
@@ -165,9 +170,29 @@ def align_rotary(
         method=own,
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
-    answer = grown(answer, Effect(heading=angle_sigma, level=angle_sigma))
+    answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
     evidence = _of_encoder(record, encoder, axes, task, spec) + _of_filter(answer, fine, spec, task)
     return judged(answer, evidence, heading_limit)
+
+
+def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) -> tuple[FineAlignment, float]:
+    """The likeliest fine alignment, and how far another one of a like likelihood is off in heading, rad.
+
+    Gyros with a bias of the earth's rate show no coarse heading: turned about by the indexer they find it, but from a heading that
+    is too far off a wrong one (likelihood ratio 166, 131 deg). So the fit begins at headings all round.
+    """
+    turned = _turned(spec)
+    if math.sqrt(float(spec.bias_variance[:3].max())) < BLIND * EARTH_RATE * math.cos(lat):
+        return sway_align(start, mount, turned), 0.0
+    found = [
+        sway_align(start._replace(C_n0_i=dcm_from_rotation_vector([0.0, 0.0, h]) @ start.C_n0_i), mount, turned)
+        for h in np.linspace(0.0, 2.0 * math.pi, HEADINGS, endpoint=False)
+    ]
+    likely = np.array([2.0 * float(fine.estimates.log_likelihood) for fine in found])
+    best = int(np.argmax(likely))
+    level = [fine.misalignment_at(np.eye(3), 0.0)[0] for fine in found]
+    off = [abs(float(misalignment(C, level[best])[2])) for C in level]
+    return found[best], max(x for x, ratio in zip(off, likely[best] - likely, strict=True) if ratio < limit("rival"))
 
 
 def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task) -> list[Evidence]:
