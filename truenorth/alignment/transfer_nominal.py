@@ -66,9 +66,9 @@ class Nominal:
 
 
 def found_by(slave: ImuRecord, track: Track, model: Walks) -> Nominal:
-    """The motion that a track leads back to, from where the slave's gyros still tell it well."""
+    """The motion that a track leads back to, from as late as the slave's gyros carry an attitude well."""
     begin = float(slave.time[0] - slave.steps[0])
-    until = begin + _told(model.gyro_random_walk, model.gyro_rate_walk, float(slave.time[-1]) - begin)
+    until = begin + _carried_for(model.gyro_random_walk, model.gyro_rate_walk, float(slave.time[-1]) - begin)
     last = max(1, int(np.searchsorted(track.time, until)))
     values = np.zeros(track.sensors.shape[1])
     for part in (BG, BA):
@@ -79,7 +79,7 @@ def found_by(slave: ImuRecord, track: Track, model: Walks) -> Nominal:
     return Nominal(_led_back(slave, track[:last])[1], values, until)
 
 
-def _told(walk: float, rate_walk: float, longest: float) -> float:
+def _carried_for(walk: float, rate_walk: float, longest: float) -> float:
     """How long, s, gyros (rad/sqrt(s), rad/s/sqrt(s)) carry an attitude before their noise is `LINEAR`; `longest` at the most."""
     t = np.linspace(0.0, longest, 1001)
     return float(t[np.searchsorted(walk**2 * t + rate_walk**2 * t**3 / 3.0, LINEAR**2, side="right") - 1])

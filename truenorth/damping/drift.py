@@ -42,7 +42,7 @@ DOUBT = math.log(2.0)  # one sigma of the logarithm of the size
 # Of log-likelihood, by which a faster walk may be less likely than a slower one and is taken all the same:
 AS_LIKELY = 0.5  # one sigma
 AS_LIKELY_APART = 2.0  # two: few rows say little
-TOLD_APART = 8.0  # four sigmas, between the slowest walk and the fastest: rows that say less do not count
+DISTINCT = 8.0  # four sigmas, between the slowest walk and the fastest: rows that say less do not count
 
 
 def likely_drift(course: Track, reference: Array, start: int, kind: Filter, given: LogErrors) -> LogErrors:
@@ -74,7 +74,7 @@ def likely_drift(course: Track, reference: Array, start: int, kind: Filter, give
             return found[str(pair)].likelihood - 0.5 * doubt**2
 
         most = max(map(weighed, pairs))
-        if seen and most - min(map(weighed, pairs)) < TOLD_APART:
+        if seen and most - min(map(weighed, pairs)) < DISTINCT:
             return seen
         return max((pair for pair in pairs if weighed(pair) >= most - slack), key=lambda p: (_walk(p), weighed(p)))
 
