@@ -103,6 +103,11 @@ def indexed(spec, seed, still=900.0, rate=50.0):
     )
 
 
+def test_angles_of_one_axis_may_be_a_column():
+    angles = np.linspace(0.0, 1.0, 5)
+    assert np.array_equal(EncoderRecord(np.arange(5.0), angles[:, None]).angles, angles)
+
+
 @pytest.mark.parametrize("said", ["tactical", None])
 def test_an_encoder_of_five_hertz_and_a_log_that_ends_in_a_slew(said):
     """Level and heading hold as sigma says; no scale factor is made of the noise of an accelerometer."""

@@ -22,7 +22,7 @@ class EncoderRecord(Record):
     time : (N,) array, s
         Strictly increasing.
     angles : (N, A) array, rad
-        Of A axes, (N,) of a single one; turns are counted, so that an angle can be interpolated.
+        Of A axes, (N,) or (N, 1) of a single one, kept as (N,); turns are counted, so that an angle can be interpolated.
     source : str
 
     Raises
@@ -34,6 +34,11 @@ class EncoderRecord(Record):
     time: Array
     angles: Array
     source: str = field(default="encoder record", compare=False)
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.angles) == 2 and np.shape(self.angles)[1] == 1:
+            object.__setattr__(self, "angles", np.asarray(self.angles)[:, 0])
+        super().__post_init__()
 
     def groups(self) -> Mapping[str, Sequence[str]]:
         """One angle an axis."""
