@@ -168,7 +168,7 @@ def align_transfer(
     along = partial(transfer_filter, assumed=said, linear=found.linear, nominal=found.nominal)
     run = partial(along, master=master, matching=rows)
     track = run(part, model=model, start=start)
-    seen = _seen(slave, master, errors, C_mb) + _rivals(part, run, track, model, start, spec)
+    seen = _seen(slave, master, errors, said) + _rivals(part, run, track, model, start, spec)
     seen += shaken_evidence(run, track, part, master, model, start, said, found.linear, what)
     track = as_said_together(track, model, said, what.attitude)
     carried = math.hypot(errors.velocity, errors.velocity_drift) if what.translation == "position" else 0.0
@@ -276,9 +276,9 @@ def _model(
     return replace(model, arm_considered=what.translation == "acceleration")
 
 
-def _seen(slave: ImuRecord, master: MasterRecord, errors: MasterErrors, C_mb: Array) -> list[Evidence]:
+def _seen(slave: ImuRecord, master: MasterRecord, errors: MasterErrors, said: Assumed) -> list[Evidence]:
     """What clocks, positions and samples show; the master's errors are all it has, also those that no row that is matched bears."""
-    parted = parted_clocks(slave, master, C_mb)
+    parted = parted_clocks(slave, master, said.C_mb, said.delay)
     slow = math.hypot(errors.velocity, errors.velocity_drift)
     return [
         *([] if parted is None else [parted]),

@@ -69,8 +69,16 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     return assumed, ()
 
 
-def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array) -> Evidence | None:
-    """That the first and the last third of the master are late by different delays; None where nothing says so."""
+def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> Evidence | None:
+    """That the first and the last third of what both logs show are late by different delays; None where nothing says so.
+
+    A master that runs before and after the slave's log shows motion there that the slave has not seen: any resemblance is chance.
+    """
+    common = (master.time - delay >= slave.time[0]) & (master.time - delay <= slave.time[-1])
+    rows = np.flatnonzero(common)
+    if rows.size < 2:
+        return None
+    master = master[rows[0] : rows[-1] + 1]
     first, last = len(master) // 3, 2 * len(master) // 3
     if first < 2:
         return None
