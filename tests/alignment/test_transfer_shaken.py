@@ -85,3 +85,24 @@ def test_levels_of_shaken_flights():
         assert np.all(np.abs(answer.transfer.lever_arm - [1.0, 0.1, 0.2]) < 4.0 * answer.transfer.lever_arm_sigma)
         found.append(misses(answer, truth)["level"])
     assert np.sqrt(np.mean(np.square(found))) < 1.25
+
+
+@pytest.mark.slow
+def test_a_vehicle_that_rocks_faster_than_a_delay_was_said_to_be_known():
+    """Once the slow part has shown the delay, the phase of the fast part is known too: sound logs were refused for late gyros."""
+    plain = BENCHES["transfer"]
+    rocks = {name: [{"amplitude": f"{size} deg", "period": "0.37 s"}] for name, size in TONES.items()}
+    rocks = {name: [*tones, {"amplitude": "0.3 deg", "period": "0.9 s"}] for name, tones in rocks.items()}
+
+    def scenario(rng):
+        flight = plain.scenario(rng) | {"imu": "industrial", "output": "rates"}
+        return flight | {"disturbances": [{"kind": "sway", "tones": rocks}]}
+
+    bench, found = Bench("rocks", scenario, plain.align, plain.sits), []
+    for run in range(4):
+        inputs, truth = bench.draw(11, run)
+        answer = bench.align(inputs)
+        assert answer.status == "aligned", answer.reasons
+        assert "transfer.shaken" not in {item.key for item in answer.evidence}
+        found.append(np.concatenate([misses(answer, truth)[name] for name in ("level", "heading")]))
+    assert np.abs(found).max() < 4.0

@@ -59,8 +59,7 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
     Found
         Not sure, with NaN, where the logs are too short.
     """
-    kind = "rate" if master.C_nb is not None else "force"
-    step = max(GRID, master.interval) if master.interval < WINDOW[kind] else 0.5 * WINDOW[kind]
+    kind, step = _grid(master)
     a = _slave_signal(slave, kind, step)
     a = a[::-1] if mirrored else a
     b = _master_signal(master, C_mb, kind, step)
@@ -76,11 +75,7 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
     score = np.where(possible, score, -1.0)
     k = int(np.argmax(score))
     peak = float(score[k])
-    fraction = 0.0
-    if 0 < k < len(score) - 1 and min(score[k - 1], score[k + 1]) > -1.0:
-        left, right = float(score[k - 1]), float(score[k + 1])
-        bend = left - 2.0 * peak + right
-        fraction = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+    fraction, _ = _peak(score, k)
     elsewhere = np.abs(shifts - shifts[k]) * step > 2.0 * WINDOW[kind]
     rival = float(np.max(score[elsewhere], initial=0.0))
     independent = float(common[k]) * step / WINDOW[kind] * a.shape[1]
@@ -90,6 +85,33 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
     shared = _changes(a, b, round(shifts[k]), max(1, round(WINDOW[kind] / step)))
     gain = -0.5 * independent * math.log(max(1.0 - peak**2, 1e-12))
     return Found(float(offset - step * (shifts[k] + fraction)), peak, rival, sure, gain, shared)
+
+
+def agreement(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> float:
+    """Correlation of both logs' motion where the master is late by this delay, s; -1 where they have nothing in common there."""
+    kind, step = _grid(master)
+    a, b = _slave_signal(slave, kind, step), _master_signal(master, C_mb, kind, step)
+    if min(len(a), len(b)) < round(SHORTEST / step):
+        return -1.0
+    shifts, score, common = _correlations(a, b)
+    score = np.where(common >= round(SHORTEST / step), score, -1.0)
+    near = np.abs(shifts - (float(master.time[0] - slave.time[0]) - delay) / step) < 2.0
+    if not near.any():
+        return -1.0
+    first = int(np.argmax(near))
+    return _peak(score, first + int(np.argmax(score[near])))[1]
+
+
+def _peak(score: Array, k: int) -> tuple[float, float]:
+    """Where the parabola through a highest score and its neighbours is highest, in steps from it, and how high, 1 at the most."""
+    peak = float(score[k])
+    if not (0 < k < len(score) - 1 and min(score[k - 1], score[k + 1]) > -1.0):
+        return 0.0, peak
+    left, right = float(score[k - 1]), float(score[k + 1])
+    bend = left - 2.0 * peak + right
+    if bend >= 0.0:
+        return 0.0, peak
+    return 0.5 * (left - right) / bend, min(peak - (left - right) ** 2 / (8.0 * bend), 1.0)
 
 
 def runs_backwards(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float, slack: float) -> bool:
@@ -110,6 +132,12 @@ def runs_backwards(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: f
         and mirrored.shared > MORE * straight.shared
         and min(abs(mirrored.delay - delay), abs(mirrored.delay - (middles - delay))) < slack
     )
+
+
+def _grid(master: MasterRecord) -> tuple[str, float]:
+    """What is compared, and at steps of how long, s."""
+    kind = "rate" if master.C_nb is not None else "force"
+    return kind, max(GRID, master.interval) if master.interval < WINDOW[kind] else 0.5 * WINDOW[kind]
 
 
 def _changes(a: Array, b: Array, shift: int, apart: int) -> float:

@@ -87,6 +87,7 @@ class Linear:
     delay: float = 0.0  # s; beyond the known one
     # s: what the filter begins with of it, and the sigma of that; as the start says when left out
     begin: tuple[float, float] | None = None
+    phase: float = math.inf  # s: sigma of the delay, by which the phase of a vibration at the rows is known
 
 
 class MasterRows(NamedTuple):
@@ -209,7 +210,8 @@ def master_aiding(
         if kind == "acceleration":
             measured[:, 3:] = _slopes(slave, held)
         elif kind == "velocity":
-            own = (own[0], _add_turns(measured, slave, master, model, assumed, held))
+            phase = math.inf if linear is None else linear.phase
+            own = (own[0], _add_turns(measured, slave, master, model, assumed, held, phase))
         elif (reach := _reach(assumed)) > 0.0:
             turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.sigma / reach)
             measured[:, 3:], own = np.nan if turns is None else turns, (of_turn,)
@@ -283,7 +285,13 @@ def _reach(assumed: Assumed) -> float:
 
 
 def _add_turns(
-    measured: Array, slave: ImuRecord, master: MasterRecord, model: TransferModel, assumed: Assumed, held: Array
+    measured: Array,
+    slave: ImuRecord,
+    master: MasterRecord,
+    model: TransferModel,
+    assumed: Assumed,
+    held: Array,
+    phase: float,
 ) -> float:
     """How the slave turns, into velocity rows; how they know the acceleration."""
     walk, pushed = model.gyro_random_walk, KNOWN
@@ -292,7 +300,7 @@ def _add_turns(
     if not own:
         spins, pushed = spins_at(slave, held, walk, _reach(assumed), push_of(master.time, master.v_n))
         measured[:, 3:6] = np.nan if spins is None else spins
-    if (rates := shaken(slave, held, walk, assumed.delay_sigma)) is not None:
+    if (rates := shaken(slave, held, walk, min(assumed.delay_sigma, phase))) is not None:
         measured[:, 10:] = rates.slow
         if not own and pushed == KNOWN:
             measured[:, 3:6], pushed = rates.spin, MEAN

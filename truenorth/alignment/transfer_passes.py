@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 
 CLOSED = 2  # passes of a closed loop
 MOST = 8  # open ones
+SURELY = 5.0  # sigmas of a delay that the slow part of the motion has shown: the phase of the fast part is known by it
 SETTLED = 0.3  # of a sigma: a pass that moves attitude, arm, delay and seat by less is the last
 PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
 LEAST = 0.1  # of the noise to begin with: less is not believed
@@ -153,7 +154,10 @@ def _linear(
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
     tau = track.layout.slice_of(DELAY)
-    return Linear(C_nm, C_nb, 0.0 if tau is None else float(track.sensors[-1, tau][0]), begin)
+    late, phase = (
+        (0.0, math.inf) if tau is None else (float(track.sensors[-1, tau][0]), SURELY * float(track.sigma[-1, tau][0]))
+    )
+    return Linear(C_nm, C_nb, late, begin, phase)
 
 
 def _refitted(

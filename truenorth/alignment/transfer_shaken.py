@@ -3,7 +3,8 @@
 A velocity row holds ``C (w x r)`` of the arm `r` between both, with the rate `w` at the row. A delay that is known to s seconds
 leaves the phase of a tone of `f` Hz at the row uncertain by ``2 pi f s``. Up to a radian the filter's columns are lines; beyond,
 a row of 10 Hz and a vibration of 10 Hz are explained by any delay, each with another arm: an aircraft's was 17 sigmas off, and
-its level 5. So what is faster tells of no arm and no delay: the rows have the slow part of the rate, both parts being split by
+its level 5. The slow part of the motion shows the delay to milliseconds, within a pass; until then what is faster tells of no arm
+and no delay: the rows have the slow part of the rate, both parts being split by
 frequency, so that neither holds anything of the other.
 
 What is left in a row is ``w~ x r`` of the fast part. It is no white noise: a vibration at a whole number of the rows' frequency is
@@ -58,7 +59,7 @@ def shaken_evidence(
     if what.translation != "velocity" or linear is None or master.v_n is None:
         return []
     held = master.time - assumed.delay - linear.delay
-    rates = shaken(slave, held, model.gyro_random_walk, assumed.delay_sigma)
+    rates = shaken(slave, held, model.gyro_random_walk, min(assumed.delay_sigma, linear.phase))
     if rates is None:
         return []
     arm, off = arm_of(track, assumed), []

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.alignment.transfer_delay import WINDOW, find_delay, runs_backwards
+from truenorth.alignment.transfer_delay import WINDOW, agreement, find_delay, runs_backwards
 from truenorth.alignment.transfer_filter import Assumed
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.earth import GRAVITY_EQUATOR, radii
@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
+MISFIT = 2.0  # times the part of a motion that the best delay leaves: another delay that leaves more is another clock's
 
 
 def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tuple[Assumed, tuple[str, ...]]:
@@ -84,9 +85,15 @@ def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: fl
         return None
     # Half a window: where the agreement is just sure, a delay is found to a tenth of it.
     least = max(0.5 * WINDOW["rate" if master.C_nb is not None else "force"], master.interval)
-    begin, end = (find_delay(slave, part, C_mb) for part in (master[:first], master[last:]))
+    parts = master[:first], master[last:]
+    begin, end = (find_delay(slave, part, C_mb) for part in parts)
     if not (begin.sure and end.sure) or abs(end.delay - begin.delay) < least:
         return None
+    # What comes again and again, such as a sea or a rotor, agrees at many delays: one that fits both parts is that of the clock.
+    for part, own, other in zip(parts, (begin, end), (end, begin), strict=True):
+        own_left, left = (1.0 - max(agreement(slave, part, C_mb, x.delay), 0.0) ** 2 for x in (own, other))
+        if left < MISFIT * own_left:
+            return None
     return contradiction(
         "transfer.clocks_part",
         "part_of_logs",
