@@ -1,11 +1,15 @@
 """A slave whose engine shakes it: what is slow and fast of its rates, and levels that are as good as their sigma says."""
 
+import math
+
 import numpy as np
 import pytest
 
+from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, master_aiding
 from truenorth.alignment.transfer_turns import shaken
 from truenorth.campaign.fault_benches import BENCHES, Bench, misses
-from truenorth.records import ImuRecord
+from truenorth.errors.master import TransferModel
+from truenorth.records import ImuRecord, MasterRecord
 
 SLOW, FAST, WALK = 0.5, 10.0, 1e-6  # Hz, Hz, rad/sqrt(s)
 TONES = {"heading": 0.064, "pitch": 0.056, "roll": 0.08}  # deg
@@ -88,8 +92,8 @@ def test_levels_of_shaken_flights():
 
 
 @pytest.mark.slow
-def test_a_vehicle_that_rocks_faster_than_a_delay_was_said_to_be_known():
-    """Once the slow part has shown the delay, the phase of the fast part is known too: sound logs were refused for late gyros."""
+def test_a_vehicle_that_rocks_in_tones_has_one_clock():
+    """Its motion comes again and again and agrees at many delays: the clock seemed to step by 12.6 s."""
     plain = BENCHES["transfer"]
     rocks = {name: [{"amplitude": f"{size} deg", "period": "0.37 s"}] for name, size in TONES.items()}
     rocks = {name: [*tones, {"amplitude": "0.3 deg", "period": "0.9 s"}] for name, tones in rocks.items()}
@@ -106,3 +110,16 @@ def test_a_vehicle_that_rocks_faster_than_a_delay_was_said_to_be_known():
         assert "transfer.shaken" not in {item.key for item in answer.evidence}
         found.append(np.concatenate([misses(answer, truth)[name] for name in ("level", "heading")]))
     assert np.abs(found).max() < 4.0
+
+
+@pytest.mark.parametrize(("known", "whole"), [(0.1, False), (0.001, True)])
+def test_once_the_delay_is_known_a_fast_rocking_counts(known, whole):
+    """Rows of velocity have the rate of the instant where its phase is known, else the slow part of it."""
+    slave = turning([SLOW, 4.0])
+    held = slave.time[10:-10:5]
+    master = MasterRecord(held, np.tile(np.eye(3), (len(held), 1, 1)), np.zeros((len(held), 3)))
+    assumed = Assumed(np.ones(3), 1.0, 0.0, 0.1, np.eye(3), 0.0)
+    linear = Linear(master.C_nb, master.C_nb, 0.0, phase=known)
+    model = TransferModel(gyro_random_walk=WALK, accel_random_walk=1e-4)
+    (rows,) = master_aiding(master, model, assumed, Matching(0.05, math.inf), linear, slave)
+    assert np.isnan(rows.measured[:, 10:]).all() == whole

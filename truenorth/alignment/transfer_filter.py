@@ -45,7 +45,6 @@ Integers = NDArray[np.int64]
 LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body turn little in it
 SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
 SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
-WIDER = 3.0  # the same master's velocity and force are not quite news to each other
 TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
 
 OTHER_NOISE = 0.4  # variance of the rate in columns of the arm, of that of a sample (`describe_instant`)
@@ -167,19 +166,6 @@ def transfer_filter(
             f"runs from {master.time[0]:.3f} s to {master.time[-1]:.3f} s): check that both logs have the same clock"
         )
     return track
-
-
-def delay_found(track: Track) -> tuple[float, float] | None:
-    """The delay that a pass by velocity tells, with `WIDER` times its sigma, to begin the matching of acceleration with.
-
-    Over the onset of a manoeuvre (some tenths of a second) a force is no straight line: with a delay off by 50 ms its column is
-    wrong by several sigmas of a row, and the first rows would settle the delay falsely. None: there is no such state.
-    """
-    tau = track.layout.slice_of(DELAY)
-    if tau is None:
-        return None
-    first, last = (float(np.sqrt(P[tau, tau][0, 0])) for P in (track.P[0], track.P[-1]))
-    return float(track.sensors[-1, tau][0]), min(first, WIDER * last)
 
 
 def master_aiding(

@@ -20,7 +20,6 @@ from truenorth.alignment.transfer_filter import (
     Matching,
     axes_along,
     by_rows,
-    delay_found,
     transfer_filter,
 )
 from truenorth.alignment.transfer_nominal import Nominal, final_attitudes, found_by
@@ -38,6 +37,7 @@ Array = NDArray[np.float64]
 
 CLOSED = 2  # passes of a closed loop
 MOST = 8  # open ones
+WIDER = 3.0  # the same master's velocity and force are not quite news to each other
 SURELY = 5.0  # sigmas of a delay that the slow part of the motion has shown: the phase of the fast part is known by it
 SETTLED = 0.3  # of a sigma: a pass that moves attitude, arm, delay and seat by less is the last
 PIECE = 10.0  # s, of innovations: longer than a seat that bends remembers
@@ -138,6 +138,19 @@ def found_in_passes(
     last = settle(log, open_loop, lambda found: found.moved, enough=SETTLED, most=MOST)
     assert linear is not None
     return Found(noise, linear, log.nominal.corrected(last.found.end, mounting), last.moved)
+
+
+def delay_found(track: Track) -> tuple[float, float] | None:
+    """The delay that a pass by velocity tells, with `WIDER` times its sigma, to begin the matching of acceleration with.
+
+    Over the onset of a manoeuvre (some tenths of a second) a force is no straight line: with a delay off by 50 ms its column is
+    wrong by several sigmas of a row, and the first rows would settle the delay falsely. None: there is no such state.
+    """
+    tau = track.layout.slice_of(DELAY)
+    if tau is None:
+        return None
+    first, last = (float(np.sqrt(P[tau, tau][0, 0])) for P in (track.P[0], track.P[-1]))
+    return float(track.sensors[-1, tau][0]), min(first, WIDER * last)
 
 
 def _linear(

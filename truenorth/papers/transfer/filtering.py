@@ -15,9 +15,9 @@ from truenorth.alignment.transfer_filter import (
     Assumed,
     Linear,
     Matching,
-    delay_found,
     transfer_filter,
 )
+from truenorth.alignment.transfer_passes import delay_found
 from truenorth.core.attitude import misalignment
 from truenorth.errors.master import ARM, DELAY, TransferModel
 from truenorth.papers.errors import AttitudeErrors
