@@ -32,9 +32,11 @@ def white_floor(record: ImuRecord) -> Array:
     """(6,) random walk of each channel, rad/sqrt(s) and m/s/sqrt(s), by the floor of its spectrum; NaN of too short a record."""
     rows = round(WINDOW / record.interval)
     count = len(record) // rows
+    if count < FEWEST or record.gaps.size:  # of rows that are nanoseconds apart a window would fill the memory
+        return np.full(6, np.nan)
     frequency = np.arange(rows // 2 + 1) / (rows * record.interval)
     band = (frequency >= SLOWEST) & (frequency <= FASTEST * frequency[-1])
-    if count < FEWEST or np.count_nonzero(band) < FEWEST or record.gaps.size:
+    if np.count_nonzero(band) < FEWEST:
         return np.full(6, np.nan)
     phase = 2.0 * math.pi * (np.arange(rows) + 0.5) / rows
     window = np.cos(np.outer(phase, np.arange(len(HARRIS)))) @ np.array(HARRIS)
