@@ -10,6 +10,7 @@ from truenorth.quality.density import noise_densities
 from truenorth.quality.floor import white_floor
 from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
+from truenorth.records.vibration import coning_left
 
 DENSITY = np.array([1e-5, 2e-5, 3e-5, 4e-4, 5e-4, 6e-4])
 
@@ -59,3 +60,4 @@ def test_rows_that_are_nanoseconds_apart_fill_no_memory():
     """A window of them would have billions of frequencies (found by the fuzzer: 24 GB)."""
     record = ImuRecord(1e-12 * np.arange(1, 201), np.ones((200, 3)), np.ones((200, 3)))
     assert np.isnan(white_floor(record)).all()
+    assert not coning_left(record)

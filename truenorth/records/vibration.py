@@ -81,6 +81,8 @@ def _cones(record: ImuRecord) -> Array:
     variance = unit**2 * (np.einsum("ki,ki->i", record.gyro, record.gyro) / len(record) - mean**2)
     slowest = 2.0 * math.pi / (length * record.interval)
     blocks = len(record) // length if float(variance.max()) > LEAST_CONE * slowest else 0
+    if not blocks:  # of rows that are nanoseconds apart a block's spectrum would fill the memory
+        return np.empty((0, 3, 2))
     x = 2.0 * math.pi * np.arange(1, length // 2 + 1) / length
     shares = (_share_left(x), np.ones_like(x)) if rates else (np.zeros_like(x), _share_of_increments(x))
     # <theta x w>/2 of a tone of amplitude A: Im(A x conj(A))/(4 w), of whose two products each is the other's conjugate. A window
