@@ -73,6 +73,15 @@ def test_what_the_body_turns_after_the_last_row_is_in_sigma():
     assert 0.3 < np.sqrt(np.mean(np.square(ratios))) < 2.0
 
 
+def biased(name):
+    """Biases and white noise of a preset, and no other errors."""
+    plain = tn.imu_spec(name)
+    return ImuSpec(
+        gyro_bias=plain.gyro_bias, gyro_random_walk=plain.gyro_random_walk,
+        accel_bias=plain.accel_bias, accel_random_walk=plain.accel_random_walk,
+    )  # fmt: skip
+
+
 def indexed(spec, seed, still=900.0, rate=50.0):
     """A still base, and an indexer of one axis that turns by half a turn every 40 s; the log ends within a slew."""
     rng = np.random.default_rng(seed)
@@ -111,11 +120,7 @@ def test_angles_of_one_axis_may_be_a_column():
 @pytest.mark.parametrize("said", ["tactical", None])
 def test_an_encoder_of_five_hertz_and_a_log_that_ends_in_a_slew(said):
     """Level and heading hold as sigma says; no scale factor is made of the noise of an accelerometer."""
-    plain = tn.imu_spec("tactical")
-    spec = ImuSpec(
-        gyro_bias=plain.gyro_bias, gyro_random_walk=plain.gyro_random_walk,
-        accel_bias=plain.accel_bias, accel_random_walk=plain.accel_random_walk,
-    )  # fmt: skip
+    spec = biased("tactical")
     record, encoder, place, C_nb = indexed(spec, 7)
     answer = tn.align(record, place, said if said is None else spec, aid=tn.Indexer(encoder, axes=("z",)))
     off = misalignment(answer.C_nb, C_nb) / np.sqrt(np.diag(answer.phi_covariance))
@@ -125,11 +130,7 @@ def test_an_encoder_of_five_hertz_and_a_log_that_ends_in_a_slew(said):
 
 
 def test_a_gyro_bias_of_many_degrees_an_hour_is_no_turn_of_the_base():
-    plain = tn.imu_spec("industrial")
-    spec = ImuSpec(
-        gyro_bias=plain.gyro_bias, gyro_random_walk=plain.gyro_random_walk,
-        accel_bias=plain.accel_bias, accel_random_walk=plain.accel_random_walk,
-    )  # fmt: skip
+    spec = biased("industrial")
     record, encoder, place, C_nb = indexed(spec, 8)
     turn = 1.5 * NET_TURN / (record.duration * 2.0 / 3.0)
     gyro = record.gyro + turn * record.interval * np.array([0.0, 0.0, 1.0])

@@ -59,20 +59,12 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
     Found
         Not sure, with NaN, where the logs are too short.
     """
-    kind, step = _grid(master)
-    a = _slave_signal(slave, kind, step)
-    a = a[::-1] if mirrored else a
-    b = _master_signal(master, C_mb, kind, step)
-    least = round(SHORTEST / step)
-    if len(a) < least or len(b) < least:
+    both = _compared(slave, master, C_mb, mirrored=mirrored)
+    if both is None:
         return Found(math.nan, 0.0, 0.0, False)
+    kind, step, a, b, shifts, score, common = both
     # Shift k puts row j of the master on row j + k of the slave: delay = (start of master) - (start of slave) - k step.
     offset = float(master.time[0] - slave.time[0])
-    shifts, score, common = _correlations(a, b)
-    possible = common >= least
-    if not possible.any():
-        return Found(math.nan, 0.0, 0.0, False)
-    score = np.where(possible, score, -1.0)
     k = int(np.argmax(score))
     peak = float(score[k])
     fraction, _ = _peak(score, k)
@@ -89,12 +81,10 @@ def find_delay(slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored:
 
 def agreement(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> float:
     """Correlation of both logs' motion where the master is late by this delay, s; -1 where they have nothing in common there."""
-    kind, step = _grid(master)
-    a, b = _slave_signal(slave, kind, step), _master_signal(master, C_mb, kind, step)
-    if min(len(a), len(b)) < round(SHORTEST / step):
+    both = _compared(slave, master, C_mb)
+    if both is None:
         return -1.0
-    shifts, score, common = _correlations(a, b)
-    score = np.where(common >= round(SHORTEST / step), score, -1.0)
+    _, step, _, _, shifts, score, _ = both
     near = np.abs(shifts - (float(master.time[0] - slave.time[0]) - delay) / step) < 2.0
     if not near.any():
         return -1.0
@@ -134,10 +124,23 @@ def runs_backwards(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: f
     )
 
 
-def _grid(master: MasterRecord) -> tuple[str, float]:
-    """What is compared, and at steps of how long, s."""
+def _compared(
+    slave: ImuRecord, master: MasterRecord, C_mb: Array, *, mirrored: bool = False
+) -> tuple[str, float, Array, Array, Array, Array, Array] | None:
+    """Kind and step (s) of both signals, these, shifts, their correlation there, rows in common; None without `SHORTEST` s of any.
+
+    A shift at which less is in common has -1.
+    """
     kind = "rate" if master.C_nb is not None else "force"
-    return kind, max(GRID, master.interval) if master.interval < WINDOW[kind] else 0.5 * WINDOW[kind]
+    step = max(GRID, master.interval) if master.interval < WINDOW[kind] else 0.5 * WINDOW[kind]
+    a, b = _slave_signal(slave, kind, step), _master_signal(master, C_mb, kind, step)
+    a = a[::-1] if mirrored else a
+    least = round(SHORTEST / step)
+    if len(a) < least or len(b) < least:
+        return None
+    shifts, score, common = _correlations(a, b)
+    possible = common >= least
+    return (kind, step, a, b, shifts, np.where(possible, score, -1.0), common) if possible.any() else None
 
 
 def _changes(a: Array, b: Array, shift: int, apart: int) -> float:
