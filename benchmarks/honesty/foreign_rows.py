@@ -147,7 +147,13 @@ CASES = (
     Case(NAME, "by GNSS, industrial, car, multipath", aligned(vehicles.car, "industrial", 200.0, "gnss", jumps=3)),
     *(
         Case(NAME, f"by odometer, {g}, {v.__name__}", aligned(v, g, 240.0, "odometer"))
-        for v, g in ((vehicles.car, "navigation"), (vehicles.tractor, "navigation"), (vehicles.car, "tactical"))
+        for v, g in (
+            (vehicles.car, "navigation"),
+            (vehicles.tractor, "navigation"),
+            (vehicles.lorry, "navigation"),
+            (vehicles.car, "tactical"),
+            (vehicles.lorry, "tactical"),
+        )
     ),
     Case(NAME, "by odometer and GNSS, industrial, car", aligned(vehicles.car, "industrial", 200.0, "odometer, gnss")),
     Case(NAME, "by Doppler log, navigation, diver", aligned(vehicles.diver, "navigation", 300.0, "log")),

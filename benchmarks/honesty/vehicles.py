@@ -85,8 +85,12 @@ def _wheeled(
     crab: float,
     quick: float,
     kick: Array | None = None,
+    dip: float = 2.5,
 ) -> World:
-    """A vehicle on wheels: `speed` of its rear axle, m/s, and curvature `bend`, 1/m, at steps of COARSE."""
+    """A vehicle on wheels: `speed` of its rear axle, m/s, and curvature `bend`, 1/m, at steps of COARSE.
+
+    Its springs let it dip by `dip`, deg/g, its tyres run askew by `crab`, deg s^2/m.
+    """
     t, fine = COARSE * np.arange(len(speed)), _grid(length)
     s = _fine(t, np.maximum(speed, 0.0), fine)
     s = np.maximum(s, 0.0)
@@ -100,7 +104,11 @@ def _wheeled(
     )
     shaken = rough * np.minimum(s / 2.0, 1.0) * (s > 0.0)
     give = rng.uniform(0.8, 1.2)
-    pitch = grade + _spring(give * 2.5 * DEG / G * along, 1.4, 0.3) + shaken * noise(rng, len(fine), 0.3, quick, DEG)
+    pitch = (
+        grade
+        + _spring(give * dip * DEG * (along / G + np.sin(grade)), 1.4, 0.3)
+        + shaken * noise(rng, len(fine), 0.3, quick, DEG)
+    )
     roll = (
         bank - _spring(give * 4.0 * DEG / G * across, 1.2, 0.3) + shaken * noise(rng, len(fine), 0.3, quick, 1.4 * DEG)
     )
@@ -127,6 +135,18 @@ def car(rng: np.random.Generator, length: float) -> World:
     wheel = _held(rng, t, lambda: 0.0 if rng.random() < 0.5 else rng.uniform(-0.12, 0.12), 3.0, 8.0)
     bend = _follow(np.clip(wheel, -1.0, 1.0) * np.minimum(1.0, 3.0 / np.maximum(0.12 * speed**2, 1e-9)), 3.0, 0.1)
     return _wheeled(rng, length, speed, bend, rng.uniform(0.05, 0.2), (25.0, 58.0, 0.15, 0.1 * DEG), 0.1, 2.5)
+
+
+def lorry(rng: np.random.Generator, length: float) -> World:
+    """Roads at up to 22 m/s, with soft springs and tyres; its engine at 10 to 35 Hz."""
+    t = COARSE * np.arange(round(length / COARSE) + 1)
+    command = _held(rng, t, lambda: 0.0 if rng.random() < 0.2 else rng.uniform(4.0, 22.0), 10.0, 30.0)
+    command[t < rng.uniform(6.0, 20.0)] = 0.0
+    speed = _follow(command, 1.0, rng.uniform(0.8, 2.0))
+    wheel = _held(rng, t, lambda: 0.0 if rng.random() < 0.4 else rng.uniform(-0.05, 0.05), 4.0, 12.0)
+    bend = _follow(wheel * np.minimum(1.0, 2.5 / np.maximum(0.05 * speed**2, 1e-9)), 1.5, 0.05)
+    engine, crab, dip = (10.0, 34.0, 0.2, 0.1 * DEG), rng.uniform(0.1, 0.4), rng.uniform(2.0, 5.0)
+    return _wheeled(rng, length, speed, bend, rng.uniform(0.05, 0.2), engine, crab, 2.5, dip=dip)
 
 
 def tractor(rng: np.random.Generator, length: float) -> World:

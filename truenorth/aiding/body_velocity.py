@@ -46,7 +46,6 @@ from truenorth.core.compiled import compiled
 from truenorth.state.now import NOW_C, NOW_NORTH, NOW_PUSH, NOW_TURN, matrix_of, vector_of
 
 _PHI, _DV, _BG = 0, 3, 9
-COUNTED_FORWARD = (1.0,)  # figures of a source that counts forward speed alone: the rest are constraints
 
 
 @compiled
@@ -127,8 +126,9 @@ def _drift(now: Any, C_mb: Any, gain: float, at: int, assumed: Any, H: Any, z: A
             H[i, at + j] = -shown
 
 
-@row
-def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+@compiled
+def vehicle_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any) -> Any:
+    """Fill in the row but for what is its own; ``C_mb`` (3, 3) as assumed now."""
     arm = with_state(figures, ARM, assumed, at[AT_ARM])
     bias, angles = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if at[AT_BIAS] >= 0:
@@ -160,6 +160,12 @@ def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any,
         H,
         z,
     )
+    return C_mb
+
+
+@row
+def _body_velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
+    C_mb = vehicle_velocity(now, figures, at, assumed, measured, H, z)
     if at[AT_OWN] >= 0:
         _drift(now, C_mb, 1.0 + state_of(assumed, at[AT_SCALE]), at[AT_OWN], assumed, H, z)
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truenorth.aiding.body_velocity import COUNTED_FORWARD
 from truenorth.aiding.heading import HEADING
 from truenorth.aiding.source import Aiding, Role, state
+from truenorth.aiding.wheel import COMPLIANCE, COUNTED_FORWARD, WHEEL
 from truenorth.core.errors import UsageError
 from truenorth.errors.group import Group
 from truenorth.errors.log import DRIFT, NAME, LogErrors
@@ -142,10 +142,12 @@ def from_odometer(record: OdometerRecord, mounting: Mounting) -> list[Aiding]:
     measured = np.stack([zero, forward, zero], axis=1)
     noise = np.stack([zero + slip, np.hypot(sigma, counted) + zero, zero + slip], axis=1)
     states = states_of(mounting, "odometer", "lever arm", "scale", "mounting", "lag")
+    if mounting.compliance > 0.0:
+        states["own"] = Group(COMPLIANCE, np.full(2, mounting.compliance), unit="rad s^2/m")
     return [
         Aiding(
             "odometer",
-            "body velocity",
+            WHEEL,
             time - mounting.latency,
             measured,
             noise,

@@ -20,8 +20,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.body_velocity import COUNTED_FORWARD
 from truenorth.aiding.source import Aiding
+from truenorth.aiding.wheel import COUNTED_FORWARD
 from truenorth.core.errors import DataError
 from truenorth.estimate.rivals import likelihood_ratio, moved, rival
 from truenorth.quality.innovations import NO_ROTATION

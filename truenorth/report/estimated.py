@@ -28,6 +28,7 @@ UNITS = {
     "heading bias": DEG,
     "attitude bias": DEG,
     "lag": ("ms", 1e3),
+    "compliance": ("deg/g", 180.0 / np.pi * 9.80665),
     "deflection of the vertical": ("arcsec", 3600.0 * 180.0 / np.pi),
     "iron": ("% of the field", 100.0),
     "anomaly": ("% of the field", 100.0),

@@ -15,6 +15,7 @@ from truenorth.state.limits import limit
 Array = NDArray[np.float64]
 
 SLIP_SIGMA = 0.1  # m/s, of a wheel sideways and of a body on its springs up and down
+COMPLIANCE_SIGMA = 5e-3  # rad s^2/m, 2.8 deg/g: tyres give 1 to 5 deg/g, springs 2 to 4
 LONGEST_ARM = 100.0  # m; ships have no longer ones
 
 
@@ -49,6 +50,9 @@ class Mounting:
         One-sigma noise where the record itself does not say; None: a usual value.
     slip : float, m/s
         One-sigma velocity of a wheel sideways and upwards (the non-holonomic constraint).
+    compliance : float, rad s^2/m
+        One sigma of the angle by which tyres and springs let the body lean from the path of an odometer's wheel, for each
+        m/s^2 of force across and along; 0: rigid, as on rails.
     """
 
     lever_arm: Array = field(default_factory=lambda: np.zeros(3))
@@ -63,6 +67,7 @@ class Mounting:
     gate: float = limit("gate")
     noise: float | None = None
     slip: float = SLIP_SIGMA
+    compliance: float = COMPLIANCE_SIGMA
 
     @property
     def slow(self) -> float:

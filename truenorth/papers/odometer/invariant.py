@@ -46,7 +46,11 @@ def run_invariant(
         zero = np.zeros(3)
         start = Start(0.0, begin[b], zero, *drives.place, zero, zero, P)
         wheel = Mounting(
-            scale_sigma=drives.scale_sigma, noise=ODOMETER_NOISE, slip=SIDEWAYS, gate=1e-4 if gated else 0.0
+            scale_sigma=drives.scale_sigma,
+            noise=ODOMETER_NOISE,
+            slip=SIDEWAYS,
+            compliance=0.0,  # the paper's vehicle is rigid
+            gate=1e-4 if gated else 0.0,
         )
         aiding = from_odometer(drives.odometers[run], wheel)
         track = navigate_track(

@@ -123,7 +123,7 @@ def one(late: Scenario, prompt: Scenario, seed: int, run: int) -> dict[str, tupl
         }
         aiding: list[Aiding] = []
         if "odometer" in use:
-            wheel = replace(sits["odometer"], noise=0.05, slip=0.05)
+            wheel = replace(sits["odometer"], noise=0.05, slip=0.05, compliance=0.0)
             aiding += from_odometer(records["odometer"].record, wheel)
         if "gnss" in use:
             aiding += from_gnss(records["gnss"].record, sits["gnss"])
