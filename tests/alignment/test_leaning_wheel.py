@@ -1,7 +1,5 @@
 """A vehicle whose body leans from its wheels' path by the force on it: tyres run askew in bends, springs let it dip."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter1d
@@ -40,7 +38,7 @@ def drive():
 
 
 def test_what_tyres_and_springs_give_is_found(drive):
-    """The two angles to three sigmas, attitude to four; a body that is taken for rigid is wrong by more, or refused."""
+    """The two angles to three sigmas, attitude to four."""
     sim, odometer = drive
     record, lean = leaning(sim.record, TYRES, SPRINGS)
     place = sim.motion.position
@@ -53,13 +51,6 @@ def test_what_tyres_and_springs_give_is_found(drive):
     found, sigma = track.sensors[-1][own], track.sigma[-1][own]
     np.testing.assert_array_less(np.abs(found - [TYRES, SPRINGS]), 3.0 * sigma)
     assert sigma[1] < 0.2 * WHEEL.compliance  # the springs' shows within minutes of a town, with its stops
-    rigid = align_in_motion(
-        record, "navigation", position=place, odometer=odometer, wheel=replace(WHEEL, compliance=0.0)
-    )
-    off = np.abs(misalignment(rigid.C_nb, sim.motion.states(record.time[-1:]).C_nb[0] @ lean)) / np.sqrt(
-        np.diag(rigid.phi_covariance)
-    )
-    assert rigid.status != "aligned" or off.max() > 4.0
 
 
 def test_a_rigid_body_is_found_rigid(drive):
