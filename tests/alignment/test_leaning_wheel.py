@@ -53,6 +53,7 @@ def test_what_tyres_and_springs_give_is_found(drive):
     assert sigma[1] < 0.2 * WHEEL.compliance  # the springs' shows within minutes of a town, with its stops
 
 
+@pytest.mark.slow
 def test_a_rigid_body_is_found_rigid(drive):
     sim, odometer = drive
     answer = align_in_motion(sim.record, "navigation", position=sim.motion.position, odometer=odometer)
