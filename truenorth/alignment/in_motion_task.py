@@ -57,14 +57,14 @@ SHORTEST = 10.0  # s
 INTERVAL = 0.2
 OUTPUT = 1.0  # s, of the history
 NO_LOG_ERRORS = LogErrors()
-WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0)
 LONGEST_ALONE = 5.0  # s, that any IMU carries a vehicle before its first aid
 USUAL_SPEED = 30.0  # m/s, of a vehicle
 SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
 PACE = 5.0  # s, over which fixes show a speed
-LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
+LATENCY_SIGMA = 0.2  # s, of a receiver or a wheel of which nothing is said
+WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0, latency_sigma=LATENCY_SIGMA)
 
 
 @dataclass(frozen=True)

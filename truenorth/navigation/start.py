@@ -156,10 +156,14 @@ def moving_start(
 
 
 def _with_sensors(start: Start, summary: Mapping[str, Any]) -> Start:
-    """The start with what an alignment on the move has found of its sensors: how the odometer sits, how late GNSS is."""
-    delay = summary.get("delays_s", {}).get("GNSS")
-    found = None if delay is None else (float(delay[0]), float(delay[1]))
-    return replace(start, wheel=_found_wheel(summary), gnss_delay=found)
+    """The start with what an alignment on the move has found of its sensors: how the odometer sits, how late both are."""
+    return replace(start, wheel=_found_wheel(summary), gnss_delay=_found_delay(summary, "GNSS"))
+
+
+def _found_delay(summary: Mapping[str, Any], sensor: str) -> tuple[float, float] | None:
+    """By how much an alignment on the move has found a sensor's stamps late, and one sigma; None: it has not."""
+    delay = summary.get("delays_s", {}).get(sensor)
+    return None if delay is None else (float(delay[0]), float(delay[1]))
 
 
 def _found_wheel(summary: Mapping[str, Any]) -> Mounting | None:
@@ -170,12 +174,15 @@ def _found_wheel(summary: Mapping[str, Any]) -> Mounting | None:
     """
     if "odometer_scale" not in summary:
         return None
+    late, sigma = _found_delay(summary, "odometer") or (0.0, 0.0)
     return Mounting(
         lever_arm=np.array(summary["wheel_arm_m"], dtype=np.float64),
         lever_arm_sigma=float(max(summary["wheel_arm_sigma_m"])),
         C_mb=np.array(summary["mounting_C_mb"], dtype=np.float64),
         angle_sigma=math.radians(max(summary["mounting_sigma_deg"])),
         scale_sigma=math.hypot(summary["odometer_scale"], summary["odometer_scale_sigma"]),
+        latency=late,
+        latency_sigma=sigma,
     )
 
 
