@@ -14,7 +14,7 @@ from truenorth import OdometerRecord, UsageError, VelocityRecord, align, imu_spe
 from truenorth.aiding.aids import Odometer, VelocityLog
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import backtracked, departures, path_to_the_end
-from truenorth.alignment.in_motion_task import LATENCY_SIGMA, POSITION_FLOOR, VELOCITY_FLOOR
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, POSITION_FLOOR, VELOCITY_FLOOR, WHEEL
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position
@@ -145,7 +145,9 @@ def test_mounting_and_lever_arm_are_found():
     )
     sim = scenario.simulate(run=2, seed=7)
     odometer = scenario.simulate_aiding(run=2, seed=7)["odometer"].record
-    answer = align_in_motion(sim.record.rotated(C), RING.imu_spec, odometer=odometer, position=PLACE)
+    # On a ring at one speed tyres that give way do what a forward arm does: it shows of a body that is rigid.
+    rigid = replace(WHEEL, compliance=0.0)
+    answer = align_in_motion(sim.record.rotated(C), RING.imu_spec, odometer=odometer, position=PLACE, wheel=rigid)
     assert answer.status == "aligned"
     wheel, sigma = answer.moving.wheel, answer.moving.wheel.angle_sigma
     assert np.allclose(rotation_vector_from_dcm(wheel.C_mb @ C)[[0, 2]], 0.0, atol=4.0 * sigma.max())
