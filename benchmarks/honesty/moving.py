@@ -147,13 +147,14 @@ def by(
 
 
 def slipping(wheel: VelocityRecord, noise: float, rng: np.random.Generator) -> VelocityRecord:
-    """A wheel as the aligner takes it: it slips sideways and upwards by what is assumed, and has such noise forward, m/s.
+    """A wheel as the aligner takes it: late or early, it slips by what is assumed, and has such noise forward, m/s.
 
     A log of three axes says what a wheel's rows stand for: the constraint is measured, and its noise drawn.
     """
     sigma = np.tile([WHEEL.slip, noise, WHEEL.slip], (len(wheel), 1))
     measured = wheel.velocity + sigma * rng.standard_normal(sigma.shape)
-    return VelocityRecord(wheel.time, measured, "body", sigma, wheel.source)
+    time = wheel.time + LATENCY_SIGMA * rng.standard_normal()
+    return VelocityRecord(time, measured, "body", sigma, wheel.source)
 
 
 def places_only(gnss: GnssRecord, rng: np.random.Generator) -> GnssRecord:
