@@ -75,7 +75,7 @@ def print_moving(console: Console, result: Alignment) -> None:
     console.print(reached.format(velocity=velocity, distance=moving.distance), soft_wrap=True)
     for name, (delay, sigma) in moving.delays.items():
         late = _("{name}: {delay:.0f} ± {sigma:.2g} ms late")
-        console.print(late.format(name=_(name), delay=1e3 * delay, sigma=1e3 * sigma), soft_wrap=True)
+        console.print(late.format(name=_(name), delay=round(1e3 * delay) + 0.0, sigma=1e3 * sigma), soft_wrap=True)
     if (wheel := moving.wheel) is None:
         return
     if result.heading_known:

@@ -110,7 +110,8 @@ def damp_navigation(
     course = even(result.track)
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
-            f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most"
+            f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most: "
+            f"--every {LONGEST_STEP:g} (`output={LONGEST_STEP:g}`)"
         )
     start = round(damper.start / course.interval)
     if start >= len(course) - 2:
