@@ -153,7 +153,7 @@ def slipping(wheel: VelocityRecord, noise: float, rng: np.random.Generator) -> V
     """
     sigma = np.tile([WHEEL.slip, noise, WHEEL.slip], (len(wheel), 1))
     measured = wheel.velocity + sigma * rng.standard_normal(sigma.shape)
-    time = wheel.time + LATENCY_SIGMA * rng.standard_normal()
+    time = wheel.time + WHEEL.latency_sigma * rng.standard_normal()
     return VelocityRecord(time, measured, "body", sigma, wheel.source)
 
 

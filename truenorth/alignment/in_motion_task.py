@@ -63,8 +63,10 @@ SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
 PACE = 5.0  # s, over which fixes show a speed
-LATENCY_SIGMA = 0.2  # s, of a receiver or a wheel of which nothing is said
-WHEEL = Mounting(scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0, latency_sigma=LATENCY_SIGMA)
+LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
+WHEEL = Mounting(  # of which nothing is said; a vehicle's bus takes some .01 s
+    scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0, latency_sigma=0.05
+)
 
 
 @dataclass(frozen=True)
