@@ -17,6 +17,7 @@ A. Mourikis, S. Roumeliotis, "Observability-based rules for designing consistent
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ def found_by(slave: ImuRecord, track: Track, model: Walks) -> Nominal:
     for name in CONSTANTS:
         if (at := track.layout.slice_of(name)) is not None:
             values[at] = track.sensors[-1, at]
-    return Nominal(_led_back(slave, track[:last])[1], values, until)
+    return Nominal(carried_back(slave, track[:last]).begin, values, until)
 
 
 def _carried_for(walk: float, rate_walk: float, longest: float) -> float:
@@ -85,13 +86,22 @@ def _carried_for(walk: float, rate_walk: float, longest: float) -> float:
     return float(t[np.searchsorted(walk**2 * t + rate_walk**2 * t**3 / 3.0, LINEAR**2, side="right") - 1])
 
 
+class Carried(NamedTuple):
+    """The final attitude of a track carried back by the gyros, the final biases and axes taken off."""
+
+    C_nb: Array  # (K, 3, 3) at each row
+    begin: Array  # (3, 3) at the beginning of the record
+    C_n0: Array  # (K, 3, 3) axes of the body at the beginning to those of n at each row
+    q: Array  # (N + 1, 4) attitude in the axes of the beginning, there and at the end of each sample
+
+
 def final_attitudes(slave: ImuRecord, track: Track) -> Array:
-    """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases and axes taken off."""
-    return _led_back(slave, track)[0]
+    """(K, 3, 3) the final attitude carried back to each row by the gyros."""
+    return carried_back(slave, track).C_nb
 
 
-def _led_back(slave: ImuRecord, track: Track) -> tuple[Array, Array]:
-    """The final attitude carried back to each row, (K, 3, 3), and to the beginning of the record, (3, 3)."""
+def carried_back(slave: ImuRecord, track: Track) -> Carried:
+    """The final attitude carried back to each row, and to the beginning of the record."""
     dtheta, _ = increments(slave)
     axes = track.layout.slice_of(GYRO_AXES)
     M = np.zeros((3, 3)) if axes is None else track.sensors[-1, axes].reshape(3, 3)
@@ -101,9 +111,8 @@ def _led_back(slave: ImuRecord, track: Track) -> tuple[Array, Array]:
     ends, steps_of = slave.time, interval_lengths(slave)
     inside = np.clip(np.searchsorted(ends, track.time - SAME_TIME), 0, len(ends) - 1)
     part = 1.0 - (ends[inside] - track.time) / steps_of[inside]
-    C_0b = dcm_from_quaternion(integrate_attitude(dtheta)[inside]) @ dcm_from_rotation_vector(
-        part[:, None] * dtheta[inside]
-    )
+    q = integrate_attitude(dtheta)
+    C_0b = dcm_from_quaternion(q[inside]) @ dcm_from_rotation_vector(part[:, None] * dtheta[inside])
     lat, alt, v = track.position[:, 0], track.position[:, 2], track.v_n
     w_in = earth_rate_n(lat) + transport_rate_n(lat, alt, v)
     steps = np.diff(track.time, prepend=ends[0] - steps_of[0])[:, None]
@@ -112,4 +121,5 @@ def _led_back(slave: ImuRecord, track: Track) -> tuple[Array, Array]:
     since = np.vstack([turned[-1] - turned, turned[-1:]])
     C_last_n = dcm_from_rotation_vector(since)
     C_i0 = track.C_nb[-1] @ C_0b[-1].T
-    return C_last_n[:-1] @ C_i0 @ C_0b, C_last_n[-1] @ C_i0
+    C_n0 = C_last_n @ C_i0
+    return Carried(C_n0[:-1] @ C_0b, C_n0[-1], C_n0[:-1], q)
