@@ -23,7 +23,7 @@ from truenorth.alignment.transfer_filter import (
     by_rows,
     transfer_filter,
 )
-from truenorth.alignment.transfer_nominal import Nominal, carried_back, found_by
+from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
 from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
 from truenorth.estimate.batch import settle
 from truenorth.estimate.memory import REOPENED, USED
@@ -169,7 +169,7 @@ def _linear(
 
     Where rows of velocity with this noise, m/s, come next in an open loop, with their columns.
     """
-    C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track)
+    C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track, carried_for(slave, model))
     C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = carried.C_nb
     C_nm = C_nb @ axes_along(track, assumed)[-1].T
     if master.C_nb is not None:
