@@ -279,9 +279,8 @@ def _add_turns(
     linear: Linear | None,
 ) -> float:
     """How the slave turns, into velocity rows; how they know the acceleration."""
-    walk, phase, columns = model.gyro_random_walk, math.inf, None
-    if linear is not None:
-        phase, columns = linear.phase, linear.columns
+    walk, phase = model.gyro_random_walk, math.inf if linear is None else linear.phase
+    columns = None if linear is None else linear.columns
     assert master.v_n is not None
     own = bool(np.isfinite(measured[:, 3:6]).any())  # the master says its acceleration
     rates = shaken(slave, held, walk, min(assumed.delay_sigma, phase))
