@@ -137,6 +137,11 @@ CASES += (
     ),
     Case(
         "transfer",
+        "aircraft, consumer slave, by velocity alone",
+        transferred(aircraft, ERRORS, "consumer", matching="velocity"),
+    ),
+    Case(
+        "transfer",
         "ship, consumer slave, by position alone",
         transferred(ship, ERRORS, "consumer", matching="position"),
     ),

@@ -96,6 +96,9 @@ def beyond_noise(rate: Any, variance: float) -> float:
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     """Measured: velocity; the master's acceleration, or the slave's spin; its attitude to linearise with; its rate; or NaN.
 
+    Last the columns of delay and arm (n, 3 x 4, by rows), and by what ``C [w x]`` is to be multiplied (3 x 4) to be what of the
+    instant's noise is in them, or NaN (:mod:`truenorth.alignment.transfer_columns`).
+
     Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant. The rate is what its gyros
     say, in body axes, without what vibrates (:mod:`truenorth.alignment.transfer_shaken`); else that of the instant.
 
@@ -139,6 +142,17 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
             x, y = m[0], m[1]
             s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
             H[0, a], H[1, a], H[2, a] = c * x - s * y, s * x + c * y, m[2]
+    if not np.isnan(measured[13]):
+        for j in range(4):
+            a = at[AT_LAG] if j == 0 else at[AT_ARM]
+            if a >= 0:
+                m = times(C, cross(w_eb, (measured[25 + j], measured[29 + j], measured[33 + j])))
+                a += max(0, j - 1)
+                x, y = m[0], m[1]
+                s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+                H[0, a] = measured[13 + j] - (c * x - s * y)
+                H[1, a] = measured[17 + j] - (s * x + c * y)
+                H[2, a] = measured[21 + j] - m[2]
     if at[AT_OWN] >= 0:  # as biases of the gyros; by a rate of another noise, as the arm
         seen = beyond_noise(other, figures[OWN])
         for i in range(3):
@@ -228,7 +242,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 
 MASTER_VELOCITY = Row(
-    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9}, width=13, instant=True
+    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9}, width=37, instant=True
 )
 MASTER_ATTITUDE = Row(
     "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"

@@ -30,7 +30,6 @@ ROLES = {
     "flexure": AT_FLEXURE,
     "own": AT_OWN,
 }
-LARGEST = 10  # numbers in a measurement
 LEVEL_FRAME, BODY_FRAME = ("east", "north", "up"), ("right", "forward", "up")
 
 
@@ -50,7 +49,7 @@ class Row:
     rows : int
         Components of `z`, 1 to 3.
     width : int
-        Numbers in a measurement, at most `LARGEST`.
+        Numbers in a measurement.
     instant : bool
         It needs rate and specific force at its very time; the loop then waits for the three samples after it.
     swings : bool

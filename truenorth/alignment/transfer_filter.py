@@ -15,6 +15,7 @@ from truenorth.aiding.master_position import MASTER_POSITION
 from truenorth.aiding.matching import Translation
 from truenorth.aiding.row import Row
 from truenorth.aiding.source import Aiding, Role
+from truenorth.alignment.transfer_columns import OTHER_NOISE, Columns
 from truenorth.alignment.transfer_nominal import Nominal
 from truenorth.alignment.transfer_turns import KNOWN, MEAN, push_of, shaken, spins_at, turns_at
 from truenorth.core.attitude import dcm_from_rotation_vector, quaternion_from_dcm, rotation_vector_from_dcm
@@ -46,8 +47,6 @@ LONGEST_STEP = 0.2  # s of one step of the filter; the level frame and the body 
 SLOPE = 0.2  # s over which derivatives of the slave's rate and force are taken, before and after
 SHARP, APART = 0.05, 4.0  # s, and sigmas: where such a short time differs by more from that, it is believed
 TRANSLATION, ATTITUDE = 0, 1  # kinds of rows, and three columns each of the innovations
-
-OTHER_NOISE = 0.4  # variance of the rate in columns of the arm, of that of a sample (`describe_instant`)
 
 
 @dataclass(frozen=True)
@@ -87,6 +86,7 @@ class Linear:
     # s: what the filter begins with of it, and the sigma of that; as the start says when left out
     begin: tuple[float, float] | None = None
     phase: float = math.inf  # s: sigma of the delay, by which the phase of a vibration at the rows is known
+    columns: Columns | None = None  # of delay and arm in an open loop; those of the instant where None
 
 
 class MasterRows(NamedTuple):
@@ -196,8 +196,7 @@ def master_aiding(
         if kind == "acceleration":
             measured[:, 3:] = _slopes(slave, held)
         elif kind == "velocity":
-            phase = math.inf if linear is None else linear.phase
-            own = (own[0], _add_turns(measured, slave, master, model, assumed, held, phase))
+            own = (own[0], _add_turns(measured, slave, master, model, assumed, held, linear))
         elif (reach := _reach(assumed)) > 0.0:
             turns, of_turn = turns_at(slave, held, model.gyro_random_walk, matching.sigma / reach)
             measured[:, 3:], own = np.nan if turns is None else turns, (of_turn,)
@@ -277,17 +276,24 @@ def _add_turns(
     model: TransferModel,
     assumed: Assumed,
     held: Array,
-    phase: float,
+    linear: Linear | None,
 ) -> float:
     """How the slave turns, into velocity rows; how they know the acceleration."""
-    walk, pushed = model.gyro_random_walk, KNOWN
+    walk, phase = model.gyro_random_walk, math.inf if linear is None else linear.phase
+    columns = None if linear is None else linear.columns
     assert master.v_n is not None
     own = bool(np.isfinite(measured[:, 3:6]).any())  # the master says its acceleration
+    rates = shaken(slave, held, walk, min(assumed.delay_sigma, phase))
+    if columns is not None and rates is None and not own:
+        measured[:, 3:6] = columns.push
+        measured[:, 13:25], measured[:, 25:] = columns.of.reshape(-1, 12), columns.common.reshape(-1, 12)
+        return KNOWN
+    pushed = KNOWN
     if not own:
         spins, pushed = spins_at(slave, held, walk, _reach(assumed), push_of(master.time, master.v_n))
         measured[:, 3:6] = np.nan if spins is None else spins
-    if (rates := shaken(slave, held, walk, min(assumed.delay_sigma, phase))) is not None:
-        measured[:, 10:] = rates.slow
+    if rates is not None:
+        measured[:, 10:13] = rates.slow
         if not own and pushed == KNOWN:
             measured[:, 3:6], pushed = rates.spin, MEAN
     return pushed
@@ -315,7 +321,7 @@ def _translation(master: MasterRecord, kind: Translation, place: Array | None, l
         return np.column_stack([force, np.full((len(master), 6), np.nan)])
     if master.v_n is None:
         return None
-    measured = np.full((len(master), 13), np.nan)
+    measured = np.full((len(master), MASTER_VELOCITY.width), np.nan)
     measured[:, :3] = master.v_n
     measured[:, 3:6] = _acceleration(master, place)
     if linear is not None and np.isnan(measured[:, 3]).any():

@@ -16,7 +16,9 @@ A. Mourikis, S. Roumeliotis, "Observability-based rules for designing consistent
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +70,7 @@ class Nominal:
 def found_by(slave: ImuRecord, track: Track, model: Walks) -> Nominal:
     """The motion that a track leads back to, from as late as the slave's gyros carry an attitude well."""
     begin = float(slave.time[0] - slave.steps[0])
-    until = begin + _carried_for(model.gyro_random_walk, model.gyro_rate_walk, float(slave.time[-1]) - begin)
+    until = begin + carried_for(slave, model)
     last = max(1, int(np.searchsorted(track.time, until)))
     values = np.zeros(track.sensors.shape[1])
     for part in (BG, BA):
@@ -76,40 +78,55 @@ def found_by(slave: ImuRecord, track: Track, model: Walks) -> Nominal:
     for name in CONSTANTS:
         if (at := track.layout.slice_of(name)) is not None:
             values[at] = track.sensors[-1, at]
-    return Nominal(_led_back(slave, track[:last])[1], values, until)
+    return Nominal(carried_back(slave, track[:last]).begin, values, until)
 
 
-def _carried_for(walk: float, rate_walk: float, longest: float) -> float:
-    """How long, s, gyros (rad/sqrt(s), rad/s/sqrt(s)) carry an attitude before their noise is `LINEAR`; `longest` at the most."""
-    t = np.linspace(0.0, longest, 1001)
+def carried_for(slave: ImuRecord, model: Walks) -> float:
+    """How long, s, gyros carry an attitude before their noise is `LINEAR`; the length of the log at the most."""
+    walk, rate_walk = model.gyro_random_walk, model.gyro_rate_walk
+    t = np.linspace(0.0, float(slave.time[-1] - slave.time[0] + slave.steps[0]), 1001)
     return float(t[np.searchsorted(walk**2 * t + rate_walk**2 * t**3 / 3.0, LINEAR**2, side="right") - 1])
 
 
+class Carried(NamedTuple):
+    """The attitude of a track carried back by the gyros, biases and axes as found taken off."""
+
+    C_nb: Array  # (K, 3, 3) at each row
+    begin: Array  # (3, 3) at the beginning of the record
+    C_n0: Array  # (K, 3, 3) axes of the body at the beginning, as the gyros carry them, to those of n at each row
+    q: Array  # (N + 1, 4) attitude in the axes of the beginning, there and at the end of each sample
+
+
 def final_attitudes(slave: ImuRecord, track: Track) -> Array:
-    """(K, 3, 3) the final attitude carried back to each row by the gyros, the final biases and axes taken off."""
-    return _led_back(slave, track)[0]
+    """(K, 3, 3) the final attitude carried back to each row by the gyros."""
+    return carried_back(slave, track).C_nb
 
 
-def _led_back(slave: ImuRecord, track: Track) -> tuple[Array, Array]:
-    """The final attitude carried back to each row, (K, 3, 3), and to the beginning of the record, (3, 3)."""
+def carried_back(slave: ImuRecord, track: Track, longest: float = math.inf) -> Carried:
+    """The final attitude carried back to each row, and to the beginning of the record.
+
+    Of a log longer than gyros carry an attitude (`longest`, s), in pieces, each from what the track has found by its end.
+    """
     dtheta, _ = increments(slave)
+    ends, steps_of = slave.time, interval_lengths(slave)
+    start, longest = float(ends[0] - steps_of[0]), max(longest, slave.interval)
+    piece, of_sample = (((times - start - SAME_TIME) // longest).astype(np.intp) for times in (track.time, ends))
+    row = np.searchsorted(piece, piece, side="right") - 1  # the last of its piece
+    of_sample = row[np.minimum(np.searchsorted(piece, of_sample), len(row) - 1)]
     axes = track.layout.slice_of(GYRO_AXES)
     M = np.zeros((3, 3)) if axes is None else track.sensors[-1, axes].reshape(3, 3)
-    dtheta = dtheta - track.sensors[-1, BG] * interval_lengths(slave)[:, None]
+    dtheta = dtheta - track.sensors[of_sample, BG] * steps_of[:, None]
     dtheta = dtheta - dtheta @ M.T
     # The sample that each row falls into, and how much of it is past by then.
-    ends, steps_of = slave.time, interval_lengths(slave)
     inside = np.clip(np.searchsorted(ends, track.time - SAME_TIME), 0, len(ends) - 1)
     part = 1.0 - (ends[inside] - track.time) / steps_of[inside]
-    C_0b = dcm_from_quaternion(integrate_attitude(dtheta)[inside]) @ dcm_from_rotation_vector(
-        part[:, None] * dtheta[inside]
-    )
+    q = integrate_attitude(dtheta)
+    C_0b = dcm_from_quaternion(q[inside]) @ dcm_from_rotation_vector(part[:, None] * dtheta[inside])
     lat, alt, v = track.position[:, 0], track.position[:, 2], track.v_n
     w_in = earth_rate_n(lat) + transport_rate_n(lat, alt, v)
-    steps = np.diff(track.time, prepend=ends[0] - steps_of[0])[:, None]
-    turned = np.cumsum(w_in * steps, axis=0)
-    # Of n against its last orientation; the turn is small enough to be one about one axis.
-    since = np.vstack([turned[-1] - turned, turned[-1:]])
-    C_last_n = dcm_from_rotation_vector(since)
-    C_i0 = track.C_nb[-1] @ C_0b[-1].T
-    return C_last_n[:-1] @ C_i0 @ C_0b, C_last_n[-1] @ C_i0
+    turned = np.cumsum(w_in * np.diff(track.time, prepend=start)[:, None], axis=0)
+    # Of n against its orientation at the end of the piece; the turn is small enough to be one about one axis.
+    C_last_n = dcm_from_rotation_vector(np.vstack([turned[row] - turned, turned[row[:1]]]))
+    C_i0 = track.C_nb[row] @ np.swapaxes(C_0b[row], 1, 2)
+    C_n0 = C_last_n[:-1] @ C_i0
+    return Carried(C_n0 @ C_0b, C_last_n[-1] @ C_i0[0], C_n0, q)

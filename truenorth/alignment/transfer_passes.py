@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.matching import FIRST_NOISE, Translation
+from truenorth.alignment.transfer_columns import columns_along
 from truenorth.alignment.transfer_filter import (
     Assumed,
     Linear,
@@ -22,7 +23,7 @@ from truenorth.alignment.transfer_filter import (
     by_rows,
     transfer_filter,
 )
-from truenorth.alignment.transfer_nominal import Nominal, final_attitudes, found_by
+from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
 from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
 from truenorth.estimate.batch import settle
 from truenorth.estimate.memory import REOPENED, USED
@@ -121,8 +122,9 @@ def found_in_passes(
         track = transfer_filter(part, master, model, start, rows, assumed, linear=linear, nominal=nominal)
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None
-        linear = _linear(part, master, track, assumed, begin)
         passes += 1
+        means = noise[0] if kind == "velocity" and passes >= CLOSED and np.isfinite(noise[0]) else None
+        linear = _linear(part, master, track, model, assumed, begin, means, linear)
         return track
 
     for _ in range(CLOSED):
@@ -157,12 +159,18 @@ def _linear(
     slave: ImuRecord,
     master: MasterRecord,
     track: Track,
+    model: TransferModel,
     assumed: Assumed,
-    begin: tuple[float, float] | None = None,
+    begin: tuple[float, float] | None,
+    sigma: float | None,
+    before: Linear | None,
 ) -> Linear:
-    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own."""
-    C_nb = np.full((len(master), 3, 3), np.nan)
-    C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = final_attitudes(slave, track)
+    """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own.
+
+    Where rows of velocity with this noise, m/s, come next in an open loop, with their columns.
+    """
+    C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track, carried_for(slave, model))
+    C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = carried.C_nb
     C_nm = C_nb @ axes_along(track, assumed)[-1].T
     if master.C_nb is not None:
         C_nm = np.where(np.isnan(C_nm), master.C_nb, C_nm)
@@ -170,7 +178,13 @@ def _linear(
     late, phase = (
         (0.0, math.inf) if tau is None else (float(track.sensors[-1, tau][0]), SURELY * float(track.sigma[-1, tau][0]))
     )
-    return Linear(C_nm, C_nb, late, begin, phase)
+    columns = None
+    if sigma is not None:
+        said = (assumed.lever_arm, assumed.lever_arm_sigma, assumed.delay_sigma)
+        calibrated = before is not None and before.columns is not None
+        held = master.time - assumed.delay - late
+        columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated)
+    return Linear(C_nm, C_nb, late, begin, phase, columns)
 
 
 def _refitted(

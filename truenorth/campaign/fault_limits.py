@@ -58,6 +58,12 @@ BY_LATENCY = (
     "late by d turn heading by d times the rate while a turn lasts; straight flight shows a master by velocity no heading, so that "
     "only one turn against another, of a delay of the slave that is not known either, tells it from one"
 )
+BY_SIGN = (
+    "measured, trial by trial: the master's velocities prefer the gyro of the right sign by less than 25 (the same ratio). In "
+    "level flight gyros about level axes see the earth's rate alone, up to 15 deg/h. Of the wrong sign it is an error of twice "
+    "as much that changes with the course; over legs of half a minute it moves a velocity by .2 m/s, as a tilt and a bias do, "
+    "which are not known"
+)
 LEAST_RATIO = 25.0
 # Faults that act as motion does: on the move only the aiding measurements speak of them.
 LIKE_MOTION = (
@@ -70,6 +76,7 @@ LIKE_MOTION = (
 
 # A turn that lags is another heading while it lasts; straight and level flight shows a master by velocity no heading.
 LATE = ("late gyros", "gyros late by a filter")
+SIGNS = ("gyro sign",)
 LIKE_HEADING = ("gyro scale",)  # that act on a base at rest as another heading does, to first order
 
 
@@ -109,6 +116,8 @@ def unseen(procedure: str, fault: str, size: str, ratio: float | None = None) ->
         return f"the measurements prefer the true sensors by {ratio:.1f} only"
     if measured and procedure == "transfer" and fault in LATE:
         return f"the master's velocities prefer gyros of one moment by {ratio:.1f} only"
+    if measured and procedure == "transfer" and fault in SIGNS:
+        return f"the master's velocities prefer the gyro of the right sign by {ratio:.1f} only"
     known = next((u for u in UNSEEN if procedure in u.procedures and fault == u.fault and re.match(u.size, size)), None)
     return None if known is None else known.why
 

@@ -13,11 +13,13 @@ from truenorth.campaign.fault_limits import (
     BY_LATENCY,
     BY_LIKELIHOOD,
     BY_MEANS,
+    BY_SIGN,
     BY_STAYING,
     LATE,
     LIKE_HEADING,
     LIKE_MOTION,
     REST,
+    SIGNS,
     UNSEEN,
 )
 from truenorth.campaign.faults import OUTCOMES, SOUND, Trial, table
@@ -138,6 +140,7 @@ def _unseen() -> list[str]:
     biases = [name for name in LIKE_MOTION if name.startswith(("gyro", "accel"))]
     lines.append(f"| {', '.join(biases)} | swaying | {BY_STAYING} |")
     lines.append(f"| {', '.join(LATE)} | transfer | {BY_LATENCY} |")
+    lines.append(f"| {', '.join(SIGNS)} | transfer | {BY_SIGN} |")
     return [*lines, f"| {', '.join(LIKE_MOTION)} | odometer, gnss, transfer, attitude, navigate | {BY_LIKELIHOOD} |"]
 
 
