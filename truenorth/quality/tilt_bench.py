@@ -44,7 +44,7 @@ class TiltBench:
         return np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1) / self.interval
 
     def scales_by_angles(self, theta: Array) -> Array | None:
-        """(3,) errors of the gyros' scale factors by the turns of their indexer, NaN about one that it hardly turns; None without one.
+        """(3,) scale errors of the gyros by the turns of their indexer, NaN about an axis that it hardly turns; None without one.
 
         What the gyros show beyond these turns is the base's own, and goes to and fro.
         """
