@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty import vehicles
-from benchmarks.honesty.foreign import E2, A, World, counted, exp, fixed, log, logged, sensed
+from benchmarks.honesty.foreign import ARCSEC, E2, STEP, A, World, counted, exp, fixed, log, logged, sensed, world
 from benchmarks.honesty.frame import Case, Outcome, main
-from truenorth.aiding.aids import Gnss
+from truenorth.aiding.aids import Gnss, Indexer
 from truenorth.alignment import align
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.core.position import Position
 from truenorth.navigation import Mounting, Start, navigate
+from truenorth.records import EncoderRecord
 from truenorth.records.specs import imu_spec
 from truenorth.state.layout import BA, BG, DP, DV, PHI
 
@@ -61,6 +62,31 @@ def aligned(vehicle: Vehicle, grade: str, length: float, by: str = "", given: bo
         if "log" in by:
             aids["velocity"] = logged(rng, true)
         return _found(align_in_motion(record, grade, position=None if "gnss" in by else place, **aids), true)
+
+    return run
+
+
+def spun(rng: np.random.Generator, still: World) -> tuple[World, EncoderRecord]:
+    """The same world for an IMU that an indexer spins about z and, on that, about x; and the angles."""
+    angles = np.outer(still.time, rng.uniform([8.0, 2.0], [18.0, 6.0]) * DEG)
+    zero = np.zeros(len(angles))
+    outer, inner = (np.stack(v, axis=1) for v in ((zero, zero, angles[:, 0]), (angles[:, 1], zero, zero)))
+    C = still.C @ exp(outer) @ exp(inner)
+    rows = slice(None, None, round(0.01 / STEP))
+    encoder = EncoderRecord(still.time[rows], ARCSEC * np.round(angles[rows] / ARCSEC))
+    return world(rng, still.place[0], still.v, C, np.zeros_like(still.v), still.speed), encoder
+
+
+def indexed(vehicle: Vehicle, grade: str, length: float, given: bool = True) -> Any:
+    """A run of alignment of an IMU that spins on an indexer of two axes; `given`: with the specification."""
+
+    def run(seed: int, number: int) -> Outcome:
+        rng = np.random.default_rng([seed, number, 11])
+        base = vehicle(rng, length)
+        true, encoder = spun(rng, base)
+        place = Position(*true.place.mean(axis=0).tolist())
+        record = sensed(rng, true, imu_spec(grade))
+        return _found(align(record, place, grade if given else None, aid=Indexer(encoder)), base)
 
     return run
 
@@ -131,6 +157,10 @@ CASES = (
         for v, g in ((vehicles.raft, "tactical"), (vehicles.gondola, "tactical"), (vehicles.gondola, "consumer"))
     ),
     Case(NAME, "swaying, tactical, raft", aligned(vehicles.raft, "tactical", 300.0)),
+    Case(NAME, "on an indexer, industrial, ship moored", indexed(moored, "industrial", 400.0)),
+    Case(
+        NAME, "on an indexer, tactical, ship moored, no specification", indexed(moored, "tactical", 400.0, given=False)
+    ),
     *(
         Case(NAME, f"by GNSS, {g}, {v.__name__}", aligned(v, g, 200.0, "gnss"))
         for v, g in (

@@ -27,6 +27,7 @@ from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.rate_step import rate_step_evidence
 from truenorth.alignment.result import Alignment
+from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
@@ -310,7 +311,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
             return start._replace(model=StaticModel.of(inferred), P_bias=P_bias)
 
         fine, noise = sway_inferred(start_of, noise, usual)
-        used, P = infer_spec(check, noise), start_of(noise).P_bias
+        start = start_of(noise)
+        used, P = infer_spec(check, noise), start.P_bias
     elif sways:
         fine = sway_align(start, turned=turned, axes=spec)
     elif turned is not None:
@@ -327,7 +329,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
-    steps += late_gyros_evidence(fine, fine.late, task.record) if isinstance(fine, SwayAlignment) else []
+    if isinstance(fine, SwayAlignment):
+        steps += late_gyros_evidence(fine, fine.late, task.record)
+        about = start._replace(C_n0_i=fine.C_n0_i)
+        steps += scale_on_sway_evidence(
+            fine, task.record, lambda record: sway_align(about._replace(record=record), turned=turned, axes=spec)
+        )
     way = farthest(fine, task.position) if sways else math.inf
     return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)
 

@@ -171,7 +171,9 @@ def align_rotary(
         method_reason=f"the IMU turns on an indexer ({how}), {why}",
     )
     answer = grown(answer, Effect(heading=math.hypot(angle_sigma, unsure), level=angle_sigma))
-    evidence = _of_encoder(record, encoder, axes, task, spec) + _of_filter(answer, fine, spec, task)
+    evidence = _of_encoder(record, encoder, axes, task, spec) + _of_filter(
+        answer, fine, spec, task, given=given is not None
+    )
     return judged(answer, evidence, heading_limit)
 
 
@@ -195,9 +197,9 @@ def _from_headings(start: CoarseStart, mount: Mount, spec: ImuSpec, lat: float) 
     return found[best], max(x for x, ratio in zip(off, likely[best] - likely, strict=True) if ratio < limit("rival"))
 
 
-def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task) -> list[Evidence]:
-    """What the innovations say."""
-    drift, steps, hemisphere = what_begins(fine, spec, task.position)
+def _of_filter(answer: Alignment, fine: FineAlignment, spec: ImuSpec, task: Task, *, given: bool) -> list[Evidence]:
+    """What the innovations say; `given`: whether somebody has given the specification."""
+    drift, steps, hemisphere = what_begins(fine, spec, task.position, given=given)
     evidence = model_evidence(drift, settled=fine.settled)
     evidence += base_speed(answer) + steps + bad_stretches(fine, task.record) + hemisphere
     if isinstance(fine, SwayAlignment):

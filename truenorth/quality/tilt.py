@@ -199,9 +199,14 @@ def check_tilt(record: ImuRecord, C_sb: Callable[[Array], Array] | None = None, 
     scale, sigma_scale = little[1:4], sigma[1:4]
     wrong = np.where(np.abs(scale) >= np.maximum(least_scale(turns), clear * sigma_scale), scale, 0.0)
     if wrong.any():
-        half, whole = (bench.left(theta / np.maximum(1.0 + part * wrong, 0.1)) for part in (0.5, 1.0))
-        if not whole < half < given or may_be_pushed:
+        half, whole = (theta / np.maximum(1.0 + part * wrong, 0.1) for part in (0.5, 1.0))
+        better = bench.left(whole) < bench.left(half) < given
+        if not better or may_be_pushed:
             sigma_scale = np.full(3, np.inf)
+        # Of an indexer the angles must say so, too: the waves that push its base leave some of that in the tilt as it spins.
+        by_angles = bench.scales_by_angles(theta)
+        if by_angles is not None:
+            sigma_scale = np.where(by_angles * wrong < 0.5 * wrong**2, np.inf, sigma_scale)
     each = little[4:], sigma[4:]
     turn = abs(late) * bench.rate_up(theta)
     pushed = push_in_step(bench, theta, late) if may_be_pushed else NO_PUSH

@@ -13,6 +13,7 @@ from truenorth.strapdown.inertial_integration import integrate_attitude
 Array = NDArray[np.float64]
 
 AXES = np.eye(3)
+MOST_OF_IT = 0.5  # of the squares of the turns about an axis, that an indexer makes
 # Values at the first edge of a piece and the next, by the means in the first four cells: exact for a cubic.
 EDGES = np.array([[25.0, -23.0, 13.0, -3.0], [3.0, 13.0, -5.0, 1.0]]) / 12.0
 
@@ -31,12 +32,30 @@ class TiltBench:
         base = C if self.C_sb is None else C @ self.C_sb
         w = theta / self.interval
         if self.C_sb is not None:
-            turn = np.swapaxes(base[:, :-1], -1, -2) @ base[:, 1:]
-            w = np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1) / self.interval
+            w = self._turning(base)
             w = np.concatenate([w[:, :1], 0.5 * (w[:, 1:] + w[:, :-1]), w[:, -1:]], axis=1)
         W = skew(changes(w) / self.interval) + skew(w) @ skew(w)
         columns = np.concatenate([C @ self.force[..., None], base @ W], axis=3)
         return self.freed(columns).reshape(-1, 4), C
+
+    def _turning(self, base: Array) -> Array:
+        """(P, L-1, 3) rates from cell to cell of attitudes (P, L, 3, 3), rad/s."""
+        turn = np.swapaxes(base[:, :-1], -1, -2) @ base[:, 1:]
+        return np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1) / self.interval
+
+    def scales_by_angles(self, theta: Array) -> Array | None:
+        """(3,) scale errors of the gyros by the turns of their indexer, NaN about an axis that it hardly turns; None without one.
+
+        What the gyros show beyond these turns is the base's own, and goes to and fro.
+        """
+        if self.C_sb is None:
+            return None
+        turn = self.C_sb[:, :-1] @ np.swapaxes(self.C_sb[:, 1:], -1, -2)
+        made = np.stack([turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]], axis=-1)
+        seen = 0.5 * (theta[:, 1:] + theta[:, :-1])
+        squares = np.sum(made**2, axis=(0, 1))
+        much = squares > MOST_OF_IT * np.sum(seen**2, axis=(0, 1))
+        return np.where(much, np.sum((seen - made) * made, axis=(0, 1)) / np.maximum(squares, 1e-300), np.nan)
 
     def freed(self, x: Array) -> Array:
         """Without a constant and a slope in each piece."""
