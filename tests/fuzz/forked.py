@@ -15,6 +15,8 @@ from pathlib import Path
 
 from truenorth.formats import mat_child
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 def serve() -> None:
     """Read requests from standard input, one a line: the arguments of the reader, and the files for what it says."""
@@ -42,12 +44,15 @@ class Reader:
 
     def __init__(self) -> None:
         self.folder = tempfile.TemporaryDirectory()
-        command = [sys.executable, "-c", "from tests.fuzz.forked import serve; serve()"]
-        self.server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.server: subprocess.Popen[str] | None = None  # until the first file
 
     def run(self, command: list[str], **options: object) -> subprocess.CompletedProcess[bytes]:
         """Run the reader with the arguments of this command."""
         out, err = (Path(self.folder.name) / name for name in ("out", "err"))
+        if self.server is None:
+            serving = [sys.executable, "-c", "from tests.fuzz.forked import serve; serve()"]
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+            self.server = subprocess.Popen(serving, cwd=ROOT, **pipes)
         assert self.server.stdin is not None
         assert self.server.stdout is not None
         self.server.stdin.write(json.dumps([command[-2:], str(out), str(err)]) + "\n")
@@ -57,7 +62,6 @@ class Reader:
 
     def close(self) -> None:
         """End the child."""
-        assert self.server.stdin is not None
-        self.server.stdin.close()
-        self.server.wait()
+        if self.server is not None:
+            self.server.communicate()
         self.folder.cleanup()
