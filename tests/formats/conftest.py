@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.fuzz.forked import Reader
+from tests.forked import Reader
 from truenorth.formats import mat
 
 
