@@ -51,12 +51,17 @@ class World:
 
 
 def exp(r: Array) -> Array:
-    """Rotation by (..., 3) vectors: Rodrigues' formula."""
-    angle = np.linalg.norm(r, axis=-1)[..., None, None]
-    K = np.zeros((*r.shape[:-1], 3, 3))
-    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
-    K -= np.swapaxes(K, -1, -2)
-    return np.asarray(np.eye(3) + np.sinc(angle / math.pi) * K + 0.5 * np.sinc(angle / (2.0 * math.pi)) ** 2 * (K @ K))
+    """Rotation by (..., 3) vectors: Rodrigues' formula, ``cos I + sinc [r x] + (1 - cos) r r' / r^2``."""
+    square = np.sum(r**2, axis=-1)
+    angle = np.sqrt(square)
+    part = 0.5 * np.sinc(angle / (2.0 * math.pi)) ** 2
+    x, y, z = np.moveaxis(np.sinc(angle / math.pi)[..., None] * r, -1, 0)
+    C = (part[..., None] * r)[..., :, None] * r[..., None, :]
+    C += (1.0 - part * square)[..., None, None] * np.eye(3)
+    for i, j, s in ((2, 1, x), (0, 2, y), (1, 0, z)):
+        C[..., i, j] += s
+        C[..., j, i] -= s
+    return np.asarray(C)
 
 
 def log(C: Array) -> Array:

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 import truenorth
+from tests.forked import PLOTTER, Forks, python
 from tests.runs import some
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -106,7 +107,7 @@ def test_the_site_has_every_page():
 
 def test_every_public_name_has_a_place_and_an_example():
     text = (ROOT / "docs/api.md").read_text(encoding="utf-8")
-    examples = "".join(code for language, code in BLOCK.findall(text) if language == "python")
+    examples = "".join(block for language, block in BLOCK.findall(text) if language == "python")
     places = set(re.findall(r"^::: truenorth\.(\w+)$", text, re.MULTILINE))
     assert places == set(truenorth.__all__)
     without = {name for name in truenorth.__all__ if f"tn.{name}" not in examples}
@@ -132,14 +133,22 @@ CODE = {
 }
 
 
+@pytest.fixture(scope="module")
+def run():
+    """``python`` with some arguments in a folder; what is loaded already is of other libraries (a second a page)."""
+    forks = Forks(PLOTTER, python)
+    yield lambda folder, *arguments: ends_well(forks.call(*arguments, folder=folder))
+    forks.close()
+
+
 @pytest.mark.parametrize("page", CODE)
-def test_the_code_of_a_page_runs(page, tmp_path):
-    code = python_of(ROOT / page)
-    assert code
+def test_the_code_of_a_page_runs(page, tmp_path, run):
+    text = python_of(ROOT / page)
+    assert text
     if (given := CODE[page]) is not None:
-        first, _, rest = code.partition("\n")
-        code = f"{first}{given}{rest}".replace('"tactical"', '"navigation"')  # whose heading is known after 300 s
-    run([sys.executable, "-c", code], tmp_path)
+        first, _, rest = text.partition("\n")
+        text = f"{first}{given}{rest}".replace('"tactical"', '"navigation"')  # whose heading is known after 300 s
+    run(tmp_path, "-c", text)
 
 
 def test_no_page_has_code_that_is_not_run():
@@ -147,7 +156,7 @@ def test_no_page_has_code_that_is_not_run():
 
 
 def python_of(page: Path) -> str:
-    return "\n".join(code for language, code in BLOCK.findall(page.read_text(encoding="utf-8")) if language == "python")
+    return "\n".join(text for language, text in BLOCK.findall(page.read_text(encoding="utf-8")) if language == "python")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
@@ -168,7 +177,7 @@ def test_calls_in_passing_are_calls_that_exist(page):
 def steps_of(page: str) -> list[str]:
     """Lines of a page's commands and code, without comments and language."""
     blocks = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-    lines = "".join(code for language, code in blocks if language in ("sh", "python")).splitlines()
+    lines = "".join(text for language, text in blocks if language in ("sh", "python")).splitlines()
     return [step for line in lines if (step := line.partition("  # ")[0].replace(" --lang zh", "").strip())]
 
 
@@ -180,19 +189,22 @@ def test_a_chinese_page_has_the_steps_of_the_english_one(page):
 
 
 @pytest.mark.parametrize("page", some(CHINESE.values(), CHINESE))
-def test_a_newcomer_can_follow_the_page(page, tmp_path):
-    """The commands of the page, then its code, in one empty folder."""
+def test_a_newcomer_can_follow_the_page(page, tmp_path, run):
+    """The commands of the page, the first one by the program itself, then its code, in one empty folder."""
     blocks = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-    for line in "".join(code for language, code in blocks if language == "sh").splitlines():
+    for at, line in enumerate("".join(text for language, text in blocks if language == "sh").splitlines()):
         program, *arguments = shlex.split(line, comments=True)
         assert program == "truenorth", line
-        run([str(Path(sys.executable).with_name(program)), *arguments], tmp_path)
-    run([sys.executable, "-c", "\n".join(code for language, code in blocks if language == "python")], tmp_path)
+        if at == 0:
+            by_itself = [str(Path(sys.executable).with_name(program)), *arguments]
+            ends_well(subprocess.run(by_itself, cwd=tmp_path, capture_output=True, check=False))
+        else:
+            run(tmp_path, "-m", program, *arguments)
+    run(tmp_path, "-c", "\n".join(text for language, text in blocks if language == "python"))
 
 
-def run(command: list[str], folder: Path) -> None:
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command[:2]}\n{done.stdout}{done.stderr}"
+def ends_well(done: subprocess.CompletedProcess[bytes]) -> None:
+    assert done.returncode == 0, f"{done.args[:2]}\n{(done.stdout + done.stderr).decode()}"
 
 
 def test_the_film_is_small_and_moves():

@@ -75,7 +75,7 @@ def test_counts_with_a_scale_and_an_interval(save):
     np.testing.assert_array_equal(record.accel, counts[:, :3] * [1, 2, 3])
 
 
-def test_a_matlab_struct_and_the_array_of_psins(tmp_path):
+def test_a_matlab_struct_and_the_array_of_psins(tmp_path, program):
     path = tmp_path / "log.mat"
     imu = np.column_stack([SENSORS, TIME])
     savemat(path, {"imu": imu, "ts": 0.01})

@@ -178,6 +178,10 @@ def test_a_file_that_is_cut_short(suffix, part, tmp_path):
     says(path, "cut short")
 
 
+def test_a_matlab_file_that_is_cut_short_in_a_process_of_its_own(tmp_path, program):
+    test_a_file_that_is_cut_short("mat compressed", 0.7, tmp_path)
+
+
 def test_damage_inside_an_archive(tmp_path):
     path = tmp_path / "log.npz"
     write_imu(ImuRecord(np.arange(1, 400) / 100, np.ones((399, 3)), np.ones((399, 3))), path)

@@ -15,11 +15,11 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from tests.forked import Reader
 from tests.formats.corpus.dialects import DEG, SI, G, table
 from tests.formats.corpus.truth import truth
 from tests.formats.test_devices import dataflash_bytes, ulog_bytes
 from tests.formats.test_text_devices import numbers, phone_log, vn
-from tests.fuzz.forked import Reader
 from truenorth.core.errors import TruenorthError
 from truenorth.core.yaml_file import read_mapping
 from truenorth.formats import mat, read_gnss, read_imu, read_odometer, write_imu

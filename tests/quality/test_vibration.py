@@ -1,5 +1,7 @@
 """Vibration that a log hardly samples: the two errors of its integration, by that integration, and what answers make of them."""
 
+from itertools import accumulate
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -42,11 +44,10 @@ def integrated(record, frequency):
     phi = dtheta.copy()
     phi[1:] += BEFORE["previous"] * np.cross(dtheta[:-1], dtheta[1:])
     truth = attitude(record.time, frequency)
-    at, error = truth[0], []
-    for k in range(1, len(record)):
-        at = at * Rotation.from_rotvec(phi[k])
-        error.append((truth[k].inv() * at).as_rotvec())
-    time, error = record.time[4:], np.array(error[3:])
+    turns = Rotation.from_rotvec(phi).as_matrix()
+    turns[0] = truth[0].as_matrix()
+    at = Rotation.from_matrix(list(accumulate(turns, np.matmul)))
+    time, error = record.time[4:], (truth.inv() * at).as_rotvec()[4:]
     drift, start = np.polyfit(time, error, 1)
     left = error - np.outer(time, drift) - start
     return np.sqrt(np.linalg.eigvalsh(left.T @ left / len(left))[-1]), np.abs(drift).max()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 from typing import Literal
 
@@ -224,24 +225,30 @@ Fit = tuple[float, tuple[int, ...], Array, Array]
 
 
 def _best_processes(shapes: Array, variance: Array, weights: Array) -> Fit:
-    fits = [
-        fit
-        for size in range(1, min(shapes.shape[1], variance.size) + 1)
-        for chosen in combinations(range(shapes.shape[1]), size)
-        if (fit := _fit_processes(shapes, variance, weights, chosen)) is not None
-    ]
+    """The set that explains it best, of those whose squares are positive; each process must be worth its place."""
+    fits: list[Fit] = []
+    for sets in _sets(shapes.shape[1], variance.size):
+        squares, solvers, costs = _fit_processes(shapes, variance * weights, weights, sets)
+        for k in np.flatnonzero(~np.any(squares <= 0.0, axis=1)):
+            fits.append((float(costs[k]), tuple(sets[k].tolist()), squares[k], solvers[k]))
     return min(fits, key=lambda fit: fit[0] + WORTH * len(fit[1]))
 
 
-def _fit_processes(shapes: Array, variance: Array, weights: Array, chosen: tuple[int, ...]) -> Fit | None:
-    """Chi-square, processes, squared coefficients and solver; None where a square is not positive."""
-    rows = shapes[:, chosen] * weights[:, None]
-    scale = np.linalg.norm(rows, axis=0)  # the shapes differ by many powers of ten
-    solver = np.linalg.pinv(rows / scale) / scale[:, None]
-    squares = solver @ (variance * weights)
-    if np.any(squares <= 0.0):
-        return None
-    return float(np.sum((rows @ squares - variance * weights) ** 2)), chosen, squares, solver
+@cache
+def _sets(processes: int, most: int) -> list[NDArray[np.int64]]:
+    """Sets of one, two, .. processes, at most so many: (C, size) each."""
+    sizes = range(1, min(processes, most) + 1)
+    return [np.array(list(combinations(range(processes), size))) for size in sizes]
+
+
+def _fit_processes(shapes: Array, wanted: Array, weights: Array, sets: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+    """Squared coefficients (C, size), solvers (C, size, M) and chi-squares (C,) of sets of processes (C, size)."""
+    rows = np.swapaxes(shapes.T[sets] * weights, 1, 2)
+    scale = np.linalg.norm(rows, axis=1)  # the shapes differ by many powers of ten
+    solvers = np.linalg.pinv(rows / scale[:, None]) / scale[:, :, None]
+    squares = solvers @ wanted
+    left = (rows @ squares[:, :, None])[:, :, 0] - wanted
+    return squares, solvers, np.sum(left**2, axis=1)
 
 
 def _degrees_of_freedom(count: int, m: NDArray[np.int64]) -> Array:

@@ -8,7 +8,6 @@ the sway. On an indexer the base's attitude is ``C_i_b = C_i_s C_s_b``, from the
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,4 +75,4 @@ def with_arm(system: LinearSystem, rows: Array, arm: Array) -> LinearSystem:
     bigger = grown(system, n + len(arm))
     bigger["Phi"][:, n:, n:] = np.eye(len(arm))
     bigger["H"][:, :, n:] = rows
-    return replace(system, **bigger, z=system.z - rows @ arm)
+    return system.with_made(**bigger, z=system.z - rows @ arm)

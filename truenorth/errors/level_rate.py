@@ -10,8 +10,6 @@ It is linear in w, where the same in heading goes round a circle.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,4 +33,4 @@ def with_level_rate(system: LinearSystem, integrals: InertialIntegrals, lat: flo
     bigger["Phi"][:, PHI, rate] = -T * level
     bigger["Phi"][:, DV, rate] = -T * (f_late @ level)
     bigger["H"][:, :, rate] = -(T**2) / 6 * (local_axes(integrals.time, lat) @ f @ level)
-    return replace(system, **bigger)
+    return system.with_made(**bigger)

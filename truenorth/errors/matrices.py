@@ -10,11 +10,13 @@ inertial navigation in-flight alignment, IEEE Trans. Aerospace and Electronic Sy
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.core.remembered import remembered
 from truenorth.errors.staying import DV, PHI, grown, local_axes
 from truenorth.filters import LinearSystem
 from truenorth.records import ImuRecord
@@ -27,21 +29,22 @@ MATRICES = 18
 
 
 def with_matrices(
-    system: LinearSystem, record: ImuRecord, integrals: InertialIntegrals, C_n0_i: Array, lat: float
+    system: LinearSystem, record: Callable[[], ImuRecord], integrals: InertialIntegrals, C_n0_i: Array, lat: float
 ) -> LinearSystem:
     """A system of :meth:`truenorth.errors.staying.StaticModel.linearise` with the matrices of both sensors as 18 more states.
 
     Parameters
     ----------
-    record : ImuRecord
-        As integrated: nominal errors taken off.
+    record : callable
+        Gives the record as integrated: nominal errors taken off. It is asked for once for the same integrals.
     integrals : InertialIntegrals
         Of that record.
     C_n0_i : (3, 3) array
     lat : float, rad
     """
     T = integrals.intervals[:, None, None]
-    gyro, accel = _moments(record, integrals)
+    gyro, accel = moments = _about(integrals).get("moments") or _moments(record(), integrals)
+    _about(integrals)["moments"] = moments
     C_n_n0 = local_axes(integrals.time, lat)
     force = system.Phi[:, DV, PHI] / T  # [f x], f the reaction to gravity
     n, K = system.states, len(T)
@@ -56,7 +59,7 @@ def with_matrices(
     Phi[:, DV, M_a] = a0
     H[:, :, M_g] = C_n_n0 @ (-force @ g2 / (2 * T))
     H[:, :, M_a] = C_n_n0 @ (-a1 / T)
-    return replace(system, **bigger)
+    return system.with_made(**bigger)
 
 
 def without_errors(record: ImuRecord, bias: Array, gyro_matrix: Array, accel_matrix: Array) -> ImuRecord:
@@ -73,7 +76,16 @@ def matrices_of(x: Array) -> tuple[Array, Array]:
     return x[:9].reshape(3, 3), x[9:].reshape(3, 3)
 
 
-def _moments(record: ImuRecord, integrals: InertialIntegrals) -> tuple[list[Array], list[Array]]:
+Moments = tuple[list[Array], list[Array]]
+
+
+@remembered
+def _about(integrals: InertialIntegrals) -> dict[str, Moments]:
+    """Moments of the last integrals: where only noise or motion are others, the log is linearised about the same ones."""
+    return {}
+
+
+def _moments(record: ImuRecord, integrals: InertialIntegrals) -> Moments:
     """``int s^m C_ib e_i w_j ds`` of each interval for m = 0, 1, 2, and the same of the force; (K, 3, i, j) each."""
     dtheta, dvel = increments(record)
     steps = record.steps

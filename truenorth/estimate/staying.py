@@ -203,7 +203,7 @@ class StayingLog:
             self.noise, slow, self.integrals, self.C_n0_i, self.position, P0[:STATES, :STATES], self.form
         )
         if "matrices" in groups:
-            system = with_matrices(system, self._without_errors(), self.integrals, self.C_n0_i, lat)
+            system = with_matrices(system, self._without_errors, self.integrals, self.C_n0_i, lat)
             self._turns = system.Phi[:, PHI, groups["matrices"]]
         if "arm" in groups:
             rows = arm_rows(self.integrals, self.C_n0_i, lat, self.C_sb)

@@ -57,8 +57,14 @@ def whiteness(normalised: Array, interval: float = 1.0) -> Whiteness:
         return Whiteness(1.0, 1.0, 1.0, False)
     total = float(np.sum(e**2))
     most = min(len(e) // 4, MOST_LAGS)
-    r = np.array([np.sum(e[k:] * e[:-k]) for k in range(1, most + 1)]) / max(total, 1e-300)
-    chance = r < 2.0 / math.sqrt(count)
+    few = 2.0 / math.sqrt(count)
+    found: list[float] = []
+    for k in range(1, most + 1):  # as far as the first that chance explains
+        found.append(np.sum(e[k:] * e[:-k]) / max(total, 1e-300))
+        if k >= LAGS and min(found) < few:
+            break
+    r = np.array(found)
+    chance = r < few
     last = int(np.argmax(chance)) if chance.any() else most
     colour = math.sqrt(1.0 + 2.0 * float(r[:last].sum()))
     turns = np.cos(2.0 * np.pi * interval * np.arange(1, last + 1) / MANOEUVRE)

@@ -15,7 +15,7 @@ from truenorth.records.motion import MotionStates, Moving
 from truenorth.records.unit_spec import value
 from truenorth.simulation.aiding import Aided, Draws, OutlyingSpec, kept, outliers
 from truenorth.simulation.motion import displaced
-from truenorth.simulation.processes import gauss_markov
+from truenorth.simulation.processes import first_order, gauss_markov
 from truenorth.simulation.sensing import NODES, WEIGHTS
 
 Array = NDArray[np.float64]
@@ -159,8 +159,6 @@ def _sigma(horizontal: float, ratio: Array, count: int) -> Array | None:
 
 def _lagging(motion: Moving, times: Array, lag: float) -> Array:
     """Solution of ``lag y' + y = alt``, settled at the first time: the exact recursion, its input by quadrature."""
-    from scipy.signal import lfilter
-
     step = float(times[1] - times[0])
     parts = math.ceil(max(4 * step / lag, 8 * step / motion.shortest_period))
     h = step / parts
@@ -169,5 +167,5 @@ def _lagging(motion: Moving, times: Array, lag: float) -> Array:
     weights = 0.5 * h * WEIGHTS * np.exp(-0.5 * h * (1.0 - NODES) / lag) / lag
     first = float(motion.states(times[0]).alt)
     # Heights above the first keep the sum's rounding small.
-    y, _ = lfilter([1.0], [1.0, -math.exp(-h / lag)], (alt - first) @ weights, zi=[0.0])
+    y = first_order(math.exp(-h / lag), (alt - first) @ weights)
     return first + np.concatenate([[0.0], y[parts - 1 :: parts]])
