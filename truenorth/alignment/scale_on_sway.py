@@ -10,7 +10,7 @@ So both compete. With its accelerometer put right the log is aligned anew, its m
 goes with the tilt any more then: the motion that was left is the base's own, and the log is likelier by thousands. Of a push, which
 has its own phase, frequencies and directions, most is left. Asked is what any push in step would explain of the log that is put
 right, ``K = K0 + K1 jw + K2 (jw)^2`` along and across, as of :mod:`truenorth.quality.pushed`. Of 16 logs with a scale factor it was
-.3 to 5 % of what this explains, of 15 sound ships and buoys half of it and more.
+.3 to 5 % of what this explains, of 13 sound ships and buoys half of it and more.
 
 In a sea that pushes a base as much as a scale factor would, the two are one, and nothing is said.
 """
