@@ -111,7 +111,7 @@ def damp_navigation(
     if course.interval > LONGEST_STEP * 1.01:
         raise UsageError(
             f"damping with a track of {course.interval:g} s from row to row; expected {LONGEST_STEP:g} s at most: "
-            f"--every {LONGEST_STEP:g} (`output={LONGEST_STEP:g}`)"
+            f"say so by `output`, seconds between rows"
         )
     start = round(damper.start / course.interval)
     if start >= len(course) - 2:
