@@ -1,13 +1,17 @@
 """From an alignment at rest on: is the sigma of free inertial navigation that of the errors?"""
 
+import json
+
 import numpy as np
 import pytest
 
 from truenorth.alignment import align
+from truenorth.core.errors import DataError
 from truenorth.core.position import Position
 from truenorth.navigation import navigate
 from truenorth.navigation.start import read_start, start_from_alignment
 from truenorth.records.specs import imu_spec
+from truenorth.results import save
 from truenorth.simulation import ideal_log, rest, simulate
 from truenorth.state.layout import BA, BG, PHI
 
@@ -39,6 +43,20 @@ def test_what_an_alignment_balances_navigation_knows_to_be_balanced(tmp_path):
         np.testing.assert_allclose(getattr(again, name), getattr(start, name), rtol=1e-12, atol=1e-30)
     np.testing.assert_allclose(again.whole.constant, start.whole.constant, rtol=1e-9)
     assert again.whole.averaged == start.whole.averaged == pytest.approx(600.0)
+
+
+@pytest.mark.parametrize("number", ["9" * 400, "1e999", "NaN"])
+def test_a_damaged_covariance_is_no_start(tmp_path, number):
+    record = simulate(
+        rest(Position.from_degrees(45.0, 8.0), 0.3), rate=20.0, duration=60.0, imu="navigation", seed=1
+    ).record
+    save(align(record, Position.from_degrees(45.0, 8.0), "navigation"), tmp_path)
+    summary = tmp_path / "summary.json"
+    content = json.loads(summary.read_text())
+    content["navigation"]["handover"]["P"][0][0] = "HERE"
+    summary.write_text(json.dumps(content).replace('"HERE"', number))
+    with pytest.raises(DataError):
+        read_start(tmp_path)
 
 
 @pytest.mark.slow

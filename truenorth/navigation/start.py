@@ -220,23 +220,30 @@ def read_start(folder: str | PathLike[str]) -> tuple[Start, ImuSpec, str]:
         spec = imu_spec(n["imu"])
         disturbance = np.array([math.nan if v is None else v for v in s["disturbance_m_s"]])
         if "P" in n:
-            v_n, P = np.array(n["v_n"], dtype=np.float64), np.array(n["P"], dtype=np.float64)
+            v_n, P = _finite(n["v_n"]), _finite(n["P"])
             biases = numbers["gyro_bias"], numbers["accel_bias"]
             start = moving_start(float(s["time_s"]), numbers["C_nb"], v_n, P, *biases, position, spec)
             start = _with_sensors(start, s)
-            return start, spec, str(s.get("source", ""))
-        gyro_bias = numbers.pop("gyro_bias")
-        if "handover" in n:
-            joint = Handover(**{key: np.array(n["handover"][key], dtype=np.float64) for key in JOINT})
         else:
-            joint = _by_static_limits(**numbers, position=position, spec=spec)
-        time, duration = float(s["time_s"]), float(s["duration_s"])
-        start = _start(time, gyro_bias, joint, position, spec, disturbance, duration)
-    except (KeyError, TypeError, ValueError) as error:
+            gyro_bias = numbers.pop("gyro_bias")
+            if "handover" in n:
+                joint = Handover(**{key: _finite(n["handover"][key]) for key in JOINT})
+            else:
+                joint = _by_static_limits(**numbers, position=position, spec=spec)
+            time, duration = float(s["time_s"]), float(s["duration_s"])
+            start = _start(time, gyro_bias, joint, position, spec, disturbance, duration)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise DataError(
             f"{path}: {error!r} is missing or not as expected; write the alignment again with this version of Truenorth"
         ) from None
     return start, spec, str(s.get("source", ""))
+
+
+def _finite(numbers: Any) -> Array:
+    found = np.array(numbers, dtype=np.float64)
+    if not np.isfinite(found).all():
+        raise ValueError("a number that is not finite")
+    return found
 
 
 ARRAYS = (
