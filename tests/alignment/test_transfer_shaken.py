@@ -70,17 +70,22 @@ def test_rows_that_are_lost_shift_nothing():
     np.testing.assert_allclose(found.slow[:, 0], slow * np.cos(2.0 * np.pi * SLOW * at), atol=0.03 * slow)
 
 
+def swaying(imu, tones):
+    """The flights of the faults' bench with this IMU, swaying so."""
+    plain = BENCHES["transfer"]
+
+    def scenario(rng):
+        flight = plain.scenario(rng) | {"imu": imu, "output": "rates"}
+        return flight | {"disturbances": [{"kind": "sway", "tones": tones}]}
+
+    return Bench("swaying", scenario, plain.align, plain.sits)
+
+
 @pytest.mark.slow
 def test_levels_of_shaken_flights():
     """Before, of five such flights one was 2.6 sigmas off and one refused: the vibration told a false arm and delay."""
-    plain = BENCHES["transfer"]
     shake = {name: [{"amplitude": f"{size} deg", "period": "0.1 s"}] for name, size in TONES.items()}
-
-    def scenario(rng):
-        flight = plain.scenario(rng) | {"imu": "navigation", "output": "rates"}
-        return flight | {"disturbances": [{"kind": "sway", "tones": shake}]}
-
-    bench, found = Bench("shaken", scenario, plain.align, plain.sits), []
+    bench, found = swaying("navigation", shake), []
     for run in range(5):
         inputs, truth = bench.draw(7, run)
         answer = bench.align(inputs)
@@ -94,15 +99,9 @@ def test_levels_of_shaken_flights():
 @pytest.mark.slow
 def test_a_vehicle_that_rocks_in_tones_has_one_clock():
     """Its motion comes again and again and agrees at many delays: the clock seemed to step by 12.6 s."""
-    plain = BENCHES["transfer"]
     rocks = {name: [{"amplitude": f"{size} deg", "period": "0.37 s"}] for name, size in TONES.items()}
     rocks = {name: [*tones, {"amplitude": "0.3 deg", "period": "0.9 s"}] for name, tones in rocks.items()}
-
-    def scenario(rng):
-        flight = plain.scenario(rng) | {"imu": "industrial", "output": "rates"}
-        return flight | {"disturbances": [{"kind": "sway", "tones": rocks}]}
-
-    bench, found = Bench("rocks", scenario, plain.align, plain.sits), []
+    bench, found = swaying("industrial", rocks), []
     for run in range(4):
         inputs, truth = bench.draw(11, run)
         answer = bench.align(inputs)

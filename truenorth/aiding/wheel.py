@@ -10,7 +10,8 @@ c (of tyres and of springs), the velocity of the wheel's hub along the body's ax
 
 An axle leans by 1 to 5 deg/g, a body by 2 to 4 deg/g: at 20 m/s and 1 m/s^2 .1 m/s, the same way in each bend and at each braking,
 which no white noise stands for. Gravity's part of the force counts, as on a slope and in a bank it does. Quicker than the body's
-own swing on its springs (1 to 2 Hz) this does not hold, and is noise.
+own swing on its springs (1 to 2 Hz) this does not hold, and is noise. What a bias of an accelerometer adds to the force is left
+out: 1 mg of it makes 1 mm/s at 20 m/s.
 
 Source: T. Gillespie, "Fundamentals of Vehicle Dynamics" (1992), ch. 6 (cornering compliance: slip angle by lateral force); the
 dip by the force along, as a state of the INS, is ours.
@@ -18,10 +19,11 @@ dip by the force along, as a state of the INS, is ours.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
-from truenorth.aiding.body_velocity import vehicle_velocity
-from truenorth.aiding.row import AT_MOUNT, AT_OWN, AT_SCALE, BODY_FRAME, Row, row, state_of
+from truenorth.aiding.body_velocity import BODY_VELOCITY, vehicle_velocity
+from truenorth.aiding.row import AT_MOUNT, AT_OWN, AT_SCALE, row, state_of
 from truenorth.core.attitude import cross, times
 from truenorth.state.now import NOW_FORCE_B, vector_of
 
@@ -44,10 +46,4 @@ def _wheel(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any,
                 H[i, at[AT_MOUNT] + 1] += c * V * cross((0.0, 0.0, 1.0), f)[k]
 
 
-WHEEL = Row(
-    "wheel",
-    _wheel,
-    {"lever arm": 3, "scale": 1, "mounting": 2, "bias": 3, "lag": 1, "own": 2},
-    axes=BODY_FRAME,
-    swings=True,
-)
+WHEEL = replace(BODY_VELOCITY, name="wheel", function=_wheel)
