@@ -85,6 +85,17 @@ def test_a_log_must_show_that_the_swing_comes_back():
     assert long_enough(61.0)
 
 
+@pytest.mark.parametrize("K", [61, 64, 70])
+def test_a_log_that_is_just_long_enough_has_one_frequency_to_try(K):
+    """A grid from two periods in the log to the slowest sea: of a log of a minute it has one cell, and a swing there is found."""
+    period = 0.5 * (30.0 + 0.5 * K)
+    z = np.stack([drawn(SEA, K, seed) for seed in (1, 2, 3)], axis=1)
+    z[:, 0] += 2.0 * math.pi / period * 1.2 * np.cos(2.0 * math.pi / period * (np.arange(K) + 0.5))
+    found = fit_swing(_still(z), 1.0, WALKS, (SEA, SEA, SEA), np.zeros((K, 3, 2)))
+    (line,) = (item for item in found[0].oscillators if is_swing(item))
+    assert 2.0 * math.pi / line.frequency == pytest.approx(period, rel=0.1)
+
+
 def _fine(likelihood):
     return SimpleNamespace(
         estimates=SimpleNamespace(log_likelihood=likelihood),

@@ -71,14 +71,15 @@ def fit_swing(
     """
     duration = interval * len(system.z)
     low, high = 2.0 * math.pi * max(FEWEST / duration, 1.0 / LONGEST), 2.0 * math.pi / SLOWEST_SEA
-    grid = np.arange(low, high, CELL / duration)
+    spacing = CELL / duration
+    grid = np.arange(low, high, spacing)  # of one frequency where the log is just long enough
     seas, lines = [], np.zeros(2)
     for axis in (0, 1):
         U, size, _ = np.linalg.svd(turns[:, axis], full_matrices=False)
         level = _Level(system.z[:, axis], interval, walks, U[:, size * ARM > LEAST_TURN * math.sqrt(len(U))])
         sea = AxisMotion(plain[axis].white, tuple(item for item in plain[axis].oscillators if not is_swing(item)))
         for _ in range(ROUNDS):
-            lines[axis] = level.line(sea, grid)
+            lines[axis] = level.line(sea, grid, spacing)
             sea = level.sea(sea, lines[axis])
         seas.append(sea)
     items = _together(system, interval, (*seas, plain[2]), lines, (low, high))
@@ -93,9 +94,9 @@ class _Level:
         self.given = z, interval, walks
         self.slow, self.series = slow, Series(*self.given, slow)
 
-    def line(self, sea: AxisMotion, grid: Array) -> float:
-        """The frequency that gains most besides the sea, rad/s."""
-        near, spacing = float(grid[np.argmax(self.series.lines(sea, grid)[0])]), float(grid[1] - grid[0])
+    def line(self, sea: AxisMotion, grid: Array, spacing: float) -> float:
+        """The frequency that gains most besides the sea, rad/s, of a grid and finer and finer about it."""
+        near = float(grid[np.argmax(self.series.lines(sea, grid)[0])])
         for _ in range(LEVELS):
             cells = near + spacing * np.linspace(-1.0, 1.0, 2 * AROUND + 1)
             near, spacing = float(cells[np.argmax(self.series.lines(sea, cells)[0])]), spacing / FINER
