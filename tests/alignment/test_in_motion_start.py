@@ -1,12 +1,26 @@
 """The state from which a pass over a log on the move begins."""
 
+import math
+
 import numpy as np
 import pytest
 
-from truenorth.alignment.in_motion_start import GNSS_START, Guess, start_at
+from truenorth.alignment.in_motion_start import (
+    BANK_LEVEL,
+    GNSS_START,
+    HEADINGS,
+    LEVEL_TIME,
+    Guess,
+    guesses_all_round,
+    start_at,
+)
+from truenorth.core.attitude import misalignment
 from truenorth.core.position import Position
 from truenorth.records import GnssRecord, ImuRecord
 from truenorth.records.specs import imu_spec
+from truenorth.simulation import rest, simulate, simulate_sensor
+from truenorth.simulation.course import Leg, course
+from truenorth.simulation.gnss import GnssSpec
 from truenorth.state.layout import DV
 from truenorth.state.mounting import Mounting
 
@@ -30,3 +44,39 @@ def test_an_antenna_that_swings_does_not_show_the_velocity_of_the_imu(mounting, 
     still = start_at(record, guess, place, SPEC, None, gnss, Mounting(), Mounting())
     assert np.sqrt(np.diag(still.P)[DV]) == pytest.approx(GNSS_START)
     assert np.sqrt(np.diag(start.P)[DV]) == pytest.approx(np.hypot(GNSS_START, arm * np.radians(15.0)), rel=0.01)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, 2.5, 4.0, 5.5])
+@pytest.mark.parametrize("late", [-0.2, 0.0, 0.2])
+def test_a_bank_of_guesses_in_a_steep_turn_holds_the_attitude(heading, late):
+    """Of an aircraft that banks by 60 deg, one guess is half a step off about the vertical that it feels, and little across."""
+    rate, speed = math.radians(24.0), 40.0
+    legs = [Leg(62.0, turn=60.0 * rate, bank="coordinated")]
+    motion = course(Position(0.8, 0.1, 500.0), legs, heading=heading, speed=speed)
+    sim = simulate(motion, rate=50.0, duration=40.0, imu="navigation", seed=1)
+    receiver = GnssSpec(rate=5.0, position_noise=1.0, velocity_noise=0.1)
+    gnss = simulate_sensor(motion, receiver, duration=40.0, seed=1).record.shifted(late).between(10.0, None)
+    record = sim.record.between(10.0, None)
+    first, last = np.searchsorted(sim.truth.time, record.time[0] - record.steps[0] + np.array([0.0, LEVEL_TIME]) - 1e-6)
+    truth = sim.truth.C_nb[first]
+    assert math.acos(truth[2, 2]) == pytest.approx(math.atan(speed * rate / 9.8), abs=0.02)
+    felt = sim.truth.v_n[last] - sim.truth.v_n[first] + np.array([0.0, 0.0, 9.806 * LEVEL_TIME])
+    axis = felt / np.linalg.norm(felt)
+    guesses = guesses_all_round(record, None, gnss, Mounting(), Mounting(latency_sigma=0.2))
+    off = min((misalignment(guess.C_nb, truth) for guess in guesses), key=lambda phi: float(np.linalg.norm(phi)))
+    about, across = float(off @ axis), float(np.linalg.norm(off - (off @ axis) * axis))
+    assert abs(about) < math.pi / HEADINGS + 0.01
+    assert across < math.radians(5.0 if late else 1.0)
+    assert across < guesses[0].level_sigma
+
+
+def test_noise_of_a_receiver_tilts_no_bank():
+    """At rest, with the receiver that is supposed where nobody says more: level as the force shows it."""
+    place = Position(0.8, 0.1, 500.0)
+    record = simulate(rest(place, 0.3), rate=50.0, duration=20.0, imu="navigation", seed=1).record
+    for seed in range(10):
+        spec = GnssSpec(rate=5.0, position_noise=1.0, velocity_noise=0.1)
+        gnss = simulate_sensor(rest(place, 0.3), spec, duration=20.0, seed=seed).record
+        for guess in guesses_all_round(record, None, gnss, Mounting(), Mounting(latency_sigma=0.2)):
+            assert guess.C_nb[2, 2] == pytest.approx(1.0, abs=1e-6)
+            assert guess.level_sigma == BANK_LEVEL

@@ -220,7 +220,7 @@ def _begun(task: MovingTask, method: str, tell: Callable[[str], None]) -> tuple[
         if guess.heading_sigma <= COARSE_HEADING:
             tell("first pass")
             return begun(task, guess, task.run(guess, gated=False)), 0.0
-    guesses = guesses_all_round(task.record, task.position, task.odometer, task.wheel)
+    guesses = guesses_all_round(task.record, task.odometer, task.gnss, task.wheel, task.antenna)
     best, track, spread = _best_of_bank(task, guesses, tell)
     return begun(task, guesses[best], track), spread
 

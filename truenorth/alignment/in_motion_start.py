@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from truenorth.aiding.sensors import place_sigma
 from truenorth.alignment.task import level_of
 from truenorth.coarse.odometer import frames, gnss_alignment, gnss_track, odometer_alignment
-from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm, skew
+from truenorth.core.attitude import dcm_from_euler, dcm_from_rotation_vector, rotation_vector_from_dcm, skew
 from truenorth.core.earth import radii
 from truenorth.core.position import Position
+from truenorth.core.units import STANDARD_GRAVITY
 from truenorth.records import GnssRecord, ImuRecord, OdometerRecord, VelocityRecord
 from truenorth.records.specs import ImuSpec
 from truenorth.state.layout import BA, BG, DV, PHI, STATES
@@ -66,20 +67,50 @@ def coarse_guess(
 
 
 def guesses_all_round(
-    record: ImuRecord, position: Position, odometer: OdometerRecord | VelocityRecord | None, wheel: Mounting
+    record: ImuRecord,
+    odometer: OdometerRecord | VelocityRecord | None,
+    gnss: GnssRecord | None,
+    wheel: Mounting,
+    antenna: Mounting,
 ) -> list[Guess]:
-    """Level from the first seconds, and headings all round."""
+    """Attitudes that the force of the first seconds allows: all round gravity, or all round what a vehicle in a turn feels of it.
+
+    What the wheel says of the acceleration, in body axes, is taken off the force. What a receiver says of it, in ENU, turns the
+    axis of the bank: an aircraft that banks by 60 deg feels a vertical of that tilt.
+    """
     dtheta, dvel = increments(record)
     rows = max(2, round(LEVEL_TIME / record.interval))
     C, velocity, _ = inertial_integrals(dtheta[:rows], dvel[:rows], record.steps[:rows], [0, rows])
-    force = velocity[1]
-    if odometer is not None:  # what the wheel says of the acceleration is not gravity's
-        at = record.time[0] - record.steps[0] + np.array([0.0, float(record.steps[:rows].sum())])
+    force, axis, sigma = velocity[1], np.eye(3), BANK_LEVEL
+    step = 2.0 * math.pi / HEADINGS
+    at = record.time[0] - record.steps[0] + np.array([0.0, float(record.steps[:rows].sum())])
+    if odometer is not None:
         v_b = _velocity_b(odometer, wheel, at)
         force = force - (C[1] @ v_b[1] - C[0] @ v_b[0])
+    elif gnss is not None:
+        axis, off = _felt_vertical(gnss, antenna, at, float(record.time[-1]))
+        tilt = math.hypot(axis[0, 2], axis[1, 2])  # a turn about an axis that leans is a tilt, too
+        sigma = math.hypot(sigma, off, tilt * step)
     level = level_of(force)
-    step = 2.0 * math.pi / HEADINGS
-    return [Guess(dcm_from_euler(k * step, 0.0, 0.0) @ level, BANK_LEVEL, step) for k in range(HEADINGS)]
+    return [Guess(axis @ dcm_from_euler(k * step, 0.0, 0.0) @ level, sigma, step) for k in range(HEADINGS)]
+
+
+def _felt_vertical(gnss: GnssRecord, antenna: Mounting, at: Array, end: float) -> tuple[Array, float]:
+    """Rotation (3, 3) from the vertical to ``a - g`` of a receiver's velocities at two times, and one sigma of its direction, rad.
+
+    A change of velocity that its noise and delay may make as well is shrunk (James and Stein): it would tilt the bank by nothing.
+    """
+    before, after = (_by_gnss(gnss, antenna, float(t), end) for t in at)
+    noise = before[1] ** 2 + after[1] ** 2
+    change = after[0] - before[0]
+    change = change * max(0.0, 1.0 - 3.0 * noise / max(float(change @ change), 1e-12))
+    fallen = STANDARD_GRAVITY * float(at[1] - at[0])
+    felt = change + np.array([0.0, 0.0, fallen])
+    felt = felt / np.linalg.norm(felt)
+    across = np.array([-felt[1], felt[0], 0.0])
+    turn = math.atan2(math.hypot(felt[0], felt[1]), felt[2])
+    rotation = dcm_from_rotation_vector(turn * across / max(float(np.linalg.norm(across)), 1e-12))
+    return rotation, min(math.sqrt(noise) / fallen, turn)
 
 
 def start_at(
