@@ -8,6 +8,7 @@ from truenorth import Gnss, GnssRecord, Odometer, align
 from truenorth.core.attitude import misalignment
 from truenorth.core.position import Position
 from truenorth.navigation import Mounting
+from truenorth.report.page import alignment_page
 from truenorth.simulation.scenario import read_scenario
 
 ANTENNA = Mounting(latency=0.1, lever_arm=np.array([0.0, -0.5, 1.2]))
@@ -51,6 +52,15 @@ def test_a_first_fix_before_driving_off(drive):
     answer = align(made.record, None, "industrial", aid=Gnss(from_on(aids["gnss"], 20.0), ANTENNA))
     assert answer.status == "aligned", answer.reasons
     assert all(item.key != "aids.late" for item in answer.evidence)
+
+
+def test_a_report_of_a_log_without_fixes_at_first(drive):
+    """Half of a minute without innovations: it ended in an internal error of the report."""
+    made, aids = drive
+    gnss = from_on(aids["gnss"], 25.0)
+    answer = align(made.record.between(None, 50.0), None, "industrial", aid=Gnss(gnss, ANTENNA), method="motion")
+    assert np.isnan(answer.history.nis[:20]).all()
+    assert "Innovations" in alignment_page(answer)
 
 
 @pytest.mark.slow

@@ -91,6 +91,22 @@ def test_limits_look_at_the_settled_part():
     assert settled_limits(middle, np.ones(100)) == pytest.approx((-1.3, 1.3))
 
 
+def test_limits_of_a_band_that_is_not_known_everywhere():
+    """A receiver that finds its satellites late has no innovations before, and one that never does has none."""
+    late = np.r_[np.full(40, np.nan), np.full(25, 1000.0), np.zeros(75)]
+    assert settled_limits(late, np.ones(140)) == pytest.approx((-1.3, 1.3))
+    assert settled_limits(np.full(9, np.nan), np.ones(9)) == (-1.0, 1.0)
+
+
+def test_averaged_nis_is_that_of_epochs_that_have_one(still):
+    nis = still.history.nis.copy()
+    nis[: 2 * NIS_BLOCK - 3] = np.nan
+    t, mean, *_ = averaged_nis(replace(still.history, nis=nis))
+    assert np.isfinite(mean).all()
+    np.testing.assert_allclose(mean[0], np.mean(nis[2 * NIS_BLOCK - 3 : 3 * NIS_BLOCK - 3]))
+    assert t[0] > still.history.time[2 * NIS_BLOCK - 3]
+
+
 def test_without_a_history_there_is_nothing_to_draw(still):
     with pytest.raises(ValueError, match="no history"):
         replace(still, history=None).plot()

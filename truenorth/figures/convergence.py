@@ -65,7 +65,11 @@ def courses(result: Alignment) -> list[Course]:
 
 
 def settled_limits(middle: Array, half: Array) -> tuple[float, float]:
-    """Vertical limits that show the settled part of a band well, with a margin."""
+    """Vertical limits that show the settled part of a band well, with a margin; of epochs that have no value, the others."""
+    known = np.isfinite(middle) & np.isfinite(half)
+    middle, half = middle[known], half[known]
+    if not len(middle):
+        return -1.0, 1.0
     late = slice(int(SETTLED_FROM * len(middle)), None)
     low, high = float(np.min((middle - half)[late])), float(np.max((middle + half)[late]))
     margin = 0.15 * max(high - low, 1e-9)
@@ -73,14 +77,14 @@ def settled_limits(middle: Array, half: Array) -> tuple[float, float]:
 
 
 def averaged_nis(history: History) -> tuple[Array, Array, float, float]:
-    """Time and mean of the NIS over blocks of `NIS_BLOCK` epochs, and the 95 % band of such a mean.
+    """Time and mean of the NIS over blocks of `NIS_BLOCK` epochs with one, and the 95 % band of such a mean.
 
     Empty arrays where the history is shorter than a block.
     """
-    count = len(history.nis) // NIS_BLOCK
-    rows = count * NIS_BLOCK
+    known = np.flatnonzero(np.isfinite(history.nis))
+    rows = known[: len(known) // NIS_BLOCK * NIS_BLOCK].reshape(-1, NIS_BLOCK)
     return (
-        history.time[:rows].reshape(count, NIS_BLOCK).mean(axis=1),
-        history.nis[:rows].reshape(count, NIS_BLOCK).mean(axis=1),
+        history.time[rows].mean(axis=1),
+        history.nis[rows].mean(axis=1),
         *NIS_BANDS[max(1, len(history.components))],
     )
