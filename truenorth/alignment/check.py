@@ -193,8 +193,11 @@ def implied(check: LogCheck, bias: Array, P: Array, P0: Array) -> LogCheck:
 
 
 def is_blind(motion: MotionSummary, check: LogCheck) -> bool:
-    """Whether the mean rate of a base that does not turn is so far from the earth's that it holds no heading."""
-    if motion.overall not in ("still", "disturbed"):
+    """Whether the mean rate of a base that does not turn is so far from the earth's that it holds no heading.
+
+    Of an IMU that is turned for a second the mean rate is that of the turn.
+    """
+    if motion.overall not in ("still", "disturbed") or motion.fraction("rotating") > 0.0:
         return False
     noise = 5.0 * float(np.max(check.rate_noise))
     return float(np.hypot(*check.rate_residual)) > max(BLIND_RATE, noise)

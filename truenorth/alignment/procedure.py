@@ -166,7 +166,7 @@ def align_base(
     evidence += turn_evidence(task) + gravity_evidence(task, answer.C_nb, answer.imu)
     evidence += rate_step_evidence(task, answer.C_nb, answer.imu)
     evidence += [] if sound else quantum_evidence(task.record, position.lat)
-    if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
+    if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
@@ -190,7 +190,8 @@ class _Found:
 def _choose(method: Method, task: Task) -> tuple[str, str]:
     if method != "auto":
         return method, "asked for"
-    if task.record.duration < SHORTEST_FILTER:
+    turns = task.motion.fraction("rotating") > 0.0  # means of an IMU that turns are of no attitude
+    if task.record.duration < SHORTEST_FILTER and not turns:
         return "analytic", (
             f"the log is {task.record.duration:.1f} s long, too short for a filter ({SHORTEST_FILTER:g} s): mean values only"
         )
@@ -216,7 +217,7 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
 def _align_analytic(task: Task, spec: ImuSpec | None) -> _Found:
     lat, alt = task.position.lat, task.position.alt
     check = check_means(task.means, lat, task.gravity)
-    used, where = _specification(spec, check, usual_noise())
+    used, where = _specification(spec, check, turning_noise(task.record))  # from row to row: short logs have no more
     P = task.bias_prior(used, level_of(task.means.f_b).T)
     C_nb, covariance, floor = analytic(task.means, lat, alt, P)
     return _Found(assemble(task, used, where, C_nb, covariance, floor), check)

@@ -43,19 +43,22 @@ LEVELLED = 1.0  # s, whose mean specific force levels to begin with
 MOSTLY = 0.95  # of the seconds
 ROCKING: tuple[Kind, ...] = ("disturbed", "swaying", "moving")  # what a ship does that goes nowhere
 ROCKED = math.radians(0.2)  # RMS about a steady turn, over 10 s
+STEADY = 3.0  # times its noise, by which a steady rate changes at most from second to second
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
+TURNING = ("still", "disturbed", "rotating")  # bases on which an IMU may be turned
 ROUND, LAST = 10, 200  # passes over a part, and over the whole: swings of tens of degrees take 40 to 150
 
 
 def turns_blindly(task: Task, spec: ImuSpec | None) -> bool:
     """Whether the IMU turns or sways in its log, and its gyros are too poor to see the earth turn."""
     overall, rocks = task.motion.overall, rocks_all_along(task.motion)
-    if not (overall in ("rotating", "swaying") or (overall == "moving" and rocks)):
+    turns = overall in TURNING and task.motion.fraction("rotating") > 0.0  # for a while, of a base that stays
+    if not (turns or overall == "swaying" or (overall == "moving" and rocks)):
         return False
     if spec is not None:
         return spec.gyro_bias > BLIND_RATE
-    if overall == "rotating" and not rocks:
+    if turns and not rocks:
         walk: float | None = float(np.max(task.motion.angle_noise))
     else:  # a sway has no quiet seconds: only what is faster than it is noise
         walks = sway_walks(task.record)
@@ -67,10 +70,17 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     """Whether the base moves in one way from the first second to the last: a ship whose IMU sits far from its centre does.
 
     Its arm accelerates it now less and now more, and the waves that she meets come in groups: sway, acceleration and what is less
-    than a sway may take turns. A buoy that swings on its chain turns by tens of degrees, but rocks as it turns: no table does.
+    than a sway may take turns. A buoy that swings on its chain turns by tens of degrees, but rocks as it turns: no table does. Nor
+    does a base that rocks pause: the rate of an IMU that was turned for a while is steady before and after, and where the log
+    is too short for ten seconds of rest its wander is that of the turn.
     """
     rocks = np.isin(motion.kind, [KINDS.index(kind) for kind in ROCKING])
-    rocks |= (motion.kind == KINDS.index("rotating")) & (motion.wander > ROCKED)
+    turns = motion.kind == KINDS.index("rotating")
+    rocks |= turns & (motion.wander > ROCKED)
+    if turns.any():
+        steps = np.linalg.norm(np.diff(motion.rate, axis=0), axis=1)
+        steady = steps < STEADY * math.sqrt(2.0) * float(np.linalg.norm(motion.angle_noise))
+        rocks[1:] &= ~steady
     return bool(rocks.size) and float(np.mean(rocks)) > MOSTLY
 
 

@@ -47,6 +47,7 @@ SWAY_ANGLE = np.radians(1.0)  # amplitude from which an oscillation is called sw
 TURN_RATE = np.radians(0.5)  # rad/s
 TURN_ANGLE = np.radians(3.0)  # net angle from which a turn is called rotating
 TURN_SHARE = 0.4  # of the RMS rate that is net rotation; a sway of 15 s period has at most 0.33
+TURN_WAY = 0.7  # of the way that the attitude goes, the same: of a turn of a second at rest all of it, of that sway at most .37
 MOVING_ACCELERATION = 0.08  # m/s^2 over one second; tilt error, bias and people in the car stay below 0.05
 LEAST_GAIN = 0.04  # m/s^2 over WINDOW: waves that come and go within it leave less, a start of .4 m/s more
 NOISY_BIAS = 200.0  # sqrt(Hz): the same of a noisier one, in its noise ...
@@ -268,7 +269,9 @@ def _turns(rate: Array, rate_noise: float) -> NDArray[np.bool_]:
     width = min(TURN_WINDOW, rate.shape[1])
     net = np.linalg.norm(box_mean(rate, width), axis=0)
     power = box_mean(np.sum(rate**2, axis=0, keepdims=True), width)[0]
-    turns: NDArray[np.bool_] = fast & (net > TURN_SHARE * np.sqrt(power)) & (net * width > TURN_ANGLE)
+    way = box_mean(np.linalg.norm(rate, axis=0, keepdims=True), width)[0]
+    one_way = (net > TURN_SHARE * np.sqrt(power)) | (net > TURN_WAY * way)
+    turns: NDArray[np.bool_] = fast & one_way & (net * width > TURN_ANGLE)
     return _closed(turns, 3)
 
 
