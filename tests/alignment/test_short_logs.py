@@ -43,8 +43,11 @@ def off(kind, duration, imu, said, seed):
     """The status, and errors of level, and of heading where it is said, in sigmas."""
     record, C_nb = log(kind, duration, imu, seed)
     answer = align(record, PLACE, said)
-    phi = misalignment(answer.C_nb, C_nb) / np.sqrt(np.diag(answer.phi_covariance))
-    return answer.status, phi[: 3 if answer.status == "aligned" else 2]
+    sigma = np.sqrt(np.diag(answer.phi_covariance))
+    if answer.status == "aligned":
+        return answer.status, misalignment(answer.C_nb, C_nb) / sigma
+    up = answer.C_nb @ C_nb[2]  # whatever the heading
+    return answer.status, np.array([up[1], -up[0]]) / sigma[:2]
 
 
 @few_and_all(24, 4)

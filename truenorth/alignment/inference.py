@@ -31,6 +31,7 @@ ACCEL_WIDTH = math.log(2.0)  # narrower: an accelerometer's offset goes with its
 LEAST = 0.3  # of the navigation preset's biases: beginning of the search
 WORST_GYRO = np.radians(10.0)  # rad/s: end of the search for a bias scale
 WORST_ACCEL = 10.0  # m/s^2
+INFERRED = "inferred from the log"
 
 
 def predictive_sigma(
@@ -86,6 +87,13 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
         accel_bias_instability=noise.accel_rate_walk * math.sqrt(0.5 * CORRELATION_TIME),
         correlation_time=CORRELATION_TIME,
     )
+
+
+def specification(spec: ImuSpec | None, check: LogCheck, noise: StaticModel) -> tuple[ImuSpec, str]:
+    """The specification that is given, or else inferred, and where it comes from in words; arguments as of :func:`infer_spec`."""
+    if spec is not None:
+        return spec, f"specification {spec.name!r}"
+    return infer_spec(check, noise), INFERRED
 
 
 @cache

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.against import against
-from truenorth.alignment.answer import assemble, at_epoch, creep, make_history, pays_until, without_heading
+from truenorth.alignment.answer import at_epoch, creep, make_history, pays_until, without_heading
 from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
@@ -21,8 +21,9 @@ from truenorth.alignment.check import LogCheck, check_filter, check_means, impli
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
+from truenorth.alignment.from_means import from_means, level_from_means
 from truenorth.alignment.handover import go_on, hand_over
-from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
+from truenorth.alignment.inference import INFERRED, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.rate_step import rate_step_evidence
@@ -31,7 +32,7 @@ from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.alignment.signatures import what_begins
 from truenorth.alignment.sway_inference import sway_inferred
 from truenorth.alignment.swaying import SwayAlignment, farthest, sway_align
-from truenorth.alignment.task import Task, bridged, last_part, level_of, make_task, noise_in
+from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_in
 from truenorth.alignment.turning import (
     infer_turning,
     rocks_all_along,
@@ -42,10 +43,8 @@ from truenorth.alignment.turning import (
     with_usual,
 )
 from truenorth.alignment.verdict import base_evidence, judged, leaves, no_attitude
-from truenorth.coarse import analytic, coarse_covariance, dual_vector, oba
-from truenorth.coarse.analytic import static_covariance
+from truenorth.coarse import coarse_covariance, dual_vector, oba
 from truenorth.coarse.uncertainty import base_velocity
-from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError, UsageError
 from truenorth.core.position import Position
 from truenorth.errors.staying import BA, BG, StaticModel, gained_velocity
@@ -71,7 +70,6 @@ GOES = 10.0  # m: of the way from where a base was in the mean, that still passe
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
-INFERRED = "inferred from the log"
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
 
@@ -142,7 +140,7 @@ def align_base(
     turned = False
     if is_blind(task.motion, means) or is_lost(task, means, spec, heading_limit):
         asked = "" if method == "auto" else f"{method} was asked for, but "
-        chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _align_level(task, spec)
+        chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _Found(*level_from_means(task, spec))
     elif turned := (method == "auto" and turns_blindly(task, spec)):
         chosen = "kalman"
         why = (
@@ -151,11 +149,11 @@ def align_base(
         )
         found = _align_turning(task, spec)
     elif chosen == "analytic":
-        found = _align_analytic(task, spec)
+        found = _Found(*from_means(task, spec))
     else:
         found = _align_inertial(task, spec, chosen, sound)
         if method == "auto" and spec is None and is_lost(task, means, found.answer.imu, heading_limit):
-            chosen, why, found = "analytic", NO_NORTH, _align_level(task, spec)
+            chosen, why, found = "analytic", NO_NORTH, _Found(*level_from_means(task, spec))
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     fitted = chosen == "swaying" or turned
@@ -214,39 +212,6 @@ def _choose(method: Method, task: Task) -> tuple[str, str]:
     return "swaying", f"{why}; its own motion is fitted to the log"
 
 
-def _align_analytic(task: Task, spec: ImuSpec | None) -> _Found:
-    lat, alt = task.position.lat, task.position.alt
-    check = check_means(task.means, lat, task.gravity)
-    used, where = _specification(spec, check, turning_noise(task.record))  # from row to row: short logs have no more
-    P = task.bias_prior(used, level_of(task.means.f_b).T)
-    C_nb, covariance, floor = analytic(task.means, lat, alt, P)
-    return _Found(assemble(task, used, where, C_nb, covariance, floor), check)
-
-
-def _align_level(task: Task, spec: ImuSpec | None) -> _Found:
-    """Level alone, from the mean specific force of a base that does not turn; heading zero by convention."""
-    task = last_part(task)
-    if not task.record.gyro.any():
-        raise AlignmentError(
-            f"{task.record.source}: all gyros read zero in every row: are they dead, or written too coarsely to see any motion?"
-        )
-    check = check_means(task.means, task.position.lat, task.gravity)
-    used, where = _specification(spec, check, allan_noise(task.record))
-    C_nb = level_of(task.means.f_b)
-    P = task.bias_prior(used, C_nb.T)
-    covariance, floor = static_covariance(C_nb, task.means, task.position.lat, task.position.alt, P)
-    # What the base moved about its mean attitude within ten seconds is not known at the epoch.
-    wander = float(np.max(task.motion.wander, initial=0.0)) if task.motion.overall != "still" else 0.0
-    covariance = without_heading(covariance + wander**2 * np.eye(3))
-    answer = assemble(task, used, where, C_nb, covariance, without_heading(floor))
-    # The mean rate is the gyro bias but for the earth's rate, of which the part about the vertical is known.
-    up = C_nb[2]
-    level_rate = EARTH_RATE * math.cos(task.position.lat)
-    bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2))
-    bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
-    return _Found(replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check)
-
-
 def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
     """Level of an IMU that turns, with gyros that do not see the earth; heading zero at the start by convention."""
     task = last_part(task)
@@ -284,7 +249,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     )
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     turns = task.motion.fraction("rotating") > 0.0
-    used, where = _specification(spec, check, turning_noise(task.record) if turns else noise)
+    used, where = specification(spec, check, turning_noise(task.record) if turns else noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
     if method in STATIONARY:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
@@ -390,9 +355,3 @@ def _explained(motion: MotionSummary, found: _Found) -> bool:
 def _moves_from(motion: MotionSummary) -> float | None:
     """When the base first goes somewhere, s on the record's clock; None if it stays."""
     return next((float(stretch.start) for stretch in motion.regimes if stretch.kind == "moving"), None)
-
-
-def _specification(spec: ImuSpec | None, check: LogCheck, noise: StaticModel) -> tuple[ImuSpec, str]:
-    if spec is not None:
-        return spec, f"specification {spec.name!r}"
-    return infer_spec(check, noise), INFERRED

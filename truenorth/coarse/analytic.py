@@ -57,12 +57,12 @@ def means(record: ImuRecord) -> Means:
     return Means(
         w_ib_b=total[1:4] / total[0] + cone_drift(record),
         f_b=total[4:] / total[0],
-        w_covariance=_scatter(w) / blocks,
-        f_covariance=_scatter(f) / blocks,
+        w_covariance=scatter_of(w) / blocks,
+        f_covariance=scatter_of(f) / blocks,
     )
 
 
-def _scatter(x: Array) -> Array:
+def scatter_of(x: Array) -> Array:
     """Covariance (3, 3) of rows (B, 3) about their mean."""
     left = x - x.sum(axis=0) / len(x)
     return left.T @ left / (len(x) - 1)

@@ -1,0 +1,113 @@
+"""Attitude from the means of a log: of one that is too short for a filter, and of gyros that do not see the earth turn.
+
+A mean is that of the whole log, and the answer is of its epoch. What a base has moved about its mean in between the gyros carry,
+where that is more than they drift in the time; what they do not carry is in sigma.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truenorth.alignment.answer import assemble, without_heading
+from truenorth.alignment.check import LogCheck, check_means
+from truenorth.alignment.inference import allan_noise, specification
+from truenorth.alignment.result import Alignment
+from truenorth.alignment.task import Task, last_part, level_of
+from truenorth.alignment.turning import turning_noise
+from truenorth.coarse import analytic
+from truenorth.coarse.analytic import BLOCKS, Means, scatter_of, static_covariance
+from truenorth.core.earth import EARTH_RATE
+from truenorth.core.errors import AlignmentError
+from truenorth.records.specs import ImuSpec
+from truenorth.strapdown.increments import increments
+from truenorth.strapdown.level import inertial_integrals
+
+Array = NDArray[np.float64]
+
+WINDOW = 10.0  # s, over which a wander of the attitude is taken
+WANDER = 1.0 / 15.0  # of a random walk N over T about its line: N sqrt(T / 15)
+
+
+def from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
+    """Attitude by the mean force and the mean rate, heading where the latter shows it.
+
+    Parameters
+    ----------
+    spec : ImuSpec, optional
+        Inferred from the log where it is left out.
+
+    Returns
+    -------
+    answer : Alignment
+    check : LogCheck
+        What the means show of the biases.
+    """
+    lat, alt = task.position.lat, task.position.alt
+    check = check_means(task.means, lat, task.gravity)
+    used, where = specification(spec, check, turning_noise(task.record))  # from row to row: short logs have no more
+    means, moved = _at_the_epoch(task, used)
+    P = task.bias_prior(used, level_of(means.f_b).T)
+    C_nb, covariance, floor = analytic(means, lat, alt, P)
+    return assemble(task, used, where, C_nb, covariance + moved**2 * np.eye(3), floor), check
+
+
+def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
+    """Level alone, from the mean specific force of a base that does not turn; heading zero by convention.
+
+    Raises
+    ------
+    AlignmentError
+        Gyros that read zero in every row.
+    """
+    task = last_part(task)
+    if not task.record.gyro.any():
+        raise AlignmentError(
+            f"{task.record.source}: all gyros read zero in every row: are they dead, or written too coarsely to see any motion?"
+        )
+    check = check_means(task.means, task.position.lat, task.gravity)
+    used, where = specification(spec, check, allan_noise(task.record))
+    C_nb = level_of(task.means.f_b)
+    P = task.bias_prior(used, C_nb.T)
+    covariance, floor = static_covariance(C_nb, task.means, task.position.lat, task.position.alt, P)
+    covariance = without_heading(covariance + _wander(task, used) ** 2 * np.eye(3))
+    answer = assemble(task, used, where, C_nb, covariance, without_heading(floor))
+    # The mean rate is the gyro bias but for the earth's rate, of which the part about the vertical is known.
+    up = C_nb[2]
+    level_rate = EARTH_RATE * math.cos(task.position.lat)
+    bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2))
+    bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
+    return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check
+
+
+def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
+    """Means in the axes of the body at the epoch, and one sigma of what it may have turned about them, rad.
+
+    The gyros carry each force to the epoch, unless they drift by more over the log than the base has moved about its mean. In the
+    inertial frame that they keep the vertical turns with the earth: towards where, a heading would say.
+    """
+    record, rows = task.record, task.epoch.row + 1
+    T = record.duration
+    turned = EARTH_RATE * math.cos(task.position.lat) / math.sqrt(2.0)
+    drift = math.hypot(0.5 * T * math.hypot(spec.gyro_bias, turned), spec.gyro_random_walk * math.sqrt(T / 3.0))
+    wander = _wander(task, spec)
+    if wander < drift:
+        return task.means, wander
+    dtheta, dvel = increments(record)
+    edges = np.unique(np.append(np.linspace(0, len(record), BLOCKS + 1).astype(int), rows))
+    C_ib, velocity, _ = inertial_integrals(dtheta, dvel, record.steps, edges)
+    C_be_i = task.epoch.attitude(C_ib[int(np.searchsorted(edges, rows))]).T
+    lengths = np.diff(np.append(0.0, np.cumsum(record.steps))[edges])
+    f = np.diff(velocity, axis=0) @ C_be_i.T / lengths[:, None]
+    mean = C_be_i @ velocity[-1] / lengths.sum()
+    return replace(task.means, f_b=mean, f_covariance=scatter_of(f) / len(f)), drift
+
+
+def _wander(task: Task, spec: ImuSpec) -> float:
+    """RMS of the attitude about its mean within ten seconds, rad, without what the noise of the gyros makes of it."""
+    seen = float(np.max(task.motion.wander, initial=0.0))
+    noise = spec.gyro_random_walk * math.sqrt(WANDER * min(WINDOW, task.record.duration))
+    return math.sqrt(max(seen**2 - noise**2, 0.0))
