@@ -11,6 +11,7 @@ from truenorth.core.attitude import dcm_from_euler, misalignment
 from truenorth.core.earth import EARTH_RATE, normal_gravity
 from truenorth.core.position import Position
 from truenorth.quality.regimes import KINDS, motion_summary
+from truenorth.simulation.scenario import read_scenario
 
 PLACE = Position.from_degrees(50.0, 10.0)
 DT = 0.01
@@ -43,11 +44,15 @@ def off(kind, duration, imu, said, seed):
     """The status, and errors of level, and of heading where it is said, in sigmas."""
     record, C_nb = log(kind, duration, imu, seed)
     answer = align(record, PLACE, said)
-    sigma = np.sqrt(np.diag(answer.phi_covariance))
     if answer.status == "aligned":
-        return answer.status, misalignment(answer.C_nb, C_nb) / sigma
-    up = answer.C_nb @ C_nb[2]  # whatever the heading
-    return answer.status, np.array([up[1], -up[0]]) / sigma[:2]
+        return answer.status, misalignment(answer.C_nb, C_nb) / np.sqrt(np.diag(answer.phi_covariance))
+    return answer.status, level_off(answer, C_nb)
+
+
+def level_off(answer, C_nb):
+    """(2,) errors of level in sigmas, whatever the heading."""
+    up = answer.C_nb @ C_nb[2]
+    return np.array([up[1], -up[0]]) / np.sqrt(np.diag(answer.phi_covariance)[:2])
 
 
 @few_and_all(24, 4)
@@ -60,6 +65,30 @@ def test_seconds_of_rest_without_a_specification(runs, imu, duration):
     assert np.abs(errors).max() < 4.0
     assert np.sqrt(np.mean(errors**2)) < 1.0 + 2.0 / math.sqrt(runs)
     assert all(status in ("level_only", "not_converged") for status, _ in found)
+
+
+@few_and_all(8, 2)
+@pytest.mark.parametrize("size", [0.05, 0.3, 3.0])
+@pytest.mark.parametrize("duration", [4.0, 10.0, 19.0])
+@pytest.mark.parametrize("imu", ["navigation", "tactical", "consumer"])
+def test_seconds_of_sway(runs, imu, duration, size):
+    """The mean attitude was given as that of the last second: level was 5 to 13 sigmas off, `level_only`."""
+    for seed in range(runs):
+        tones = [("roll", 1.0, 4.0 + seed), ("pitch", 0.7, 3.1 + 0.5 * seed), ("heading", 0.5, 6.0 + seed)]
+        motion = {name: [{"amplitude": f"{part * size} deg", "period": f"{T} s"}] for name, part, T in tones}
+        content = {
+            "name": "short",
+            "duration": f"{duration} s",
+            "rate": "100 Hz",
+            "position": {"lat": "50 deg", "lon": "10 deg"},
+            "imu": imu,
+            "motion": {"kind": "sway", "heading": f"{40 * seed} deg", "tones": motion},
+        }
+        made = read_scenario(content).simulate(seed=seed, run=0)
+        for said in (None, imu):
+            answer = align(made.record, PLACE, said)
+            assert answer.status in ("level_only", "not_converged", "aligned"), answer.reasons
+            assert np.abs(level_off(answer, made.truth.C_nb[-1])).max() < 4.0
 
 
 @few_and_all(12, 2)

@@ -18,6 +18,7 @@ from truenorth.alignment.inference import allan_noise, specification
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.task import Task, last_part, level_of
 from truenorth.alignment.turning import turning_noise
+from truenorth.alignment.usual import usual
 from truenorth.coarse import analytic
 from truenorth.coarse.analytic import BLOCKS, Means, scatter_of, static_covariance
 from truenorth.core.earth import EARTH_RATE
@@ -47,9 +48,13 @@ def from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
         What the means show of the biases.
     """
     lat, alt = task.position.lat, task.position.alt
-    check = check_means(task.means, lat, task.gravity)
-    used, where = specification(spec, check, turning_noise(task.record))  # from row to row: short logs have no more
-    means, moved = _at_the_epoch(task, used)
+    noise = turning_noise(task.record)  # from row to row: short logs have no more
+    rough, _ = specification(spec, check_means(task.means, lat, task.gravity), noise)
+    means, moved = _at_the_epoch(task, rough)
+    check = check_means(
+        means, lat, task.gravity
+    )  # of a base that sways, the mean of the force in body axes is less than gravity
+    used, where = specification(spec, check, noise)
     P = task.bias_prior(used, level_of(means.f_b).T)
     C_nb, covariance, floor = analytic(means, lat, alt, P)
     return assemble(task, used, where, C_nb, covariance + moved**2 * np.eye(3), floor), check
@@ -83,6 +88,14 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check
 
 
+def _check(task: Task, means: Means) -> LogCheck:
+    """What means show of the biases: the mean rate of a base that moves may all be its own."""
+    check = check_means(means, task.position.lat, task.gravity)
+    if means is task.means and task.motion.overall in ("still", "unknown"):
+        return check
+    return replace(check, rate_noise=np.hypot(check.rate_noise, float(np.linalg.norm(task.means.w_ib_b))))
+
+
 def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     """Means in the axes of the body at the epoch, and one sigma of what it may have turned about them, rad.
 
@@ -92,7 +105,9 @@ def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     record, rows = task.record, task.epoch.row + 1
     T = record.duration
     turned = EARTH_RATE * math.cos(task.position.lat) / math.sqrt(2.0)
-    drift = math.hypot(0.5 * T * math.hypot(spec.gyro_bias, turned), spec.gyro_random_walk * math.sqrt(T / 3.0))
+    axes = max(spec.gyro_misalignment, usual("gyro", "misalignment", spec.gyro_random_walk)) * turned_by(task)
+    walk = spec.gyro_random_walk * math.sqrt(T / 3.0)
+    drift = math.sqrt((0.5 * T) ** 2 * (spec.gyro_bias**2 + turned**2) + walk**2 + axes**2)
     wander = _wander(task, spec)
     if wander < drift:
         return task.means, wander
@@ -104,6 +119,11 @@ def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     f = np.diff(velocity, axis=0) @ C_be_i.T / lengths[:, None]
     mean = C_be_i @ velocity[-1] / lengths.sum()
     return replace(task.means, f_b=mean, f_covariance=scatter_of(f) / len(f)), drift
+
+
+def turned_by(task: Task) -> float:
+    """The way that the attitude goes in the log, second by second, rad."""
+    return float(np.sum(np.linalg.norm(task.motion.rate, axis=1)))
 
 
 def _wander(task: Task, spec: ImuSpec) -> float:

@@ -21,7 +21,7 @@ from truenorth.alignment.check import LogCheck, check_filter, check_means, impli
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
-from truenorth.alignment.from_means import from_means, level_from_means
+from truenorth.alignment.from_means import from_means, level_from_means, turned_by
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.inference import INFERRED, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyros import late_gyros_evidence
@@ -70,6 +70,7 @@ GOES = 10.0  # m: of the way from where a base was in the mean, that still passe
 STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes for sway
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
+TURNED = math.radians(30.0)  # less in a short log may be part of a sway
 SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
 
@@ -141,7 +142,7 @@ def align_base(
     if is_blind(task.motion, means) or is_lost(task, means, spec, heading_limit):
         asked = "" if method == "auto" else f"{method} was asked for, but "
         chosen, why, found = "analytic", f"{asked}{NO_NORTH}", _Found(*level_from_means(task, spec))
-    elif turned := (method == "auto" and turns_blindly(task, spec)):
+    elif turned := (method == "auto" and chosen != "analytic" and turns_blindly(task, spec)):
         chosen = "kalman"
         why = (
             "the IMU turns, and its gyros do not see the earth turn: scale factors, misalignments and the arm from the axis "
@@ -188,7 +189,7 @@ class _Found:
 def _choose(method: Method, task: Task) -> tuple[str, str]:
     if method != "auto":
         return method, "asked for"
-    turns = task.motion.fraction("rotating") > 0.0  # means of an IMU that turns are of no attitude
+    turns = task.motion.fraction("rotating") > 0.0 and turned_by(task) > TURNED  # so far that the biases show
     if task.record.duration < SHORTEST_FILTER and not turns:
         return "analytic", (
             f"the log is {task.record.duration:.1f} s long, too short for a filter ({SHORTEST_FILTER:g} s): mean values only"
