@@ -75,6 +75,8 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
         )
     check = check_means(task.means, task.position.lat, task.gravity)
     used, where = specification(spec, check, allan_noise(task.record))
+    moves = _wander(task, used) > _drift(task, used)
+    check = _check(task, task.means, moves)
     C_nb = level_of(task.means.f_b)
     P = task.bias_prior(used, C_nb.T)
     covariance, floor = static_covariance(C_nb, task.means, task.position.lat, task.position.alt, P)
@@ -83,15 +85,16 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     # The mean rate is the gyro bias but for the earth's rate, of which the part about the vertical is known.
     up = C_nb[2]
     level_rate = EARTH_RATE * math.cos(task.position.lat)
-    bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2))
+    own = float(np.linalg.norm(task.means.w_ib_b)) if moves else 0.0
+    bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2) + own**2)
     bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
     return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check
 
 
-def _check(task: Task, means: Means) -> LogCheck:
+def _check(task: Task, means: Means, moves: bool = False) -> LogCheck:
     """What means show of the biases: the mean rate of a base that moves may all be its own."""
     check = check_means(means, task.position.lat, task.gravity)
-    if means is task.means and task.motion.overall in ("still", "unknown"):
+    if not moves and task.motion.overall in ("still", "unknown"):
         return check
     return replace(check, rate_noise=np.hypot(check.rate_noise, float(np.linalg.norm(task.means.w_ib_b))))
 
@@ -103,11 +106,7 @@ def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     inertial frame that they keep the vertical turns with the earth: towards where, a heading would say.
     """
     record, rows = task.record, task.epoch.row + 1
-    T = record.duration
-    turned = EARTH_RATE * math.cos(task.position.lat) / math.sqrt(2.0)
-    axes = max(spec.gyro_misalignment, usual("gyro", "misalignment", spec.gyro_random_walk)) * turned_by(task)
-    walk = spec.gyro_random_walk * math.sqrt(T / 3.0)
-    drift = math.sqrt((0.5 * T) ** 2 * (spec.gyro_bias**2 + turned**2) + walk**2 + axes**2)
+    drift = _drift(task, spec)
     wander = _wander(task, spec)
     if wander < drift:
         return task.means, wander
@@ -119,6 +118,15 @@ def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     f = np.diff(velocity, axis=0) @ C_be_i.T / lengths[:, None]
     mean = C_be_i @ velocity[-1] / lengths.sum()
     return replace(task.means, f_b=mean, f_covariance=scatter_of(f) / len(f)), drift
+
+
+def _drift(task: Task, spec: ImuSpec) -> float:
+    """One sigma of what gyros add to the level that they carry from the middle of a log to its end, and the earth does, rad."""
+    T = task.record.duration
+    turned = EARTH_RATE * math.cos(task.position.lat) / math.sqrt(2.0)
+    axes = max(spec.gyro_misalignment, usual("gyro", "misalignment", spec.gyro_random_walk)) * turned_by(task)
+    walk = spec.gyro_random_walk * math.sqrt(T / 3.0)
+    return math.sqrt((0.5 * T) ** 2 * (spec.gyro_bias**2 + turned**2) + walk**2 + axes**2)
 
 
 def turned_by(task: Task) -> float:
