@@ -67,6 +67,29 @@ def test_seconds_of_rest_without_a_specification(runs, imu, duration):
     assert all(status in ("level_only", "not_converged") for status, _ in found)
 
 
+@few_and_all(16, 4)
+@pytest.mark.parametrize("rate", [10, 20])
+def test_a_base_that_trembles_without_a_specification(runs, rate):
+    """An Allan variance takes the tremble for quantisation; the biases of a navigation grade were usual of the noise it left."""
+    spec, step = imu_spec("industrial"), 1.0 / rate
+    for seed in range(runs):
+        rng = np.random.default_rng(seed)
+        t = step * np.arange(1, 60 * rate + 1)
+        turn = 2.0 * math.pi * rng.uniform(1.0, rate / 3.0, 6)
+        phase, shake = rng.uniform(0.0, 2.0 * math.pi, 6), rng.uniform(0.02, 0.05)
+        tremble = np.column_stack([np.cos(w * t + p) for w, p in zip(turn, phase, strict=True)])
+        noise = rng.standard_normal((len(t), 6)) / math.sqrt(step)
+        gyro = 2e-4 * turn[:3] * tremble[:, :3] + spec.gyro_bias * rng.standard_normal(3)
+        bias = spec.accel_bias * rng.standard_normal(3)
+        accel = shake * tremble[:, 3:] + bias + [0.0, 0.0, float(normal_gravity(PLACE.lat, 0.0))]
+        record = ImuRecord(
+            t, gyro + spec.gyro_random_walk * noise[:, :3], accel + spec.accel_random_walk * noise[:, 3:]
+        )
+        answer = align(record, PLACE)
+        assert answer.status == "level_only"
+        assert np.abs(level_off(answer, np.eye(3))).max() < 4.0
+
+
 @few_and_all(8, 2)
 @pytest.mark.parametrize("size", [0.05, 0.3, 3.0])
 @pytest.mark.parametrize("duration", [4.0, 10.0, 19.0])

@@ -23,6 +23,7 @@ from truenorth.coarse import analytic
 from truenorth.coarse.analytic import BLOCKS, Means, scatter_of, static_covariance
 from truenorth.core.earth import EARTH_RATE
 from truenorth.core.errors import AlignmentError
+from truenorth.errors.staying import StaticModel
 from truenorth.records.specs import ImuSpec
 from truenorth.strapdown.increments import increments
 from truenorth.strapdown.level import inertial_integrals
@@ -74,7 +75,7 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
             f"{task.record.source}: all gyros read zero in every row: are they dead, or written too coarsely to see any motion?"
         )
     check = check_means(task.means, task.position.lat, task.gravity)
-    used, where = specification(spec, check, allan_noise(task.record))
+    used, where = specification(spec, check, _louder(allan_noise(task.record), turning_noise(task.record)))
     moves = _wander(task, used) > _drift(task, used)
     check = _check(task, task.means, moves)
     C_nb = level_of(task.means.f_b)
@@ -89,6 +90,12 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     bias_sigma = np.sqrt(np.diag(task.means.w_covariance) + 0.5 * level_rate**2 * (1.0 - up**2) + own**2)
     bias = task.means.w_ib_b - EARTH_RATE * math.sin(task.position.lat) * up
     return replace(answer, gyro_bias=bias, gyro_bias_sigma=bias_sigma), check
+
+
+def _louder(a: StaticModel, b: StaticModel) -> StaticModel:
+    """The larger random walks: an Allan variance takes vibration for quantisation, and leaves too little for noise."""
+    walks = {name: max(getattr(a, name), getattr(b, name)) for name in ("gyro_random_walk", "accel_random_walk")}
+    return replace(a, **walks)
 
 
 def _check(task: Task, means: Means, moves: bool = False) -> LogCheck:
