@@ -8,10 +8,11 @@ import pytest
 from benchmarks.honesty import vehicles
 from benchmarks.honesty.foreign import sensed
 from tests.runs import some
-from truenorth.alignment import align, procedure
+from truenorth.alignment import align, procedure, scale_on_sway
 from truenorth.alignment.scale_on_sway import scale_on_sway_evidence
 from truenorth.campaign.fault_benches import BENCHES, misses
 from truenorth.core.position import Position
+from truenorth.records import ImuRecord
 from truenorth.records.specs import imu_spec
 
 SEED = 61001
@@ -61,3 +62,14 @@ def test_a_sea_that_pushes_a_ship_in_step_with_her_roll_is_no_scale_factor(monke
     assert align(record, Position(lat, lon, alt), "tactical").status == "aligned"
     assert tried
     assert found == [[]]
+
+
+@pytest.mark.parametrize(
+    ("frequency", "rate", "hardly"), [(5.5, 20.0, True), (2.4, 10.0, True), (0.2, 100.0, False), (1.0, 100.0, False)]
+)
+def test_a_tremble_that_rows_hardly_sample_says_nothing_of_a_scale_factor(frequency, rate, hardly):
+    """Summed from row to row its angle is too small, and gravity in the accelerometers seems too much: by 39 % of one at 5.5 Hz in 20."""
+    t = np.arange(1, 2001) / rate
+    gyro = np.outer(np.cos(2.0 * np.pi * frequency * t), [1e-3, 2e-3, 0.0])
+    record = ImuRecord(t, gyro, np.tile([0.0, 0.0, 9.8], (len(t), 1)))
+    assert scale_on_sway._hardly_sampled(record) is hardly

@@ -36,7 +36,6 @@ from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_
 from truenorth.alignment.turning import (
     infer_turning,
     rocks_all_along,
-    sway_walks,
     turning_align,
     turning_noise,
     turns_blindly,
@@ -242,7 +241,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     usual = usual_noise()
     # A rough sea shows as moving, a ship whose engine runs as disturbed: their motion, too, is slower than the noise of sensors.
     smooth = task.motion.overall in ("swaying", "moving") or rocks_all_along(task.motion)
-    walks = sway_walks(task.record) if spec is None and smooth else None
+    walks = turning_noise(task.record) if spec is None and smooth else None
     if walks is not None:
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     filtered, noise = check_filter(

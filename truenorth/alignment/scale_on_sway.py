@@ -33,11 +33,13 @@ from truenorth.filters.gains import through
 from truenorth.records import ImuRecord
 from truenorth.state.evidence import Effect, Evidence, Figure
 from truenorth.state.limits import limit, may_be_chance
+from truenorth.strapdown.increments import increments
 
 Array = NDArray[np.float64]
 
 ROUNDS = 4  # of alignments anew: the response of a log that is far off is linear in a part of the scale factor only
 LARGEST = 0.5  # of a correction in one round
+FAST = 0.5  # rad of phase from row to row, at which an angle comes out 2 % too small
 
 
 class _Response(NamedTuple):
@@ -64,6 +66,8 @@ def scale_on_sway_evidence(
     anew : callable
         Aligns another record about the same attitude, its motion fitted anew.
     """
+    if _hardly_sampled(record):
+        return []
     sigma = np.sqrt(np.diag(fine.P)[PHI])
     shown = [item for item in _responses(fine) if not may_be_chance(item.ratio)]
     shown = [item for item in shown if np.any(np.abs(item.moved) > limit("negligible") * sigma)]
@@ -95,6 +99,13 @@ def scale_on_sway_evidence(
         "level": effect.level,
     }
     return [Evidence("bias.accel_scale", figures, "bounded", effect, ("specification", "units"))]
+
+
+def _hardly_sampled(record: ImuRecord) -> bool:
+    """Whether the base turns to and fro so fast that from row to row the angle is not a sum of rates: it comes out too small."""
+    turned = increments(record)[0]
+    turned = turned - turned.mean(axis=0)
+    return bool(np.sum(np.diff(turned, axis=0) ** 2) > FAST**2 * np.sum(turned**2))
 
 
 def _likelihood(fine: FineAlignment) -> float:
