@@ -69,9 +69,11 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     Its arm accelerates it now less and now more, and the waves that she meets come in groups: sway, acceleration and what is less
     than a sway may take turns. A buoy that swings on its chain turns by tens of degrees, but rocks as it turns: no table does.
     """
-    rocks = np.isin(motion.kind, [KINDS.index(kind) for kind in ROCKING])
+    if not motion.kind.size:
+        return False
+    rocks = np.array([kind in ROCKING for kind in KINDS])[motion.kind]
     rocks |= (motion.kind == KINDS.index("rotating")) & (motion.wander > ROCKED)
-    return bool(rocks.size) and float(np.mean(rocks)) > MOSTLY
+    return float(np.mean(rocks)) > MOSTLY
 
 
 def infer_turning(task: Task) -> ImuSpec:
