@@ -68,7 +68,7 @@ def test_a_sea_that_pushes_a_ship_in_step_with_her_roll_is_no_scale_factor(monke
     ("frequency", "rate", "hardly"), [(5.5, 20.0, True), (2.4, 10.0, True), (0.2, 100.0, False), (1.0, 100.0, False)]
 )
 def test_a_tremble_that_rows_hardly_sample_says_nothing_of_a_scale_factor(frequency, rate, hardly):
-    """Summed from row to row its angle is too small, and gravity in the accelerometers seems too much: by 39 % of one at 5.5 Hz in 20."""
+    """Its angle, summed from row to row, is too small: of 5.5 Hz in rows at 20 Hz accelerometers seemed to read 39 % too much."""
     t = np.arange(1, 2001) / rate
     gyro = np.outer(np.cos(2.0 * np.pi * frequency * t), [1e-3, 2e-3, 0.0])
     record = ImuRecord(t, gyro, np.tile([0.0, 0.0, 9.8], (len(t), 1)))

@@ -74,14 +74,16 @@ def rocks_all_along(motion: MotionSummary) -> bool:
     does a base that rocks pause: the rate of an IMU that was turned for a while is steady before and after, and where the log
     is too short for ten seconds of rest its wander is that of the turn.
     """
-    rocks = np.isin(motion.kind, [KINDS.index(kind) for kind in ROCKING])
+    if not motion.kind.size:
+        return False
+    rocks = np.array([kind in ROCKING for kind in KINDS])[motion.kind]
     turns = motion.kind == KINDS.index("rotating")
     rocks |= turns & (motion.wander > ROCKED)
     if turns.any():
         steps = np.linalg.norm(np.diff(motion.rate, axis=0), axis=1)
         steady = steps < STEADY * math.sqrt(2.0) * float(np.linalg.norm(motion.angle_noise))
         rocks[1:] &= ~steady
-    return bool(rocks.size) and float(np.mean(rocks)) > MOSTLY
+    return float(np.mean(rocks)) > MOSTLY
 
 
 def infer_turning(task: Task) -> ImuSpec:

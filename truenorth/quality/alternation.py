@@ -15,6 +15,7 @@ size with a phase, a complex number. One sensor in three that is turned by an an
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -42,12 +43,14 @@ def alternation(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0
 
     Zero where chance may give it.
     """
-    length = _length(record, period, stretches)
+    return _alternation(record, _of_channels(record, period, stretches))
+
+
+def _alternation(record: ImuRecord, quick: Sequence[Any]) -> Array:
+    """The same, of what the channels do once in so many rows."""
     found = np.zeros(3)
-    if length < SHORTEST:
-        return found
-    for channel, x in enumerate(record.accel.T):
-        means = _periodic(x, length, period, stretches).mean(axis=1)
+    for channel, (x, q) in enumerate(zip(record.accel.T, quick)):
+        means = q.mean(axis=1)
         size = float(abs(means.mean()))
         if _keeps(means) and size > COUNTS * _step(x):
             found[channel] = size
@@ -56,23 +59,38 @@ def alternation(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0
 
 def turn_in_turn(record: ImuRecord, period: int = 2, stretches: int = STRETCHES[0]) -> float:
     """By how much (rad) forces of one in so many rows are turned against the mean; zero where not all of the log shows it."""
-    length = _length(record, period, stretches)
-    if length < SHORTEST:
+    return _turn(record, _of_channels(record, period, stretches), period, stretches)
+
+
+def _turn(record: ImuRecord, q: Sequence[Any], period: int, stretches: int) -> float:
+    """The same, of what the channels do once in so many rows."""
+    if not q:
         return 0.0
-    columns = record.accel.T
-    q = np.stack([_periodic(x, length, period, stretches) for x in columns], axis=2)
-    f = np.stack([_smooth(x, length, period, stretches) for x in columns], axis=2)
-    z = np.cross(f, q).sum(axis=1)  # of each stretch, as A: normal equations of q = theta x f
-    A = np.sum(f * f, axis=(1, 2))[:, None, None] * np.eye(3) - np.einsum("kni,knj->kij", f, f)
+    length, columns = _length(record, period, stretches), record.accel.T
+    f = [_smooth(x, length, period, stretches) for x in columns]
+    # Of each stretch, as A: normal equations of q = theta x f.
+    z = np.stack([(f[j] * q[k] - f[k] * q[j]).sum(axis=1) for j, k in ((1, 2), (2, 0), (0, 1))], axis=1)
+    products = np.array([[(a * b).sum(axis=1) for b in f] for a in f])
+    square = np.einsum("iik->k", products)
+    A = square[:, None, None] * np.eye(3) - products.transpose(2, 0, 1)
     theta = np.linalg.pinv(A.sum(axis=0), rcond=limit("alternating turn"), hermitian=True) @ z.sum(axis=0)
-    force = math.sqrt(float(np.mean(f**2)) * 3.0)
+    force = math.sqrt(float(square.sum()) / f[0].size)
     shows, expected = np.real(z @ theta.conj()), np.real(np.einsum("i,kij,j->k", theta.conj(), A, theta))
     size = float(np.linalg.norm(theta))
-    left = np.mean(q - np.cross(theta, f), axis=1)  # a vibration alternates where no force is turned, too
-    explains = float(np.sum(abs(left) ** 2)) < float(expected.sum()) / q.shape[1]
+    # A vibration alternates where no force is turned, too.
+    left = np.stack([x.mean(axis=1) for x in q], axis=1) - np.cross(
+        theta, np.stack([x.mean(axis=1) for x in f], axis=1)
+    )
+    explains = float(np.sum(abs(left) ** 2)) < float(expected.sum()) / q[0].shape[1]
     if not (explains and _shown(shows, expected)):
         return 0.0
     return size if size * force > COUNTS * max(_step(x) for x in columns) else 0.0
+
+
+def _of_channels(record: ImuRecord, period: int, stretches: int) -> list[Any]:
+    """What each accelerometer does once in so many rows, as of :func:`_periodic`; nothing of a log that is too short."""
+    length = _length(record, period, stretches)
+    return [] if length < SHORTEST else [_periodic(x, length, period, stretches) for x in record.accel.T]
 
 
 def _length(record: ImuRecord, period: int, stretches: int) -> int:
@@ -92,7 +110,8 @@ def _periodic(x: Array, length: int, period: int, stretches: int) -> Any:
 def _smooth(x: Array, length: int, period: int, stretches: int) -> Array:
     """The rest of it, at the same rows."""
     slow = (x[:-4] + 4.0 * x[1:-3] + 6.0 * x[2:-2] + 4.0 * x[3:-1] + x[4:]) / 16.0
-    return np.asarray(slow[: stretches * length].reshape(stretches, length // period, period).mean(axis=2))
+    rows = slow[: stretches * length].reshape(stretches, length // period, period)
+    return np.asarray(sum(rows[:, :, i] for i in range(period)) / period)
 
 
 def _keeps(means: Any) -> bool:
@@ -140,8 +159,9 @@ def alternation_evidence(record: ImuRecord) -> list[Evidence]:
 def _turned(record: ImuRecord, period: int, stretches: int) -> float:
     """By how much (rad) the mean is turned against one in so many rows, by the larger of both figures."""
     unit = record.interval if record.kind == "increments" else 1.0
-    offset = float(np.linalg.norm(alternation(record, period, stretches)))
-    return max(offset / GRAVITY_EQUATOR / unit, turn_in_turn(record, period, stretches))
+    quick = _of_channels(record, period, stretches)
+    offset = float(np.linalg.norm(_alternation(record, quick)))
+    return max(offset / GRAVITY_EQUATOR / unit, _turn(record, quick, period, stretches))
 
 
 def _step(values: Array) -> float:

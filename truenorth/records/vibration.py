@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 
 BLOCK = 20.0  # s, in which an engine runs as it does
 FEWEST = 32  # rows of a block
+ABREAST = 20  # rows
 LEAST_CONE = 2e-10  # rad/s, 4e-5 deg/h: no gyro has as small a bias
 
 SECOND = np.array([0.0, 0.0, 1.0, -2.0, 1.0, 0.0, 0.0])
@@ -78,7 +79,7 @@ def _cones(record: ImuRecord) -> Array:
     rates = record.kind == "rates"
     unit = 1.0 if rates else 1.0 / record.interval
     mean = np.ones(len(record)) @ record.gyro / len(record)
-    variance = unit**2 * (np.einsum("ki,ki->i", record.gyro, record.gyro) / len(record) - mean**2)
+    variance = unit**2 * (_squares(record.gyro) / len(record) - mean**2)
     slowest = 2.0 * math.pi / (length * record.interval)
     blocks = len(record) // length if float(variance.max()) > LEAST_CONE * slowest else 0
     if not blocks:  # of rows that are nanoseconds apart a block's spectrum would fill the memory
@@ -95,6 +96,13 @@ def _cones(record: ImuRecord) -> Array:
         W = np.fft.rfft((rows - mean).T * window)[:, 1:]
         drift[at] = [(W[j].imag * W[k].real - W[j].real * W[k].imag) @ weight for j, k in ((1, 2), (2, 0), (0, 1))]
     return drift
+
+
+def _squares(rows: Array) -> Array:
+    """(3,) sums of the squares of columns (N, 3); twenty rows as one, over which a sum of NumPy takes a quarter of the time."""
+    whole = len(rows) // ABREAST * ABREAST
+    wide, rest = rows[:whole].reshape(-1, 3 * ABREAST), rows[whole:]
+    return np.asarray(np.einsum("ki,ki->i", wide, wide).reshape(-1, 3).sum(axis=0) + np.einsum("ki,ki->i", rest, rest))
 
 
 def _share_of_increments(x: Array) -> Array:

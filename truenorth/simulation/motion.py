@@ -66,11 +66,13 @@ class Motion(ABC):
         k = self.kinematics(t)
         C_nb = dcm_from_euler(*k.angles)
         w_nb, dw_nb = body_rates(k.angles, k.rates, k.accelerations)
+        lat, lon, alt, v, a = k.lat, k.lon, k.alt, k.v, k.a
         arm, d_arm, dd_arm = self.arm(t)
-        turning = np.cross(w_nb, arm) + d_arm
-        centripetal = np.cross(dw_nb, arm) + np.cross(w_nb, turning + d_arm) + dd_arm
-        away = _apply(C_nb, arm), _apply(C_nb, turning), _apply(C_nb, centripetal)
-        lat, lon, alt, v, a = displaced((k.lat, k.lon, k.alt, k.v, k.a), away)
+        if arm.any() or d_arm.any() or dd_arm.any():
+            turning = np.cross(w_nb, arm) + d_arm
+            centripetal = np.cross(dw_nb, arm) + np.cross(w_nb, turning + d_arm) + dd_arm
+            away = _apply(C_nb, arm), _apply(C_nb, turning), _apply(C_nb, centripetal)
+            lat, lon, alt, v, a = displaced((lat, lon, alt, v, a), away)
         w_ie, w_en = earth_rate_n(lat), transport_rate_n(lat, alt, v)
         f_n = a + np.cross(2 * w_ie + w_en, v) - gravity_n(lat, alt)
         C_bn = np.swapaxes(C_nb, -1, -2)
