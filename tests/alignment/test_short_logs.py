@@ -67,6 +67,15 @@ def test_seconds_of_rest_without_a_specification(runs, imu, duration):
     assert all(status in ("level_only", "not_converged") for status, _ in found)
 
 
+@few_and_all(40, 6)
+@pytest.mark.parametrize("duration", [20.0, 40.0])
+def test_half_a_minute_of_rest_without_a_specification(runs, duration):
+    """Tilts hardly show gyros' noise so soon: taken for a navigation grade, a tactical heading was 5.6 sigmas off, `aligned`."""
+    for seed in range(runs):
+        _, phi = off("rests", duration, "tactical", None, seed)
+        assert np.abs(phi).max() < 4.0
+
+
 @few_and_all(16, 4)
 @pytest.mark.parametrize("rate", [10, 20])
 def test_a_base_that_trembles_without_a_specification(runs, rate):

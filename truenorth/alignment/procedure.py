@@ -23,7 +23,7 @@ from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.from_means import from_means, level_from_means, turned_by
 from truenorth.alignment.handover import go_on, hand_over
-from truenorth.alignment.inference import INFERRED, infer_spec, specification, usual_noise
+from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
 from truenorth.alignment.rate_step import rate_step_evidence
@@ -241,8 +241,11 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     usual = usual_noise()
     # A rough sea shows as moving, a ship whose engine runs as disturbed: their motion, too, is slower than the noise of sensors.
     smooth = task.motion.overall in ("swaying", "moving") or rocks_all_along(task.motion)
-    walks = turning_noise(task.record) if spec is None and smooth else None
-    if walks is not None:
+    brief = (
+        task.motion.overall == "still" and task.record.duration < SHORTEST_SWAYING
+    )  # tilts hardly show gyros' noise so soon
+    if spec is None and (smooth or brief):
+        walks = turning_noise(task.record) if smooth else allan_noise(task.record)
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
     filtered, noise = check_filter(
         task, integrals, coarse.C_n0_i, usual, None if spec is None else StaticModel.of(spec)
