@@ -247,9 +247,8 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     if spec is None and (smooth or brief):
         walks = turning_noise(task.record) if smooth else allan_noise(task.record)
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
-    filtered, noise = check_filter(
-        task, integrals, coarse.C_n0_i, usual, None if spec is None else StaticModel.of(spec)
-    )
+    known = usual if spec is None and brief else None if spec is None else StaticModel.of(spec)
+    filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known)
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     turns = task.motion.fraction("rotating") > 0.0
     used, where = specification(spec, check, turning_noise(task.record) if turns else noise)
