@@ -17,11 +17,13 @@ from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
+from truenorth.alignment.by_heave import weighed_by_heave
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, is_lost, sharper
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.handover import go_on, hand_over
+from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import allan_noise, infer_spec, usual_noise
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
@@ -159,7 +161,7 @@ def align_base(
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     fitted = chosen == "swaying" or turned
-    moves = None if fitted and _explained(task.motion, found) else _moves_from(task.motion)
+    moves = None if fitted and _explained(task.motion, found) else task.motion.moves_at
     biased = math.sqrt(float(answer.imu.bias_variance[3:].max()))
     evidence = record_evidence(task.record, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
@@ -169,6 +171,7 @@ def align_base(
     if chosen in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)
+    evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     return judged(answer, evidence, heading_limit)
 
@@ -184,6 +187,7 @@ class _Found:
     form: str = ""
     steps: Sequence[Evidence] = ()
     way: float = math.inf  # m, that a swaying base is from its mean place at most
+    heave: Heave | None = None  # of a swaying base
     acted: float | None = None  # share of the epochs in which factors of a published filter acted
 
 
@@ -329,6 +333,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
+    heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
         about = start._replace(C_n0_i=fine.C_n0_i)
@@ -336,7 +341,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
             fine, task.record, lambda record: sway_align(about._replace(record=record), turned=turned, axes=spec)
         )
     way = farthest(fine, task.position) if sways else math.inf
-    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)
+    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
@@ -384,11 +389,6 @@ def _explained(motion: MotionSummary, found: _Found) -> bool:
     """
     small = float(np.max(found.answer.disturbance[:2])) < STAYS or found.way < GOES
     return rocks_all_along(motion) and found.settled and small
-
-
-def _moves_from(motion: MotionSummary) -> float | None:
-    """When the base first goes somewhere, s on the record's clock; None if it stays."""
-    return next((float(stretch.start) for stretch in motion.regimes if stretch.kind == "moving"), None)
 
 
 def _specification(spec: ImuSpec | None, check: LogCheck, noise: StaticModel) -> tuple[ImuSpec, str]:
