@@ -37,6 +37,7 @@ from truenorth.alignment.task import Task, bridged, last_part, level_of, make_ta
 from truenorth.alignment.turning import (
     infer_turning,
     rocks_all_along,
+    strays,
     sway_walks,
     turning_align,
     turning_noise,
@@ -264,7 +265,8 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
         handover=None,
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
-    return _Found(answer, unchecked, fine.settled)
+    way = strays(fine, task.position, used.gyro_random_walk)
+    return _Found(answer, unchecked, fine.settled, way=way)
 
 
 def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) -> _Found:
