@@ -69,8 +69,8 @@ def columns(names: str) -> Reading:
 
     def read(record: ImuRecord) -> ImuRecord:
         gyro = np.empty_like(record.gyro)
-        for column, (sign, axis) in enumerate(names.split()):
-            gyro[:, "xyz".index(axis)] = float(f"{sign}1") * record.gyro[:, column]
+        for column, name in enumerate(names.split()):
+            gyro[:, "xyz".index(name[1])] = float(f"{name[0]}1") * record.gyro[:, column]
         return replace(record, gyro=gyro)
 
     return read

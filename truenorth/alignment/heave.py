@@ -110,7 +110,7 @@ class Heave:
             return None
         tried = np.stack([self._slow(gyros_behind(self._part[0], -float(late))) for late in NODES])
         curve = chebyshev.chebfit(NODES / LONGEST, tried, len(NODES) - 1)
-        misfits = self._misfits(chebyshev.chebval(DELAYS / LONGEST, curve).T)
+        misfits = self._misfits(np.asarray(chebyshev.chebval(DELAYS / LONGEST, curve).T, dtype=np.float64))
         likely = np.exp(-0.5 * (misfits - misfits.min()))
         likely /= likely.sum()
         size = float(likely @ DELAYS)
