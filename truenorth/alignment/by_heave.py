@@ -44,7 +44,7 @@ def weighed_by_heave(heave: Heave | None, evidence: Sequence[Evidence], record: 
     if heave is None or heave.delay is None:
         return list(evidence)
     delay = heave.delay
-    false = {key for key, read in _readings(evidence) if excluded(heave, read)}
+    false = {key for key, reads in _readings(evidence) if all(excluded(heave, read) for read in reads)}
     others = [item for item in evidence if item.key not in false and item.key not in LATE + EARLY]
     clocks = [item for item in evidence if item.key in LATE + EARLY]
     effect = turned_by(delay.rms, record)
@@ -76,14 +76,17 @@ def columns(names: str) -> Reading:
     return read
 
 
-def _readings(evidence: Sequence[Evidence]) -> list[tuple[str, Reading]]:
-    """Another order of the gyros and other scale factors, where the evidence has them: what it is of, and the gyros put right."""
-    found = [(item.key, columns(str(item.figures["axes"]))) for item in evidence if item.key == "tilt.axes"]
+def _readings(evidence: Sequence[Evidence]) -> list[tuple[str, list[Reading]]]:
+    """Another order of the gyros and other scale factors, where the evidence has them: what it is of, and the gyros put right.
+
+    A push may add to a scale factor that is there. So half of it must be excluded, too.
+    """
+    found = [(item.key, [columns(str(item.figures["axes"]))]) for item in evidence if item.key == "tilt.axes"]
     scale = np.zeros(3)
     for item in evidence:
         if item.key == "tilt.scale":  # fitted together, they stand or fall together
             scale["xyz".index(str(item.figures["axis"]))] = float(item.figures["scale"])
-    return [*found, ("tilt.scale", scaled(scale))] if scale.any() else found
+    return [*found, ("tilt.scale", [scaled(0.5 * scale), scaled(scale)])] if scale.any() else found
 
 
 def _put_right(item: Evidence) -> Reading:
