@@ -61,18 +61,23 @@ def late_gyros_evidence(fine: FineAlignment, response: Array, record: ImuRecord)
     if ratio <= limit("hint"):
         return []
     delay = float(size[0])
+    effect = turned_by(delay, record)
+    figures: dict[str, Figure] = {
+        "delay": abs(delay),
+        "ratio": ratio,
+        "chance": limit("hint"),
+        "heading": effect.heading,
+        "level": effect.level,
+    }
+    side = "late" if delay > 0.0 else "early"
+    return [Evidence(f"response.gyros_{side}", figures, "hint", effect, ("common_clock",))]
+
+
+def turned_by(delay: float, record: ImuRecord) -> Effect:
+    """What an IMU turns about the level and about the vertical in the time of a delay (s), at any moment of its record."""
     turned = FASTEST * abs(delay)
     rate = record.gyro / (record.interval if record.kind == "increments" else 1.0)
     up = record.accel / np.linalg.norm(record.accel, axis=1, keepdims=True)
     about = np.sum(rate * up, axis=1)
     tilt = turned * math.sqrt(max(float(np.mean(np.sum(rate**2, axis=1) - about**2)), 0.0))
-    turn = turned * math.sqrt(float(np.mean(about**2)))
-    figures: dict[str, Figure] = {
-        "delay": abs(delay),
-        "ratio": ratio,
-        "chance": limit("hint"),
-        "heading": turn,
-        "level": tilt,
-    }
-    side = "late" if delay > 0.0 else "early"
-    return [Evidence(f"response.gyros_{side}", figures, "hint", Effect(heading=turn, level=tilt), ("common_clock",))]
+    return Effect(heading=turned * math.sqrt(float(np.mean(about**2))), level=tilt)

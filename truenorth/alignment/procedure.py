@@ -17,12 +17,14 @@ from truenorth.alignment.assumptions import STAYING, reason, refuse
 from truenorth.alignment.bad_stretches import bad_stretches
 from truenorth.alignment.bias import true_bias
 from truenorth.alignment.bias_step import gravity_evidence, matrix_signatures, turn_evidence
+from truenorth.alignment.by_heave import weighed_by_heave
 from truenorth.alignment.check import LogCheck, check_filter, check_means, implied, is_blind, is_lost, sharper
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
 from truenorth.alignment.from_means import from_means, level_from_means, turned_by
 from truenorth.alignment.handover import go_on, hand_over
+from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
 from truenorth.alignment.late_gyros import late_gyros_evidence
 from truenorth.alignment.published import FADING, STATIONARY, Published, factor_share, faded_align, stationary_align
@@ -36,6 +38,7 @@ from truenorth.alignment.task import Task, bridged, last_part, make_task, noise_
 from truenorth.alignment.turning import (
     infer_turning,
     rocks_all_along,
+    strays,
     turning_align,
     turning_noise,
     turns_blindly,
@@ -157,7 +160,7 @@ def align_base(
     why = reason(method, found.acted) if chosen in STAYING else f"{why}; {found.form}" if found.form else why
     answer = replace(found.answer, method=chosen, method_reason=why)
     fitted = chosen == "swaying" or turned
-    moves = None if fitted and _explained(task.motion, found) else _moves_from(task.motion)
+    moves = None if fitted and _explained(task.motion, found) else task.motion.moves_at
     biased = math.sqrt(float(answer.imu.bias_variance[3:].max()))
     evidence = record_evidence(task.record, task.motion, sound=sound, accel_bias=biased) + leaves(moves)
     evidence += [*base_evidence(answer, found.check, found.drift, settled=found.settled), *found.steps]
@@ -167,6 +170,7 @@ def align_base(
     if method in SIMPLER and task.motion.fraction("rotating") > 0.0:  # they know no scale factors and no misalignments
         own = align_base(record, position, imu, at=at, heading_limit=heading_limit, progress=progress, sound=sound)
         evidence += against(own, answer)
+    evidence = weighed_by_heave(found.heave, evidence, task.record)
     evidence += [] if spec is None else specification_evidence(task.record, task.motion, spec, position.lat)
     return judged(answer, evidence, heading_limit)
 
@@ -182,6 +186,7 @@ class _Found:
     form: str = ""
     steps: Sequence[Evidence] = ()
     way: float = math.inf  # m, that a swaying base is from its mean place at most
+    heave: Heave | None = None  # of a swaying base
     acted: float | None = None  # share of the epochs in which factors of a published filter acted
 
 
@@ -226,7 +231,8 @@ def _align_turning(task: Task, spec: ImuSpec | None) -> _Found:
         handover=None,
     )
     unchecked = LogCheck(np.zeros(2), np.full(2, math.inf), 0.0, math.inf)
-    return _Found(answer, unchecked, fine.settled)
+    way = strays(fine, task.position, used.gyro_random_walk)
+    return _Found(answer, unchecked, fine.settled, way=way)
 
 
 def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) -> _Found:
@@ -241,13 +247,12 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     usual = usual_noise()
     # A rough sea shows as moving, a ship whose engine runs as disturbed: their motion, too, is slower than the noise of sensors.
     smooth = task.motion.overall in ("swaying", "moving") or rocks_all_along(task.motion)
-    brief = (
-        task.motion.overall == "still" and task.record.duration < SHORTEST_SWAYING
-    )  # tilts hardly show gyros' noise so soon
-    if spec is None and (smooth or brief):
+    # Tilts hardly show the noise of gyros in less than a minute.
+    brief = spec is None and task.motion.overall == "still" and task.record.duration < SHORTEST_SWAYING
+    if brief or (spec is None and smooth):
         walks = turning_noise(task.record) if smooth else allan_noise(task.record)
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
-    known = usual if spec is None and brief else None if spec is None else StaticModel.of(spec)
+    known = StaticModel.of(spec) if spec is not None else usual if brief else None
     filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known)
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     turns = task.motion.fraction("rotating") > 0.0
@@ -297,6 +302,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     others = matrix_signatures(fine, used if spec is not None else with_usual(used)) if sways else None
     drift, steps, hemisphere = what_begins(fine, used, task.position, others, given=spec is not None)
     steps += ([] if sound else bad_stretches(fine, task.record)) + hemisphere
+    heave = fine.heave if isinstance(fine, SwayAlignment) else None
     if isinstance(fine, SwayAlignment):
         steps += late_gyros_evidence(fine, fine.late, task.record)
         about = start._replace(C_n0_i=fine.C_n0_i)
@@ -304,7 +310,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
             fine, task.record, lambda record: sway_align(about._replace(record=record), turned=turned, axes=spec)
         )
     way = farthest(fine, task.position) if sways else math.inf
-    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way)
+    return _Found(answer, check, fine.settled, drift, "" if sways else form, steps, way, heave)
 
 
 def _stationary(task: Task, used: ImuSpec, where: str, C_n0_i: Array, P: Array, method: str) -> Alignment:
@@ -352,8 +358,3 @@ def _explained(motion: MotionSummary, found: _Found) -> bool:
     """
     small = float(np.max(found.answer.disturbance[:2])) < STAYS or found.way < GOES
     return rocks_all_along(motion) and found.settled and small
-
-
-def _moves_from(motion: MotionSummary) -> float | None:
-    """When the base first goes somewhere, s on the record's clock; None if it stays."""
-    return next((float(stretch.start) for stretch in motion.regimes if stretch.kind == "moving"), None)

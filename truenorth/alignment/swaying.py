@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import bias_signatures
 from truenorth.alignment.fine import CoarseStart, FineAlignment
+from truenorth.alignment.heave import Heave
 from truenorth.alignment.late_gyros import response_to_late_gyros
 from truenorth.alignment.matched import innovations_of, matched
 from truenorth.alignment.motion_fit import fit_motion
@@ -30,6 +31,7 @@ from truenorth.coarse import oba
 from truenorth.coarse.uncertainty import base_velocity, detrended
 from truenorth.core.earth import gravity_of_place
 from truenorth.core.position import Position
+from truenorth.errors.matrices import matrices_of, without_errors
 from truenorth.errors.staying import PHI, QUIETEST_BASE
 from truenorth.errors.sway import MOST_OSCILLATORS, AxisMotion, with_motion
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
@@ -76,6 +78,7 @@ class SwayAlignment(FineAlignment):
     misfit_at: Callable[[Position], float]  # how badly the log fits another place: :func:`misfit_at`
     begun: tuple[Evidence, ...] = ()  # that a slow part of the motion may be something that began within the log
     noisier: Mapping[str, float] = field(default_factory=dict)  # times its specification, by sensor
+    heave: Heave | None = None  # of a base that is one with the IMU
     slow_arm: slice | None = None  # states of the arm of a base that swings on lines; None of another
 
 
@@ -215,6 +218,7 @@ def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Posit
         arm_sigma=np.sqrt(np.diag(last.found.P)[arm]),
         late=response_to_late_gyros(log, last.found.system.z),
         misfit_at=misfit,
+        heave=_heave(log) if log.C_sb is None else None,
         slow_arm=log.prior.groups.get("slow arm"),
     )
     return replace(
@@ -222,6 +226,13 @@ def _filtered(log: StayingLog, estimator: _MotionFilter, misfit: Callable[[Posit
         begun=tuple(slow_sway_evidence(fine, last.found.system, estimator.motion, estimator.without)),
         noisier=noisier_sensors(log, estimator.motion, estimator.interval, partial(begun, fine)),
     )
+
+
+def _heave(log: StayingLog) -> Heave:
+    """Of a log, with the errors of its sensors that were found taken off."""
+    matrices = log.prior.groups.get("matrices")
+    off = (np.zeros((3, 3)),) * 2 if matrices is None else matrices_of(log.taken[matrices])
+    return Heave(without_errors(log.record, log.bias, *off), log.C_n0_i, log.position, log.noise.accel_random_walk)
 
 
 def begun(fine: SwayAlignment) -> float:

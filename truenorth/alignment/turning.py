@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from truenorth.alignment.check import BLIND_RATE, LogCheck
 from truenorth.alignment.fine import MAX_NOISE_PASSES, TURN_ARM, FineAlignment
 from truenorth.alignment.inference import GYRO_WIDTH, infer_spec
-from truenorth.alignment.swaying import ARM_PRIOR
+from truenorth.alignment.swaying import ARM_PRIOR, farthest
 from truenorth.alignment.task import Task, filter_interval, level_of
 from truenorth.alignment.usual import usual
-from truenorth.core.earth import EARTH_RATE
+from truenorth.core.earth import EARTH_RATE, gravity_of_place
+from truenorth.core.position import Position
 from truenorth.errors.staying import StaticModel, mean_velocity
 from truenorth.estimate.base_motion import VelocityNoise, white_variance
 from truenorth.estimate.batch import Filtered, in_sigmas, settle
@@ -47,6 +48,7 @@ STEADY = 3.0  # times its noise, by which a steady rate changes at most from sec
 VERTICAL = 10.0  # m/s, what is taken to disturb it
 LEVEL = slice(0, 2)
 TURNING = ("still", "disturbed", "rotating")  # bases on which an IMU may be turned
+AT_ENDS = 0.0031  # of g N T^2.5: a thrice integrated white noise less its cubic, at the ends
 ROUND, LAST = 10, 200  # passes over a part, and over the whole: swings of tens of degrees take 40 to 150
 
 
@@ -167,6 +169,18 @@ def turning_align(task: Task, spec: ImuSpec, rows_at: Array) -> FineAlignment:
             return FineAlignment.of(log, last, prior.sensors, np.sqrt(noise.R[0]))
         log.correct(last.found.end)
         C, taken, length = log.C_n0_i, log.taken, 2.0 * length
+
+
+def strays(fine: FineAlignment, position: Position, walk: float) -> float:
+    """How much farther the IMU is from its mean place, at most, than tilts make it seem that its gyros walk, m.
+
+    Gyros with a random walk ``N`` (rad/sqrt(s)) tilt by ``N W(t)``, and gravity carries the computed place away: less the cubic
+    that :func:`farthest` takes off, by .0031 g N T^2.5 (one sigma) at the ends, 14 m of a consumer IMU after 300 s. What goes no
+    farther than three of these may be as far as that in level, and no more: the filter knows that walk.
+    """
+    T = float(fine.integrals.time[-1])
+    seems = AT_ENDS * gravity_of_place(position.lat, position.alt) * walk * T**2.5
+    return farthest(fine, position) - 3.0 * seems
 
 
 def _by_level(noise: VelocityNoise, system: LinearSystem) -> Filtered:

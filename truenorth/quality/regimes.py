@@ -127,6 +127,11 @@ class MotionSummary:
             return float(kind == "unknown" and self.kind.size == 0)
         return float(self._shares[KINDS.index(kind)])
 
+    @property
+    def moves_at(self) -> float | None:
+        """When the base first goes somewhere, s on the record's clock; None if it stays."""
+        return next((float(stretch.start) for stretch in self.regimes if stretch.kind == "moving"), None)
+
     @cached_property
     def overall(self) -> Kind:
         """The strongest kind of motion, in the order of `KINDS`, that over 5 % of the seconds show."""

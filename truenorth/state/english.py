@@ -39,9 +39,7 @@ SENTENCES = {
     "heading.known_with_level": "heading is known to {sigma:angle}, level to {level:angle} (one sigma)",
     "heading.paid": "after {pays_until:.0f} s more time stopped paying: the floor was the larger part",
     "heading.pays": "more time pays until about {pays_until:.0f} s; the log has {duration:.0f} s",
-    "heading.vertical": (
-        "pitch is near ±90 deg: only a combination of heading and roll is known (see the combination)"
-    ),
+    "heading.vertical": "pitch is near ±90 deg: only a combination of heading and roll is known (see the combination)",
     "level.upside_down": (
         "z points down: this is the attitude of an IMU that lies upside down; a log whose axes are forward, right, down needs "
         "to be read as such, and has another heading"
@@ -161,11 +159,13 @@ SENTENCES = {
         "gyros turned by half a turn about the vertical, x and y reversed, fit the measurements better (likelihood ratio "
         "{ratio:.0f}, chance gives {chance:.0f} at most): gyros and accelerometers have other axes"
     ),
+    "heave.delay": (
+        "gyros {delay:+.3f} ± {sigma:.3f} s late fit the slow vertical motion better (likelihood ratio {ratio:.0f}, chance gives "
+        "{chance:.0f} at most); heading moves by {heading:angle}, level by {level:angle} as the IMU turns"
+    ),
     "tilt.gyros_late": "the gyros are {delay:.3f} s late against the accelerometers, by how gravity turns in these",
     "tilt.gyros_early": "the gyros are {delay:.3f} s early against the accelerometers, by how gravity turns in these",
-    "tilt.scale": (
-        "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers"
-    ),
+    "tilt.scale": "the {axis} gyro turns {scale:+.1%} ± {sigma:.1%} too far, by how gravity turns in the accelerometers",
     "bias.gyro": (
         "the {axis} gyro's bias comes out {bias:deg/h|} deg/h, where the specification ({imu:imu}) allows {allowed:deg/h|} deg/h"
     ),
