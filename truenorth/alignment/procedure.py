@@ -247,8 +247,9 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     usual = usual_noise()
     # A rough sea shows as moving, a ship whose engine runs as disturbed: their motion, too, is slower than the noise of sensors.
     smooth = task.motion.overall in ("swaying", "moving") or rocks_all_along(task.motion)
-    # Tilts hardly show the noise of gyros in less than a minute.
-    brief = spec is None and task.motion.overall == "still" and task.record.duration < SHORTEST_SWAYING
+    # Velocities hardly show the noise of sensors in less than a minute: it is taken as their rows show it, and not fitted.
+    quiet = task.motion.overall == "still"
+    brief = spec is None and (quiet or smooth) and task.record.duration < SHORTEST_SWAYING
     if brief or (spec is None and smooth):
         walks = turning_noise(task.record) if smooth else allan_noise(task.record)
         usual = replace(usual, gyro_random_walk=walks.gyro_random_walk, accel_random_walk=walks.accel_random_walk)
