@@ -5,17 +5,19 @@ those errors, delay (50 ms), lever arm (1 m), mounting (3 deg), the slave's bias
 the master taken for the truth. Sigma is honest where the RMS lies in .8 to 1.25.
 
 A master's clock is assumed to walk against the slave's, as clocks of two computers do. So the aircraft is there twice: the
-second time its clock walks as is assumed.
+second time its clock walks as is assumed. The last cases have logs of 700 s, masters whose velocity went through a filter of
+the first order, and stamps that scatter from row to row.
 
 Run: ``python -m benchmarks.honesty.transfer --runs 20``.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.honesty.frame import Case, Outcome, main
 from truenorth.aiding.matching import What
@@ -24,15 +26,22 @@ from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.core.position import Position
 from truenorth.errors.master import MasterErrors
 from truenorth.records import MasterRecord
+from truenorth.records.motion import MotionStates, Moving
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import MasterSpec, simulate, simulate_sensor
 from truenorth.simulation.course import course
+from truenorth.simulation.gnss import place_of
 from truenorth.simulation.manoeuvres import s_turn, straight
 from truenorth.simulation.sway import Disturbed
 from truenorth.simulation.tones import Tone
 
+Array = NDArray[np.float64]
+
 DEG, ARCMIN = np.radians(1.0), np.radians(1.0 / 60.0)
 SECONDS, RATE = 200.0, 100.0
+LONG = 700.0  # s
+FINE = 0.002  # s, of steps of a master's filter
+YAW, PITCH, ROLL = (Tone(1 * DEG, 9.0),), (Tone(2 * DEG, 6.0, 1.0),), (Tone(4 * DEG, 8.0, 2.0),)
 ERRORS = MasterErrors(0.3 * ARCMIN, 2.0 * ARCMIN, 0.05, 0.3 * ARCMIN, 0.05, correlation_time=200.0)
 
 
@@ -40,17 +49,25 @@ def ship() -> Any:
     """12 m/s at 20 deg N, rolling and pitching, with a turn each way."""
     legs = [*straight(30.0), *s_turn(30 * DEG, 1 * DEG), *straight(200.0)]
     way = course(Position.from_degrees(20.0, 115.0), legs, heading=0.6, speed=12.0)
-    return Disturbed(
-        way,
-        heading_tones=(Tone(1 * DEG, 9.0),),
-        pitch_tones=(Tone(2 * DEG, 6.0, 1.0),),
-        roll_tones=(Tone(4 * DEG, 8.0, 2.0),),
-    )
+    return Disturbed(way, heading_tones=YAW, pitch_tones=PITCH, roll_tones=ROLL)
 
 
 def aircraft() -> Any:
     """150 m/s at 62 deg N, S-turns."""
     legs = [*straight(30.0), *s_turn(20 * DEG, 3 * DEG), *straight(60.0), *s_turn(20 * DEG, 3 * DEG), *straight(200.0)]
+    return course(Position.from_degrees(62.0, 20.0, 3000.0), legs, heading=0.6, speed=150.0)
+
+
+def long_ship() -> Any:
+    """As the ship, with a turn each way in each four minutes, 700 s."""
+    legs = [*straight(30.0), *([*s_turn(30 * DEG, 1 * DEG), *straight(100.0)] * 4)]
+    way = course(Position.from_degrees(20.0, 115.0), legs, heading=0.6, speed=12.0)
+    return Disturbed(way, heading_tones=YAW, pitch_tones=PITCH, roll_tones=ROLL)
+
+
+def long_aircraft() -> Any:
+    """As the aircraft, with S-turns in each 100 s, 700 s."""
+    legs = [*straight(30.0), *([*s_turn(20 * DEG, 3 * DEG), *straight(60.0)] * 8)]
     return course(Position.from_degrees(62.0, 20.0, 3000.0), legs, heading=0.6, speed=150.0)
 
 
@@ -65,6 +82,51 @@ def wandering(master: MasterRecord, rng: np.random.Generator) -> tuple[MasterRec
     return replace(master, time=master.time + late), float(late[-1])
 
 
+@dataclass(frozen=True)
+class Scattered:
+    """A motion as rows show it whose stamps are off by these times, s: a row stamped `stamps` holds at ``stamps + off``."""
+
+    motion: Moving
+    stamps: Array
+    off: Array
+
+    @property
+    def breaks(self) -> Array:
+        """Of the motion."""
+        return self.motion.breaks
+
+    @property
+    def shortest_period(self) -> float:
+        """Of the motion."""
+        return self.motion.shortest_period
+
+    def states(self, t: ArrayLike) -> MotionStates:
+        """At the times at which rows with these stamps hold."""
+        return self.motion.states(t + np.interp(t, self.stamps, self.off))
+
+
+def filtered(master: MasterRecord, times: Array, way: Moving, arm: Array, constant: float) -> MasterRecord:
+    """A master whose velocity went through a filter of the first order: ``v_f' = (v - v_f) / constant``, s.
+
+    Parameters
+    ----------
+    times : (M,) array, s
+        When its rows held.
+    arm : (3,) array, m
+        From the master to the slave, whose motion `way` is, slave axes.
+    """
+    t = np.arange(times[0], times[-1] + FINE, FINE)
+    v = place_of(way.states(t), -arm)[3]
+    kept, f = np.exp(-FINE / constant), v.copy()
+    # Of a velocity that is a straight line from point to point.
+    ramp = 1.0 - (1.0 - kept) * constant / FINE
+    for k in range(1, len(t)):
+        f[k] = kept * f[k - 1] + (1.0 - kept) * v[k - 1] + ramp * (v[k] - v[k - 1])
+    off = np.stack([np.interp(times, t, axis) for axis in (f - v).T], axis=1)
+    assert master.v_n is not None
+    return replace(master, v_n=master.v_n + off)
+
+
 def transferred(
     motion: Any,
     errors: MasterErrors | None,
@@ -72,10 +134,15 @@ def transferred(
     walks: bool = False,
     matching: What = "auto",
     far: bool = False,
+    *,
+    seconds: float = SECONDS,
+    constant: float = 0.0,
+    scatter: float = 0.0,
 ) -> Any:
     """A run of a slave of a grade against a master with these errors; None: it is taken for the truth.
 
-    With `walks` its clock walks against the slave's. Where it is `far`, the arm is 15 to 40 m, known to .5 m.
+    With `walks` its clock walks against the slave's. Where it is `far`, the arm is 15 to 40 m, known to .5 m. Its velocity goes
+    through a filter of the first order with a time `constant`, s, and its stamps `scatter` by so much, s (one sigma).
     """
 
     def run(seed: int, number: int) -> Outcome:
@@ -101,8 +168,16 @@ def transferred(
             attitude_noise=ARCMIN,
         )
         way, spec = motion(), imu_spec(grade)
-        slave = simulate(way, rate=RATE, duration=SECONDS, imu=spec, seed=seed, run=number).record
-        master = simulate_sensor(way, of_master, duration=SECONDS, seed=seed, run=number).record
+        slave = simulate(way, rate=RATE, duration=seconds, imu=spec, seed=seed, run=number).record
+        seen: Moving = way
+        if scatter > 0.0:
+            stamps = np.arange(0.0, seconds + 1.0, 1.0 / of_master.rate)
+            seen = Scattered(way, stamps, np.maximum(scatter * rng.standard_normal(len(stamps)), -stamps))
+        master = simulate_sensor(seen, of_master, duration=seconds, seed=seed, run=number).record
+        if constant > 0.0:
+            master = filtered(master, master.time - tau, way, arm, constant)
+            # By velocity alone a filter's mean delay is one of the master; with attitude that of attitude is meant.
+            tau += constant if matching == "velocity" else 0.0
         late = 0.0
         if walks:
             master, late = wandering(master, rng)
@@ -122,6 +197,8 @@ def transferred(
 
     return run
 
+
+ROWS: dict[What, str] = {"velocity": "velocity", "both": "velocity and attitude"}
 
 CASES: tuple[Case, ...] = tuple(
     Case("transfer", f"{name}, errors of the master {how}", transferred(motion, errors), left_out=errors is None)
@@ -153,6 +230,36 @@ CASES += tuple(
         transferred(ship, ERRORS, grade, matching="position", far=True),
     )
     for grade in ("tactical", "consumer")
+)
+CASES += tuple(
+    Case(
+        "transfer",
+        f"{name} of 700 s, {grade} slave, by {ROWS[by]}",
+        transferred(motion, ERRORS, grade, matching=by, seconds=LONG),
+    )
+    for name, motion in (("ship", long_ship), ("aircraft", long_aircraft))
+    for grade in ("tactical", "consumer")
+    for by in ROWS
+)
+CASES += tuple(
+    Case(
+        "transfer",
+        f"aircraft, {grade} slave, by {ROWS[by]}, a filter of {constant:g} s",
+        transferred(aircraft, ERRORS, grade, matching=by, constant=constant),
+    )
+    for constant in (0.1, 0.2)
+    for grade in ("tactical", "consumer")
+    for by in ROWS
+)
+CASES += tuple(
+    Case(
+        "transfer",
+        f"{name}, {grade} slave, by {ROWS[by]}, stamps that scatter by 20 ms",
+        transferred(motion, ERRORS, grade, matching=by, scatter=0.02),
+    )
+    for name, motion in (("ship", ship), ("aircraft", aircraft))
+    for grade in ("tactical", "consumer")
+    for by in ROWS
 )
 
 if __name__ == "__main__":

@@ -153,6 +153,11 @@ def test_what_only_was_said_stays_as_it_was_said():
     sigma = 0.5 * DEG
     information = (4.0 / sigma**2 + 1.0 / (3 * DEG) ** 2) * np.eye(3) - skew(ARM) @ skew(ARM) / 0.3**2
     np.testing.assert_allclose(C_nb.T @ back.P[0][:3, :3] @ C_nb, np.linalg.inv(information), rtol=2e-2, atol=1e-8)
+    # What is left of the gyros' turn against the rest moves the likeliest turn of all, by its weight.
+    P[model.slice_of(GYRO_AXES), model.slice_of(GYRO_AXES)] = (0.2 * DEG) ** 2 * np.eye(9)
+    more = as_said_together(replace(track, P=P[None]), model, said, True).P[0][:3, :3] - back.P[0][:3, :3]
+    weight = np.linalg.inv(information) * 2.0 / sigma**2
+    np.testing.assert_allclose(C_nb.T @ more @ C_nb, 0.5 * (0.2 * DEG) ** 2 * weight @ weight, rtol=2e-2, atol=1e-9)
     known = replace(model, mounting=False)
     assert as_said_together(track, known, said, True) is track
 

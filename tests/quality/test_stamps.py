@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from truenorth.aiding.source import Aiding
-from truenorth.quality.stamps import SOURCES, scattered, stamp_scatter, with_scatter
+from truenorth.core.attitude import dcm_from_rotation_vector
+from truenorth.quality.stamps import scattered, stamp_scatter, with_scatter
 from truenorth.state.layout import Layout
 from truenorth.state.track import Residuals, Track
 
@@ -24,7 +25,7 @@ def drive(rng, scatter=0.0, factor=1.0, slow=0.0):
     v, a = way()
     rates = {"GNSS velocity": a, "GNSS position": v}
     residuals, sources = [], []
-    for name in SOURCES:
+    for name in SIGMA:
         sigma = np.full((len(TIME), 3), SIGMA[name])
         e = factor * sigma * rng.standard_normal(sigma.shape) + rates[name] * scatter * rng.standard_normal(
             (len(TIME), 1)
@@ -72,6 +73,21 @@ def test_sigmas_grow_by_what_a_stamp_makes_of_speed_and_acceleration():
     )
     again = Track(track.time, track.C_nb, track.v_n, track.position, track.sensors, track.P, track.layout, wider)
     assert stamp_scatter(again, sources, 0.1) == pytest.approx(stamp_scatter(track, sources, 0.0), rel=0.1)
+
+
+def test_attitudes_of_a_moment_that_is_off_show_it_by_the_rate():
+    """A master's attitude in turns, 20 ms off: a common time of its rows, not their noise."""
+    heading = -np.cumsum(np.where(TIME % 40.0 < 8.0, np.pi / 16.0, 0.0))
+    C = dcm_from_rotation_vector(np.outer(heading, [0.0, 0.0, 1.0]))
+    rate, rng, sigma = np.append(np.diff(heading), 0.0), np.random.default_rng(6), np.full((len(TIME), 3), 3e-4)
+    for scatter in (0.0, 0.02):
+        e = sigma * rng.standard_normal(sigma.shape)
+        e[:, 2] += scatter * rate * rng.standard_normal(len(TIME))
+        used, nothing = np.ones(len(TIME), dtype=bool), (np.zeros((0, 3)), np.zeros((0, 0)), np.zeros((0, 0, 0)))
+        rows = Residuals("master attitude", TIME, e, sigma, np.sum((e / sigma) ** 2, axis=1), used, 0, TIME, ~used)
+        track = Track(TIME, C, np.zeros((len(TIME), 3)), *nothing, Layout(), (rows,))
+        source = Aiding("master attitude", "rotation", TIME, np.zeros((len(TIME), 3)), sigma)
+        assert stamp_scatter(track, [source], 0.0) == pytest.approx(scatter, rel=0.3)
 
 
 def test_nothing_scatters_nothing():

@@ -4,13 +4,15 @@ The master is late by tau, stands at -r in the slave (r: from master to slave, s
 master axes, ``C_mb true = (I + [mu x]) C_mb assumed``); the slave's seat bends by theta:
 
     velocity   z = v_hat - C_hat (w_hat x r) - v_master
-                 = dv + a tau + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r) - db
+                 = dv + a (tau + lambda) - a' chi + a'' kappa + C [w x] dr + phi x C (w x r) - C ((eps + M w) x r) - db
     attitude   C_hat (C_master C_mb)' = exp(-[z x]),   z = phi - C w_nb tau - C_master mu - C theta - dm
 
 with `a` the *master's* acceleration: the slave's holds that of the arm itself, which would tell a delay from the master's
 smooth motion falsely. The rows are re-timed: they are taken at the stamp less the delay as known now, so that only what
 is left of it is linearised. ``b`` and ``m`` are the master's own slow errors of velocity and attitude, east, north, up; `M` holds
-scale factors and misalignments of the gyros: of an arm of 30 m one per cent is an arm of 30.3 m.
+scale factors and misalignments of the gyros: of an arm of 30 m one per cent is an arm of 30.3 m. A filter that the master's
+velocity went through makes it late by ``lambda``, the mean of its impulse response, and flatter by ``chi`` and ``kappa``, parts of
+the variance and the third moment of that (:mod:`truenorth.alignment.transfer_smoothed`).
 
 Sources: Xia Jiahe et al., "Study on transfer alignment algorithm considering space-time difference", Navigation Positioning
 and Timing 3 (2016), eq. 6-9, corrected: a zero column is missing in its (9); the sign of tau in its (8) is that of (9) when
@@ -30,6 +32,7 @@ from truenorth.aiding.row import (
     ARM,
     AT_ARM,
     AT_BIAS,
+    AT_FILTER,
     AT_FLEXURE,
     AT_LAG,
     AT_MOUNT,
@@ -40,6 +43,7 @@ from truenorth.aiding.row import (
     by_axes,
     lag_now,
     row,
+    state_of,
     with_state,
 )
 from truenorth.aiding.velocity import velocity_row
@@ -77,6 +81,13 @@ def from_north(now: Any, v: Any) -> Any:
 
 
 @compiled
+def into_n(now: Any, v: Any) -> Any:
+    """A vector along w, of east, north, up; tuples."""
+    s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
+    return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
+
+
+@compiled
 def turned_from_north(now: Any, q: Any, first: int) -> Any:
     """An attitude against east, north, up (four numbers of a vector), against w: a quaternion, tuple."""
     # w is turned against ENU about up: x = c E + s N.
@@ -96,8 +107,10 @@ def beyond_noise(rate: Any, variance: float) -> float:
 def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: Any, z: Any, R: Any) -> None:
     """Measured: velocity; the master's acceleration, or the slave's spin; its attitude to linearise with; its rate; or NaN.
 
-    Last the columns of delay and arm (n, 3 x 4, by rows), and by what ``C [w x]`` is to be multiplied (3 x 4) to be what of the
-    instant's noise is in them, or NaN (:mod:`truenorth.alignment.transfer_columns`).
+    Then the columns of delay and arm (n, 3 x 4, by rows), and by what ``C [w x]`` is to be multiplied (3 x 4) to be what of the
+    instant's noise is in them, or NaN (:mod:`truenorth.alignment.transfer_columns`). Last what
+    a filter makes flatter: the master's specific force, body axes, that turns, how it changes besides, m/s^3, and
+    what of that changes, m/s^4, n; or NaN.
 
     Acceleration and attitude (quaternion) are of n. Without either, the spin is that of the instant. The rate is what its gyros
     say, in body axes, without what vibrates (:mod:`truenorth.alignment.transfer_shaken`); else that of the instant.
@@ -132,27 +145,34 @@ def _velocity(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
         own = acceleration(now, force, False)
         push = (own[0] - arms[0], own[1] - arms[1], own[2] - arms[2])
     away = (-r[0], -r[1], -r[2])
-    velocity_row(now, C, w_eb, push, away, lag_now(now, assumed, at[AT_LAG]), -1, at[AT_LAG], measured, H, z)
+    lag = lag_now(now, assumed, at[AT_LAG]) + state_of(assumed, at[AT_FILTER])
+    velocity_row(now, C, w_eb, push, away, lag, -1, at[AT_LAG], measured, H, z)
     if at[AT_ARM] >= 0:
         turn = (other[0] - still[0], other[1] - still[1], other[2] - still[2])
         seen = beyond_noise(turn, figures[OWN])
         for j in range(3):
-            m = times(C, cross(turn, (seen * (j == 0), seen * (j == 1), seen * (j == 2))))
+            m = into_n(now, times(C, cross(turn, (seen * (j == 0), seen * (j == 1), seen * (j == 2)))))
             a = at[AT_ARM] + j
-            x, y = m[0], m[1]
-            s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
-            H[0, a], H[1, a], H[2, a] = c * x - s * y, s * x + c * y, m[2]
+            H[0, a], H[1, a], H[2, a] = m[0], m[1], m[2]
     if not np.isnan(measured[13]):
         for j in range(4):
             a = at[AT_LAG] if j == 0 else at[AT_ARM]
             if a >= 0:
-                m = times(C, cross(w_eb, (measured[25 + j], measured[29 + j], measured[33 + j])))
+                m = into_n(now, times(C, cross(w_eb, (measured[25 + j], measured[29 + j], measured[33 + j]))))
                 a += max(0, j - 1)
-                x, y = m[0], m[1]
-                s, c = now[NOW_NORTH], now[NOW_NORTH + 1]
-                H[0, a] = measured[13 + j] - (c * x - s * y)
-                H[1, a] = measured[17 + j] - (s * x + c * y)
-                H[2, a] = measured[21 + j] - m[2]
+                for i in range(3):
+                    H[i, a] = measured[13 + 4 * i + j] - m[i]
+    if at[AT_FILTER] >= 0:
+        a, f_m = at[AT_FILTER], vector_of(measured, 37)
+        late, turned = into_n(now, push), into_n(now, times(C, cross(w_eb, f_m)))
+        for i in range(3):
+            H[i, a] = H[i, at[AT_LAG]] if at[AT_LAG] >= 0 else late[i]
+            if not (np.isnan(measured[40]) or np.isnan(measured[43])):
+                J = turned[i]
+                if at[AT_ARM] >= 0:  # a force that turns with the body is an arm: no noise may part the two
+                    J = H[i, at[AT_ARM]] * f_m[0] + H[i, at[AT_ARM] + 1] * f_m[1] + H[i, at[AT_ARM] + 2] * f_m[2]
+                H[i, a + 1], H[i, a + 2] = -J - measured[40 + i], measured[43 + i]
+                z[i] -= H[i, a + 1] * assumed[a + 1] + H[i, a + 2] * assumed[a + 2]
     if at[AT_OWN] >= 0:  # as biases of the gyros; by a rate of another noise, as the arm
         seen = beyond_noise(other, figures[OWN])
         for i in range(3):
@@ -242,7 +262,7 @@ def _attitude(now: Any, figures: Any, at: Any, assumed: Any, measured: Any, H: A
 
 
 MASTER_VELOCITY = Row(
-    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9}, width=37, instant=True
+    "master velocity", _velocity, {"lever arm": 3, "bias": 3, "lag": 1, "own": 9, "filter": 3}, width=46, instant=True
 )
 MASTER_ATTITUDE = Row(
     "master attitude", _attitude, {"lag": 1, "mounting": 3, "flexure": 3, "bias": 3}, width=10, instant=True, unit="rad"

@@ -20,7 +20,7 @@ SIGNATURE = "void(float64[::1], float64[::1], int64[::1], float64[::1], float64[
 # Figures of a source: lever arm (IMU to sensor, body axes), axes (body to sensor) by rows, then the row's own.
 ARM, MOUNT, OWN, FIGURES = 0, 3, 12, 20
 # Where a source's groups stand, -1: not estimated. The last are free for a row's own.
-AT_ARM, AT_SCALE, AT_MOUNT, AT_BIAS, AT_LAG, AT_FLEXURE, AT_OWN, PLACES = range(8)
+AT_ARM, AT_SCALE, AT_MOUNT, AT_BIAS, AT_LAG, AT_FLEXURE, AT_OWN, AT_FILTER, PLACES = range(9)
 ROLES = {
     "lever arm": AT_ARM,
     "scale": AT_SCALE,
@@ -29,6 +29,7 @@ ROLES = {
     "lag": AT_LAG,
     "flexure": AT_FLEXURE,
     "own": AT_OWN,
+    "filter": AT_FILTER,
 }
 LEVEL_FRAME, BODY_FRAME = ("east", "north", "up"), ("right", "forward", "up")
 

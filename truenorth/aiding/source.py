@@ -22,7 +22,7 @@ from truenorth.errors.group import Group
 from truenorth.state.limits import limit
 
 Array = NDArray[np.float64]
-Role = Literal["lever arm", "scale", "mounting", "bias", "lag", "flexure", "own"]
+Role = Literal["lever arm", "scale", "mounting", "bias", "lag", "flexure", "own", "filter"]
 Does = Literal["measurement", "disturbance", "place"]
 
 KINDS: dict[str, Row] = {row.name: row for row in (POSITION, VELOCITY, BODY_VELOCITY, HEIGHT, ROTATION)}

@@ -21,6 +21,7 @@ from truenorth.alignment.transfer_axes import slave_axes
 from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, Matching, transfer_filter
 from truenorth.alignment.transfer_passes import found_in_passes
 from truenorth.alignment.transfer_shaken import shaken_evidence
+from truenorth.alignment.transfer_smoothed import filter_sigmas
 from truenorth.alignment.transfer_start import common_clock, hand_over, model_from_spec, parted_clocks
 from truenorth.alignment.transfer_together import as_said_together
 from truenorth.core.attitude import dcm_from_euler
@@ -273,6 +274,8 @@ def _model(
     if what.translation == "position":  # place and velocity are against a master whose own velocity error wanders
         walk = math.sqrt(2.0 / errors.correlation_time) * errors.velocity_drift
         model = replace(model, accel_random_walk=math.hypot(model.accel_random_walk, walk))
+    if what.translation == "velocity":
+        model = replace(model, filter=filter_sigmas(errors.filter, what.attitude))
     return replace(model, arm_considered=what.translation == "acceleration")
 
 

@@ -243,7 +243,9 @@ def _open(last: LastPass) -> tuple[str, ...]:
     k = np.arange(0, len(track.time), every)
     if len(k) < 3:
         return ()
-    model = replace(model, master=MasterErrors(), axes=())  # their groups stand behind all others
+    model = replace(
+        model, master=MasterErrors(), axes=(), filter=(0.0, 0.0, 0.0)
+    )  # their groups stand behind all others
     middle, at, T = _states(slave, track, k)
     speed = float(np.max(np.linalg.norm(track.v_n, axis=1)))
     P0 = model.prior(

@@ -28,6 +28,7 @@ Sources: W. Fuller, "Measurement error models" (1987), chapters 1 and 2; R. Carr
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ from truenorth.alignment.transfer_nominal import Carried
 from truenorth.alignment.transfer_turns import HALVES, INSTANT
 from truenorth.core.attitude import dcm_from_quaternion, skew
 from truenorth.core.earth import earth_rate_n, gravity_n, transport_rate_n
-from truenorth.errors.master import ARM, DELAY, TransferModel
+from truenorth.errors.master import ARM, DELAY, FILTER, TransferModel
 from truenorth.records import ImuRecord
 from truenorth.state.layout import ACCEL_AXES, BA
 from truenorth.state.track import Track
@@ -90,29 +91,29 @@ def columns_along(
     P, at = track.P[-1], track.layout.slice_of(ARM)
     arm = arm + (0.0 if at is None else track.sensors[-1, at])
     reach = float(arm @ arm) + (0.0 if at is None else float(np.trace(P[at, at])))
-    places, which = _places(track)
-    prior = np.array([delay_sigma, arm_sigma, arm_sigma, arm_sigma])[which]
-    T, walk, push = slave.interval, model.gyro_random_walk**2, model.accel_random_walk**2
+    T, which = _places(track)
+    prior = np.array([math.hypot(delay_sigma, model.filter[0]), arm_sigma, arm_sigma, arm_sigma])[which]
+    known = np.linalg.inv(T @ P @ T.T / np.outer(prior, prior))
+    step, walk, push = slave.interval, model.gyro_random_walk**2, model.accel_random_walk**2
 
     def noise(rate: float, spin: float, force: float) -> Array:
         """(n,) information of columns of noise on delay and arm, by that before the log; variances of a component."""
         of = len(track) / sigma**2 * np.array([2.0 * reach * spin + 3.0 * force, *[2.0 * rate] * 3])
         return np.asarray(of[which] * prior**2)
 
-    of_instant = noise(OTHER_NOISE * walk / T, SPIN_NOISE * walk / T**3, FORCE_NOISE * push / T)
-    known = np.linalg.inv(P[np.ix_(places, places)] / np.outer(prior, prior))
+    of_instant = noise(OTHER_NOISE * walk / step, SPIN_NOISE * walk / step**3, FORCE_NOISE * push / step)
     known = _at_least_one(known if calibrated else known - np.diag(of_instant))
-    halves = [half for half in HALVES if half > 2.0 * T]
+    halves = [half for half in HALVES if half > 2.0 * step]
     false = np.linalg.eigvalsh(np.sqrt(of_instant)[:, None] * np.linalg.inv(known) * np.sqrt(of_instant))
     if np.max(false, initial=0.0) <= SMALL or not halves:
         return None
-    means, best, most = _Means(slave, track, carried, held, arm), None, -np.inf
+    means, best, most = Means(slave, track, carried, held, arm), None, -np.inf
     for half in halves:
         force, of, common = means.over(half)
         usable = np.isfinite(common)
         H = of[usable][:, :, which].reshape(-1, len(which)) * prior / sigma
         # Of weights of a triangle without what the instant has in common with them, and of their slope.
-        own, tied = 2.0 / (3.0 * half), T / (INSTANT * half)
+        own, tied = 2.0 / (3.0 * half), step / (INSTANT * half)
         N = noise(walk * (own - tied / half) / (1.0 - tied) ** 2, 2.0 * walk / half**3, push * own)
         A, knows = _calibrated(H.T @ H, N)
         if knows > most:
@@ -123,14 +124,19 @@ def columns_along(
     return best
 
 
-def _places(track: Track) -> tuple[Integers, Integers]:
-    """Where the states of delay and arm stand in the filter, and which of (delay, arm) there are."""
-    places = np.full(4, -1)
+def _places(track: Track) -> tuple[Array, Integers]:
+    """(k, n) which states make the delay of a velocity and the arm, and which of (delay, arm) there are.
+
+    A velocity that went through a filter is late by what that delays it, too.
+    """
+    T = np.zeros((4, track.P.shape[-1]))
     for name, own in ((DELAY, slice(0, 1)), (ARM, slice(1, 4))):
         if (at := track.layout.slice_of(name)) is not None:
-            places[own] = np.arange(at.start, at.stop)
-    which = np.flatnonzero(places >= 0)
-    return places[which], which
+            T[own, at] = np.eye(at.stop - at.start)
+    if (at := track.layout.slice_of(FILTER)) is not None:
+        T[0, at.start] = T[0].any()
+    which = np.flatnonzero(T.any(axis=1))
+    return T[which], which
 
 
 def _at_least_one(information: Array) -> Array:
@@ -147,7 +153,7 @@ def _calibrated(G: Array, N: Array) -> tuple[Array, float]:
     return A, float(np.linalg.slogdet(np.eye(len(N)) + A.T @ G @ A)[1])
 
 
-class _Means:
+class Means:
     """The master's acceleration and the columns of the arm as means about its rows, of the motion that a pass has found."""
 
     def __init__(self, slave: ImuRecord, track: Track, carried: Carried, held: Array, arm: Array) -> None:
@@ -158,6 +164,7 @@ class _Means:
         middle = 0.5 * (self.C[1:] + self.C[:-1])
         velocity = _summed((middle @ _forces(slave, track, steps)[..., None])[..., 0])
         self.turned = _summed(middle * steps[:, None, None])
+        self.attitudes = _summed(0.5 * (self.turned[1:] + self.turned[:-1]) * steps[:, None, None])
         self.moved = _summed(0.5 * (velocity[1:] + velocity[:-1]) * steps[:, None])
         row = np.clip(np.searchsorted(track.time, held), 0, len(track) - 1)
         lat, alt, v = track.position[row, 0], track.position[row, 2], track.v_n[row]
@@ -177,11 +184,18 @@ class _Means:
         common = common / (1.0 - common)
         return push, np.concatenate([push[..., None], of_arm], axis=2), common
 
-    def _slope(self, whole: Array, span: Array) -> Array:
-        """Mean slope of the quantity whose integral this is, by a triangle's weights: a second difference."""
+    def held_at(self, shift: float, half: float) -> tuple[Array, Array]:
+        """The master's specific force (M, 3) and the attitude (M, 3, 3), n, so long after its rows, means; NaN beyond the log."""
+        there = self.held + shift
+        span = np.where((there - half >= self.knots[0]) & (there + half <= self.knots[-1]), half, np.nan)
+        force = self._slope(self.moved, span, shift) - self._slope(self.C, span, shift) @ self.arm
+        return (self.into_n @ force[..., None])[..., 0], self.into_n @ self._slope(self.attitudes, span, shift)
+
+    def _slope(self, whole: Array, span: Array, after: float = 0.0) -> Array:
+        """Mean slope, so long after the rows, of what this is the integral of, by a triangle's weights: a second difference."""
         flat, far = whole.reshape(len(whole), -1), np.nan_to_num(span)
         late, now, early = (
-            np.stack([np.interp(self.held + shift, self.knots, column) for column in flat.T], axis=1)
+            np.stack([np.interp(self.held + after + shift, self.knots, column) for column in flat.T], axis=1)
             for shift in (far, 0.0, -far)
         )
         return np.asarray((late - 2.0 * now + early) / span[:, None] ** 2).reshape(len(span), *whole.shape[1:])

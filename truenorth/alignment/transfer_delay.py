@@ -93,13 +93,16 @@ def agreement(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float)
 
 
 def _peak(score: Array, k: int) -> tuple[float, float]:
-    """Where the parabola through a highest score and its neighbours is highest, in steps from it, and how high, 1 at the most."""
+    """Where the parabola through a highest score and its neighbours is highest, in steps from it, and how high, 1 at the most.
+
+    A score on a slope, with a higher neighbour, stands as it is: the top of its parabola is elsewhere.
+    """
     peak = float(score[k])
     if not (0 < k < len(score) - 1 and min(score[k - 1], score[k + 1]) > -1.0):
         return 0.0, peak
     left, right = float(score[k - 1]), float(score[k + 1])
     bend = left - 2.0 * peak + right
-    if bend >= 0.0:
+    if bend >= 0.0 or max(left, right) > peak:
         return 0.0, peak
     return 0.5 * (left - right) / bend, min(peak - (left - right) ** 2 / (8.0 * bend), 1.0)
 

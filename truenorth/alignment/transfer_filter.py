@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ from truenorth.errors.master import (
     ARM,
     ATTITUDE_ERROR,
     DELAY,
+    FILTER,
     FLEXURE,
     MOUNTING,
     PLACE_SIGMA,
@@ -34,6 +36,7 @@ from truenorth.errors.master import (
 )
 from truenorth.estimate.memory import ABSENT, REJECTED, REOPENED, USED
 from truenorth.estimate.run import navigate_track
+from truenorth.quality.stamps import with_scatter
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.layout import ACCEL_AXES, BA, BG, DP, DV, GYRO_AXES, PHI
 from truenorth.state.state import Start
@@ -87,6 +90,9 @@ class Linear:
     begin: tuple[float, float] | None = None
     phase: float = math.inf  # s: sigma of the delay, by which the phase of a vibration at the rows is known
     columns: Columns | None = None  # of delay and arm in an open loop; those of the instant where None
+    scatter: Mapping[str, float] = field(default_factory=dict)  # s: one sigma of stamps, by the name of their rows
+    scattered: Mapping[str, Array] = field(default_factory=dict)  # (M, 3) what that adds to sigmas
+    flatter: Array | None = None  # (M, 9) what a filter of the master's velocity makes flatter, where there may be one
 
 
 class MasterRows(NamedTuple):
@@ -207,6 +213,7 @@ def master_aiding(
         known = np.isfinite(measured[:, :3]).all(axis=1)
         roles: dict[Role, str] = {"lag": DELAY, "lever arm": ARM}
         roles |= {"own": GYRO_AXES} if kind != "position" else {}
+        roles |= {"filter": FILTER} if kind == "velocity" else {}
         roles |= {"scale": ACCEL_AXES} if kind == "acceleration" else {}
         at_rest = groups[ACCEL_AXES].figures if ACCEL_AXES in groups else (0.0, 0.0, 0.0)
         found.append(
@@ -254,14 +261,7 @@ def master_aiding(
                 output=np.asarray(known_C),
             )
         )
-    return found
-
-
-def arm_of(track: Track, assumed: Assumed) -> Array:
-    """(3,) m: size of each component of the lever arm in the end, its sigma included."""
-    at = track.layout.slice_of(ARM)
-    found, sigma = (0.0, 0.0) if at is None else (track.sensors[-1, at], track.sigma[-1, at])
-    return np.asarray(np.hypot(assumed.lever_arm + found, sigma))
+    return found if linear is None else with_scatter(found, linear.scattered)
 
 
 def _reach(assumed: Assumed) -> float:
@@ -286,7 +286,7 @@ def _add_turns(
     rates = shaken(slave, held, walk, min(assumed.delay_sigma, phase))
     if columns is not None and rates is None and not own:
         measured[:, 3:6] = columns.push
-        measured[:, 13:25], measured[:, 25:] = columns.of.reshape(-1, 12), columns.common.reshape(-1, 12)
+        measured[:, 13:25], measured[:, 25:37] = columns.of.reshape(-1, 12), columns.common.reshape(-1, 12)
         return KNOWN
     pushed = KNOWN
     if not own:
@@ -324,6 +324,8 @@ def _translation(master: MasterRecord, kind: Translation, place: Array | None, l
     measured = np.full((len(master), MASTER_VELOCITY.width), np.nan)
     measured[:, :3] = master.v_n
     measured[:, 3:6] = _acceleration(master, place)
+    if linear is not None and linear.flatter is not None:
+        measured[:, 37:] = linear.flatter
     if linear is not None and np.isnan(measured[:, 3]).any():
         measured[:, 6:10] = _quaternions(linear.C_nb)
     return measured
@@ -360,9 +362,7 @@ def _slopes(slave: ImuRecord, times: Array) -> Array:
     inside = (times - SLOPE >= edges[0]) & (times + SLOPE <= edges[-1])
     apart = np.abs(sharp - smooth)
     noise = 1.4826 * np.median(apart[inside], axis=0) if inside.any() else 0.0
-    moved = np.any(apart > APART * noise, axis=1)[
-        :, None
-    ]  # all six alike: delay and arm are separated by their columns
+    moved = np.any(apart > APART * noise, axis=1)[:, None]  # all six alike: their columns tell delay from arm
     return np.where(inside[:, None], np.where(moved, sharp, smooth), np.nan)
 
 

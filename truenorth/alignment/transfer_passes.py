@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.matching import FIRST_NOISE, Translation
+from truenorth.aiding.source import Aiding
 from truenorth.alignment.transfer_columns import columns_along
 from truenorth.alignment.transfer_filter import (
     Assumed,
@@ -21,12 +22,15 @@ from truenorth.alignment.transfer_filter import (
     Matching,
     axes_along,
     by_rows,
+    master_aiding,
     transfer_filter,
 )
 from truenorth.alignment.transfer_nominal import Nominal, carried_back, carried_for, found_by
+from truenorth.alignment.transfer_smoothed import flatter_along
 from truenorth.errors.master import ARM, DELAY, MOUNTING, TransferModel
 from truenorth.estimate.batch import settle
 from truenorth.estimate.memory import REOPENED, USED
+from truenorth.quality.stamps import scattered, stamp_scatter
 from truenorth.quality.whiteness import whiteness
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.layout import PHI
@@ -123,8 +127,9 @@ def found_in_passes(
         noise = noise if velocity else _refitted(track, noise, fitted, kind)
         begin = linear.begin if linear is not None else delay_found(track) if velocity else None
         passes += 1
-        means = noise[0] if kind == "velocity" and passes >= CLOSED and np.isfinite(noise[0]) else None
-        linear = _linear(part, master, track, model, assumed, begin, means, linear)
+        means = noise[0] if kind == "velocity" and np.isfinite(noise[0]) else None
+        found = _linear(part, master, track, model, assumed, begin, means, linear, passes >= CLOSED)
+        linear = found if velocity else _with_scatter(found, linear, track, master_aiding(master, model, assumed, rows))
         return track
 
     for _ in range(CLOSED):
@@ -164,10 +169,11 @@ def _linear(
     begin: tuple[float, float] | None,
     sigma: float | None,
     before: Linear | None,
+    opened: bool,
 ) -> Linear:
     """Attitudes at the master's rows as the slave's gyros and the final answer have them; else as the master gives its own.
 
-    Where rows of velocity with this noise, m/s, come next in an open loop, with their columns.
+    Where rows of velocity with this noise, m/s, come next, with what their filter makes flatter; in an open loop, their columns.
     """
     C_nb, carried = np.full((len(master), 3, 3), np.nan), carried_back(slave, track, carried_for(slave, model))
     C_nb[np.searchsorted(master.time - assumed.delay, by_rows(track).stamp)] = carried.C_nb
@@ -178,13 +184,24 @@ def _linear(
     late, phase = (
         (0.0, math.inf) if tau is None else (float(track.sensors[-1, tau][0]), SURELY * float(track.sigma[-1, tau][0]))
     )
-    columns = None
+    columns = flatter = None
+    held = master.time - assumed.delay - late
     if sigma is not None:
+        flatter = flatter_along(slave, track, carried, model, held, assumed.lever_arm, sigma)
+    if sigma is not None and opened:
         said = (assumed.lever_arm, assumed.lever_arm_sigma, assumed.delay_sigma)
         calibrated = before is not None and before.columns is not None
-        held = master.time - assumed.delay - late
         columns = columns_along(slave, track, carried, model, held, said, sigma, calibrated)
-    return Linear(C_nm, C_nb, late, begin, phase, columns)
+    return Linear(C_nm, C_nb, late, begin, phase, columns, flatter=flatter)
+
+
+def _with_scatter(found: Linear, before: Linear | None, track: Track, sources: list[Aiding]) -> Linear:
+    """With what stamps that scatter add to the sigmas of rows, each kind by itself: often they come in other messages."""
+    had = {} if before is None else before.scatter
+    measured = [source for source in sources if source.does == "measurement"]
+    scatter = {s.name: stamp_scatter(track, [s], had.get(s.name, 0.0)) for s in measured}
+    added = {name: sigmas for s in measured for name, sigmas in scattered([s], track, scatter[s.name]).items()}
+    return replace(found, scatter=scatter, scattered=added)
 
 
 def _refitted(

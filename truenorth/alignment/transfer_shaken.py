@@ -21,12 +21,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truenorth.aiding.matching import Matched
-from truenorth.alignment.transfer_filter import Assumed, Linear, arm_of
+from truenorth.alignment.transfer_filter import Assumed, Linear
 from truenorth.alignment.transfer_turns import shaken
 from truenorth.core.attitude import rotation_vector_from_dcm
-from truenorth.errors.master import TransferModel
+from truenorth.errors.master import ARM, TransferModel
 from truenorth.records import ImuRecord, MasterRecord
 from truenorth.state.evidence import Effect, Evidence
 from truenorth.state.judge import weight
@@ -34,6 +35,8 @@ from truenorth.state.layout import DV, PHI
 from truenorth.state.limits import limit
 from truenorth.state.state import Start
 from truenorth.state.track import Track
+
+Array = NDArray[np.float64]
 
 
 def shaken_evidence(
@@ -62,7 +65,7 @@ def shaken_evidence(
     rates = shaken(slave, held, model.gyro_random_walk, min(assumed.delay_sigma, linear.phase))
     if rates is None:
         return []
-    arm, off = arm_of(track, assumed), []
+    arm, off = _arm_of(track, assumed), []
     for part in (rates.fast, rates.quarter):
         for swing in np.diag(arm):
             added = np.nan_to_num(np.einsum("kij,kj->ki", linear.C_nb, np.cross(part, swing)))
@@ -77,3 +80,10 @@ def shaken_evidence(
         return []
     size = float(np.sqrt(np.mean(np.sum(rates.fast**2, axis=1)) * (arm @ arm)))
     return [Evidence("transfer.shaken", {"size": size, "level": effect.level}, "hint", effect)]
+
+
+def _arm_of(track: Track, assumed: Assumed) -> Array:
+    """(3,) m: size of each component of the lever arm in the end, its sigma included."""
+    at = track.layout.slice_of(ARM)
+    found, sigma = (0.0, 0.0) if at is None else (track.sensors[-1, at], track.sigma[-1, at])
+    return np.asarray(np.hypot(assumed.lever_arm + found, sigma))

@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 SLOWEST = 3.0  # m/s: slower, a course says nothing of heading
 COURSE_SIGMA, LEVEL_SIGMA = math.radians(10.0), math.radians(3.0)  # of a start from course and specific force
 FIRST = 1.0  # s over which those are taken
+AGAIN = 5.0  # s: sooner no manoeuvre comes again
 MISFIT = 2.0  # times the part of a motion that the best delay leaves: another delay that leaves more is another clock's
 
 
@@ -49,6 +50,8 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
     apart = start >= slave.time[-1] or stop <= slave.time[0]
     miss = abs(found.delay - assumed.delay)
     slack = limit("other delay") * max(assumed.delay_sigma, 0.5 * master.interval)
+    if found.sure and not apart and miss > AGAIN and _fits(slave, master, assumed, found.correlation):
+        return assumed, ()
     if found.sure and (apart or miss > slack):
         if not apart and runs_backwards(slave, master, assumed.C_mb, assumed.delay, slack):
             raise DataError(
@@ -68,6 +71,15 @@ def common_clock(slave: ImuRecord, master: MasterRecord, assumed: Assumed) -> tu
             "of the master's clock, or logs with more motion in common"
         )
     return assumed, ()
+
+
+def _fits(slave: ImuRecord, master: MasterRecord, assumed: Assumed, best: float) -> bool:
+    """Whether a log agrees at the delay that was said about as well as it does anywhere (`best`, a correlation).
+
+    Manoeuvres that come again agree as well with the next ones, and stamps that scatter make it a matter of chance where best.
+    """
+    said = max(agreement(slave, master, assumed.C_mb, assumed.delay), 0.0)
+    return 1.0 - said**2 < MISFIT * (1.0 - best**2)
 
 
 def parted_clocks(slave: ImuRecord, master: MasterRecord, C_mb: Array, delay: float) -> Evidence | None:

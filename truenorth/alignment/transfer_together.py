@@ -9,7 +9,12 @@ each before:
 for a consumer IMU (30 arcmin each) .25 deg. A filter whose columns turn with what it learns takes that turning for knowledge: its
 sigma of heading was .13 deg, and its answer six of these off. Where a loop is closed (:mod:`truenorth.alignment.transfer_nominal`)
 its columns turn. So the answer is brought back to where the prior is likeliest along
-`s`, which is where a consistent filter would have left it, and its covariance along `s` is no smaller than the prior's.
+`s`, which is where a consistent filter would have left it: ``s = -K x`` of what the filter found of these states. What it says of
+everything else stands, of that along `s` the prior: with `N` the change of all states by `s`,
+
+    P = (1 - N K) P (1 - N K)' + N information^-1 N'
+
+(the difference of the turns of gyros and accelerometers, say, is known to some 10 arcmin, and moves the likeliest `s` too).
 
 Source of the defect, and of the remedy's idea: G. Huang, A. Mourikis, S. Roumeliotis, "Observability-based rules for designing
 consistent EKF SLAM estimators", Int. J. Robotics Research 29 (2010). The projection onto the prior is ours.
@@ -44,25 +49,32 @@ def as_said_together(track: Track, model: TransferModel, said: Assumed, seats: b
     seats : bool
         Attitude is matched: the mounting must be a state then.
     """
-    groups = model.groups
+    groups, at = model.groups, track.layout.slice_of
     if not {GYRO_AXES, ACCEL_AXES, ARM} <= groups.keys() or (seats and MOUNTING not in groups):
         return track
     last, C_mb = track.sensors[-1], axes_along(track, said)[-1]
-    arm = said.lever_arm + last[track.layout.slice_of(ARM)]
-    terms = [(TURNED, last[track.layout.slice_of(name)], groups[name].sigma) for name in (GYRO_AXES, ACCEL_AXES)]
-    terms.append((skew(arm), arm - said.lever_arm, np.full(3, said.lever_arm_sigma)))
+    arm = said.lever_arm + last[at(ARM)]
+    terms = [(name, TURNED, last[at(name)], groups[name].sigma) for name in (GYRO_AXES, ACCEL_AXES)]
+    terms.append((ARM, skew(arm), arm - said.lever_arm, np.full(3, said.lever_arm_sigma)))
     if MOUNTING in groups:
         off = rotation_vector_from_dcm(C_mb @ said.C_mb.T)
-        terms.append((C_mb, off, np.full(3, said.mounting_sigma)))
-    known = [(J / sigma[:, None], x / sigma) for J, x, sigma in terms if np.all(sigma > 0.0)]
-    J, x = np.vstack([J for J, _ in known]), np.concatenate([x for _, x in known])
-    information = J.T @ J
-    s = -np.linalg.solve(information, J.T @ x)
-    return _turned(track, model, said, s, np.asarray(np.linalg.inv(information), dtype=np.float64))
+        terms.append((MOUNTING, C_mb, off, np.full(3, said.mounting_sigma)))
+    known = [term for term in terms if np.all(term[3] > 0.0)]
+    information = np.sum([J.T @ (J / sigma[:, None] ** 2) for _, J, _, sigma in known], axis=0)
+    variance = np.asarray(np.linalg.inv(information), dtype=np.float64)
+    K, s = np.zeros((3, model.states)), np.zeros(3)
+    for name, J, x, sigma in known:
+        own = variance @ (J / sigma[:, None] ** 2).T
+        K[:, at(name)] = own
+        s -= own @ x
+    return _turned(track, model, said, s, variance, K)
 
 
-def _turned(track: Track, model: TransferModel, assumed: Assumed, s: Array, variance: Array) -> Track:
-    """A track whose seat, arm and sensors are turned by s, and known together no better than by this covariance, slave axes."""
+def _turned(track: Track, model: TransferModel, assumed: Assumed, s: Array, variance: Array, K: Array) -> Track:
+    """A track whose seat, arm and sensors are turned by s, slave axes, and known together as by this covariance.
+
+    `K` (3, n) is what of an error of the states the choice of s takes as a turn.
+    """
     at = {name: track.layout.slice_of(name) for name in (GYRO_AXES, ACCEL_AXES, ARM, MOUNTING)}
     C_mb, force = axes_along(track, assumed), np.array(model.groups[ACCEL_AXES].figures)
     N = np.zeros((len(track), model.states, 3))
@@ -78,14 +90,6 @@ def _turned(track: Track, model: TransferModel, assumed: Assumed, s: Array, vari
     for name in (GYRO_AXES, ACCEL_AXES, ARM):
         sensors[:, at[name]] += N[:, at[name]] @ s
     sensors[:, BA] += N[:, BA] @ s
-    P_b = np.swapaxes(track.C_nb, 1, 2) @ track.P[:, PHI, PHI] @ track.C_nb
-    P = track.P + N @ (_no_less(P_b, variance) - P_b) @ np.swapaxes(N, 1, 2)
+    left = np.eye(model.states) - N @ K
+    P = left @ track.P @ np.swapaxes(left, 1, 2) + N @ variance @ np.swapaxes(N, 1, 2)
     return replace(track, C_nb=track.C_nb @ dcm_from_rotation_vector(s), sensors=sensors, P=P)
-
-
-def _no_less(P: Array, least: Array) -> Array:
-    """(K, 3, 3) covariances that are no smaller than one (3, 3) in any direction: the least addition."""
-    root = np.linalg.cholesky(least)
-    back = np.linalg.inv(root)
-    values, vectors = np.linalg.eigh(back @ P @ back.T)
-    return root @ (vectors * np.maximum(values, 1.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2) @ root.T

@@ -4,6 +4,7 @@
 | --- | --- | --- |
 | `DELAY` | delay of the master beyond the known one: true minus assumed | s |
 | `ARM` | lever arm from the master to the slave, slave axes: true minus assumed | m |
+| `FILTER` | a filter of its velocity: mean delay beyond its attitude's, variance / 2, third moment / 6 | s, s^2, s^3 |
 | `MOUNTING` | mounting of the slave on the master, master axes: ``C_mb = (I + [mu x]) C_mb_assumed`` | rad |
 | `FLEXURE` | the slave's seat turned against the rigid body, slave axes; behind it its rate | rad, rad/s |
 | `GYRO_AXES`, `ACCEL_AXES` | scale factors and misalignments of the slave's sensors, by rows (:mod:`truenorth.errors.axes`) | 1 |
@@ -39,11 +40,14 @@ Array = NDArray[np.float64]
 
 DELAY, ARM, MOUNTING, FLEXURE = "master delay", "master lever arm", "mounting", "flexure"
 VELOCITY_ERROR, ATTITUDE_ERROR = "master velocity error", "master attitude error"
+FILTER = "master velocity filter"
 SIDES = ("right", "forward", "up")
+FILTER_SIGMA = 0.15  # s: masters put out what a filter of some tenths of a second has smoothed
 PLACE_SIGMA = 10.0  # m: the slave's place is set to the master's, its error moves attitude by parts in a million
 _OF_GROUPS = {
     DELAY: (("tau",), "s"),
     ARM: (tuple(f"r_{side}" for side in SIDES), "m"),
+    FILTER: (("lambda", "chi", "kappa"), "s"),
     MOUNTING: (tuple(f"mu_{axis}" for axis in "xyz"), "rad"),
     FLEXURE: (tuple(f"theta_{axis}" for axis in "xyz") + tuple(f"theta'_{axis}" for axis in "xyz"), "rad"),
     VELOCITY_ERROR: (tuple(f"master_dv_{axis}" for axis in "ENU"), "m/s"),
@@ -73,6 +77,8 @@ class MasterErrors:
         Of each axis: a stationary Gauss-Markov process.
     correlation_time : float, s
         Of the drift.
+    filter : float, s
+        Sigma of the time constant of a filter that its velocity went through and its attitude did not; 0: none.
     """
 
     level: float = 0.0
@@ -81,9 +87,10 @@ class MasterErrors:
     attitude_drift: float = 0.0
     velocity_drift: float = 0.0
     correlation_time: float = 300.0
+    filter: float = FILTER_SIGMA
 
     def __post_init__(self) -> None:
-        sigmas = (self.level, self.heading, self.velocity, self.attitude_drift, self.velocity_drift)
+        sigmas = (self.level, self.heading, self.velocity, self.attitude_drift, self.velocity_drift, self.filter)
         if not all(0.0 <= x < math.inf for x in sigmas):
             raise UsageError(f"{self}: expected sigmas of zero or more")
         if not self.correlation_time > 0.0:
@@ -107,6 +114,7 @@ DIMENSIONS = {
     "attitude_drift": "angle",
     "velocity_drift": "speed",
     "correlation_time": "time",
+    "filter": "time",
 }
 
 
@@ -187,11 +195,16 @@ class TransferModel(Walks):
     flexure_sigma: tuple[float, float, float] = (0.0, 0.0, 0.0)
     flexure_beta: float = 1.0  # rad/s; natural frequency of its critically damped processes
     master: MasterErrors = MasterErrors()  # of the master itself; zeros: it is taken for the truth
+    filter: tuple[float, float, float] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # s, s^2, s^3: sigmas of `FILTER`; zeros: there are no such states
     considered: bool = True  # whether the master's errors count in the covariance alone; else they are estimated
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not all(0.0 <= x < math.inf for x in (*self.turn_noise, self.delay_walk, *self.flexure_sigma)):
+        if not all(0.0 <= x < math.inf for x in (*self.turn_noise, self.delay_walk, *self.flexure_sigma, *self.filter)):
             raise UsageError(f"{self}: a random walk or a sigma is negative or not finite")
         if not 0.0 < self.flexure_beta < math.inf:
             raise UsageError(f"flexure_beta is {self.flexure_beta}; expected a positive frequency, rad/s")
@@ -204,6 +217,8 @@ class TransferModel(Walks):
             found.append(Group(DELAY, np.zeros(1), walk=self.delay_walk, unit="s"))
         if self.lever_arm:
             found.append(Group(ARM, np.zeros(3), considered=self.arm_considered, unit="m"))
+        if any(self.filter):
+            found.append(Group(FILTER, np.array(self.filter), unit="s"))
         if self.mounting:
             found.append(Group(MOUNTING, np.zeros(3), rotation=True, unit="rad"))
         if any(self.flexure_sigma):
@@ -310,4 +325,6 @@ class TransferModel(Walks):
 
 
 def _unit(name: str, group: str) -> str:
+    if name in ("chi", "kappa"):
+        return "s^2" if name == "chi" else "s^3"
     return "rad/s" if name.startswith("theta'") else _OF_GROUPS[group][1]

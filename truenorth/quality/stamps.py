@@ -1,10 +1,11 @@
 """Stamps that scatter: measurements of a moment that is a little off the one they are stamped with, by another time in each row.
 
-A stamp that is off by ``tau`` makes a velocity wrong by ``a tau`` and a position by ``v tau``, and nothing at a steady velocity or
-at rest. So the noise of such a sensor is larger in manoeuvres alone, where the filter learns attitude, and looks like an IMU whose
-errors grow with turns. The latter last from row to row, the former do not: of the *difference* of innovations that follow each
-other, along acceleration or velocity, the variance is ``q (S_1 + S_2) + sigma^2 (a_1^2 + a_2^2)``. Whether there is a sigma beyond
-the factor q says the ratio of the largest likelihoods with and without it. Differences share their rows: half of it counts.
+A stamp that is off by ``tau`` makes a velocity wrong by ``a tau``, a position by ``v tau`` and an attitude by ``w tau``, and
+nothing at a steady velocity or at rest. So the noise of such a sensor is larger in manoeuvres alone, where the filter learns
+attitude, and looks like an IMU whose errors grow with turns. The latter last from row to row, the former do not: of the
+*difference* of innovations that follow each other, along acceleration, velocity or rate, the variance is
+``q (S_1 + S_2) + sigma^2 (a_1^2 + a_2^2)``. Whether there is a sigma beyond the factor q says the ratio of the largest likelihoods
+with and without it. Differences share their rows: half of it counts.
 
 The rule is ours; differences of innovations as in :mod:`truenorth.alignment.in_motion_learnt`.
 """
@@ -12,30 +13,31 @@ The rule is ours; differences of innovations as in :mod:`truenorth.alignment.in_
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.aiding.source import Aiding
+from truenorth.core.attitude import rotation_vector_from_dcm
 from truenorth.quality.whiteness import FEWEST
 from truenorth.state.limits import limit
 from truenorth.state.track import Residuals, Track
 
 Array = NDArray[np.float64]
 
-SOURCES = {"GNSS velocity": 1, "GNSS position": 0}  # and which derivative of the velocity a stamp multiplies
 LONGEST = 0.5  # s, one sigma: more is no scatter of stamps
 TRIES = np.concatenate([[0.0], np.geomspace(2e-3, LONGEST, 60)])  # s, one sigma
-SLOW = 1e-9  # m/s or m/s^2: rates that have no direction, and are looked at along ..
+SLOW = 1e-9  # m/s, m/s^2 or rad/s: rates that have no direction, and are looked at along ..
 ANYWHERE = np.array([1.0, 0.0, 0.0])
+SHORTEST = 1e-3  # s, of a step
 STEP = 0.5  # s, over which the motion of a vehicle is steady
 MOST = 25.0  # square of a normalised difference, that is an outlier beyond
 
 
 def stamp_scatter(track: Track, aiding: Iterable[Aiding], had: float) -> float:
-    """One sigma of the stamps of a receiver, s, as its innovations show it; 0 where chance explains them.
+    """One sigma of the stamps of a receiver or a master, s, as its innovations show it; 0 where chance explains them.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ def scattered(aiding: Sequence[Aiding], track: Track, sigma: float) -> dict[str,
     """What stamps that scatter by so much (s) add to the sigmas of a receiver, (M, 3) by name."""
     if sigma == 0.0:
         return {}
-    return {s.name: sigma * np.abs(_rate_of(track, s.name, s.time)) for s in aiding if s.name in SOURCES}
+    return {s.name: sigma * np.abs(SOURCES[s.name](track, s.time)) for s in aiding if s.name in SOURCES}
 
 
 def with_scatter(aiding: Sequence[Aiding], added: Mapping[str, Array]) -> list[Aiding]:
@@ -67,12 +69,40 @@ def with_scatter(aiding: Sequence[Aiding], added: Mapping[str, Array]) -> list[A
     return [replace(s, sigma=np.hypot(s.sigma, added[s.name])) if s.name in added else s for s in aiding]
 
 
-def _rate_of(track: Track, name: str, time: Array) -> Array:
-    """(M, 3) what a stamp multiplies: velocity (m/s) of a position, acceleration (m/s^2) of a velocity."""
-    before, after = (
-        np.stack([np.interp(time + dt, track.time, v) for v in track.v_n.T], axis=1) for dt in (-STEP, STEP)
-    )
-    return (after - before) / (2.0 * STEP) if SOURCES[name] else 0.5 * (after + before)
+def _velocity(track: Track, time: Array) -> Array:
+    before, after = _around(track, time)
+    return 0.5 * (after + before)
+
+
+def _acceleration(track: Track, time: Array) -> Array:
+    before, after = _around(track, time)
+    return (after - before) / (2.0 * STEP)
+
+
+def _around(track: Track, time: Array) -> list[Array]:
+    """(M, 3) velocities a step before and after."""
+    return [_at(time + dt, track.time, track.v_n) for dt in (-STEP, STEP)]
+
+
+def _turn(track: Track, time: Array) -> Array:
+    """(M, 3) rad/s, along n, from each row of the track to the next."""
+    turned = rotation_vector_from_dcm(track.C_nb[1:] @ np.swapaxes(track.C_nb[:-1], 1, 2))
+    steps = np.maximum(np.diff(track.time), SHORTEST)[:, None]  # rows may hold at one time
+    return _at(time, 0.5 * (track.time[1:] + track.time[:-1]), turned / steps)
+
+
+def _at(time: Array, of: Array, values: Array) -> Array:
+    return np.stack([np.interp(time, of, v) for v in values.T], axis=1)
+
+
+# What a stamp multiplies, (M, 3) at some times: velocity (m/s) of a position, acceleration (m/s^2) of a velocity, rate (rad/s).
+SOURCES: dict[str, Callable[[Track, Array], Array]] = {
+    "GNSS velocity": _acceleration,
+    "GNSS position": _velocity,
+    "master velocity": _acceleration,
+    "master position": _velocity,
+    "master attitude": _turn,
+}
 
 
 def _pairs(track: Track, r: Residuals, had: float) -> tuple[Array, Array, Array]:
@@ -80,7 +110,7 @@ def _pairs(track: Track, r: Residuals, had: float) -> tuple[Array, Array, Array]
 
     The variance is without the scatter that the sigmas have already.
     """
-    rate = _rate_of(track, r.name, r.time)
+    rate = SOURCES[r.name](track, r.time)
     there, some = np.isfinite(r.innovation), r.rows > 0
     e, sigma, rate = (np.where(there, values, 0.0)[some] for values in (r.innovation, r.sigma, rate))
     pairs = rate[1:] + rate[:-1]  # of rows that follow each other alike, or the two say little
