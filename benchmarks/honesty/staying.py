@@ -16,7 +16,7 @@ from truenorth.alignment import align
 from truenorth.alignment.inference import ACCEL_WIDTH, GYRO_WIDTH, usual
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.rotary import align_rotary
-from truenorth.records.specs import ImuSpec, imu_spec
+from truenorth.records.specs import PRESETS, ImuSpec, imu_spec
 
 UNSCALED = {
     "gyro": {"bias": "0.01 deg/h", "random_walk": "0.001 deg/sqrt(h)", "bias_instability": "0.001 deg/h"},
@@ -155,6 +155,22 @@ def offset(rng: np.random.Generator) -> Mapping[str, Any]:
     return low_cost(rng) | {"imu": "consumer", "errors": {"gyro": gyro}}
 
 
+def seconds(sways: bool) -> Any:
+    """A log of 2 to 19 s, of any preset, at rest or on a base that sways by .05 to 3 deg."""
+
+    def scenario(rng: np.random.Generator) -> Mapping[str, Any]:
+        size = 0.05 * 60.0 ** rng.random()
+        tones = _sway(rng, (size, 0.7 * size, 0.5 * size), tuple(rng.uniform(3.0, 10.0, 3)))
+        return {
+            "duration": f"{rng.uniform(2.0, 19.0):.1f} s",
+            "position": place(rng),
+            "motion": tones if sways else _rest(rng),
+            "imu": str(rng.choice(list(PRESETS))),
+        }
+
+    return scenario
+
+
 def _by_rotary(axes: tuple[str, ...], imu: Any = "navigation", angle_sigma: float = 0.0) -> Any:
     def call(log: Log) -> Alignment:
         return align_rotary(log.record, log.encoder, log.position, imu, axes=axes, angle_sigma=angle_sigma)
@@ -169,6 +185,7 @@ def _with(imu: Any) -> Any:
     return call
 
 
+BRIEF = ("aligned", "level_only", "not_converged")  # of seconds none may know heading, and level is compared
 CASES = (
     Case("rotary, eight positions, navigation grade", rotary_scheme, _by_rotary(("z", "x"))),
     Case("rotary, encoder off by 20 arcsec", rotary_off, _by_rotary(("z", "x"), angle_sigma=np.radians(20.0 / 3600.0))),
@@ -188,6 +205,8 @@ CASES = (
     # what a log says of its accelerometers alone may leave level unknown: that is no refusal, and its sigma is compared
     Case("low cost at rest, no specification", low_cost, _with(None), ("aligned", "level_only", "not_converged")),
     Case("gyros off by .5 to 20 deg/s at rest", offset, _with("consumer"), ("level_only",)),
+    Case("seconds of rest, no specification", seconds(False), _with(None), BRIEF),
+    Case("seconds of sway, no specification", seconds(True), _with(None), BRIEF),
 )
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from truenorth.strapdown.level import inertial_integrals
 
 Array = NDArray[np.float64]
 
+SHORTEST_FILTER = 20.0  # s: below that a filter cannot tell the base's motion from tilt
 WINDOW = 10.0  # s, over which a wander of the attitude is taken
 WANDER = 1.0 / 15.0  # of a random walk N over T about its line: N sqrt(T / 15)
 
@@ -78,10 +79,13 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
     used, where = specification(spec, check, _louder(allan_noise(task.record), turning_noise(task.record)))
     moves = _wander(task, used) > _drift(task, used)
     check = _check(task, task.means, moves)
-    C_nb = level_of(task.means.f_b)
+    # Poor gyros drift by more in a long log than a base wanders.
+    brief = task.record.duration < SHORTEST_FILTER
+    means, moved = _at_the_epoch(task, used) if brief else (task.means, _wander(task, used))
+    C_nb = level_of(means.f_b)
     P = task.bias_prior(used, C_nb.T)
-    covariance, floor = static_covariance(C_nb, task.means, task.position.lat, task.position.alt, P)
-    covariance = without_heading(covariance + _wander(task, used) ** 2 * np.eye(3))
+    covariance, floor = static_covariance(C_nb, means, task.position.lat, task.position.alt, P)
+    covariance = without_heading(covariance + moved**2 * np.eye(3))
     answer = assemble(task, used, where, C_nb, covariance, without_heading(floor))
     # The mean rate is the gyro bias but for the earth's rate, of which the part about the vertical is known.
     up = C_nb[2]
@@ -113,11 +117,15 @@ def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     inertial frame that they keep the vertical turns with the earth: towards where, a heading would say.
     """
     record, rows = task.record, task.epoch.row + 1
-    drift = _drift(task, spec)
-    wander = _wander(task, spec)
-    if wander < drift:
-        return task.means, wander
     dtheta, dvel = increments(record)
+    turned = np.cumsum(dtheta, axis=0)
+    away = turned[task.epoch.row] - turned.mean(axis=0)
+    up = task.means.f_b / np.linalg.norm(task.means.f_b)
+    away = away - (away @ up) * up
+    drift = _drift(task, spec)
+    moved = max(_wander(task, spec), math.sqrt(max(float(away @ away) - drift**2, 0.0)))
+    if moved < drift:
+        return task.means, moved
     edges = np.unique(np.append(np.linspace(0, len(record), BLOCKS + 1).astype(int), rows))
     C_ib, velocity, _ = inertial_integrals(dtheta, dvel, record.steps, edges)
     C_be_i = task.epoch.attitude(C_ib[int(np.searchsorted(edges, rows))]).T

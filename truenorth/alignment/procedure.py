@@ -22,7 +22,7 @@ from truenorth.alignment.check import LogCheck, check_filter, check_means, impli
 from truenorth.alignment.drift import Drift
 from truenorth.alignment.fine import CoarseStart, FineAlignment, fine_align
 from truenorth.alignment.form import pick_form
-from truenorth.alignment.from_means import from_means, level_from_means, turned_by
+from truenorth.alignment.from_means import SHORTEST_FILTER, from_means, level_from_means, turned_by
 from truenorth.alignment.handover import go_on, hand_over
 from truenorth.alignment.heave import Heave
 from truenorth.alignment.inference import INFERRED, allan_noise, infer_spec, specification, usual_noise
@@ -73,7 +73,6 @@ STAYS = 0.5  # m/s: of a base's own level velocity, one sigma, that still passes
 SHORTEST_SWAYING = 60.0  # s: below that the sway's periods cannot be found
 POSITIONS = " (where a turntable does it, the aid `Positions()` shows more)"
 TURNED = math.radians(30.0)  # less in a short log may be part of a sway
-SHORTEST_FILTER = 20.0  # s: below that the filter cannot tell the base's motion from tilt
 
 
 def align_base(
