@@ -1,12 +1,14 @@
 """A master whose velocity went through a filter, or whose stamps scatter: found as such, or in sigma."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks.honesty.transfer import ERRORS, aircraft, transferred
 from tests.alignment.test_transfer_axes import ARM, ship
+from truenorth.alignment import transfer_verdict
 from truenorth.alignment.transfer_filter import Assumed, Linear, Matching, master_aiding
 from truenorth.alignment.transfer_smoothed import filter_sigmas
 from truenorth.core.attitude import skew
@@ -74,6 +76,27 @@ def test_a_filter_of_a_tenth_of_a_second_is_no_arm(grade, matching):
         answer = transferred(aircraft, ERRORS, grade, matching=matching, constant=0.1)(91, run)
         assert not answer.refused
         assert all(np.nanmax(np.abs(ratio)) < 4.0 for ratio in answer.ratios.values())
+
+
+@pytest.mark.parametrize(
+    ("values", "sigmas", "slow"),
+    [
+        ((0.1, 0.01, 0.001), (0.004, 0.001, 4e-4), False),
+        ((0.2, 0.03, 0.006), (0.004, 0.001, 4e-4), True),
+        ((0.13, 0.015, 0.002), (0.01, 0.005, 1e-3), False),
+        ((0.0, 0.005, 0.0), (0.0, 0.001, 2e-4), False),
+        ((0.0, 0.02, 0.002), (0.0, 0.002, 2e-4), True),
+        ((0.0, 0.02, 0.002), (0.0, 0.007, 2e-4), False),
+        ((0.0, -0.002, 0.0), (0.0, 0.001, 2e-4), False),
+    ],
+)
+def test_a_slow_filter_is_named(values, sigmas, slow):
+    """By the delay of velocity behind attitude where both are there, else by how flat it is: of .2 s the arm was 11 sigmas off."""
+    layout = SimpleNamespace(slice_of=lambda name: slice(1, 4))
+    P = np.diag([1.0, *np.square(sigmas)])[None]
+    track = SimpleNamespace(layout=layout, P=P, sensors=np.array([[0.0, *values]]))
+    found = transfer_verdict._filtered(track)
+    assert [item.key for item in found] == (["transfer.filter"] if slow else [])
 
 
 @pytest.mark.slow

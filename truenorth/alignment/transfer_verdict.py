@@ -10,7 +10,7 @@ from truenorth.alignment.transfer_filter import TRANSLATIONS, Assumed, axes_alon
 from truenorth.alignment.transfer_result import Transfer
 from truenorth.alignment.verdict import judged
 from truenorth.core.attitude import rotation_vector_from_dcm
-from truenorth.errors.master import ATTITUDE_ERROR, VELOCITY_ERROR
+from truenorth.errors.master import ATTITUDE_ERROR, FILTER, VELOCITY_ERROR
 from truenorth.estimate.memory import USED
 from truenorth.estimate.rivals import counted_once
 from truenorth.quality.whiteness import whiteness
@@ -21,6 +21,7 @@ from truenorth.state.track import Track
 Array = NDArray[np.float64]
 
 MOST_JUMPS = 3  # of the master, that the reasons name one by one
+LONGEST_FILTER = 0.12  # s: of a longer time constant the terms that are left out move the arm by more than its sigma
 LOPSIDED, STEADY, FEWEST = 6.0, 0.9, 20  # sigmas of a mean of innovations, their correlation from row to row, rows
 
 
@@ -41,6 +42,7 @@ def judge_transfer(
     evidence = list(of_master)
     evidence += _rejected(transfer)
     evidence += _misses(transfer, track, assumed)
+    evidence += _filtered(track)
     lopsided = _lopsided(track, transfer)
     evidence += [] if lopsided else _lasting(transfer, least)
     if lopsided:
@@ -85,6 +87,25 @@ def _misses(transfer: Transfer, track: Track, assumed: Assumed) -> list[Evidence
             remedies = ("slave_axes", f"transfer.{name}")
             found.append(contradiction(f"transfer.{name}", *remedies, miss=miss, prior=float(prior)))
     return found
+
+
+def _filtered(track: Track) -> list[Evidence]:
+    """A filter of the master's velocity that is slower than the terms of it which are states describe.
+
+    By attitude and velocity its time constant is the mean delay of the one behind the other, by velocity alone the root of twice
+    the variance term; counted is what it is at least, by two sigmas.
+    """
+    at = track.layout.slice_of(FILTER)
+    if at is None:
+        return []
+    sigma = np.sqrt(np.diag(track.P[-1][at, at]))
+    (late, flat), (late_sigma, flat_sigma) = track.sensors[-1, at][:2], sigma[:2]
+    by_both = late_sigma > 0.0
+    least = late - 2.0 * late_sigma if by_both else np.sqrt(2.0 * max(flat - 2.0 * flat_sigma, 0.0))
+    if least < LONGEST_FILTER:
+        return []
+    constant = late if by_both else np.sqrt(2.0 * flat)
+    return [contradiction("transfer.filter", "without_filter", constant=float(constant))]
 
 
 def _lasting(transfer: Transfer, least: float) -> list[Evidence]:

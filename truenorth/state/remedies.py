@@ -37,6 +37,7 @@ REMEDIES = {
     "rows_of_one": "align the rows of one sensor",
     "put_times_right": "correct the times",
     "transfer_geometry": "check the axes, the lever arm, the mounting and the delay",
+    "without_filter": "give the master's velocity without a filter, or with a faster one",
     "flexure": "check whether both sit on one rigid body",
     "slave_axes": "check the slave's axes",
     "transfer.delay": "check the delay",
