@@ -51,15 +51,18 @@ def from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
     """
     lat, alt = task.position.lat, task.position.alt
     noise = turning_noise(task.record)  # from row to row: short logs have no more
-    rough, _ = specification(spec, check_means(task.means, lat, task.gravity), noise)
+    rough, _ = specification(spec, _check(task, task.means, False), noise)
     means, moved = _at_the_epoch(task, rough)
-    check = check_means(
-        means, lat, task.gravity
-    )  # of a base that sways, the mean of the force in body axes is less than gravity
+    # Of a base that sways the mean of the force in body axes is less than gravity: that of the force as it was carried counts.
+    carried = means is not task.means
+    check = _check(task, means, carried)
     used, where = specification(spec, check, noise)
     P = task.bias_prior(used, level_of(means.f_b).T)
     C_nb, covariance, floor = analytic(means, lat, alt, P)
-    return assemble(task, used, where, C_nb, covariance + moved**2 * np.eye(3), floor), check
+    covariance = covariance + moved**2 * np.eye(3)
+    if carried:  # the mean rate is the base's own
+        covariance, floor = without_heading(covariance), without_heading(floor)
+    return assemble(task, used, where, C_nb, covariance, floor), check
 
 
 def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
@@ -102,7 +105,7 @@ def _louder(a: StaticModel, b: StaticModel) -> StaticModel:
     return replace(a, **walks)
 
 
-def _check(task: Task, means: Means, moves: bool = False) -> LogCheck:
+def _check(task: Task, means: Means, moves: bool) -> LogCheck:
     """What means show of the biases: the mean rate of a base that moves may all be its own."""
     check = check_means(means, task.position.lat, task.gravity)
     if not moves and task.motion.overall in ("still", "unknown"):
