@@ -341,7 +341,7 @@ SENTENCES = {
         "the master's {rows} differ from the prediction to one side all the time: the slave's errors are larger than its "
         "specification ({imu:imu}) allows, or the master drifts"
     ),
-    "transfer.filter": "a filter of some {constant:.2f} s smoothed the master's velocity: the arm may be off by more than its sigma",
+    "transfer.filter": "a filter of some {constant:.2f} s smoothed the master's velocity: its arm may be off by more than sigma",
     "transfer.lasting": (
         "{name}: what it differs from the slave by ({size:.3g} {unit}) lasts from row to row ({colour:.0f} times the error of "
         "white noise): this is no motion of one rigid body"
