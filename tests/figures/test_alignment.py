@@ -10,6 +10,7 @@ import pytest
 from truenorth.alignment import align
 from truenorth.core.position import Position
 from truenorth.figures.convergence import NIS_BLOCK, averaged_nis, courses, settled_limits
+from truenorth.figures.units import Clock
 from truenorth.records.specs import imu_spec
 from truenorth.simulation import rest, simulate
 
@@ -110,3 +111,15 @@ def test_averaged_nis_is_that_of_epochs_that_have_one(still):
 def test_without_a_history_there_is_nothing_to_draw(still):
     with pytest.raises(ValueError, match="no history"):
         replace(still, history=None).plot()
+
+
+def test_a_clock_that_counts_from_a_date_is_drawn_from_the_first_second_of_the_log():
+    """Ticks of 1.710773355e9 s could not be read."""
+    clock = Clock.of(1710773350.4 + np.arange(31.0))
+    assert clock.label == "s since 1710773350 s"
+    np.testing.assert_allclose(clock([1710773350.4, 1710773352.0]), [0.4, 2.0], atol=1e-6)
+    assert clock.lasting(30.0) == 30.0
+    days = Clock.of(np.array([2e9, 2e9 + 86400.0]))
+    assert (float(days(2e9 + 7200.0)), days.label) == (2.0, "h since 2000000000 s")
+    of_the_week = Clock.of(np.array([345600.0, 345700.0]))
+    assert (float(of_the_week(345600.0)), of_the_week.label) == (345600.0, "s")

@@ -60,7 +60,7 @@ def plot_alignment(result: Alignment) -> Figure:
             ax.set_xlim(t[0], t[-1])
             ax.tick_params(labelbottom=ax in (nis, innovations))
         for ax in (nis, innovations):
-            ax.set_xlabel(f"time, {clock.unit}")
+            ax.set_xlabel(f"time, {clock.label}")
         figure.suptitle(f"{result.source}: {result.status}, method {result.method}", x=0.01, ha="left")
     return figure
 

@@ -60,7 +60,7 @@ def plot_navigation(result: Navigation) -> Figure:
             ax.set_xlim(t[0], t[-1])
             ax.tick_params(labelbottom=ax in (velocity, innovations))
         for ax in (velocity, innovations):
-            ax.set_xlabel(f"time, {clock.unit}")
+            ax.set_xlabel(f"time, {clock.label}")
         figure.align_ylabels([height, velocity])
         figure.align_ylabels([heading, level, position, speeds, innovations])
         smoothed = ", smoothed" if result.smoothed else ""

@@ -13,24 +13,36 @@ from truenorth.core.units import MICRO_G
 Array = NDArray[np.float64]
 
 HOURS_FROM = 7200.0  # s: longer spans are drawn in hours
+OF_AN_EPOCH = 1e7  # s: a clock that stands there counts from a date, and is drawn from the log's first second on
 
 
 @dataclass(frozen=True)
 class Clock:
-    """The unit in which times of one log are drawn: seconds, or hours from two hours on."""
+    """The unit in which times of one log are drawn: seconds, or hours from two hours on; and from where on."""
 
     scale: float
     unit: str
+    zero: float = 0.0  # s, of the log's clock
 
     @classmethod
     def of(cls, time: Array) -> Clock:
         """Choose for these times, s."""
         long = len(time) > 0 and float(time[-1] - time[0]) >= HOURS_FROM
-        return cls(3600.0, "h") if long else cls(1.0, "s")
+        zero = float(np.floor(time[0])) if len(time) > 0 and abs(time[0]) >= OF_AN_EPOCH else 0.0
+        return cls(3600.0, "h", zero) if long else cls(1.0, "s", zero)
+
+    @property
+    def label(self) -> str:
+        """The unit, and the second of the log's clock from which it counts where that is not zero."""
+        return f"{self.unit} since {self.zero:.0f} s" if self.zero else self.unit
 
     def __call__(self, time: ArrayLike) -> Array:
-        """Seconds in this unit."""
-        return np.asarray(time, dtype=np.float64) / self.scale
+        """Times of the log, s, in this unit."""
+        return (np.asarray(time, dtype=np.float64) - self.zero) / self.scale
+
+    def lasting(self, duration: ArrayLike) -> Array:
+        """Durations, s, in this unit."""
+        return np.asarray(duration, dtype=np.float64) / self.scale
 
 
 def length_unit(values: ArrayLike) -> tuple[float, str]:

@@ -84,7 +84,7 @@ def _of_history(result: Alignment) -> list[Panel]:
 
 def over_time(clock: Clock) -> str:
     """Title of an axis of time."""
-    return _("time, {unit}").format(unit=clock.unit)
+    return _("time, {unit}").format(unit=clock.label)
 
 
 def _convergence(t: Array, angles: list[Course], heading_known: bool, clock: Clock) -> Chart:
@@ -100,8 +100,8 @@ def _convergence(t: Array, angles: list[Course], heading_known: bool, clock: Clo
 
 
 def _sigmas(t: Array, angles: list[Course], clock: Clock) -> Chart:
-    chart = Chart([_("one sigma, arcmin")], over_time(clock), height=380)
-    since = clock(t[1:] - t[0])  # zero has no logarithm
+    chart = Chart([_("one sigma, arcmin")], _("time, {unit}").format(unit=clock.unit), height=380)
+    since = clock.lasting(t[1:] - t[0])  # zero has no logarithm
     for number, course in enumerate(angles):
         for values, dash, name in (
             (course.sigma, "solid", _(course.name)),
