@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ def from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCheck]:
         What the means show of the biases.
     """
     lat, alt = task.position.lat, task.position.alt
-    noise = turning_noise(task.record)  # from row to row: short logs have no more
+    noise = cache(lambda: turning_noise(task.record))  # from row to row: short logs have no more
     rough, _ = specification(spec, _check(task, task.means, False), noise)
     means, moved = _at_the_epoch(task, rough)
     # Of a base that sways the mean of the force in body axes is less than gravity: that of the force as it was carried counts.
@@ -79,12 +80,10 @@ def level_from_means(task: Task, spec: ImuSpec | None) -> tuple[Alignment, LogCh
             f"{task.record.source}: all gyros read zero in every row: are they dead, or written too coarsely to see any motion?"
         )
     check = check_means(task.means, task.position.lat, task.gravity)
-    used, where = specification(spec, check, _louder(allan_noise(task.record), turning_noise(task.record)))
+    used, where = specification(spec, check, lambda: _louder(allan_noise(task.record), turning_noise(task.record)))
     moves = _wander(task, used) > _drift(task, used)
     check = _check(task, task.means, moves)
-    # Poor gyros drift by more in a long log than a base wanders.
-    brief = task.record.duration < SHORTEST_FILTER
-    means, moved = _at_the_epoch(task, used) if brief else (task.means, _wander(task, used))
+    means, moved = _at_the_epoch(task, used)
     C_nb = level_of(means.f_b)
     P = task.bias_prior(used, C_nb.T)
     covariance, floor = static_covariance(C_nb, means, task.position.lat, task.position.alt, P)
@@ -117,9 +116,12 @@ def _at_the_epoch(task: Task, spec: ImuSpec) -> tuple[Means, float]:
     """Means in the axes of the body at the epoch, and one sigma of what it may have turned about them, rad.
 
     The gyros carry each force to the epoch, unless they drift by more over the log than the base has moved about its mean. In the
-    inertial frame that they keep the vertical turns with the earth: towards where, a heading would say.
+    inertial frame that they keep the vertical turns with the earth: towards where, a heading would say. Over a log that is long
+    enough for a filter they carry nothing.
     """
     record, rows = task.record, task.epoch.row + 1
+    if record.duration >= SHORTEST_FILTER:
+        return task.means, _wander(task, spec)
     dtheta, dvel = increments(record)
     turned = np.cumsum(dtheta, axis=0)
     away = turned[task.epoch.row] - turned.mean(axis=0)

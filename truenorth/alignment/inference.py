@@ -11,6 +11,7 @@ motion.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -89,11 +90,14 @@ def infer_spec(check: LogCheck, noise: StaticModel) -> ImuSpec:
     )
 
 
-def specification(spec: ImuSpec | None, check: LogCheck, noise: StaticModel) -> tuple[ImuSpec, str]:
-    """The specification that is given, or else inferred, and where it comes from in words; arguments as of :func:`infer_spec`."""
+def specification(spec: ImuSpec | None, check: LogCheck, noise: Callable[[], StaticModel]) -> tuple[ImuSpec, str]:
+    """The specification that is given, or else inferred (:func:`infer_spec`), and where it comes from in words.
+
+    `noise` is asked for only where none is given: a log's noise takes time.
+    """
     if spec is not None:
         return spec, f"specification {spec.name!r}"
-    return infer_spec(check, noise), INFERRED
+    return infer_spec(check, noise()), INFERRED
 
 
 @cache

@@ -256,7 +256,7 @@ def _align_inertial(task: Task, spec: ImuSpec | None, method: str, sound: bool) 
     filtered, noise = check_filter(task, integrals, coarse.C_n0_i, usual, known)
     check = sharper(filtered, check_means(task.means, lat, task.gravity), task.motion)
     turns = task.motion.fraction("rotating") > 0.0
-    used, where = specification(spec, check, turning_noise(task.record) if turns else noise)
+    used, where = specification(spec, check, lambda: turning_noise(task.record) if turns else noise)
     P = task.bias_prior(used, coarse.C_n0_i.T)
     if method in STATIONARY:
         return _Found(_stationary(task, used, where, coarse.C_n0_i, P, method), check)
