@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.fine import FineAlignment
 from truenorth.alignment.matched import Match, Signatures
+from truenorth.alignment.passing_turn import passing_turns
 from truenorth.alignment.task import Task
 from truenorth.alignment.touched import Touch, find_touch
 from truenorth.alignment.usual import usual
@@ -148,7 +149,7 @@ def turn_evidence(task: Task) -> list[Evidence]:
     motion = task.motion
     if motion.overall not in ("still", "disturbed"):
         return []
-    turns = motion.kind == KINDS.index("rotating")
+    turns = (motion.kind == KINDS.index("rotating")) | passing_turns(motion)
     if turns.any():
         turns = np.convolve(turns, np.ones(2 * AWAY + 1), "same") > 0.0
     found = []

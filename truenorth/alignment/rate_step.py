@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truenorth.alignment.bias_step import SIGNATURES
+from truenorth.alignment.passing_turn import passing_turns
 from truenorth.alignment.task import Task
 from truenorth.alignment.usual import usual
 from truenorth.core.earth import EARTH_RATE
@@ -39,22 +40,21 @@ def rate_step_evidence(task: Task, C_nb: Array, spec: ImuSpec) -> list[Evidence]
     """
     motion = task.motion
     count = len(motion.time)
-    if (
-        motion.overall != "still" or count < FEWEST or motion.fraction("rotating") > 0.0
-    ):  # a turn shares the earth's rate anew
+    turns = motion.fraction("rotating") > 0.0 or passing_turns(motion).any()
+    if motion.overall != "still" or count < FEWEST or turns:  # a turn shares the earth's rate anew
         return []
-    shapes = _shapes(count)
+    shapes, rate = _shapes(count), motion.rate
     energy = np.sum(shapes**2, axis=0)[:, None]
-    size = shapes.T @ (motion.rate - motion.rate.mean(axis=0)) / energy  # (S, 3), rad/s
-    noise = 0.5 * np.mean((motion.rate[1:] - motion.rate[:-1]) ** 2, axis=0)
+    size = shapes.T @ (rate - rate.mean(axis=0)) / energy  # (S, 3), rad/s
+    noise = 0.5 * np.mean((rate[1:] - rate[:-1]) ** 2, axis=0)
     instability = max(spec.gyro_bias_instability, usual("gyro", "bias_instability", spec.gyro_random_walk))
     ratio = size**2 / (noise / energy + 2.0 * instability**2)
     best, axis = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     if ratio[best, axis] <= limit("hint"):
         return []
-    rate = C_nb[:, axis] * float(size[best, axis])
+    change = C_nb[:, axis] * float(size[best, axis])
     span = float(motion.time[-1] - motion.time[0])
-    heading = abs(rate[0]) / (EARTH_RATE * math.cos(task.position.lat)) + 0.5 * span * abs(rate[2])
+    heading = abs(change[0]) / (EARTH_RATE * math.cos(task.position.lat)) + 0.5 * span * abs(change[2])
     figures: dict[str, Figure] = {
         "axis": "xyz"[axis],
         "onset": SIGNATURES[best][1] * span,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from truenorth.alignment.bias import bias_prior
 from truenorth.alignment.epoch import Epoch, find_epoch
+from truenorth.alignment.passing_turn import means_at_rest
 from truenorth.coarse.analytic import Means, means, static_jacobian
 from truenorth.core.attitude import dcm_from_euler
 from truenorth.core.earth import DEFLECTION, EARTH_RATE, gravity_of_place
@@ -68,13 +69,14 @@ class Task:
 
 def make_task(record: ImuRecord, position: Position, at: float | None) -> Task:
     """Look at a record and set up its alignment for an epoch (the last sample when `at` is None)."""
+    motion = motion_summary(record)
     return Task(
         record=record,
         position=position,
         interval=filter_interval(record),
         epoch=find_epoch(record, at),
-        motion=motion_summary(record),
-        means=means(record),
+        motion=motion,
+        means=means_at_rest(record, motion),
     )
 
 

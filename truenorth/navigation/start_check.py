@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.core.earth import earth_rate_n, normal_gravity
+from truenorth.core.earth import EARTH_RATE, earth_rate_n, normal_gravity
 from truenorth.core.errors import DataError
 from truenorth.quality.regimes import MOVING_ACCELERATION, motion_summary
 from truenorth.records import ImuRecord
@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 ORTHONORMAL = 1e-6
 SYMMETRIC = 1e-6  # of the largest product of two sigmas
 FIRST, LEAST = 20.0, 5.0  # s of the log's begin that are held against the start, and the least of them at rest
+TURNS = 3.0  # times the earth's rate: no attitude and no latitude makes it miss itself by more than twice
+SAME_WAY = 0.98  # cosine
 SHAKE = 0.02  # m/s^2 and, divided by a second, rad/s: of a mean over seconds at rest with the engine running
 
 
@@ -105,7 +107,8 @@ def check_start_at_rest(start: Start, record: ImuRecord) -> None:
     w_sigma = math.sqrt(float(np.max(sigma[BG])) ** 2 + noise**2 + (SHAKE / g / rest.duration) ** 2)
     f_sigma = math.hypot(g * float(np.max(sigma[PHI][:2])), float(np.max(sigma[BA])), SHAKE)
     worst, hour = float(np.max(np.abs(w_off))), math.radians(1.0) / 3600.0
-    if worst > clear * w_sigma + 0.1 * float(np.linalg.norm(earth_rate_n(start.lat))):
+    turns = worst > TURNS * EARTH_RATE + clear * w_sigma and not _scaled(start.C_nb @ w, earth_rate_n(start.lat))
+    if worst > clear * w_sigma + 0.1 * EARTH_RATE and not turns:
         raise DataError(
             f"{record.source}: at rest the gyros miss the earth's rate, as the start has it, by {worst / hour:.3g} deg/h; expected "
             f"{w_sigma / hour:.2g} deg/h (one sigma): check the start's latitude and attitude, and the IMU's axes and units"
@@ -116,3 +119,8 @@ def check_start_at_rest(start: Start, record: ImuRecord) -> None:
             f"against the start; expected {math.degrees(f_sigma / g):.2g} deg (one sigma): the IMU has been moved, or the start is "
             "of another log; align anew"
         )
+
+
+def _scaled(rate: Array, earth: Array) -> bool:
+    """Whether a rate is the earth's in another unit: along it, and not as large. Of a base that turns evenly it is not."""
+    return float(rate @ earth) > SAME_WAY * float(np.linalg.norm(rate)) * EARTH_RATE
