@@ -7,8 +7,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from truenorth.aiding.aids import ANTENNA
-from truenorth.alignment.in_motion_task import WHEEL
+from truenorth.aiding.aids import ANTENNA, WHEEL
 from truenorth.alignment.transfer import ON_MASTER
 from truenorth.cli.aiding_options import ByMaster, OnIndexer, OnTheMove, Turntable
 from truenorth.cli.attitude_options import OfAttitude

@@ -20,9 +20,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.honesty.harness import Case, Log, main, place
+from truenorth.aiding.aids import WHEEL
 from truenorth.aiding.sensors import ODOMETER_SIGMA
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.alignment.in_motion_task import LATENCY_SIGMA, VELOCITY_FLOOR, WHEEL
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, VELOCITY_FLOOR
 from truenorth.alignment.result import Alignment
 from truenorth.records import GnssRecord, VelocityRecord
 

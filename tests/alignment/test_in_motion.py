@@ -11,10 +11,10 @@ from scipy.stats import chi2
 
 from tests.runs import few_and_all, some
 from truenorth import OdometerRecord, UsageError, VelocityRecord, align, imu_spec, navigate
-from truenorth.aiding.aids import Odometer, VelocityLog
+from truenorth.aiding.aids import WHEEL, Odometer, VelocityLog
 from truenorth.alignment.in_motion import align_in_motion
 from truenorth.alignment.in_motion_start import backtracked, departures, path_to_the_end
-from truenorth.alignment.in_motion_task import LATENCY_SIGMA, POSITION_FLOOR, VELOCITY_FLOOR, WHEEL
+from truenorth.alignment.in_motion_task import LATENCY_SIGMA, POSITION_FLOOR, VELOCITY_FLOOR
 from truenorth.coarse.odometer import odometer_alignment
 from truenorth.core.attitude import dcm_from_euler, rotation_vector_from_dcm
 from truenorth.core.position import METRES_PER_RADIAN, Position

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import yaml
 
-from truenorth.aiding.aids import Odometer
+from truenorth.aiding.aids import WHEEL, Odometer
 from truenorth.alignment import align, in_motion_passes
 from truenorth.alignment.in_motion_passes import begun, once_more
 from truenorth.alignment.in_motion_start import LEAST_HEADING, Guess, led_back
-from truenorth.alignment.in_motion_task import WHEEL
 from truenorth.core.attitude import dcm_from_euler, euler_from_dcm
 from truenorth.core.position import Position
 from truenorth.navigation.stops import seconds_at_rest

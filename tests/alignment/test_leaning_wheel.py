@@ -5,9 +5,9 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
+from truenorth.aiding.aids import WHEEL
 from truenorth.aiding.wheel import COMPLIANCE
 from truenorth.alignment.in_motion import align_in_motion
-from truenorth.alignment.in_motion_task import WHEEL
 from truenorth.core.attitude import misalignment
 from truenorth.records import ImuRecord
 from truenorth.simulation.scenario import read_scenario

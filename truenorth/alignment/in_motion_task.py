@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import BASELINE
+from truenorth.aiding.aids import BASELINE, WHEEL
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import changed, differs, louder, noise_factors
@@ -64,9 +64,6 @@ POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
 PACE = 5.0  # s, over which fixes show a speed
 LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
-WHEEL = Mounting(  # of which nothing is said; a vehicle's bus takes some .01 s
-    scale_sigma=0.03, angle_sigma=math.radians(3.0), lever_arm_sigma=1.0, latency_sigma=0.05
-)
 
 
 @dataclass(frozen=True)

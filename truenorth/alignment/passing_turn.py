@@ -28,7 +28,8 @@ MOSTLY = 0.5  # of the seconds, at most: a median is that of the rest
 def passing_turns(motion: MotionSummary) -> NDArray[np.bool_]:
     """Seconds (m,) of a still base in which it turns, and after which it rests as before.
 
-    A base that people shake is another matter: it tilts in a second and may come back in many. The noise of a second's mean is that of neighbours, of which most are alike.
+    A base that people shake is another matter: it tilts in a second and may come back in many. The noise of a second's mean is
+    that of neighbours, of which most are alike.
     """
     rate = motion.rate
     none = np.zeros(len(rate), dtype=np.bool_)
@@ -50,6 +51,4 @@ def means_at_rest(record: ImuRecord, motion: MotionSummary) -> Means:
         return found
     rest = motion.rate[~turns] + motion.rate_bias
     blocks = np.stack([part.mean(axis=0) for part in np.array_split(rest, min(BLOCKS, len(rest)))])
-    return replace(
-        found, w_ib_b=rest.mean(axis=0) + cone_drift(record), w_covariance=scatter_of(blocks) / len(blocks)
-    )
+    return replace(found, w_ib_b=rest.mean(axis=0) + cone_drift(record), w_covariance=scatter_of(blocks) / len(blocks))

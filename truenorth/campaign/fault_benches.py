@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truenorth.aiding.aids import WHEEL as ON_WHEEL
 from truenorth.aiding.aids import Gnss, Indexer, Master, Odometer
 from truenorth.alignment import align
-from truenorth.alignment.in_motion_task import WHEEL as ON_WHEEL
 from truenorth.alignment.in_motion_task import usual_antenna
 from truenorth.alignment.result import Alignment
 from truenorth.alignment.transfer import ON_MASTER

@@ -261,8 +261,8 @@ class OnTheMove:
             return []
         from dataclasses import replace
 
-        from truenorth.aiding.aids import Gnss, Odometer, VelocityLog
-        from truenorth.alignment.in_motion_task import WHEEL, usual_antenna
+        from truenorth.aiding.aids import WHEEL, Gnss, Odometer, VelocityLog
+        from truenorth.alignment.in_motion_task import usual_antenna
         from truenorth.core.errors import UsageError
         from truenorth.formats import read_gnss, read_odometer, read_velocity
 

@@ -144,11 +144,16 @@ class Sensors:
         return replace(unsaid, **given(self, "antenna"))
 
     def wheel(self, found: Mounting | None = None) -> Mounting:
-        """Of the odometer, and of a velocity log; `found` is how an alignment found it, where nothing is said."""
+        """Of the odometer: what is said of it; for the rest, `found` is how an alignment found it; else the usual."""
+        from truenorth.aiding.aids import WHEEL
+
+        return replace(found or WHEEL, **given(self, "wheel"))
+
+    def log(self) -> Mounting:
+        """Of a velocity log; its scale and its angles have errors of their own."""
         from truenorth.state.mounting import Mounting
 
-        said = given(self, "wheel")
-        return replace(Mounting() if said or found is None else found, **said)
+        return replace(Mounting(), **(given(self, "wheel") | {"lever_arm_sigma": 0.0}))
 
     def log_errors(self, frame: str) -> LogErrors | None:
         """Of the velocity log: those of its kind, and what is given of them; None: nothing is said."""
@@ -171,12 +176,11 @@ class Sensors:
         if self.gnss is not None:
             aids.append(Gnss(read_gnss(self.gnss), self.antenna(begin)))
         if self.odometer is not None:
-            sits = replace(self.wheel(begin.wheel), **given(self, "odometer")) if said or begin.wheel is None else None
+            sits = replace(self.wheel(begin.wheel), **given(self, "odometer")) if said else None
             aids.append(Odometer(read_odometer(self.odometer), sits))
         if self.velocity is not None:
-            log = replace(self.wheel(), lever_arm_sigma=0.0)
             record = read_velocity(self.velocity)
-            aids.append(VelocityLog(record, log, self.log_errors(record.frame)))
+            aids.append(VelocityLog(record, self.log(), self.log_errors(record.frame)))
         if self.baro is not None:
             aids.append(Barometer(read_height(self.baro), **given(self, "baro")))
         if self.fix or self.azimuth:

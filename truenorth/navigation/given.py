@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from truenorth.aiding.aids import ANTENNA, WEATHER, Aid, Barometer, Gnss, Odometer, VelocityLog
+from truenorth.aiding.aids import ANTENNA, WEATHER, WHEEL, Aid, Barometer, Gnss, Odometer, VelocityLog
 from truenorth.aiding.fixes import Fixes
 from truenorth.core.errors import UsageError
 from truenorth.navigation.result import Altitude
@@ -17,7 +17,7 @@ from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 AIDS = (Gnss, Odometer, VelocityLog, Barometer)
-USUAL = {"baro": WEATHER}
+USUAL = {"odometer": WHEEL, "baro": WEATHER}
 
 
 def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:

@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 
 STILL_VELOCITY = 0.01  # m/s, one sigma of a base on which nothing is seen to move
 DISTURBED_VELOCITY = 0.03  # m/s, of one that people, wind or an engine shake
-BIAS_CHANGE = math.radians(0.05)  # rad/s: of poor gyros while they warm up, or by the earth's rate when a vehicle has turned
+BIAS_CHANGE = math.radians(
+    0.05
+)  # rad/s: of poor gyros while they warm up, or by the earth's rate when a vehicle has turned
 STANDING = 0.2  # m/s: a speed below it is standing, where the IMU sees no motion either
 FEWEST_FIXES = 5  # through which a line is laid
 REACHES = (2.0, 5.0, 10.0, 20.0)  # s before and after a fix
@@ -37,8 +39,8 @@ def stops_in(record: ImuRecord) -> tuple[Array, Array]:
     Constant velocity looks like rest to an IMU, but a vehicle that drives shakes. Seconds without any motion above the
     sensor's noise count anywhere; seconds of small disturbances only before the vehicle first moves. The second after one in
     which it moves does not count: a vehicle sets off with a push, but rolls to rest, and may have .1 m/s in it, ten times the
-    sigma of rest, with less acceleration than tells motion from tilt. Nor does one in which it turns evenly on the spot: the rate is
-    not that of the other seconds, and no bias changes by so much.
+    sigma of rest, with less acceleration than tells motion from tilt. Nor does one in which it turns evenly on the spot: its
+    rate is not that of the other seconds, and no bias changes by so much.
 
     Returns
     -------
