@@ -72,7 +72,7 @@ def test_scale_and_mounting_that_are_not_estimated(drive):
     motion, record, start = drive
     log = wheel_log(motion)
     fast = OdometerRecord(log.time, 1.03 * log.values, "speed", source="odo.csv")
-    (words,) = warnings(navigate(record, start, aid=Odometer(fast), imu=SPEC, altitude="fixed"))
+    (words,) = warnings(navigate(record, start, aid=Odometer(fast, Mounting()), imu=SPEC, altitude="fixed"))
     assert words.startswith("the odometer seems to count +")
     assert words.endswith("%: let it be estimated")
     value, sigma = (float(x) for x in words.split("count +")[1].split(" %")[0].split(" ± "))

@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from truenorth.aiding.aids import BASELINE, WHEEL
+from truenorth.aiding.aids import ANTENNA, LATENCY_SIGMA, WHEEL
 from truenorth.aiding.sensors import from_gnss, from_odometer, from_velocity
 from truenorth.aiding.source import Aiding
 from truenorth.alignment.in_motion_learnt import changed, differs, louder, noise_factors
@@ -63,7 +63,6 @@ SOMEWHERE = math.radians(45.0)  # where the latitude is not known (yet)
 POSITION_FLOOR, VELOCITY_FLOOR = 0.05, 0.05  # m, m/s
 FIRST_FIX = 10.0, 20.0  # m, one sigma along the level and up
 PACE = 5.0  # s, over which fixes show a speed
-LATENCY_SIGMA = 0.2  # s, of a receiver of which nothing is said
 
 
 @dataclass(frozen=True)
@@ -292,9 +291,7 @@ def _with_floors(gnss: GnssRecord) -> GnssRecord:
 
 def usual_antenna(gnss: GnssRecord | None) -> Mounting:
     """Of an antenna of which nothing is said: late by an unknown time, its fixes off together for minutes."""
-    return Mounting(
-        latency_sigma=LATENCY_SIGMA, bias_sigma=usual_bias(gnss), bias_time=USUAL_TIME, angle_sigma=BASELINE
-    )
+    return replace(ANTENNA, bias_sigma=usual_bias(gnss), bias_time=USUAL_TIME)
 
 
 def has_fixes(gnss: GnssRecord | None) -> TypeGuard[GnssRecord]:

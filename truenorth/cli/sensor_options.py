@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from truenorth.cli.aiding_options import Baseline, Errors, LogKind, OdometerNoise, Offset
+from truenorth.cli.aiding_options import Baseline, Errors, KnownLatency, LogKind, OdometerNoise, Offset
 from truenorth.cli.fields import Fields, Read, Sets, angles, arm, given, plain, quantity, quantity_and_time
 from truenorth.cli.options import option
 from truenorth.cli.reading import numbers_of
@@ -109,6 +109,7 @@ class Sensors:
         option("Heading,pitch,roll of the IMU against the vehicle, deg (odometer, log)."),
         Sets("wheel", angles),
     ] = None
+    latency: KnownLatency = None
     estimate: Annotated[
         str | None,
         option(f"What is not known and estimated, of: {', '.join(PARTS)}."),
@@ -117,13 +118,6 @@ class Sensors:
     ] = None
     odometer_noise: OdometerNoise = None
     offset: Offset = None
-    latency: Annotated[
-        float | None,
-        option(
-            "GNSS measurements are older than their stamps by this, s; without it by what the alignment found, else 0."
-        ),
-        Sets("antenna", plain("latency")),
-    ] = None
     gnss_drift: Annotated[
         str | None,
         option("Slow error of the GNSS positions: one sigma in m and its time in s, as '2,60'; none without it."),
@@ -140,7 +134,7 @@ class Sensors:
         from truenorth.aiding.aids import ANTENNA
         from truenorth.navigation.given import late_as_found
 
-        unsaid = ANTENNA if begin is None or self.latency is not None else late_as_found(ANTENNA, begin)
+        unsaid = ANTENNA if begin is None else late_as_found(ANTENNA, begin)
         return replace(unsaid, **given(self, "antenna"))
 
     def wheel(self, found: Mounting | None = None) -> Mounting:

@@ -17,7 +17,7 @@ from truenorth.state.mounting import Mounting
 from truenorth.state.state import Start
 
 AIDS = (Gnss, Odometer, VelocityLog, Barometer)
-USUAL = {"odometer": WHEEL, "baro": WEATHER}
+USUAL = {"gnss": ANTENNA, "odometer": WHEEL, "baro": WEATHER}
 
 
 def by_key(aid: Aid | Sequence[Aid]) -> dict[str, Any]:
@@ -61,6 +61,12 @@ def taken_over(given: dict[str, Any], begin: Start) -> list[Evidence]:
         if _says_the_same(key, aid.mounting or found, found):
             said.append(note("odometer.taken_over" if key == Odometer.key else "gnss.delay_taken_over"))
     return said
+
+
+def mounted_as_usual(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The aids, those of whose mounting nothing is said and nothing was found as is usual of them."""
+    unsaid = {key for key, a in given.items() if key in USUAL and isinstance(a, AIDS) and a.mounting is None}
+    return {key: a.mounted(USUAL[key]) if key in unsaid else a for key, a in given.items()}
 
 
 def _says_the_same(key: str, given: Mounting, found: Mounting) -> bool:
