@@ -1,15 +1,31 @@
-"""An odometer of which nothing is said, after an alignment at rest: what it counts and how it sits is estimated."""
+"""Sensors of which nothing is said: what a wheel counts and how it sits, and how late a receiver is, is estimated."""
 
 import numpy as np
 
 from tests.helpers import start_before
-from truenorth.aiding.aids import WHEEL, Odometer
+from tests.navigation.test_navigate import SPEC, drive, fixes
+from truenorth.aiding.aids import WHEEL, Gnss, Odometer
 from truenorth.core.attitude import misalignment
 from truenorth.navigation import navigate
 from truenorth.records.specs import imu_spec
 from truenorth.simulation.scenario import read_scenario
 from truenorth.state.layout import DV
 from truenorth.state.mounting import Mounting
+
+__all__ = ["drive"]  # the fixture of a car that turns twice
+
+
+def test_a_late_receiver(drive):
+    motion, record, start = drive
+    gnss = fixes(motion, np.arange(1.0, 178.0), sigma=0.3)
+    for late in (0.0, 0.15):
+        result = navigate(record, start, aid=Gnss(gnss.shifted(late)), imu=SPEC)
+        assert result.status == "navigated", result.reasons
+        assert not any(reason.startswith("warning") for reason in result.reasons)
+        lag = result.estimated()["GNSS lag"]
+        assert abs(lag["value"][0] - late) < min(4.0 * lag["sigma"][0], 0.05)
+    on_time = navigate(record, start, aid=Gnss(gnss.shifted(0.15), Mounting()), imu=SPEC)  # said to be, and is not
+    assert any("late" in reason for reason in on_time.reasons)
 
 
 def van(scale):
